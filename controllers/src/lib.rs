@@ -1,0 +1,1 @@
+//! Control laws of a hydraulic shake table: what the computer does

@@ -1,0 +1,1 @@
+//! From measured data to a model, and what a model gets wrong

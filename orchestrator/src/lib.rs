@@ -1,0 +1,1 @@
+//! Hydraulic shake tables as FMI components, co-simulated

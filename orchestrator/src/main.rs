@@ -1,0 +1,2 @@
+//! The program `shakebench`.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Shake table, actuator, specimen and sensors: what the world does

@@ -1,0 +1,1 @@
+//! Rigs with an effect hidden in the data: an independent generator and a scorer

@@ -1,0 +1,1 @@
+//! Acceptance tests: the thesis's tables, importers, hidden effects
