@@ -1,1 +1,37 @@
-//! Control laws of a hydraulic shake table: what the computer does
+//! Control laws of a hydraulic shake table: what the computer does.
+//!
+//! One law, one file; every law meets [`Controller`]. Laws are sampled: they are called once a
+//! period with what the sensors gave, and the command they return is held until the next call.
+
+pub mod pid;
+pub mod three_variable;
+
+pub use plant::ModelError;
+
+/// A sampled control law: plain parameters and plain memory.
+pub trait Controller {
+    /// What the law is told at a sample, SI.
+    type Input;
+    /// What it commands until the next sample, SI.
+    type Output;
+
+    /// Refuses parameters with which the law cannot run, by name.
+    fn validate(&self) -> Result<(), ModelError>;
+
+    /// Computes the command of this sample and advances the memory by `period` seconds.
+    fn step(&mut self, input: &Self::Input, period: f64) -> Self::Output;
+
+    /// Forgets everything but the parameters.
+    fn reset(&mut self);
+}
+
+/// Motion of the table: displacement (m), velocity (m/s), acceleration (m/s²).
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Motion {
+    /// Displacement in m.
+    pub displacement: f64,
+    /// Velocity in m/s.
+    pub velocity: f64,
+    /// Acceleration in m/s².
+    pub acceleration: f64,
+}

@@ -1,1 +1,15 @@
-//! Shake table, actuator, specimen and sensors: what the world does
+//! Shake table, actuator, specimen and sensors: what the world does.
+//!
+//! Everything here is in SI units; the thesis's constants stand in thesis units (inch,
+//! pound-force, second, volt) beside their conversion. No control and no FMI.
+
+pub mod actuator;
+pub mod error;
+pub mod linear;
+pub mod rig;
+pub mod shake_table;
+pub mod specimen;
+pub mod table;
+pub mod units;
+
+pub use error::ModelError;

@@ -1,0 +1,170 @@
+//! PID control of one measured quantity (Eq 3-1).
+
+use plant::units::{INCH, LBF};
+
+use crate::{Controller, ModelError};
+
+/// PID gains, from the error's unit to volt, and the memory of the law.
+///
+/// The integral takes in the error of the present sample and stands still while the command is at
+/// its limit and the error would push it further.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Pid {
+    /// Proportional gain, V per unit.
+    pub proportional: f64,
+    /// Integral gain, V per unit and second.
+    pub integral: f64,
+    /// Derivative gain, V s per unit.
+    pub derivative: f64,
+    /// Time constant of the lag on the derivative, s.
+    pub derivative_lag: f64,
+    /// Largest magnitude of the valve command, V.
+    pub limit: f64,
+    /// What the law remembers.
+    pub memory: PidMemory,
+}
+
+/// Memory of [`Pid`].
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct PidMemory {
+    /// Integral part of the command, V.
+    pub integral: f64,
+    /// Filtered rate of the error, unit/s.
+    pub rate: f64,
+    /// Error at the previous sample, absent before the first.
+    pub error: Option<f64>,
+}
+
+/// What a PID law is told.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PidInput {
+    /// Wanted value.
+    pub reference: f64,
+    /// Measured value.
+    pub measured: f64,
+}
+
+/// Largest valve command of the laboratory, V.
+pub const VALVE_LIMIT: f64 = 10.0;
+
+impl Pid {
+    /// Displacement control, `C_d = (3 s + 0.4) / s` V/in (Eq 3-6).
+    pub fn equation_3_6() -> Self {
+        Self::proportional_integral(3.0 / INCH, 0.4 / INCH)
+    }
+
+    /// Force control, `C_f = (0.366 s + 3.222) / s` V/lbf (Eq 3-7).
+    pub fn equation_3_7() -> Self {
+        Self::proportional_integral(0.366 / LBF, 3.222 / LBF)
+    }
+
+    fn proportional_integral(proportional: f64, integral: f64) -> Self {
+        Self {
+            proportional,
+            integral,
+            derivative: 0.0,
+            derivative_lag: 0.0,
+            limit: VALVE_LIMIT,
+            memory: PidMemory::default(),
+        }
+    }
+}
+
+impl Controller for Pid {
+    type Input = PidInput;
+    type Output = f64;
+
+    fn validate(&self) -> Result<(), ModelError> {
+        ModelError::require_finite("proportional_gain", self.proportional)?;
+        ModelError::require_finite("integral_gain", self.integral)?;
+        ModelError::require_finite("derivative_gain", self.derivative)?;
+        ModelError::require_non_negative("derivative_lag", self.derivative_lag)?;
+        ModelError::require_positive("valve_limit", self.limit)
+    }
+
+    fn step(&mut self, input: &PidInput, period: f64) -> f64 {
+        let error = input.reference - input.measured;
+        let rate = (error - self.memory.error.unwrap_or(error)) / period;
+        self.memory.rate += (rate - self.memory.rate) * period / (period + self.derivative_lag);
+        self.memory.error = Some(error);
+        let increment = self.integral * error * period;
+        let others = self.proportional * error + self.derivative * self.memory.rate;
+        limit_and_integrate(&mut self.memory.integral, increment, others, self.limit)
+    }
+
+    fn reset(&mut self) {
+        self.memory = PidMemory::default();
+    }
+}
+
+/// Adds `increment` to the integral unless that drives the command further beyond `limit`, and
+/// returns the limited sum of integral and `others`.
+pub(crate) fn limit_and_integrate(
+    integral: &mut f64,
+    increment: f64,
+    others: f64,
+    limit: f64,
+) -> f64 {
+    let command = others + *integral + increment;
+    if command.abs() <= limit || command * increment < 0.0 {
+        *integral += increment;
+    }
+    command.clamp(-limit, limit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_of_error_gives_the_three_parts() {
+        let mut pid = Pid {
+            proportional: 2.0,
+            integral: 3.0,
+            derivative: 0.5,
+            limit: 1e3,
+            ..Pid::equation_3_6()
+        };
+        let mut command = 0.0;
+        for k in 1..=100 {
+            command = pid.step(
+                &PidInput {
+                    reference: f64::from(k) * 0.01,
+                    measured: 0.0,
+                },
+                0.01,
+            );
+        }
+        // Error 1 at a slope of 1: 2 + 3 * sum(k / 100) / 100 + 0.5.
+        assert!(
+            (command - (2.0 + 3.0 * 0.505 + 0.5)).abs() < 1e-12,
+            "{command}"
+        );
+    }
+
+    #[test]
+    fn the_integral_does_not_wind_up_at_the_limit() {
+        let mut pid = Pid::equation_3_6();
+        for _ in 0..5000 {
+            assert_eq!(
+                pid.step(
+                    &PidInput {
+                        reference: 1.0,
+                        measured: 0.0
+                    },
+                    0.002
+                ),
+                10.0
+            );
+        }
+        assert_eq!(pid.memory.integral, 0.0);
+        let command = pid.step(
+            &PidInput {
+                reference: 0.0,
+                measured: 0.001,
+            },
+            0.002,
+        );
+        assert!(command < 0.0);
+    }
+}

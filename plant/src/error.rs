@@ -1,0 +1,80 @@
+//! What can be wrong with a model's parameters.
+
+/// A model that cannot be built or must not be simulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// A parameter lies outside what the model allows.
+    #[error("parameter `{name}` is {value}, expected {expected}")]
+    Parameter {
+        /// The parameter's name, as the FMU shows it.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+        /// What is allowed, in words.
+        expected: &'static str,
+    },
+    /// The model is readable but simulating it would mislead.
+    #[error("{model} must not be simulated: {reason}")]
+    NotForSimulation {
+        /// The model's name.
+        model: &'static str,
+        /// Why.
+        reason: String,
+    },
+    /// Matrices whose shapes do not fit.
+    #[error("{what}: expected {expected}, got {got}")]
+    Shape {
+        /// Which matrix.
+        what: &'static str,
+        /// The shape needed.
+        expected: String,
+        /// The shape given.
+        got: String,
+    },
+    /// A matrix equation without the solution that was asked for.
+    #[error("{equation} has no stabilising solution: {reason}")]
+    NoSolution {
+        /// The equation.
+        equation: &'static str,
+        /// Why.
+        reason: String,
+    },
+}
+
+impl ModelError {
+    /// Checks that a parameter is finite and positive.
+    pub fn require_positive(name: &'static str, value: f64) -> Result<(), Self> {
+        if value.is_finite() && value > 0.0 {
+            return Ok(());
+        }
+        Err(Self::Parameter {
+            name,
+            value,
+            expected: "a positive number",
+        })
+    }
+
+    /// Checks that a parameter is finite and not negative.
+    pub fn require_non_negative(name: &'static str, value: f64) -> Result<(), Self> {
+        if value.is_finite() && value >= 0.0 {
+            return Ok(());
+        }
+        Err(Self::Parameter {
+            name,
+            value,
+            expected: "zero or a positive number",
+        })
+    }
+
+    /// Checks that a parameter is finite.
+    pub fn require_finite(name: &'static str, value: f64) -> Result<(), Self> {
+        if value.is_finite() {
+            return Ok(());
+        }
+        Err(Self::Parameter {
+            name,
+            value,
+            expected: "a finite number",
+        })
+    }
+}
