@@ -4,7 +4,9 @@
 //! pound-force, second, volt) beside their conversion. No control and no FMI.
 
 pub mod actuator;
+pub mod effects;
 pub mod error;
+pub mod identified_rig;
 pub mod linear;
 pub mod rig;
 pub mod shake_table;
