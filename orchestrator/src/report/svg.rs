@@ -246,11 +246,17 @@ fn draw(out: &mut String, series: &Series, colour: &str, x: &Scale, y: &Scale) {
         path
     };
     let forward = line(&mut series.values.iter().copied().enumerate());
+    // A reference lies wide and pale behind what follows it, so that both are seen.
+    let pen = if colour == COLOURS[0] {
+        "3.6\" stroke-opacity=\"0.5"
+    } else {
+        "1.2"
+    };
     let _ = match &series.style {
         Style::Line | Style::Path => {
             writeln!(
                 out,
-                "<path d=\"{forward}\" stroke=\"{colour}\" stroke-width=\"1.3\"/>"
+                "<path d=\"{forward}\" stroke=\"{colour}\" stroke-width=\"{pen}\"/>"
             )
         }
         Style::Dashed => writeln!(

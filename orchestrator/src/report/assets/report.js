@@ -112,12 +112,14 @@
     roles.forEach(({ series: one, role }, n) => {
       const stroke = colour(`--series-${one.colour === 0 ? 0 : 1 + (one.colour - 1) % 8}`);
       const is = (style) => one.style === style;
+      const wide = one.colour === 0 && is("line");
       series.push({
         label: role === "upper" ? `${one.name}, upper` : one.name,
-        stroke: is("path") ? "transparent" : stroke,
-        width: is("points") || is("path") ? 0 : is("band") ? 0.6 : 1.4,
+        stroke: is("path") ? "transparent" : wide ? `${stroke}88` : stroke,
+        // A reference lies wide and pale behind what follows it, so that both are seen.
+        width: is("points") || is("path") ? 0 : is("band") ? 0.6 : wide ? 4 : 1.2,
         dash: is("dashed") ? [6, 4] : undefined,
-        points: { show: is("points"), size: 4, fill: stroke, stroke },
+        points: { show: is("points"), size: 6, fill: stroke, stroke },
         paths: is("points") || is("path") ? () => null : undefined,
         value: (_, v) => digits(v, ySpan),
       });
@@ -133,7 +135,8 @@
     const scale = (which, unit) => {
       const made = { time: false };
       if (which.log) { made.distr = 3; made.log = 10; }
-if (which.limits) made.range = limited(which, unit);
+      if (which.log && which === panel.x) made.range = (_, low, high) => [low, high];
+      if (which.limits) made.range = limited(which, unit);
       return made;
     };
     const options = {
