@@ -27,10 +27,10 @@ fn quantities_as_people_write_them() {
     close(si("1 kN"), 1000.0);
     close(si("25 mm"), 0.025);
     close(si("2 ms"), 0.002);
-    close(si("3000 psi"), 3000.0 * 6894.757_293_168_361);
+    close(si("3000 psi"), 3000.0 * 6_894.757_293_168_361);
     close(
         si("1 in^3/s/V/sqrt(psi)"),
-        1.638_706_4e-5 / 6894.757_293_168_361_f64.sqrt(),
+        1.638_706_4e-5 / 6_894.757_293_168_361_f64.sqrt(),
     );
     close(si("5 %"), 0.05);
     close(si("7"), 7.0);

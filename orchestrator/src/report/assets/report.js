@@ -135,7 +135,9 @@
     const scale = (which, unit) => {
       const made = { time: false };
       if (which.log) { made.distr = 3; made.log = 10; }
-      if (which.log && which === panel.x) made.range = (_, low, high) => [low, high];
+      if (which.log && which === panel.x) {
+        made.range = (_, low, high) => (low > 0 ? [0.98 * low, 1.02 * high] : [null, null]);
+      }
       if (which.limits) made.range = limited(which, unit);
       return made;
     };
