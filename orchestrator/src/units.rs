@@ -218,6 +218,20 @@ pub fn convert(value: f64, from: &str, to: &str) -> Result<f64, UnitError> {
     Ok(value * Unit::parse(from)?.factor_to(&Unit::parse(to)?)?)
 }
 
+/// Reads a value meant to be in `unit`, as `--set`, `--pga` and `--peak` take it: a number alone
+/// is in that unit already, a number with a unit is converted to it.
+///
+/// # Errors
+/// Text that cannot be read, or a unit of another dimension.
+pub fn value_in(text: &str, unit: &str) -> Result<f64, UnitError> {
+    let quantity = Quantity::parse(text)?;
+    if quantity.unit.text.is_empty() {
+        Ok(quantity.value)
+    } else {
+        quantity.to(unit)
+    }
+}
+
 /// Splits a header cell `displacement [in]` into its name and the text of its unit, if any.
 #[must_use]
 pub fn split_header(cell: &str) -> (&str, Option<&str>) {

@@ -136,6 +136,18 @@ fn what_cannot_be_read_says_where_and_what_was_expected() {
 }
 
 #[test]
+fn a_number_alone_is_in_the_unit_that_is_meant() {
+    close(value_in("0.3", "g").unwrap(), 0.3);
+    close(value_in("0.3 g", "g").unwrap(), 0.3);
+    close(value_in("3.2 ft/s^2", "in/s^2").unwrap(), 38.4);
+    close(value_in("5 %", "1").unwrap(), 0.05);
+    assert_eq!(
+        value_in("1.2 g", "m").unwrap_err().to_string(),
+        "unit \"g\" (m s^-2) does not fit \"m\" (m)"
+    );
+}
+
+#[test]
 fn grams_are_not_offered() {
     assert!(Unit::parse("mg").is_err());
     assert_eq!(

@@ -115,6 +115,7 @@
   };
 
   let charts = [];
+  let printing = false;
   const draw = (place) => {
     const panel = panels[Number(place.dataset.panel)];
     const system = root.dataset.units;
@@ -169,7 +170,7 @@
       return made;
     };
     const options = {
-      width: place.clientWidth, height: 250,
+      width: place.clientWidth, height: printing ? 175 : 250,
       scales: { x: scale(panel.x, xUnit), y: scale(panel.y, yUnit) },
       series, bands,
       axes: [axis(panel.x, xUnit, 34), axis(panel.y, yUnit, panel.y.log ? 64 : 58)],
@@ -225,6 +226,15 @@
   let waiting = 0;
   addEventListener("resize", () => { cancelAnimationFrame(waiting); waiting = requestAnimationFrame(resize); });
   let before = null;
-  addEventListener("beforeprint", () => { before = root.dataset.theme; choose("theme", "light", true); build(); });
-  addEventListener("afterprint", () => { if (before) { choose("theme", before, true); build(); } });
+  addEventListener("beforeprint", () => {
+    before = root.dataset.theme;
+    printing = true;
+    choose("theme", "light", true);
+    build();
+  });
+  addEventListener("afterprint", () => {
+    printing = false;
+    choose("theme", before, true);
+    build();
+  });
 })();
