@@ -1,1 +1,3 @@
 //! Hydraulic shake tables as FMI components, co-simulated
+
+pub mod units;
