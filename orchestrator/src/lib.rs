@@ -1,1 +1,4 @@
 //! Hydraulic shake tables as FMI components, co-simulated
+
+pub mod motion;
+pub mod units;
