@@ -1,4 +1,5 @@
 //! Hydraulic shake tables as FMI components, co-simulated
 
+pub mod metrics;
 pub mod motion;
 pub mod units;
