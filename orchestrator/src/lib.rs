@@ -2,4 +2,5 @@
 
 pub mod metrics;
 pub mod motion;
+pub mod report;
 pub mod units;
