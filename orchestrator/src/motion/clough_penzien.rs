@@ -18,7 +18,8 @@ use crate::units::STANDARD_GRAVITY;
 /// The seed of the built-in motion when none is asked for.
 pub const DEFAULT_SEED: u64 = 1;
 
-/// Parameters of the process; the default is firm soil.
+/// Parameters of the process; the default is the rock or stiff soil of G. Deodatis, *Probabilistic
+/// Engineering Mechanics* 11 (1996).
 #[derive(Debug, Clone, PartialEq)]
 pub struct CloughPenzien {
     /// Frequency of the soil, rad/s.
@@ -42,9 +43,9 @@ pub struct CloughPenzien {
 impl Default for CloughPenzien {
     fn default() -> Self {
         Self {
-            soil_frequency: 5.0 * PI,
+            soil_frequency: 8.0 * PI,
             soil_damping: 0.6,
-            filter_frequency: 0.5 * PI,
+            filter_frequency: 0.8 * PI,
             filter_damping: 0.6,
             rise: 4.0,
             strong: 12.0,

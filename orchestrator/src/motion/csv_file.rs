@@ -234,7 +234,7 @@ fn read_header(
                 line,
                 column: index + 1,
                 name: name.to_string(),
-                source,
+                source: Box::new(source),
             })?;
         heads.push((known, factor));
     }

@@ -75,7 +75,7 @@ pub enum MotionError {
         /// The name in the header.
         name: String,
         /// What is wrong with the unit.
-        source: UnitError,
+        source: Box<UnitError>,
     },
     /// The motion needs more stroke than there is.
     #[error(

@@ -653,6 +653,26 @@ fn the_built_in_motion_is_synthetic_and_says_so() {
     assert_ne!(motion(1).acceleration, motion(2).acceleration);
 }
 
+/// The density against the absolute square of the two transfer functions it comes from: the
+/// absolute acceleration of one oscillator, the relative acceleration of the other.
+#[test]
+fn the_density_is_that_of_two_oscillators() {
+    use realfft::num_complex::Complex64;
+    let process = CloughPenzien::default();
+    for w in [0.3, 2.0, 2.6, 10.0, 25.0, 80.0] {
+        let s = Complex64::new(0.0, w);
+        let (wg, zg) = (process.soil_frequency, process.soil_damping);
+        let (wf, zf) = (process.filter_frequency, process.filter_damping);
+        let soil = (2.0 * zg * wg * s + wg * wg) / (s * s + 2.0 * zg * wg * s + wg * wg);
+        let filter = s * s / (s * s + 2.0 * zf * wf * s + wf * wf);
+        let expected = (soil * filter).norm_sqr();
+        assert!(
+            (process.density(w) / expected - 1.0).abs() < 1e-12,
+            "at {w} rad/s"
+        );
+    }
+}
+
 /// The mean periodogram of the strong phase over many seeds has the shape of the spectrum.
 #[test]
 fn the_synthetic_process_has_the_spectrum_it_is_named_for() {
