@@ -1,5 +1,6 @@
 //! One instance of an FMU, the same for FMI 2.0 and 3.0.
 
+use std::cell::Cell;
 use std::ffi::c_void;
 use std::ptr::null_mut;
 use std::sync::Arc;
@@ -25,6 +26,8 @@ pub struct Instance {
     interface: Interface,
     messages: Arc<Messages>,
     time: f64,
+    /// The standard forbids every further call after a fatal one.
+    is_dead: Cell<bool>,
 }
 
 enum Interface {
@@ -120,6 +123,7 @@ impl Instance {
             interface,
             messages,
             time: 0.0,
+            is_dead: Cell::new(false),
         })
     }
 
@@ -322,7 +326,7 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal.
     pub fn free_state(&self, mut state: State) -> Outcome {
-        if state.0.is_null() {
+        if state.0.is_null() || self.is_dead.get() {
             return Ok(());
         }
         let done = call!(self, freeFMUstate(&mut state.0), freeFMUState(&mut state.0));
@@ -338,7 +342,8 @@ impl Instance {
         let name = STATUS.get(status as usize).copied().unwrap_or("an unknown status");
         let error = self.failure(call, references, format!("returned {name}"));
         if name == "fatal" {
-            // The standard forbids every further call, that of freeing included.
+            self.is_dead.set(true);
+            // Not even freeing it is allowed.
             match &self.interface {
                 Interface::Fmi2(fmu) => std::mem::forget(fmu.clone()),
                 Interface::Fmi3(fmu) => std::mem::forget(fmu.clone()),

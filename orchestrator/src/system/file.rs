@@ -1,7 +1,7 @@
 //! The TOML of a system, as people write it.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -33,6 +33,9 @@ pub struct SystemFile {
     /// Lines of the connections, in their order.
     #[serde(skip)]
     pub lines: Vec<usize>,
+    /// The file's directory, from which paths in it count.
+    #[serde(skip)]
+    pub directory: Option<PathBuf>,
 }
 
 /// A component in a system file.
@@ -109,6 +112,7 @@ impl SystemFile {
             reason: error.to_string(),
         })?;
         let mut file = Self::parse(&path.display().to_string(), &text)?;
+        file.directory = path.parent().map(Path::to_path_buf);
         if file.name.is_empty() {
             file.name = path.file_stem().map_or_else(String::new, |stem| {
                 stem.to_string_lossy().into_owned()
