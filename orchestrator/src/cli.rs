@@ -10,8 +10,12 @@ use crate::commands::{build, info, run};
 ///
 /// Without a command, the built-in system is run on the built-in motion.
 #[derive(Debug, Parser)]
-#[command(name = "shakebench", version, after_help = "Exit status: 0 done; 1 the run ended early \
-    (what was computed is saved); 2 the input is at fault (nothing is written).")]
+#[command(
+    name = "shakebench",
+    version,
+    after_help = "Exit status: 0 done; 1 the run ended early \
+    (what was computed is saved); 2 the input is at fault (nothing is written)."
+)]
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,

@@ -3,11 +3,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::connection::{self, Quantity, Source};
+use super::connection::{self, connect, split};
 use super::file::{ComponentFile, SystemFile};
-use super::{Component, Connection, DEFAULT_PERIOD, System, SystemError, Value, hint, model, value};
-use crate::fmu::{Causality, Fmu, Kind, Variability, Variable};
-use crate::units::Unit;
+use super::{Component, DEFAULT_PERIOD, System, SystemError, Value, hint, model, value};
+use crate::fmu::{Causality, Fmu, Kind, Variability};
 
 /// Finds the FMU of a component by what the system file calls it.
 pub type Library<'a> = dyn FnMut(&str) -> Result<Arc<Fmu>, Box<dyn std::error::Error>> + 'a;
@@ -69,7 +68,8 @@ pub fn assemble(
     }
     for (index, part) in components.iter_mut().enumerate() {
         let variables = &part.fmu.description.variables;
-        part.inputs.retain(|(input, _)| !driven.contains_key(&(index, *input)));
+        part.inputs
+            .retain(|(input, _)| !driven.contains_key(&(index, *input)));
         for input in part.fmu.description.of(Causality::Input) {
             let given = part.inputs.iter().any(|(variable, _)| *variable == input);
             if !given && !driven.contains_key(&(index, input)) {
@@ -117,7 +117,11 @@ fn component(
         let found = find(&fmu, variable, Causality::Parameter);
         let position = found.map_err(|reason| at(&place, reason))?;
         let value = value::read(&description.variables[position], written);
-        put(&mut parameters, position, value.map_err(|reason| at(&place, reason))?);
+        put(
+            &mut parameters,
+            position,
+            value.map_err(|reason| at(&place, reason))?,
+        );
     }
     let mut inputs = Vec::new();
     for (variable, written) in &part.inputs {
@@ -125,7 +129,11 @@ fn component(
         let found = find(&fmu, variable, Causality::Input);
         let position = found.map_err(|reason| at(&place, reason))?;
         let value = value::read(&description.variables[position], written);
-        put(&mut inputs, position, value.map_err(|reason| at(&place, reason))?);
+        put(
+            &mut inputs,
+            position,
+            value.map_err(|reason| at(&place, reason))?,
+        );
     }
     let period = match &part.period {
         Some(written) => Some(value::time(written).map_err(|reason| at(".period", reason))?),
@@ -144,8 +152,12 @@ fn component(
 /// computes them when it is stepped, not when they are read.
 fn sampled(fmu: &Fmu) -> bool {
     let description = &fmu.description;
-    let outputs = description.of(Causality::Output).map(|output| &description.variables[output]);
-    let mut direct = outputs.filter(|variable| !variable.dependencies.is_empty()).peekable();
+    let outputs = description
+        .of(Causality::Output)
+        .map(|output| &description.variables[output]);
+    let mut direct = outputs
+        .filter(|variable| !variable.dependencies.is_empty())
+        .peekable();
     direct.peek().is_some() && direct.all(|v| v.variability == Variability::Discrete)
 }
 
@@ -156,11 +168,17 @@ fn put(values: &mut Vec<(usize, Value)>, position: usize, value: Value) {
     }
 }
 
-fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, String> {
+/// The position of the variable `name`, which has to be of that causality.
+///
+/// # Errors
+/// Another causality, or no such name (with the nearest one).
+pub(super) fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, String> {
     let description = &fmu.description;
     let word = words(causality);
     let Some(position) = description.position(name) else {
-        let known = description.of(causality).map(|index| description.variables[index].name.as_str());
+        let known = description
+            .of(causality)
+            .map(|index| description.variables[index].name.as_str());
         return Err(format!(
             "{} ({}) has no {word} `{name}`{}",
             description.model_name,
@@ -221,78 +239,18 @@ fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn component_index(components: &[Component], name: &str) -> Result<usize, String> {
-    components.iter().position(|part| part.name == name).ok_or_else(|| {
-        let known = components.iter().map(|part| part.name.as_str());
-        format!("there is no component `{name}`{}", hint(name, known))
-    })
-}
-
-fn split(end: &str) -> Result<(&str, &str), String> {
-    end.split_once('.')
-        .ok_or_else(|| format!("`{end}` should read component.variable"))
-}
-
-fn connect(components: &[Component], from: &str, to: &str) -> Result<Connection, String> {
-    let (component, variable) = split(to)?;
-    let component = component_index(components, component)?;
-    let input = find(&components[component].fmu, variable, Causality::Input)?;
-    let target = &components[component].fmu.description.variables[input];
-
-    let (name, variable) = split(from)?;
-    let (source, kind, unit) = if name == "reference" {
-        let source = connection::reference(variable).ok_or_else(|| {
-            let known = Quantity::ALL.into_iter().map(Quantity::name);
-            format!(
-                "the reference has no `{variable}`{} (or `displacement[3]`, three samples ahead)",
-                hint(variable, known)
-            )
-        })?;
-        let Source::Reference { quantity, .. } = source else {
-            return Err(format!("`{from}` is no reference"));
-        };
-        (source, Kind::Float64, Some(quantity.unit()))
-    } else {
-        let component = component_index(components, name)?;
-        let variable = find(&components[component].fmu, variable, Causality::Output)?;
-        let output = &components[component].fmu.description.variables[variable];
-        let source = Source::Output {
-            component,
-            variable,
-        };
-        (source, output.kind.clone(), output.unit.as_deref())
-    };
-    fits(&kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
-    let factor = factor(unit, target.unit.as_deref())
-        .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
-    Ok(Connection {
-        source,
-        component,
-        input,
-        factor,
-    })
-}
-
-fn fits(kind: &Kind, target: &Variable) -> Result<(), String> {
-    let same = kind.name() == target.kind.name();
-    let widened = *kind == Kind::Int32 && target.kind == Kind::Float64;
-    if kind.is_numeric() && (same || widened) {
-        return Ok(());
-    }
-    let (from, to) = (kind.name(), target.kind.name());
-    Err(format!("is a {from} and cannot drive the {to}"))
-}
-
-/// The factor from one unit to the other; a side without a unit takes the other's.
-fn factor(from: Option<&str>, to: Option<&str>) -> Result<f64, String> {
-    match (from, to) {
-        (Some(from), Some(to)) if from != to => {
-            let unit = |text: &str| Unit::parse(text).map_err(|error| error.to_string());
-            let factor = unit(from)?.factor_to(&unit(to)?);
-            factor.map_err(|error| error.to_string())
-        }
-        _ => Ok(1.0),
-    }
+/// The position of a component.
+///
+/// # Errors
+/// No such name (with the nearest one).
+pub(super) fn component_index(components: &[Component], name: &str) -> Result<usize, String> {
+    components
+        .iter()
+        .position(|part| part.name == name)
+        .ok_or_else(|| {
+            let known = components.iter().map(|part| part.name.as_str());
+            format!("there is no component `{name}`{}", hint(name, known))
+        })
 }
 
 fn end(
@@ -306,7 +264,9 @@ fn end(
     };
     let experiment = &file.experiment;
     let after = experiment.end_after.as_ref().map(value::time).transpose();
-    let after = after.map_err(|reason| at("end_after", reason))?.unwrap_or(0.0);
+    let after = after
+        .map_err(|reason| at("end_after", reason))?
+        .unwrap_or(0.0);
     let Some(name) = &experiment.end_when else {
         return Ok((None, after));
     };
