@@ -7,13 +7,15 @@ pub use effects::{Apply, catalogue};
 
 use plant::identified_rig::IdentifiedRig;
 
-use crate::case::Nominal;
+use crate::case::{CHANNELS, Nominal};
 use crate::diagnosis::{Candidate, Point, RigModel};
 use crate::predictor::{Disturbance, Predictor, Signals};
 
 /// One record and whether the effects were there when it was taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelRecord {
+    /// Its name.
+    pub name: String,
     /// The signals, SI.
     pub signals: Signals,
     /// False for a baseline: the same rig before the effect.
@@ -134,6 +136,58 @@ impl RigModel for ShakeTableModel {
         self.records.len()
     }
 
+    fn record_name(&self, record: usize) -> &str {
+        &self.records[record].name
+    }
+
+    fn channels(&self) -> &[&'static str] {
+        &CHANNELS
+    }
+
+    fn disturbed(&self, factor: f64) -> Self {
+        let mut model = self.clone();
+        model.disturbance.sigma *= factor;
+        model
+    }
+
+    // From the measured signals one sample before: the noise of the sample itself is in its
+    // innovation.
+    fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)> {
+        let signals = &self.records[record].signals;
+        let n = signals.len();
+        let before = |k: usize| k.saturating_sub(1);
+        let channel = |i: usize| -> Vec<f64> {
+            (0..n).map(|k| signals.channels[before(k)][i]).collect()
+        };
+        let x = channel(0);
+        // Velocity over eight samples, smooth enough for its sign.
+        let v: Vec<f64> = (0..n)
+            .map(|k| (x[k] - x[k.saturating_sub(8)]) / (8.0 * self.period))
+            .collect();
+        let command: Vec<f64> = (0..n).map(|k| signals.command[before(k)]).collect();
+        let mut all = Vec::new();
+        for (name, signal) in [
+            ("valve command", command),
+            ("displacement", x.clone()),
+            ("velocity", v),
+            ("actuator force", channel(2)),
+            ("specimen acceleration", channel(3)),
+        ] {
+            let peak = signal.iter().fold(0.0f64, |peak, s| peak.max(s.abs()));
+            if peak == 0.0 {
+                continue;
+            }
+            let even = signal.iter().map(|s| s * s / peak).collect();
+            let odd = signal.iter().map(|s| s * s * s / (peak * peak)).collect();
+            let sign = signal.iter().map(|s| (40.0 * s / peak).tanh()).collect();
+            all.push((format!("{name} squared"), even));
+            all.push((format!("{name} cubed"), odd));
+            all.push((format!("sign of {name}"), sign));
+            all.push((name.to_string(), signal));
+        }
+        all
+    }
+
     fn residual_count(&self, record: usize) -> usize {
         4 * self.records[record].signals.len()
     }
@@ -171,6 +225,7 @@ impl RigModel for ShakeTableModel {
         let ModelRecord {
             signals,
             with_effects,
+            ..
         } = &self.records[record];
         let (rig, predictor) = match (&predictor.without_effects, with_effects) {
             (Some(without), false) => (self.rig_without_effects(&point.nuisance), without),

@@ -14,6 +14,22 @@ pub trait RigModel: Sync {
     /// Number of records.
     fn records(&self) -> usize;
 
+    /// Name of a record.
+    fn record_name(&self, record: usize) -> &str;
+
+    /// Names of the channels, in the order in which their residuals stand within a sample.
+    fn channels(&self) -> &[&'static str];
+
+    /// Functions of command and state that a wrong model leaves traces of, each with its name,
+    /// one value a sample.
+    fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)>;
+
+    /// The same rig with what its predictor assumes about unseen disturbances multiplied by
+    /// `factor`.
+    fn disturbed(&self, factor: f64) -> Self
+    where
+        Self: Sized;
+
     /// Length of a record's residual vector.
     fn residual_count(&self, record: usize) -> usize;
 
@@ -143,6 +159,27 @@ impl Candidate {
     pub fn internal(&self, values: &[f64]) -> Vec<f64> {
         let pairs = self.parameters.iter().zip(values);
         pairs.map(|(p, &v)| p.scale.to_internal(v)).collect()
+    }
+
+    /// Internal coordinates of a weak effect of the form of `start`: functions of the share of the
+    /// catalogue's weakest value.
+    pub fn nearly_off(&self, start: &[f64]) -> Vec<impl Fn(f64) -> f64> {
+        let pairs = self.parameters.iter().zip(start);
+        pairs
+            .map(|(p, &value)| {
+                let (full, shrinks) = match (p.role, p.scale) {
+                    (Role::Size { weak }, Scale::Linear(_)) => (p.scale.to_internal(weak), true),
+                    (Role::Size { weak }, Scale::Inverse(_)) => {
+                        // Not past the bound where the effect is off.
+                        (p.scale.to_internal(weak.max(0.9 * p.bounds.1)), false)
+                    }
+                    (Role::Size { .. }, Scale::Logarithmic) | (Role::Shape { .. }, _) => {
+                        (p.scale.to_internal(value), false)
+                    }
+                };
+                move |share| if shrinks { share * full } else { full }
+            })
+            .collect()
     }
 
     /// Brings internal coordinates into the parameters' bounds.
