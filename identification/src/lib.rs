@@ -4,3 +4,4 @@ pub mod case;
 pub mod catalogue;
 pub mod diagnosis;
 pub mod predictor;
+pub mod rigs;

@@ -6,6 +6,7 @@ mod units;
 
 pub use nominal::{ControlLaw, Nominal};
 pub use record::{CHANNELS, Record};
+pub use units::factor_to;
 
 use std::path::{Path, PathBuf};
 

@@ -3,7 +3,7 @@
 /// Exponents of kg, m, s, A and rad.
 type Dimension = [i32; 5];
 
-const NAMES: [(&str, f64, Dimension); 27] = [
+const NAMES: [(&str, f64, Dimension); 30] = [
     ("1", 1.0, [0; 5]),
     ("s", 1.0, [0, 0, 1, 0, 0]),
     ("ms", 1e-3, [0, 0, 1, 0, 0]),
@@ -24,6 +24,9 @@ const NAMES: [(&str, f64, Dimension); 27] = [
     ("N", 1.0, [1, 1, -2, 0, 0]),
     ("kN", 1e3, [1, 1, -2, 0, 0]),
     ("MN", 1e6, [1, 1, -2, 0, 0]),
+    ("Pa", 1.0, [1, -1, -2, 0, 0]),
+    ("MPa", 1e6, [1, -1, -2, 0, 0]),
+    ("GPa", 1e9, [1, -1, -2, 0, 0]),
     ("lbf", plant::units::LBF, [1, 1, -2, 0, 0]),
     ("kip", 1e3 * plant::units::LBF, [1, 1, -2, 0, 0]),
     ("V", 1.0, [1, 2, -3, -1, 0]),

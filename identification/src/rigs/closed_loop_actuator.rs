@@ -1,0 +1,90 @@
+//! Servo-hydraulic actuator in a closed displacement loop: command to displacement.
+//!
+//! Nominal: `τ u' = g r + o - u`, `e = u - x`, `x' = K e` (Merritt, Hydraulic Control Systems,
+//! 1967: a valve-controlled cylinder integrates, the loop closes it to one pole).
+
+use super::{Effect, Named, Rig, Series, effect, size};
+
+/// The rig.
+pub struct ClosedLoopActuator;
+
+const STEPS: usize = 2;
+
+impl Rig for ClosedLoopActuator {
+    fn inputs(&self) -> &'static [Named] {
+        &[("command", "m")]
+    }
+
+    fn output(&self) -> Named {
+        ("displacement", "m")
+    }
+
+    fn parameters(&self) -> &'static [Named] {
+        &[("loop_gain", "1/s"), ("command_lag", "s"), ("scale", "1"), ("offset", "m")]
+    }
+
+    fn effects(&self) -> Vec<Effect> {
+        vec![
+            // r(t - T): conversion, computation and valve electronics.
+            effect("delay", vec![size("delay", "s", 1e-3, (0.0, 0.05))], &[0.0], &[&[2e-3], &[6e-3]]),
+            // Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
+            effect("dead_band", vec![size("half_width", "m", 5e-6, (0.0, 1e-3))], &[0.0], &[&[3e-5], &[2e-4]]),
+            // Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
+            // of Hydraulic Servosystems, 1980).
+            effect("asymmetric_gain", vec![size("asymmetry", "1", 0.01, (-0.8, 0.8))], &[0.0], &[&[0.03], &[-0.03]]),
+            // Spool: T w' = K e - w, x' = w.
+            effect("valve_lag", vec![size("time_constant", "s", 1e-3, (0.0, 0.02))], &[0.0], &[&[2e-3]]),
+            // Flow falls with speed as the load pressure rises: x' = w / (1 + |w| / s).
+            effect("flow_saturation", vec![size("compression", "s/m", 0.2, (0.0, 50.0))], &[0.0], &[&[1.0]]),
+            // Transducer: y = x (1 + c x).
+            effect("sensor_curvature", vec![size("curvature", "1/m", 2.0, (-200.0, 200.0))], &[0.0], &[&[3.0], &[-3.0]]),
+            // Transducer linkage: y follows x only beyond a gap.
+            effect("free_play", vec![size("gap", "m", 1e-5, (0.0, 1e-3))], &[0.0], &[&[4e-5]]),
+            // Disturbance n that command and output share in the recorder: the loop gets r - n, the
+            // record y = x + c n; n is what a median of five samples takes out of the command.
+            effect("shared_disturbance", vec![size("coupling", "1", 0.1, (-5.0, 5.0))], &[0.0], &[&[1.0]]),
+        ]
+    }
+
+    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
+        let &[gain, lag, scale, offset] = nominal else { return };
+        let &[delay, dead_band, asymmetry, valve, compression, curvature, gap, coupling] = effects
+        else {
+            return;
+        };
+        let command = &series.inputs[0];
+        let clean = &series.cleaned;
+        let loop_input = if coupling == 0.0 { command } else { clean };
+        let Some(&first) = loop_input.first() else { return };
+        let h = series.step / STEPS as f64;
+        let keep = |time: f64| if time > 1e-5 { (-h / time).exp() } else { 0.0 };
+        let (keep_command, keep_valve) = (keep(lag), keep(valve));
+        let mut u = scale * first + offset;
+        let mut x = u;
+        let mut speed = 0.0;
+        let mut shown = x;
+        let last = loop_input.len() - 1;
+        for (k, y) in out.iter_mut().enumerate() {
+            shown = shown.clamp(x - 0.5 * gap, x + 0.5 * gap);
+            *y = shown * (1.0 + curvature * shown);
+            if coupling != 0.0 {
+                *y += coupling * (command[k] - clean[k]);
+            }
+            for step in 0..STEPS {
+                let place = k as f64 + (step as f64 + 0.5) / STEPS as f64 - delay / series.step;
+                let place = place.max(0.0);
+                let before = (place as usize).min(last);
+                let share = place - before as f64;
+                let after = (before + 1).min(last);
+                let r = loop_input[before] * (1.0 - share) + loop_input[after] * share;
+                u = keep_command * u + (1.0 - keep_command) * (scale * r + offset);
+                let error = u - x;
+                let open = (error.abs() - dead_band).max(0.0).copysign(error);
+                let flow = gain * (open + asymmetry * open.abs());
+                let flow = flow / (1.0 + compression * flow.abs());
+                speed = keep_valve * speed + (1.0 - keep_valve) * flow;
+                x += h * speed;
+            }
+        }
+    }
+}

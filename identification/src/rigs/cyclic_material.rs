@@ -1,0 +1,195 @@
+//! Cyclically strained metal: strain to stress.
+//!
+//! Nominal: `σ' = E (ε' - ε_p')`, yield at `|σ - Σα| = σ_y + R`, `α_i' = C_i ε_p' - γ_i α_i |ε_p'|`
+//! with one backstress (Armstrong and Frederick 1966; Chaboche, Int. J. Plasticity 2, 1986).
+
+use super::{Effect, Named, Rig, Series, effect, shape, size};
+
+/// The rig.
+pub struct CyclicMaterial;
+
+/// Strain of one substep.
+const SUBSTEP: f64 = 5e-5;
+
+impl Rig for CyclicMaterial {
+    fn inputs(&self) -> &'static [Named] {
+        &[("strain", "1")]
+    }
+
+    fn output(&self) -> Named {
+        ("stress", "Pa")
+    }
+
+    fn parameters(&self) -> &'static [Named] {
+        &[("modulus", "Pa"), ("yield_stress", "Pa"), ("hardening", "Pa"), ("recovery", "1")]
+    }
+
+    fn effects(&self) -> Vec<Effect> {
+        let backstress = |name, recovery: f64| {
+            effect(
+                name,
+                vec![size("hardening", "Pa", 1e8, (0.0, 1e12)), shape("recovery", "1", recovery, 0.8)],
+                &[0.0, recovery],
+                &[&[1e9, recovery], &[1e10, recovery]],
+            )
+        };
+        vec![
+            backstress("slow_backstress", 20.0),
+            backstress("middle_backstress", 200.0),
+            backstress("fast_backstress", 1000.0),
+            // R = Q (1 - e^{-b p}), p the plastic path (Voce 1948).
+            effect(
+                "isotropic_hardening",
+                vec![size("saturation", "Pa", 5e6, (-3e8, 1e9)), shape("rate", "1", 10.0, 1.0)],
+                &[0.0, 10.0],
+                &[&[5e7, 10.0], &[-3e7, 10.0]],
+            ),
+            // Yield plateau: a further R that falls within the first strain (Q < 0).
+            effect(
+                "initial_softening",
+                vec![size("drop", "Pa", 5e6, (0.0, 4e8)), shape("rate", "1", 200.0, 0.7)],
+                &[0.0, 200.0],
+                &[&[5e7, 200.0], &[1e8, 300.0]],
+            ),
+            // E = E_0 (1 - s (1 - e^{-ξ p})) (Yoshida, Uemori and Fujiwara, Int. J. Plasticity 18,
+            // 2002).
+            effect(
+                "modulus_degradation",
+                vec![size("share", "1", 0.02, (-1.0, 0.9)), shape("rate", "1", 20.0, 1.0)],
+                &[0.0, 20.0],
+                &[&[0.1, 20.0], &[-0.1, 20.0]],
+            ),
+            // Compression yields at (1 + a) of tension.
+            effect("strength_differential", vec![size("asymmetry", "1", 0.01, (-0.5, 0.5))], &[0.0], &[&[0.02], &[-0.02]]),
+            // Sampling of the strain misses the turns: between two samples it ran on to the
+            // amplitude of the test.
+            effect("missed_turns", vec![size("amplitude", "1", 2e-4, (0.0, 0.2))], &[0.0], &[&[0.005], &[0.01], &[0.02], &[0.0201], &[0.04]]),
+            // Strain recorded late by a part of a sample, or stress.
+            effect("strain_late", vec![size("samples", "1", 0.05, (-2.0, 2.0))], &[0.0], &[&[0.3], &[-0.3]]),
+        ]
+    }
+
+    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
+        let (&[modulus, yield_stress, hardening, recovery], &[
+            slow,
+            slow_recovery,
+            middle,
+            middle_recovery,
+            fast,
+            fast_recovery,
+            saturation,
+            rate,
+            drop,
+            drop_rate,
+            degradation,
+            degradation_rate,
+            differential,
+            amplitude,
+            late,
+        ]) = (nominal, effects)
+        else {
+            return;
+        };
+        let strain = &series.inputs[0];
+        let Some(&first) = strain.first() else { return };
+        let mut state = Steel {
+            modulus,
+            yield_stress,
+            backstresses: [
+                (hardening, recovery),
+                (slow, slow_recovery),
+                (middle, middle_recovery),
+                (fast, fast_recovery),
+            ],
+            isotropic: [(saturation, rate), (-drop, drop_rate)],
+            degradation: (degradation, degradation_rate),
+            differential,
+            stress: 0.0,
+            back: [0.0; 4],
+            path: 0.0,
+        };
+        let last = strain.len() - 1;
+        let at = |k: usize| {
+            let place = (k as f64 + late).clamp(0.0, last as f64);
+            let before = place as usize;
+            let share = place - before as f64;
+            strain[before] * (1.0 - share) + strain[(before + 1).min(last)] * share
+        };
+        let mut now = first;
+        let mut direction = 0.0f64;
+        for (k, stress) in out.iter_mut().enumerate() {
+            let next = at(k);
+            if next != now {
+                let turn = (next - now).signum();
+                if turn * direction < 0.0 && amplitude > 0.0 {
+                    let peak = direction * amplitude;
+                    // Only a sample near the amplitude is a turn of the test.
+                    if (peak - now) * direction > 0.0 && now * direction > 0.5 * amplitude {
+                        state.strain_by(peak - now);
+                        now = peak;
+                    }
+                }
+                direction = turn;
+                state.strain_by(next - now);
+                now = next;
+            }
+            *stress = state.stress;
+        }
+    }
+}
+
+struct Steel {
+    modulus: f64,
+    yield_stress: f64,
+    backstresses: [(f64, f64); 4],
+    isotropic: [(f64, f64); 2],
+    degradation: (f64, f64),
+    differential: f64,
+    stress: f64,
+    back: [f64; 4],
+    path: f64,
+}
+
+impl Steel {
+    fn strain_by(&mut self, total: f64) {
+        let count = (total.abs() / SUBSTEP).ceil().clamp(1.0, 1e5);
+        let step = total / count;
+        for _ in 0..count as usize {
+            self.step(step);
+        }
+    }
+
+    fn step(&mut self, strain: f64) {
+        let (share, share_rate) = self.degradation;
+        let modulus = self.modulus * (1.0 - share * (1.0 - (-share_rate * self.path).exp()));
+        let back: f64 = self.back.iter().sum();
+        let trial = self.stress + modulus * strain;
+        let side = (trial - back).signum();
+        let mut radius = self.yield_stress;
+        let mut slope = 0.0;
+        for (limit, rate) in self.isotropic {
+            let left = (-rate * self.path).exp();
+            radius += limit * (1.0 - left);
+            slope += limit * rate * left;
+        }
+        if side < 0.0 {
+            radius *= 1.0 + self.differential;
+        }
+        let over = side * (trial - back) - radius.max(0.02 * self.yield_stress);
+        if over <= 0.0 {
+            self.stress = trial;
+            return;
+        }
+        for ((c, g), a) in self.backstresses.iter().zip(&self.back) {
+            slope += c - g * a * side;
+        }
+        let plastic = over / (modulus + slope.max(-0.5 * modulus));
+        for ((c, g), a) in self.backstresses.iter().zip(&mut self.back) {
+            // Exact for a constant direction of flow.
+            let left = (-g * plastic).exp();
+            *a = *a * left + side * c / g * (1.0 - left);
+        }
+        self.path += plastic;
+        self.stress = trial - side * modulus * plastic;
+    }
+}

@@ -1,0 +1,172 @@
+//! Friction device: displacement to force.
+//!
+//! Nominal: elastic up to a Coulomb force, `f' = k v (1 - (f / F)^n sgn v)` with n → ∞ (Dahl 1968;
+//! n = 1 is his curve, n between is Bouc and Wen's with no post-yield stiffness).
+
+use super::{Effect, Named, Rig, Series, effect, shape, size};
+
+/// The rig.
+pub struct HystereticDevice;
+
+impl Rig for HystereticDevice {
+    fn inputs(&self) -> &'static [Named] {
+        &[("displacement", "m"), ("velocity", "m/s")]
+    }
+
+    fn output(&self) -> Named {
+        ("force", "N")
+    }
+
+    fn parameters(&self) -> &'static [Named] {
+        &[("coulomb_force", "N"), ("stiffness", "N/m")]
+    }
+
+    fn effects(&self) -> Vec<Effect> {
+        vec![
+            // F± = F (1 ± a).
+            effect("asymmetric_coulomb_friction", vec![size("asymmetry", "1", 0.03, (-0.9, 0.9))], &[0.0], &[&[0.1], &[-0.1]]),
+            // After the force has gone to zero, the device moves through a gap before it takes
+            // hold on the other side.
+            effect("free_play", vec![size("gap", "m", 2e-4, (0.0, 0.05))], &[0.0], &[&[2e-3], &[6e-3]]),
+            // Stiffness while the force falls is (1 + s) k: a band that wraps on gives way more
+            // softly than it lets go.
+            effect("stiffer_unloading", vec![size("excess", "1", 0.05, (-0.9, 20.0))], &[0.0], &[&[0.5], &[-0.3]]),
+            // k± = k (1 ± a).
+            effect("asymmetric_stiffness", vec![size("asymmetry", "1", 0.03, (-0.9, 0.9))], &[0.0], &[&[0.1], &[-0.1]]),
+            // Rounded transition: k (1 - r |f / F|^n) with exponent n.
+            effect(
+                "rounded_transition",
+                vec![size("rounding", "1", 0.05, (0.0, 1.0)), shape("exponent", "1", 2.0, 0.7)],
+                &[0.0, 2.0],
+                &[&[0.5, 2.0], &[0.9, 1.0]],
+            ),
+            // Soft begin of contact: k (1 - p e^{-|f| / (c F)}).
+            effect(
+                "progressive_contact",
+                vec![size("softness", "1", 0.05, (0.0, 0.98)), shape("share", "1", 0.1, 0.7)],
+                &[0.0, 0.1],
+                &[&[0.6, 0.1], &[0.6, 0.3]],
+            ),
+            // F (1 + s e^{-|v| / v_s}) (Stribeck).
+            effect(
+                "stribeck",
+                vec![size("excess", "1", 0.03, (-0.9, 2.0)), shape("speed", "m/s", 0.03, 1.0)],
+                &[0.0, 0.03],
+                &[&[0.2, 0.03], &[-0.2, 0.03]],
+            ),
+            // F (1 + s |v| / (1 m/s)).
+            effect("rate_dependence", vec![size("slope", "s/m", 0.2, (-5.0, 20.0))], &[0.0], &[&[0.5], &[-0.5]]),
+            // c v beside the friction.
+            effect("viscous", vec![size("damping", "N s/m", 300.0, (-1e6, 1e6))], &[0.0], &[&[3e3], &[-3e3]]),
+            // y follows the force through (2π f)² / (s² + 2 ζ (2π f) s + (2π f)²), ζ = 0.1: mass and
+            // spring between device and load cell.
+            effect("load_path_resonance", vec![shape("frequency", "rad/s", 150.0, 0.7)], &[0.0], &[&[80.0], &[110.0], &[200.0]]),
+            // Displacement or force late.
+            effect("delay", vec![size("delay", "s", 1e-3, (0.0, 0.2))], &[0.0], &[&[5e-3], &[2e-2]]),
+        ]
+    }
+
+    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
+        let &[coulomb, stiffness] = nominal else { return };
+        let &[
+            asymmetry,
+            gap,
+            unloading,
+            stiffness_asymmetry,
+            rounding,
+            exponent,
+            softness,
+            contact,
+            excess,
+            slow,
+            rate,
+            damping,
+            resonance,
+            delay,
+        ] = effects
+        else {
+            return;
+        };
+        let (x, v) = (&series.inputs[0], &series.inputs[1]);
+        let mut force = 0.0f64;
+        // Travelled part of the gap, 0 at its negative end.
+        let mut travelled = 0.5 * gap;
+        let (mut shown, mut shown_rate) = (0.0, 0.0);
+        let late = delay / series.step;
+        let at = |values: &[f64], k: usize| {
+            let place = (k as f64 - late).max(0.0);
+            let before = place as usize;
+            let share = place - before as f64;
+            let after = (before + 1).min(values.len() - 1);
+            values[before] * (1.0 - share) + values[after] * share
+        };
+        let mut position = x.first().copied().unwrap_or(0.0);
+        for (k, y) in out.iter_mut().enumerate() {
+            let (now, speed) = (at(x, k), at(v, k));
+            let mut move_left = now - position;
+            position = now;
+            let mut level = 1.0 + rate * speed.abs();
+            if excess != 0.0 {
+                level += excess * (-speed.abs() / slow).exp();
+            }
+            let level = coulomb * level.max(0.05);
+            // At most: let go, cross the gap, take hold.
+            for _ in 0..3 {
+                if move_left == 0.0 {
+                    break;
+                }
+                let direction = move_left.signum();
+                let loose = force == 0.0;
+                if loose {
+                    let room = if direction > 0.0 { gap - travelled } else { travelled };
+                    if move_left.abs() < room {
+                        travelled += move_left;
+                        break;
+                    }
+                    move_left -= direction * room;
+                    travelled = if direction > 0.0 { gap } else { 0.0 };
+                }
+                let side = if loose { direction } else { force.signum() };
+                let k_side = stiffness * (1.0 + side * stiffness_asymmetry);
+                if side * direction > 0.0 {
+                    let limit = level * (1.0 + side * asymmetry);
+                    let share = (force.abs() / limit).min(1.0);
+                    let mut k_now = k_side;
+                    if rounding > 0.0 {
+                        k_now *= 1.0 - rounding * share.powf(exponent);
+                    }
+                    if softness > 0.0 {
+                        k_now *= 1.0 - softness * (-share / contact).exp();
+                    }
+                    force += k_now * move_left;
+                    if force.abs() > limit {
+                        force = side * limit;
+                    }
+                    move_left = 0.0;
+                } else {
+                    let k_now = k_side * (1.0 + unloading);
+                    let rest = force + k_now * move_left;
+                    if rest * side > 0.0 {
+                        force = rest;
+                        move_left = 0.0;
+                    } else {
+                        move_left += force / k_now;
+                        force = 0.0;
+                        travelled = if side > 0.0 { gap } else { 0.0 };
+                    }
+                }
+            }
+            let total = force + damping * speed;
+            if resonance > 0.0 {
+                let h = series.step / 8.0;
+                for _ in 0..8 {
+                    shown_rate += h * resonance * (resonance * (total - shown) - 0.2 * shown_rate);
+                    shown += h * shown_rate;
+                }
+                *y = shown;
+            } else {
+                *y = total;
+            }
+        }
+    }
+}
