@@ -8,7 +8,7 @@ use super::{Effect, Named, Rig, Series, effect, size};
 /// The rig.
 pub struct ClosedLoopActuator;
 
-const STEPS: usize = 2;
+const STEPS: usize = 1;
 
 impl Rig for ClosedLoopActuator {
     fn inputs(&self) -> &'static [Named] {
@@ -26,14 +26,14 @@ impl Rig for ClosedLoopActuator {
     fn effects(&self) -> Vec<Effect> {
         vec![
             // r(t - T): conversion, computation and valve electronics.
-            effect("delay", vec![size("delay", "s", 1e-3, (0.0, 0.05))], &[0.0], &[&[2e-3], &[6e-3]]),
+            effect("delay", vec![size("delay", "s", 1e-3, (0.0, 0.05))], &[0.0], &[&[2e-3], &[6e-3]]).like(&["valve_lag"]),
             // Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
             effect("dead_band", vec![size("half_width", "m", 5e-6, (0.0, 1e-3))], &[0.0], &[&[3e-5], &[2e-4]]),
             // Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
             // of Hydraulic Servosystems, 1980).
             effect("asymmetric_gain", vec![size("asymmetry", "1", 0.01, (-0.8, 0.8))], &[0.0], &[&[0.03], &[-0.03]]),
             // Spool: T w' = K e - w, x' = w.
-            effect("valve_lag", vec![size("time_constant", "s", 1e-3, (0.0, 0.02))], &[0.0], &[&[2e-3]]),
+            effect("valve_lag", vec![size("time_constant", "s", 1e-3, (0.0, 0.02))], &[0.0], &[&[2e-3]]).like(&["delay"]),
             // Flow falls with speed as the load pressure rises: x' = w / (1 + |w| / s).
             effect("flow_saturation", vec![size("compression", "s/m", 0.2, (0.0, 50.0))], &[0.0], &[&[1.0]]),
             // Transducer: y = x (1 + c x).

@@ -40,10 +40,10 @@ impl Rig for HystereticDevice {
                 &[0.0, 2.0],
                 &[&[0.5, 2.0], &[0.9, 1.0]],
             ),
-            // Soft begin of contact: k (1 - p e^{-|f| / (c F)}).
+            // Soft begin of contact: k (1 - p e^{-|f| / (c F)}); p near one would be free play.
             effect(
                 "progressive_contact",
-                vec![size("softness", "1", 0.05, (0.0, 0.98)), shape("share", "1", 0.1, 0.7)],
+                vec![size("softness", "1", 0.05, (0.0, 0.8)), shape("share", "1", 0.1, 0.7)],
                 &[0.0, 0.1],
                 &[&[0.6, 0.1], &[0.6, 0.3]],
             ),
@@ -88,9 +88,10 @@ impl Rig for HystereticDevice {
             return;
         };
         let (x, v) = (&series.inputs[0], &series.inputs[1]);
-        let mut force = 0.0f64;
+        // The device begins as it was left: where in the gap, the first measured force tells.
+        let mut force = series.output.first().map_or(0.0, |f| f.clamp(-coulomb, coulomb));
         // Travelled part of the gap, 0 at its negative end.
-        let mut travelled = 0.5 * gap;
+        let mut travelled = if force > 0.0 { gap } else { 0.0 };
         let (mut shown, mut shown_rate) = (0.0, 0.0);
         let late = delay / series.step;
         let at = |values: &[f64], k: usize| {

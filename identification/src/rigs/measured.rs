@@ -4,7 +4,7 @@ use super::{Effect, Measurement, Rig};
 use crate::diagnosis::{Candidate, Point, RigModel};
 
 /// Runs into which a part is cut for the check inside it.
-const RUNS: usize = 8;
+const RUNS: usize = 16;
 
 /// The selections of samples that can be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -32,6 +32,14 @@ pub struct Effect {
     pub off: Vec<f64>,
 }
 
+impl Effect {
+    /// The same with effects that records of a rig often cannot tell from it.
+    fn like(mut self, names: &'static [&'static str]) -> Self {
+        self.candidate.look_alikes = names;
+        self
+    }
+}
+
 /// A kind of rig: its equations and the effects it may have.
 pub trait Rig: Sync {
     /// What the data must hold beside the output.

@@ -8,7 +8,7 @@ use super::{Effect, Named, Rig, Series, effect, shape, size};
 /// The rig.
 pub struct PositioningDrive;
 
-const STEPS: usize = 4;
+const STEPS: usize = 2;
 /// Nominal leads of ball screws, m (ISO 3408-2).
 const LEADS: [f64; 12] =
     [1e-3, 1.25e-3, 2e-3, 2.5e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3, 12e-3, 20e-3];
@@ -48,16 +48,13 @@ impl Rig for PositioningDrive {
         );
         ripple.candidate.starts = LEADS.iter().map(|&lead| vec![0.5, 0.5, lead]).collect();
         vec![
-            // F± = (F_v (1 ± a) |v| + F_c (1 ± b)) sgn v: friction of a worn screw (Janot, Gautier
-            // and Brunot 2019, section 4).
+            // F± = (F_v (1 ± a) |v| + F_c) sgn v + o: friction of a worn screw (Janot, Gautier and
+            // Brunot 2019, section 4). The nominal offset is the Coulomb part of the asymmetry.
             effect(
                 "asymmetric_friction",
-                vec![
-                    size("viscous_asymmetry", "1", 0.03, (-0.9, 0.9)),
-                    size("coulomb_asymmetry", "1", 0.03, (-0.9, 0.9)),
-                ],
-                &[0.0, 0.0],
-                &[&[0.1, 0.0], &[-0.1, 0.0]],
+                vec![size("viscous_asymmetry", "1", 0.03, (-0.9, 0.9))],
+                &[0.0],
+                &[&[0.1], &[-0.1]],
             ),
             // F_c (1 + s e^{-|v|/v_s}): s > 0 is Stribeck's fall, s < 0 a friction that builds up
             // with speed (Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994).
@@ -70,9 +67,10 @@ impl Rig for PositioningDrive {
             // A cos(2π q / p) + B sin(2π q / p): screw and motor poles.
             ripple,
             // Current loop: T F' = G u - F.
-            effect("actuation_lag", vec![size("time_constant", "s", 1e-4, (0.0, 0.02))], &[0.0], &[&[5e-4]]),
+            effect("actuation_lag", vec![size("time_constant", "s", 1e-4, (0.0, 0.02))], &[0.0], &[&[5e-4]])
+                .like(&["delay"]),
             // u acts late.
-            effect("delay", vec![size("delay", "s", 1e-4, (0.0, 2e-3))], &[0.0], &[&[5e-4]]),
+            effect("delay", vec![size("delay", "s", 1e-4, (0.0, 2e-3))], &[0.0], &[&[5e-4]]).like(&["actuation_lag"]),
             // F_c (1 + c (q - q_0)), q_0 in the middle of the travel: misalignment.
             effect("position_dependent_friction", vec![size("slope", "1/m", 0.1, (-5.0, 5.0))], &[0.0], &[&[0.3], &[-0.3]]),
             // -D |v| v.
@@ -91,7 +89,6 @@ impl Rig for PositioningDrive {
         let &[mass, viscous, coulomb, offset, force_gain, kp, kv, limit] = nominal else { return };
         let &[
             viscous_asymmetry,
-            coulomb_asymmetry,
             excess,
             slow,
             cosine,
@@ -157,7 +154,7 @@ impl Rig for PositioningDrive {
                 // Implicit in the friction, so that it holds at standstill.
                 let free = v + h / motor * drive;
                 let side = free.signum();
-                let threshold = h / motor * level * (1.0 + side * coulomb_asymmetry);
+                let threshold = h / motor * level;
                 let linear = viscous * (1.0 + side * viscous_asymmetry) + drag * v.abs();
                 v = if free.abs() > threshold {
                     (free - side * threshold) / (1.0 + h / motor * linear)

@@ -28,7 +28,7 @@ pub struct EffectReport {
     pub effect: String,
     /// Its parameters.
     pub parameters: Vec<Value>,
-    /// Posterior share against the model without it, 0 to 1.
+    /// Probability that its gain on unseen data is no chance, correlated samples counted once.
     pub confidence: f64,
     /// By how much the squared error on the data not fitted grows without it (all else refitted),
     /// as a share of the nominal model's.
@@ -113,12 +113,31 @@ pub fn diagnose(
         part.effects.iter().map(|effect| effect.effect.clone()).collect()
     };
     let (here, there) = (list(&as_described), list(&swapped));
-    let named: Vec<String> = here.iter().filter(|name| there.contains(name)).cloned().collect();
-    let only = here.iter().filter(|name| !there.contains(name));
+    // Effects that records of a rig cannot tell apart confirm each other.
+    let alike = |name: &str, other: &str| {
+        name == other
+            || measured
+                .candidates()
+                .iter()
+                .any(|c| c.effect == name && c.look_alikes.contains(&other))
+    };
+    let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
+    let named: Vec<String> = here
+        .iter()
+        .filter(|name| in_both(name, &there))
+        .map(|name| match there.iter().find(|other| alike(name, other)) {
+            Some(other) if other != name => format!("{name} or {other}"),
+            _ => name.clone(),
+        })
+        .collect();
+    let only = here.iter().filter(|name| !in_both(name, &there));
     let not_confirmed: Vec<String> =
-        only.chain(there.iter().filter(|name| !here.contains(name))).cloned().collect();
+        only.chain(there.iter().filter(|name| !in_both(name, &here))).cloned().collect();
     let pays = as_described.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
-    let rivalled = as_described.rivals.iter().any(|(_, against)| named.contains(against));
+    let rivalled = as_described
+        .rivals
+        .iter()
+        .any(|(rival, against)| named.contains(against) && !alike(against, rival));
     let verdict = match (here.is_empty() && there.is_empty(), named.is_empty() || !pays, rivalled) {
         (true, ..) => Verdict::Adequate,
         (_, true, _) => Verdict::Unexplained,
@@ -170,7 +189,7 @@ fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) 
         effects.push(EffectReport {
             effect: candidate.effect.to_owned(),
             parameters,
-            confidence: 1.0 / (1.0 + (-0.5 * selected.margins[i]).exp()),
+            confidence: normal(selected.deviates[i]),
             share: (without - after) / before,
         });
     }
@@ -187,6 +206,17 @@ fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) 
         rivals: selected.rivals.iter().map(|r| (name(r.effect), name(r.against))).collect(),
         point: point.clone(),
     }
+}
+
+/// Probability below `deviate` of the normal distribution (Zelen and Severo 1964, 26.2.17 in
+/// Abramowitz and Stegun; error below 1e-7), for positive deviates.
+fn normal(deviate: f64) -> f64 {
+    let x = deviate.abs();
+    let t = 1.0 / (1.0 + 0.231_641_9 * x);
+    let series = [0.319_381_530, -0.356_563_782, 1.781_477_937, -1.821_255_978, 1.330_274_429];
+    let sum = series.iter().rev().fold(0.0, |sum, c| (sum + c) * t);
+    let above = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt() * sum;
+    if deviate < 0.0 { above } else { 1.0 - above }
 }
 
 fn parameters(measured: &Measured<'_>, point: &Point, deviations: &[f64]) -> Vec<Value> {

@@ -1,20 +1,20 @@
 //! Which effects a part of the data asks for.
 //!
-//! Forward, one effect a round; an effect is taken when it pays against its price with as many
-//! samples as are independent, and when a model fitted to one half of the part with it predicts
-//! the other half better than without, both ways. Backward at the end.
+//! Forward, one effect a round: the one with which a model fitted to one half of the part predicts
+//! the other half best, both ways, as long as the gain is no chance when correlated samples are
+//! counted once. Backward at the end by the same test.
 
 use super::measured::{Measured, Selection};
 use super::resampling::correlation_time;
 use crate::diagnosis::{Fit, Jacobian, Point, RigModel, evaluate, fit, polish};
 
-/// Price of an effect in units of `2 log` likelihood; the engine's search asks the same.
-const PRICE_OF_AN_EFFECT: f64 = 18.0;
-const PRICE_OF_A_PARAMETER: f64 = 6.0;
+/// Standard deviations by which the likelihood of unseen data must rise. A dozen candidates are
+/// tried, so that one in a thousand times would be chance.
+const LEAST_DEVIATE: f64 = 3.0;
 /// Share of the squared error below which an effect is not worth a name.
 const LEAST_GAIN: f64 = 0.01;
-/// A candidate within this of the one taken is its rival.
-const RIVAL_WITHIN: f64 = 12.0;
+/// A candidate that gains this share of what the one taken gains is its rival.
+const RIVAL: f64 = 0.9;
 /// Effects in one model.
 const MOST_EFFECTS: usize = 8;
 /// Candidates that are fitted to the end in a round.
@@ -46,20 +46,14 @@ pub struct Selected {
     pub nominal: Model,
     /// With all effects.
     pub extended: Model,
-    /// What each effect gains over the extended model without it, in `2 log` likelihood over its
-    /// price.
-    pub margins: Vec<f64>,
+    /// What each effect gains on unseen data, in standard deviations of that gain.
+    pub deviates: Vec<f64>,
     /// The extended model without each effect.
     pub without: Vec<Model>,
     /// Rivals that are not in the extended model.
     pub rivals: Vec<Rival>,
     /// One standard deviation of each coordinate: nuisance first, then the effects'.
     pub deviations: Vec<f64>,
-}
-
-fn price(measured: &Measured<'_>, effect: usize) -> f64 {
-    let parameters = measured.candidates()[effect].parameters.len();
-    PRICE_OF_AN_EFFECT + PRICE_OF_A_PARAMETER * parameters.saturating_sub(1) as f64
 }
 
 fn model_of(measured: &Measured<'_>, fit: &Fit, record: usize) -> Model {
@@ -84,7 +78,7 @@ fn settle(measured: &Measured<'_>, start: &Point, scale: f64, record: usize, rou
     for _ in 0..2 {
         let rig = measured.with_scale(scale);
         let begin = evaluate(&rig, &point, &[record])?;
-        let (fit, _) = polish(&rig, &begin, &[record], rounds)?;
+        let fit = polish(&rig, &begin, &[record], rounds).map_or(begin, |(fit, _)| fit);
         let settled = model_of(measured, &fit, record);
         point = settled.point.clone();
         let next = scale_of(&settled);
@@ -97,35 +91,61 @@ fn settle(measured: &Measured<'_>, start: &Point, scale: f64, record: usize, rou
     model
 }
 
-/// Log-likelihood ratio, doubled, by the independent samples of the better model.
-fn gain(worse: &Model, better: &Model) -> f64 {
-    better.samples * (worse.squares / better.squares).ln()
+/// What a model fitted to one fold gains on the other, both ways.
+struct Inside {
+    /// Share of the squared error that goes.
+    gain: f64,
+    /// Root of twice the logarithm of the likelihood ratio, with the gain's sign.
+    deviate: f64,
+    /// True when both ways gain.
+    both: bool,
 }
 
-/// True when the effect added last predicts each fold better from the other.
-fn holds_inside(measured: &Measured<'_>, part: Selection, base: &Model, extended: &Model) -> bool {
-    let folds = part.folds();
-    let scale = scale_of(extended);
-    let on_other = |model: &Model, fitted: usize, tested: usize| -> Option<f64> {
+impl Inside {
+    fn holds(&self) -> bool {
+        self.both && self.deviate > LEAST_DEVIATE && self.gain > LEAST_GAIN
+    }
+}
+
+/// Errors of `model` on each fold when its parameters are refitted to the other.
+fn crossed(measured: &Measured<'_>, part: Selection, model: &Model) -> Option<[Vec<f64>; 2]> {
+    let [one, two] = part.folds();
+    let scale = scale_of(model);
+    let on_other = |fitted: usize, tested: usize| {
         let fitted = settle(measured, &model.point, scale, fitted, 2)?;
-        Some(measured.errors(&fitted.point, tested).iter().map(|e| e * e).sum())
+        Some(measured.errors(&fitted.point, tested))
     };
-    [(folds[0], folds[1]), (folds[1], folds[0])].iter().all(|&(fitted, tested)| {
-        match (on_other(base, fitted, tested), on_other(extended, fitted, tested)) {
-            (Some(before), Some(after)) => after < before,
-            _ => false,
-        }
-    })
+    Some([on_other(two, one)?, on_other(one, two)?])
 }
 
-/// Best extensions of `base` by one effect, the best first, with what they gain over their price.
-fn extensions(measured: &Measured<'_>, base: &Model, record: usize) -> Option<Vec<(f64, usize, Model)>> {
+/// Compares two models by their errors from [`crossed`].
+fn compare(before: &[Vec<f64>; 2], after: &[Vec<f64>; 2]) -> Inside {
+    let both = before.iter().zip(after).all(|(b, a)| {
+        b.iter().map(|e| e * e).sum::<f64>() > a.iter().map(|e| e * e).sum::<f64>()
+    });
+    let squares = |errors: &[Vec<f64>; 2]| errors.iter().flatten().map(|e| e * e).sum::<f64>();
+    let (worse, better) = (squares(before), squares(after));
+    let independent: f64 = after.iter().map(|a| a.len() as f64 / correlation_time(a)).sum();
+    // Twice the logarithm of the likelihood ratio on data that neither model was fitted to.
+    let ratio = independent * (worse / better).ln();
+    Inside {
+        gain: 1.0 - better / worse,
+        deviate: ratio.abs().sqrt().copysign(ratio),
+        both,
+    }
+}
+
+/// The extensions of `base` by one effect that fit best.
+fn extensions(measured: &Measured<'_>, base: &Model, record: usize) -> Option<Vec<(usize, Model)>> {
     let rig = measured.with_scale(scale_of(base));
     let start = evaluate(&rig, &base.point, &[record])?;
     let jacobian = Jacobian::at(&rig, &start, &[record])?;
     let mut quick: Vec<(usize, Fit)> = Vec::new();
     for (effect, candidate) in rig.candidates().iter().enumerate() {
-        if base.point.effects.iter().any(|(i, _)| *i == effect) {
+        let held = |i: usize| {
+            i == effect || candidate.look_alikes.contains(&rig.candidates()[i].effect)
+        };
+        if base.point.effects.iter().any(|(i, _)| held(*i)) {
             continue;
         }
         let best = candidate
@@ -140,16 +160,14 @@ fn extensions(measured: &Measured<'_>, base: &Model, record: usize) -> Option<Ve
         quick.extend(best.map(|best| (effect, best)));
     }
     quick.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-    let mut finished: Vec<_> = quick
-        .into_iter()
-        .take(FINALISTS)
-        .filter_map(|(effect, quick)| {
-            let model = settle(measured, &quick.point, rig.scale, record, 4)?;
-            Some((gain(base, &model) - price(measured, effect), effect, model))
-        })
-        .collect();
-    finished.sort_by(|a, b| b.0.total_cmp(&a.0));
-    Some(finished)
+    let finished = quick.into_iter().take(FINALISTS);
+    Some(
+        finished
+            .filter_map(|(effect, quick)| {
+                Some((effect, settle(measured, &quick.point, rig.scale, record, 4)?))
+            })
+            .collect(),
+    )
 }
 
 /// Finds the effects that `part` asks for.
@@ -166,61 +184,64 @@ pub fn select(measured: &Measured<'_>, part: Selection, verbose: bool) -> Option
     let mut current = nominal.clone();
     let mut rivals = Vec::new();
     while current.point.effects.len() < MOST_EFFECTS {
-        let finished = extensions(measured, &current, record)?;
-        let mut taken = None;
-        for (i, (score, effect, model)) in finished.iter().enumerate() {
-            let pays = *score > 0.0 && model.squares < (1.0 - LEAST_GAIN) * current.squares;
-            let holds = pays && holds_inside(measured, part, &current, model);
-            if verbose {
+        let before = crossed(measured, part, &current)?;
+        let mut tried: Vec<(Inside, usize, Model)> = extensions(measured, &current, record)?
+            .into_iter()
+            .filter_map(|(effect, model)| {
+                let after = crossed(measured, part, &model)?;
+                Some((compare(&before, &after), effect, model))
+            })
+            .collect();
+        tried.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+        if verbose {
+            for (inside, _, model) in &tried {
                 eprintln!(
-                    "  {}: error {:.3} %, score {score:.1}{}{} {:?}",
+                    "  {}: error {:.3} %, on the other fold {:.2} % of the square less, {:.1} deviations{} {:?}",
                     names(model).join(" + "),
                     100.0 * measured.normalised_error(&model.point, record),
-                    if pays { ", pays" } else { "" },
-                    if holds { ", holds" } else { "" },
+                    100.0 * inside.gain,
+                    inside.deviate,
+                    if inside.holds() { ", holds" } else { "" },
                     model.point.effects.last().map(|(i, q)| measured.candidates()[*i].values(q)),
                 );
             }
-            if holds {
-                for (other, rival, _) in &finished[i + 1..] {
-                    if score - other < RIVAL_WITHIN && *other > 0.0 {
-                        rivals.push(Rival { effect: *rival, against: *effect });
-                    }
-                }
-                taken = Some(model.clone());
-                break;
-            }
         }
-        let Some(model) = taken else { break };
+        let pays = |model: &Model| model.squares < (1.0 - LEAST_GAIN) * current.squares;
+        tried.retain(|(inside, _, model)| inside.holds() && pays(model));
+        let mut tried = tried.into_iter();
+        let Some((best, effect, model)) = tried.next() else { break };
+        let near = tried.filter(|(inside, ..)| inside.gain > RIVAL * best.gain);
+        rivals.extend(near.map(|(_, rival, _)| Rival { effect: rival, against: effect }));
         current = model;
     }
     // What no longer pays goes.
-    let (margins, without) = loop {
-        let mut margins = Vec::new();
+    let (deviates, without) = loop {
+        let after = crossed(measured, part, &current)?;
+        let mut compared = Vec::new();
         let mut without = Vec::new();
         for i in 0..current.point.effects.len() {
             let mut point = current.point.clone();
-            let (effect, _) = point.effects.remove(i);
+            point.effects.remove(i);
             let smaller = settle(measured, &point, scale_of(&current), record, 3)?;
-            margins.push(gain(&smaller, &current) - price(measured, effect));
+            compared.push(compare(&crossed(measured, part, &smaller)?, &after));
             without.push(smaller);
         }
-        let least = (0..margins.len()).min_by(|&a, &b| margins[a].total_cmp(&margins[b]));
+        let least = (0..compared.len())
+            .min_by(|&a, &b| compared[a].gain.total_cmp(&compared[b].gain))
+            .filter(|&i| !compared[i].holds());
         match least {
-            Some(i)
-                if margins[i] < 0.0
-                    || current.squares > (1.0 - LEAST_GAIN) * without[i].squares =>
-            {
-                current = without.swap_remove(i);
-            }
-            _ => break (margins, without),
+            Some(i) => current = without.swap_remove(i),
+            None => break (compared.iter().map(|inside| inside.deviate).collect(), without),
         }
     };
     let held = |effect: usize| current.point.effects.iter().any(|(i, _)| *i == effect);
     rivals.retain(|rival| held(rival.against) && !held(rival.effect));
     let rig = measured.with_scale(scale_of(&current));
     let last = evaluate(&rig, &current.point, &[record])?;
-    let covariance = Jacobian::at(&rig, &last, &[record])?.covariance(&rig, &last)?;
-    let deviations = (0..covariance.nrows()).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect();
-    Some(Selected { nominal, extended: current, margins, without, rivals, deviations })
+    let covariance =
+        Jacobian::at(&rig, &last, &[record]).and_then(|jacobian| jacobian.covariance(&rig, &last));
+    let deviations = covariance.map_or_else(Vec::new, |covariance| {
+        (0..covariance.nrows()).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect()
+    });
+    Some(Selected { nominal, extended: current, deviates, without, rivals, deviations })
 }
