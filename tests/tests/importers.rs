@@ -17,8 +17,8 @@ fn paths(wanted: impl Fn(&PackedFmu) -> bool) -> Vec<PathBuf> {
     paths
 }
 
-/// Runs a script on FMUs and checks that it did something with each.
-fn gate(script: &str, fmus: &[PathBuf]) {
+/// Runs a script on FMUs and checks that it did something with each. Returns what it printed.
+fn gate(script: &str, fmus: &[PathBuf]) -> String {
     let report = run_script(script, fmus);
     println!("{report}");
     let passed = report
@@ -30,6 +30,7 @@ fn gate(script: &str, fmus: &[PathBuf]) {
         "{script} checked only {passed} times for {}",
         fmus.len()
     );
+    report
 }
 
 #[test]
@@ -48,8 +49,10 @@ fn ecos_steps_every_fmu() {
 }
 
 #[test]
-fn libcosim_steps_every_fmu_of_version_2() {
-    gate("libcosim_gate.py", &paths(|f| f.version == FmiVersion::Two));
+fn libcosim_steps_every_fmu_of_version_2_without_a_warning() {
+    let report = gate("libcosim_gate.py", &paths(|f| f.version == FmiVersion::Two));
+    // The strictest reader of model descriptions: its log is silent unless something is odd.
+    assert!(!report.contains("FMI Library"), "{report}");
 }
 
 #[test]
@@ -78,17 +81,16 @@ fn fmi_rs_finds_nothing_wrong_with_any_description() {
 fn problems(version: FmiVersion, description: &Path) -> Vec<String> {
     use fmi_rs::model_description::{fmi2, fmi3};
     let problems = match version {
-        FmiVersion::Two => fmi2::ModelDescription::from_path(description)
-            .unwrap()
-            .validate(),
-        FmiVersion::Three => fmi3::ModelDescription::from_path(description)
-            .unwrap()
-            .validate(),
+        FmiVersion::Two => fmi2::ModelDescription::from_path(description).map(|d| d.validate()),
+        FmiVersion::Three => fmi3::ModelDescription::from_path(description).map(|d| d.validate()),
     };
-    problems
-        .into_iter()
-        .map(|problem| problem.message)
-        .collect()
+    match problems {
+        Ok(problems) => problems
+            .into_iter()
+            .map(|problem| problem.message)
+            .collect(),
+        Err(unreadable) => vec![unreadable.to_string()],
+    }
 }
 
 #[test]
