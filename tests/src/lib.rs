@@ -1,1 +1,4 @@
 //! Acceptance tests: the thesis's tables, importers, hidden effects
+
+pub mod monolithic;
+pub mod shared;

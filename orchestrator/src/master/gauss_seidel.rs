@@ -22,16 +22,17 @@ pub(super) fn observe(simulation: &mut Simulation) -> Result<(), MasterError> {
     Ok(())
 }
 
-/// Continuous components over `[t_k, t_k + h]`, with their inputs held at their values at `t_k`.
+/// Continuous components over `[t_k, t_k + h]` with their inputs held: commands at their value of
+/// `t_k`, what another continuous component gives at its newest value. So the specimen steps under
+/// the table's acceleration at `t_k`, half a step late on average, and the table under the
+/// specimen's force at `t_k + h`, half a step early; round the loop the two cancel.
 pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     let (time, step) = (simulation.time(), simulation.step);
-    for part in simulation
-        .parts
-        .iter_mut()
-        .filter(|part| part.every.is_none())
-    {
+    for &part in &simulation.order {
+        let part = &mut simulation.parts[part];
         part.inputs.transfer(&simulation.signals, &part.instance)?;
         part.instance.do_step(time, step)?;
+        part.onward.read(&mut simulation.signals, &part.instance)?;
     }
     Ok(())
 }

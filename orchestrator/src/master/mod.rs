@@ -2,7 +2,7 @@
 //!
 //! At tick k the outputs at `t_k = k h` become known in dependency order, sampled components being
 //! called from the reference down ([`Simulation::observe`]); then the continuous components step
-//! over `[t_k, t_k + h]` with their inputs held ([`Simulation::advance`]). A row of the record
+//! over `[t_k, t_k + h]` one after the other with their inputs held ([`Simulation::advance`]). A row of the record
 //! holds the outputs at `t_k` together with the commands computed from them.
 
 mod action;
@@ -77,6 +77,8 @@ pub struct Simulation {
     names: Vec<String>,
     reference: Reference,
     parts: Vec<Part>,
+    /// The continuous components in the order in which they step.
+    order: Vec<usize>,
     actions: Vec<Action>,
     /// The signal that ends the run when it is not 0, and how long the run goes on then, s.
     end_when: Option<(usize, f64)>,
@@ -94,6 +96,8 @@ struct Part {
     inputs: Inputs,
     /// All its outputs.
     outputs: Outputs,
+    /// Outputs that the continuous components after it take from the end of its step.
+    onward: Outputs,
     /// Where the state is kept that a repetition goes back to.
     state: State,
 }
