@@ -48,7 +48,7 @@ fn convergence(algorithm: Algorithm) -> (Vec<f64>, Vec<f64>) {
 }
 
 #[test]
-fn held_inputs_at_2_ms_err_by_less_than_2_percent_of_the_peak_for_every_record() {
+fn coupling_at_2_ms_errs_by_less_than_2_percent_of_the_peak_for_every_record() {
     let mut errors = Vec::new();
     for record in shared::records() {
         let prepared = request(Some(&record), "linear", 0.002);
@@ -72,19 +72,21 @@ fn without_a_specimen_there_is_nothing_to_couple() {
 }
 
 #[test]
-fn held_inputs_converge_with_first_order() {
-    let (errors, orders) = convergence(Algorithm::GaussSeidel);
-    assert!(errors[0] < 0.02, "{errors:?}");
-    for order in orders {
-        assert!((order - 1.0).abs() < 0.15, "{order}");
+fn the_coupling_is_of_second_order() {
+    for algorithm in [Algorithm::GaussSeidel, Algorithm::Iterative] {
+        let (errors, orders) = convergence(algorithm);
+        assert!(errors[0] < 0.005, "{algorithm}: {errors:?}");
+        for order in orders {
+            assert!((order - 2.0).abs() < 0.1, "{algorithm}: {order}");
+        }
     }
 }
 
 #[test]
-fn iteration_converges_with_second_order() {
-    let (errors, orders) = convergence(Algorithm::Iterative);
-    assert!(errors[0] < 0.005, "{errors:?}");
+fn a_jacobi_master_couples_with_first_order() {
+    let (errors, orders) = convergence(Algorithm::Jacobi);
+    println!("{errors:?}");
     for order in orders {
-        assert!((order - 2.0).abs() < 0.3, "{order}");
+        assert!((order - 1.0).abs() < 0.3, "{order}");
     }
 }

@@ -6,7 +6,7 @@ use super::action::Action;
 use super::reference::Reference;
 use super::transfer::{Inputs, Outputs};
 use super::{Algorithm, MasterError, Part, Simulation, start};
-use crate::fmu::{Causality, Instance, Kind, State};
+use crate::fmu::{Causality, Instance, Kind, State, Variability};
 use crate::motion::Motion;
 use crate::system::{Operation, Quantity, Source, System};
 
@@ -33,7 +33,6 @@ impl Simulation {
                 reference.tap(quantity, ahead);
             }
         }
-        let order = order(system, &schedule.operations);
         let mut plan = Plan::new(system, &mut reference, &schedule.operations);
         let mut parts = Vec::with_capacity(system.components.len());
         for (index, component) in system.components.iter().enumerate() {
@@ -50,7 +49,6 @@ impl Simulation {
                 every: every.transpose()?,
                 inputs: plan.inputs(&mut reference, index, |_| true),
                 outputs: std::mem::take(&mut plan.outputs[index]),
-                onward: plan.onward(index, &order),
                 state: State::default(),
             });
         }
@@ -78,7 +76,6 @@ impl Simulation {
             names: plan.names,
             reference,
             parts,
-            order,
             actions,
             end_when,
         };
@@ -100,26 +97,6 @@ fn ticks(period: f64, step: f64, what: &str) -> Result<usize, MasterError> {
         )));
     }
     Ok(count as usize)
-}
-
-/// The continuous components, those first whose outputs others depend on directly.
-fn order(system: &System, operations: &[Operation]) -> Vec<usize> {
-    let reads = |operation: &Operation, part: usize| match operation {
-        Operation::Read { component, .. } => *component == part,
-        Operation::Call { .. } => false,
-        Operation::Iterate(parts) => parts
-            .iter()
-            .any(|o| matches!(o, Operation::Read { component, .. } if *component == part)),
-    };
-    let mut order: Vec<usize> = (0..system.components.len())
-        .filter(|&part| system.components[part].period.is_none())
-        .collect();
-    order.sort_by_key(|&part| {
-        operations
-            .iter()
-            .rposition(|operation| reads(operation, part))
-    });
-    order
 }
 
 /// Where each signal stands.
@@ -214,6 +191,21 @@ impl<'a> Plan<'a> {
         }
     }
 
+    /// Whether the source changes between samples.
+    fn is_smooth(&self, source: Source) -> bool {
+        match source {
+            Source::Reference { .. } => false,
+            Source::Output {
+                component,
+                variable,
+            } => {
+                let component = &self.system.components[component];
+                let variable = &component.fmu.description.variables[variable];
+                component.period.is_none() && variable.variability == Variability::Continuous
+            }
+        }
+    }
+
     fn inputs(
         &self,
         reference: &mut Reference,
@@ -225,39 +217,14 @@ impl<'a> Plan<'a> {
         for connection in &self.system.connections {
             if connection.component == component && chosen(connection.input) {
                 let signal = self.signal(reference, connection.source);
-                inputs.add(&variables[connection.input], signal, connection.factor);
+                let input = &variables[connection.input];
+                let is_smooth = self.is_smooth(connection.source)
+                    && input.kind == Kind::Float64
+                    && input.variability == Variability::Continuous;
+                inputs.add(input, signal, connection.factor, is_smooth);
             }
         }
         inputs
-    }
-
-    /// The outputs of a continuous component that are known as soon as it has stepped and that drive
-    /// continuous components later in `order`.
-    fn onward(&self, component: usize, order: &[usize]) -> Outputs {
-        let variables = &self.system.components[component].fmu.description.variables;
-        let place = |part| order.iter().position(|&other| other == part);
-        let mut onward = Outputs::default();
-        let mut taken = Vec::new();
-        for connection in &self.system.connections {
-            let Source::Output {
-                component: from,
-                variable,
-            } = connection.source
-            else {
-                continue;
-            };
-            let later = place(connection.component) > place(component);
-            let known = variables
-                .get(variable)
-                .is_some_and(|v| v.dependencies.is_empty());
-            if from == component && later && known && !taken.contains(&variable) {
-                let signal = self.places[&(component, variable)];
-                let variable_of = &variables[variable];
-                onward.add(&variable_of.kind, vec![variable_of.reference], signal);
-                taken.push(variable);
-            }
-        }
-        onward
     }
 
     fn action(&self, reference: &mut Reference, operation: &Operation) -> Action {

@@ -2,7 +2,7 @@
 //!
 //! At tick k the outputs at `t_k = k h` become known in dependency order, sampled components being
 //! called from the reference down ([`Simulation::observe`]); then the continuous components step
-//! over `[t_k, t_k + h]` one after the other with their inputs held ([`Simulation::advance`]). A row of the record
+//! over `[t_k, t_k + h]` with their inputs held ([`Simulation::advance`]). A row of the record
 //! holds the outputs at `t_k` together with the commands computed from them.
 
 mod action;
@@ -77,14 +77,13 @@ pub struct Simulation {
     names: Vec<String>,
     reference: Reference,
     parts: Vec<Part>,
-    /// The continuous components in the order in which they step.
-    order: Vec<usize>,
     actions: Vec<Action>,
     /// The signal that ends the run when it is not 0, and how long the run goes on then, s.
     end_when: Option<(usize, f64)>,
+    /// The signals at the tick before; in [`Algorithm::Iterative`] those of the last repetition.
+    last_signals: Vec<f64>,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
     next_signals: Vec<f64>,
-    last_signals: Vec<f64>,
 }
 
 /// A component in a simulation.
@@ -96,8 +95,6 @@ struct Part {
     inputs: Inputs,
     /// All its outputs.
     outputs: Outputs,
-    /// Outputs that the continuous components after it take from the end of its step.
-    onward: Outputs,
     /// Where the state is kept that a repetition goes back to.
     state: State,
 }
