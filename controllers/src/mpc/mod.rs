@@ -137,7 +137,7 @@ impl ModelPredictiveControl {
             LowLevelLaw::Continuous => LoopModel::continuous(&p.plant, gains, p.period),
         };
         let filter = design_filter(&model, p)?;
-        let problem = ReducedProblem::new(&model, p.horizon, &p.weights, &p.limits)?;
+        let problem = ReducedProblem::new(&model, p.horizon, &p.weights, &p.limits, p.valve_limit())?;
         let (hessian, constraints) = (&problem.hessian, &problem.constraints);
         let solver: Box<dyn Solver> = match p.solver {
             SolverChoice::Kwik => Box::new(Kwik::new(
@@ -253,6 +253,12 @@ impl ModelPredictiveControl {
         }
         self.memory.reference_acceleration = Some(now.acceleration);
         let (offset, order) = (CHANNELS * p.horizon, self.state.len());
+        // Three-variable control sees the disturbances and has integrated them.
+        self.work.valve_offset = self.model.valve_feedback().map_or(0.0, |feedback| {
+            let disturbances = self.state.fixed_rows::<CHANNELS>(order - CHANNELS);
+            feedback.dot(&disturbances.transpose()) + self.memory.integral
+                - self.estimate[self.model.integral_state]
+        });
         self.work
             .given
             .rows_mut(offset, order)

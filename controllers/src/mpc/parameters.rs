@@ -309,6 +309,12 @@ impl Parameters {
         Ok(())
     }
 
+    /// The valve's limit as the problem knows it.
+    pub(crate) fn valve_limit(&self) -> Option<f64> {
+        (self.law == LowLevelLaw::Sampled && self.low_level.limit.is_finite())
+            .then_some(self.low_level.limit)
+    }
+
     fn validate_plant(&self) -> Result<(), ModelError> {
         let plant = StateSpace::new(
             self.plant.a.clone(),

@@ -154,6 +154,12 @@ impl LoopModel {
         }
     }
 
+    /// What three-variable control adds to its command for a measured motion that is off by the
+    /// disturbance, V; `None` where the law runs continuously and there is no one valve command.
+    pub fn valve_feedback(&self) -> Option<RowVector3<f64>> {
+        self.valve.as_ref().map(|valve| -valve.feedback)
+    }
+
     /// Number of states.
     pub fn order(&self) -> usize {
         self.a.nrows()

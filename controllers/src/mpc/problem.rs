@@ -31,6 +31,9 @@ pub struct ReducedProblem {
     /// `b` is this part plus `bound_state` times the state.
     bound_constant: DVector<f64>,
     bound_state: DMatrix<f64>,
+    /// Constraints from this one on are the valve's: the first half its lower, the rest its upper
+    /// limit.
+    first_valve_row: usize,
     /// Stacked commands from `w`, from the state and from the previous command.
     plan_sequence: DMatrix<f64>,
     plan_state: DMatrix<f64>,
@@ -42,6 +45,8 @@ pub struct ReducedProblem {
 pub struct Workspace {
     /// `[stacked reference; state; previous command]`, the numbers of the step.
     pub given: DVector<f64>,
+    /// What the valve command will be beyond the model's `w`, V.
+    pub valve_offset: f64,
     /// `[w; slack]`.
     pub solution: DVector<f64>,
     target: DVector<f64>,
@@ -61,12 +66,15 @@ pub enum Found {
 }
 
 impl ReducedProblem {
-    /// Builds the problem of `horizon` samples. Fails where the Hessian is not positive definite.
+    /// Builds the problem of `horizon` samples; `valve_limit` (V) bounds the valve sequence where
+    /// the model has one. That limit is hard, as the valve's is, and always leaves a solution; the
+    /// output limits are soft. Fails where the Hessian is not positive definite.
     pub fn new(
         model: &LoopModel,
         horizon: usize,
         weights: &Weights,
         limits: &OutputLimits,
+        valve_limit: Option<f64>,
     ) -> Result<Self, ModelError> {
         let singular = |what: &str| ModelError::NoSolution {
             equation: "the prediction's least squares (Eq 5-14; its weights set it)",
@@ -128,9 +136,18 @@ impl ReducedProblem {
             })
             .filter(|(_, _, bound, _)| bound.is_finite())
             .collect();
-        let mut constraints = DMatrix::zeros(rows.len(), p + 1);
-        let mut bound_state = DMatrix::zeros(rows.len(), n);
-        let mut bound_constant = DVector::zeros(rows.len());
+        let first_valve_row = rows.len();
+        let valve_rows = if valve_limit.is_some() { 2 * p } else { 0 };
+        let mut constraints = DMatrix::zeros(first_valve_row + valve_rows, p + 1);
+        let mut bound_state = DMatrix::zeros(first_valve_row, n);
+        let mut bound_constant = DVector::zeros(first_valve_row + valve_rows);
+        if let Some(limit) = valve_limit {
+            for i in 0..p {
+                constraints[(first_valve_row + i, i)] = 1.0;
+                constraints[(first_valve_row + p + i, i)] = -1.0;
+            }
+            bound_constant.rows_mut(first_valve_row, 2 * p).fill(-limit);
+        }
         for (i, &(output, sign, bound, scale)) in rows.iter().enumerate() {
             constraints
                 .view_mut((i, 0), (1, p))
@@ -150,6 +167,7 @@ impl ReducedProblem {
             minimiser,
             bound_constant,
             bound_state,
+            first_valve_row,
             plan_sequence: &projection * big_n,
             plan_state: &projection * &response.offset,
             plan_previous: &repeat - &projection * m * &repeat,
@@ -161,6 +179,7 @@ impl ReducedProblem {
         let rows = self.constraints.nrows();
         Workspace {
             given: DVector::zeros(self.minimiser.ncols()),
+            valve_offset: 0.0,
             solution: DVector::zeros(self.horizon + 1),
             target: DVector::zeros(self.horizon + 1),
             bound: DVector::zeros(rows),
@@ -214,12 +233,22 @@ impl ReducedProblem {
             .rows_mut(0, p)
             .gemv(1.0, &self.minimiser, &work.given, 0.0);
         work.bound.copy_from(&self.bound_constant);
-        work.bound.gemv(
+        work.bound.rows_mut(0, self.first_valve_row).gemv(
             1.0,
             &self.bound_state,
             &work.given.rows(CHANNELS * p, n),
             1.0,
         );
+        for (i, bound) in work.bound.as_mut_slice()[self.first_valve_row..]
+            .iter_mut()
+            .enumerate()
+        {
+            *bound += if i < p {
+                -work.valve_offset
+            } else {
+                work.valve_offset
+            };
+        }
     }
 
     /// The commands of sample `index` of the plan that belongs to `work`'s numbers and solution.
