@@ -420,4 +420,6 @@ fn design_filter(
 }
 
 #[cfg(test)]
+mod problem_tests;
+#[cfg(test)]
 mod tests;

@@ -139,9 +139,11 @@ fn explore() {
     for seed in 1..8 {
         let reference = motion(seed, 20.0);
         let rig = with_specimen();
-        let t0 = track(&rig, None, &reference, 0, 0);
-        let mut c = controller(Parameters { plant: prediction_plant(&rig), ..Parameters::default() });
+        for plant in [Rig::default(), rig] {
+        for (scale, rate) in [([1.0;3], 0.1), ([0.2, 0.5, 1.0], 0.1), ([0.1, 0.3, 1.0], 0.1), ([0.1, 0.1, 1.0], 0.1), ([0.03, 0.1, 1.0], 0.1), ([1.5*INCH, 20.0*INCH, G], 0.1), ([1.5*INCH, 20.0*INCH, G], 0.001)] {
+        let mut c = controller(Parameters { plant: prediction_plant(&plant), weights: Weights{scale, rate: [rate;3], ..Weights::TABLE_5_1}, ..Parameters::default() });
         let e = track(&rig, Some(&mut c), &reference, 0, 0);
-        println!("tvc {:.3} {:.4} {:.2}; mpc {:.4} {:.4} valve {:.2} {:?}", t0.error, t0.peak_displacement/INCH, t0.peak_valve, e.error, e.peak_displacement/INCH, e.peak_valve, c.memory.counters);
+        println!("{seed} {} scale {scale:?} {rate} mpc {:.4} {:.4} valve {:.2} {}", plant.specimen.is_some(), e.error, e.peak_displacement/INCH, e.peak_valve, c.memory.counters.solved);
+        }}
     }
 }

@@ -7,7 +7,6 @@ use nalgebra::DMatrix;
 use crate::ModelError;
 
 const MAX_DOUBLINGS: usize = 80;
-const REFINEMENTS: usize = 2;
 
 /// Stabilising `X` of `A' X A - X - A' X B (R + B' X B)^-1 B' X A + Q = 0` (Eq 5-8 with `A`, `C`
 /// transposed).
@@ -23,39 +22,19 @@ pub fn discrete_riccati(
     const NAME: &str = "the discrete Riccati equation";
     let r_inverse = invert(r, NAME, "the input weight is singular")?;
     let g = b * r_inverse * b.transpose();
-    let mut x = double(a.clone(), g, q.clone(), NAME)?;
-    let gain = |x: &DMatrix<f64>| -> Result<DMatrix<f64>, ModelError> {
-        let weight = invert(&(r + b.transpose() * x * b), NAME, "R + B'XB is singular")?;
-        Ok(weight * b.transpose() * x * a)
-    };
-    // Doubling loses digits to unstable modes; Newton's method (Hewer, 1971) brings them back.
-    for _ in 0..REFINEMENTS {
-        let gain = gain(&x)?;
-        let closed = a - b * &gain;
-        if closed
-            .complex_eigenvalues()
-            .iter()
-            .any(|pole| pole.norm() >= 1.0)
-        {
-            return Err(no_solution(NAME, "the closed loop is not stable"));
-        }
-        x = discrete_lyapunov(closed, q + gain.transpose() * r * &gain);
+    let x = double(a.clone(), g, q.clone(), NAME)?;
+    let gain = invert(&(r + b.transpose() * &x * b), NAME, "R + B'XB is singular")?
+        * b.transpose()
+        * &x
+        * a;
+    if (a - b * gain)
+        .complex_eigenvalues()
+        .iter()
+        .any(|pole| pole.norm() >= 1.0)
+    {
+        return Err(no_solution(NAME, "the closed loop is not stable"));
     }
     Ok(x)
-}
-
-/// `X = A' X A + Q` for `A` with all eigenvalues inside the unit circle, by Smith's doubling.
-fn discrete_lyapunov(mut a: DMatrix<f64>, q: DMatrix<f64>) -> DMatrix<f64> {
-    let mut x = q;
-    for _ in 0..MAX_DOUBLINGS {
-        let step = a.transpose() * &x * &a;
-        x += &step;
-        if step.norm() <= f64::EPSILON * x.norm() {
-            break;
-        }
-        a = &a * &a;
-    }
-    (&x + x.transpose()) * 0.5
 }
 
 /// Left-hand side of the discrete equation at `x`.

@@ -1,31 +1,32 @@
 use clarabel::algebra::CscMatrix;
-use clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
-};
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
 use nalgebra::{DMatrix, DVector};
 
+use super::metric::Metric;
 use super::{Outcome, Solver};
 use crate::ModelError;
 
 /// The interior point method of the crate `clarabel`.
+///
+/// It is given the step from the target in units of the largest violation there, in the metric
+/// of the Hessian: then its tolerances are relative to what the step is about.
 pub struct Clarabel {
-    hessian: DMatrix<f64>,
-    linear: Vec<f64>,
+    metric: Metric,
+    y: DVector<f64>,
+    margins: DVector<f64>,
     bound: Vec<f64>,
     solver: DefaultSolver<f64>,
 }
 
-fn sparse(matrix: &DMatrix<f64>, upper: bool) -> CscMatrix<f64> {
+fn dense(matrix: &DMatrix<f64>) -> CscMatrix<f64> {
     let (rows, columns) = matrix.shape();
-    let (mut starts, mut indices, mut values) = (vec![0], Vec::new(), Vec::new());
-    for j in 0..columns {
-        for i in 0..if upper { j + 1 } else { rows } {
-            indices.push(i);
-            values.push(matrix[(i, j)]);
-        }
-        starts.push(indices.len());
-    }
-    CscMatrix::new(rows, columns, starts, indices, values)
+    CscMatrix::new(
+        rows,
+        columns,
+        (0..=columns).map(|j| j * rows).collect(),
+        (0..columns).flat_map(|_| 0..rows).collect(),
+        matrix.as_slice().to_vec(),
+    )
 }
 
 impl Clarabel {
@@ -37,15 +38,16 @@ impl Clarabel {
         iteration_limit: usize,
         time_limit: f64,
     ) -> Result<Self, ModelError> {
+        let metric = Metric::new(hessian, constraints)?;
         let (m, n) = constraints.shape();
         let settings = DefaultSettings {
             verbose: false,
             max_iter: iteration_limit.try_into().unwrap_or(u32::MAX),
             time_limit,
             presolve_enable: false,
-            tol_gap_abs: 1e-12,
-            tol_gap_rel: 1e-12,
-            tol_feas: 1e-12,
+            tol_gap_abs: 1e-11,
+            tol_gap_rel: 1e-11,
+            tol_feas: 1e-11,
             reduced_tol_gap_abs: 1e-9,
             reduced_tol_gap_rel: 1e-9,
             reduced_tol_feas: 1e-9,
@@ -53,9 +55,9 @@ impl Clarabel {
         };
         let cones = [NonnegativeConeT(m)];
         let solver = DefaultSolver::new(
-            &sparse(hessian, true),
+            &CscMatrix::identity(n),
             &vec![0.0; n],
-            &sparse(&-constraints, false),
+            &dense(&-metric.normals.transpose()),
             &vec![0.0; m],
             if m > 0 { &cones } else { &[] },
             settings,
@@ -65,8 +67,9 @@ impl Clarabel {
             reason: error.to_string(),
         })?;
         Ok(Self {
-            hessian: hessian.clone(),
-            linear: vec![0.0; n],
+            metric,
+            y: DVector::zeros(n),
+            margins: DVector::zeros(m),
             bound: vec![0.0; m],
             solver,
         })
@@ -80,21 +83,30 @@ impl Solver for Clarabel {
         bound: &DVector<f64>,
         solution: &mut DVector<f64>,
     ) -> Outcome {
-        for (linear, column) in self.linear.iter_mut().zip(self.hessian.column_iter()) {
-            *linear = -column.dot(target);
+        self.y.gemv(1.0, &self.metric.to, target, 0.0);
+        self.margins
+            .gemv_tr(1.0, &self.metric.normals, &self.y, 0.0);
+        for (i, kept) in self.bound.iter_mut().enumerate() {
+            *kept = self.metric.margin(i, self.margins[i], bound);
         }
-        for (kept, b) in self.bound.iter_mut().zip(bound.iter()) {
-            *kept = -b;
+        let violation = self.bound.iter().fold(0.0, |most: f64, margin| most.max(-margin));
+        if violation == 0.0 {
+            solution.copy_from(target);
+            return Outcome::Solved { iterations: 0 };
         }
-        let updated = self.solver.update_q(&self.linear).is_ok()
-            && self.solver.update_b(&self.bound).is_ok();
-        if !updated {
+        for kept in &mut self.bound {
+            *kept /= violation;
+        }
+        if self.solver.update_b(&self.bound).is_err() {
             return Outcome::Failed;
         }
         self.solver.solve();
-        solution.copy_from_slice(&self.solver.solution.x);
+        for (y, step) in self.y.iter_mut().zip(&self.solver.solution.x) {
+            *y += violation * step;
+        }
+        solution.gemv(1.0, &self.metric.from, &self.y, 0.0);
         match self.solver.solution.status {
-            // Almost solved: short of 1e-12 but within the reduced tolerances.
+            // Almost solved: within the reduced tolerances.
             SolverStatus::Solved | SolverStatus::AlmostSolved => Outcome::Solved {
                 iterations: self.solver.solution.iterations as usize,
             },

@@ -1,7 +1,8 @@
 use std::time::{Duration, Instant};
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
+use super::metric::Metric;
 use super::{Outcome, Solver};
 use crate::ModelError;
 
@@ -10,23 +11,15 @@ use crate::ModelError;
 /// for solving strictly convex quadratic programs", 1983).
 ///
 /// It starts at the minimiser without constraints and adds the most violated constraint, dropping
-/// those whose multiplier would turn negative, until none is violated. With `H = L L'` all of it
-/// happens in `y = L' x`, where the metric is the plain one; the inverse of `L` and the
-/// constraints' normals in `y`, of length one, are made once. `Q` and `R` factor the active
-/// normals.
+/// those whose multiplier would turn negative, until none is violated. All of it happens in the
+/// metric of the Hessian, whose factors and the constraints' normals there are made once. `Q` and
+/// `R` factor the active normals.
 #[derive(Debug, Clone)]
 pub struct Kwik {
     n: usize,
     iteration_limit: usize,
     time_limit: Option<Duration>,
-    /// `L'`, to go to `y`.
-    to_metric: DMatrix<f64>,
-    /// `L^-T`, to come back.
-    from_metric: DMatrix<f64>,
-    /// Normals in `y`, n x m, one column a constraint.
-    normals: DMatrix<f64>,
-    /// Lengths that the normals had.
-    lengths: DVector<f64>,
+    metric: Metric,
     // Work of a solve.
     y: DVector<f64>,
     margins: DVector<f64>,
@@ -54,35 +47,12 @@ impl Kwik {
         iteration_limit: usize,
         time_limit: f64,
     ) -> Result<Self, ModelError> {
-        let no_solution = |reason: &str| ModelError::NoSolution {
-            equation: "the quadratic program",
-            reason: reason.into(),
-        };
         let (m, n) = constraints.shape();
-        let lower = Cholesky::new(hessian.clone())
-            .ok_or_else(|| no_solution("its Hessian is not positive definite"))?
-            .unpack();
-        let mut normals = lower
-            .solve_lower_triangular(&constraints.transpose())
-            .ok_or_else(|| no_solution("its Hessian is singular"))?;
-        let from_metric = lower
-            .transpose()
-            .solve_upper_triangular(&DMatrix::identity(n, n))
-            .ok_or_else(|| no_solution("its Hessian is singular"))?;
-        let lengths = DVector::from_fn(m, |i, _| normals.column(i).norm());
-        for (mut normal, &length) in normals.column_iter_mut().zip(lengths.iter()) {
-            if length > 0.0 {
-                normal /= length;
-            }
-        }
         Ok(Self {
             n,
             iteration_limit,
             time_limit: Duration::try_from_secs_f64(time_limit).ok(),
-            to_metric: lower.transpose(),
-            from_metric,
-            normals,
-            lengths,
+            metric: Metric::new(hessian, constraints)?,
             y: DVector::zeros(n),
             margins: DVector::zeros(m),
             q: DMatrix::identity(n, n),
@@ -98,16 +68,12 @@ impl Kwik {
 
     /// Most violated constraint, if any is violated beyond rounding.
     fn most_violated(&mut self, bound: &DVector<f64>) -> Option<usize> {
-        self.margins.gemv_tr(1.0, &self.normals, &self.y, 0.0);
+        self.margins
+            .gemv_tr(1.0, &self.metric.normals, &self.y, 0.0);
         let size = 1.0 + self.y.amax();
         let (mut worst, mut at) = (-TOLERANCE * size, None);
         for i in 0..self.margins.len() {
-            let length = self.lengths[i];
-            let margin = if length > 0.0 {
-                self.margins[i] - bound[i] / length
-            } else {
-                -bound[i]
-            };
+            let margin = self.metric.margin(i, self.margins[i], bound);
             self.margins[i] = margin;
             if margin < worst && !self.is_active[i] {
                 (worst, at) = (margin, Some(i));
@@ -121,7 +87,7 @@ impl Kwik {
     fn find_steps(&mut self, constraint: usize) -> f64 {
         let count = self.active.len();
         self.d
-            .gemv_tr(1.0, &self.q, &self.normals.column(constraint), 0.0);
+            .gemv_tr(1.0, &self.q, &self.metric.normals.column(constraint), 0.0);
         self.step.gemv(
             1.0,
             &self.q.columns(count, self.n - count),
@@ -208,7 +174,7 @@ impl Solver for Kwik {
         self.active.clear();
         self.is_active.fill(false);
         self.q.fill_with_identity();
-        self.y.gemv(1.0, &self.to_metric, target, 0.0);
+        self.y.gemv(1.0, &self.metric.to, target, 0.0);
 
         let mut iterations = 0;
         while let Some(constraint) = self.most_violated(bound) {
@@ -259,7 +225,7 @@ impl Solver for Kwik {
                 }
             }
         }
-        solution.gemv(1.0, &self.from_metric, &self.y, 0.0);
+        solution.gemv(1.0, &self.metric.from, &self.y, 0.0);
         Outcome::Solved { iterations }
     }
 }

@@ -2,6 +2,7 @@
 
 mod clarabel;
 mod kwik;
+mod metric;
 
 pub use self::clarabel::Clarabel;
 pub use self::kwik::Kwik;
@@ -34,3 +35,6 @@ pub enum Outcome {
     /// There is no feasible point, or the numbers are not finite.
     Failed,
 }
+
+#[cfg(test)]
+mod tests;
