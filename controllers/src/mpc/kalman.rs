@@ -38,7 +38,10 @@ impl SteadyStateKalmanFilter {
             size = DVector::from_fn(a.nrows(), |i, _| {
                 solution.m[(i, i)] * solution.from[(i, i)].powi(2)
             });
-            if best.as_ref().is_none_or(|best| solution.residual < best.residual) {
+            if best
+                .as_ref()
+                .is_none_or(|best| solution.residual < best.residual)
+            {
                 best = Some(solution);
             }
         }
@@ -137,16 +140,10 @@ mod tests {
     #[test]
     fn a_measured_random_walk_has_its_closed_form_gain() {
         // M² - q M - q r = 0, K = M / (M + r).
-        let (q, r) = (0.09, 0.25);
+        let (q, r): (f64, f64) = (0.09, 0.25);
         let one = dmatrix![1.0];
-        let filter = SteadyStateKalmanFilter::new(
-            &one,
-            &one,
-            &dmatrix![q],
-            &dmatrix![r],
-        )
-        .unwrap();
-        let m = (q + (q * q + 4.0 * q * r as f64).sqrt()) / 2.0;
+        let filter = SteadyStateKalmanFilter::new(&one, &one, &dmatrix![q], &dmatrix![r]).unwrap();
+        let m = (q + (q * q + 4.0 * q * r).sqrt()) / 2.0;
         assert!((filter.gain[(0, 0)] - m / (m + r)).abs() < 1e-13);
         assert!(filter.residual < 1e-14);
     }
@@ -154,14 +151,9 @@ mod tests {
     #[test]
     fn a_walk_that_nothing_drives_is_refused_by_the_names_of_its_parameters() {
         let one = dmatrix![1.0];
-        let error = SteadyStateKalmanFilter::new(
-            &one,
-            &one,
-            &dmatrix![0.0],
-            &one,
-        )
-        .unwrap_err()
-        .to_string();
+        let error = SteadyStateKalmanFilter::new(&one, &one, &dmatrix![0.0], &one)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("no stabilising solution"), "{error}");
         assert!(error.contains("`process_noise`"), "{error}");
     }

@@ -5,6 +5,7 @@
 
 pub mod disturbance;
 pub mod kalman;
+mod memory;
 pub mod parameters;
 pub mod prediction;
 pub mod problem;
@@ -12,6 +13,7 @@ pub mod solver;
 
 use nalgebra::{DMatrix, DVector};
 
+pub use self::memory::{Counters, Memory, Plan};
 pub use self::parameters::{
     LowLevelLaw, MAXIMUM_DELAY, MAXIMUM_HORIZON, MAXIMUM_ORDER, Noise, Outlook, OutputLimits,
     Parameters, SolverChoice, Weights, prediction_plant,
@@ -23,10 +25,6 @@ use self::problem::{Found, ReducedProblem, Workspace};
 use self::solver::{Clarabel, Kwik, Solver};
 use crate::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use crate::{Controller, ModelError, Motion};
-
-/// Most states of the prediction: a plant, the commands on their way to the valve, the integral,
-/// three disturbances.
-const LOOP_STATES: usize = MAXIMUM_ORDER + MAXIMUM_DELAY + 1 + CHANNELS;
 
 /// Model predictive control: what it was built from, what it remembers, and what follows from the
 /// first alone.
@@ -43,52 +41,6 @@ pub struct ModelPredictiveControl {
     estimate: DVector<f64>,
     state: DVector<f64>,
     next_state: DVector<f64>,
-}
-
-/// What model predictive control remembers from sample to sample: plain data.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub struct Memory {
-    /// `x_c[k|k-1]` of Eq 5-11.
-    pub prediction: [f64; LOOP_STATES],
-    /// Integral part of three-variable control, V.
-    pub integral: f64,
-    /// Commands on their way to three-variable control, oldest first.
-    pub command_line: [[f64; CHANNELS]; MAXIMUM_DELAY],
-    /// Latest command.
-    pub command: [f64; CHANNELS],
-    /// Reference acceleration one sample ago, m/s², absent before the first.
-    pub reference_acceleration: Option<f64>,
-    /// Latest plan.
-    pub plan: Option<Plan>,
-    /// What happened so far.
-    pub counters: Counters,
-}
-
-/// Numbers from which the plan of a step follows.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub struct Plan {
-    /// Samples since it was made.
-    pub age: usize,
-    sequence: [f64; MAXIMUM_HORIZON],
-    state: [f64; LOOP_STATES],
-    previous: [f64; CHANNELS],
-}
-
-/// Counts since the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-pub struct Counters {
-    /// Steps whose optimum was the minimiser without limits.
-    pub shortcuts: u32,
-    /// Steps that the solver solved.
-    pub solved: u32,
-    /// Iterations of the solver in the latest step.
-    pub iterations: u32,
-    /// Iterations of the solver in all steps.
-    pub total_iterations: u64,
-    /// Steps that went on along the previous plan because the solver failed or ran out of time.
-    pub shifted_plans: u32,
-    /// Steps left to three-variable control alone because no plan reached so far.
-    pub low_level_alone: u32,
 }
 
 /// What model predictive control is told.
@@ -137,7 +89,8 @@ impl ModelPredictiveControl {
             LowLevelLaw::Continuous => LoopModel::continuous(&p.plant, gains, p.period),
         };
         let filter = design_filter(&model, p)?;
-        let problem = ReducedProblem::new(&model, p.horizon, &p.weights, &p.limits, p.valve_limit())?;
+        let problem =
+            ReducedProblem::new(&model, p.horizon, &p.weights, &p.limits, p.valve_limit())?;
         let (hessian, constraints) = (&problem.hessian, &problem.constraints);
         let solver: Box<dyn Solver> = match p.solver {
             SolverChoice::Kwik => Box::new(Kwik::new(
@@ -196,8 +149,7 @@ impl ModelPredictiveControl {
     /// Measurement update (Eq 5-10): `self.estimate` becomes `x_c[k|k]`.
     fn correct(&mut self, measured: &Motion) {
         let n = self.estimate.len();
-        self.estimate
-            .copy_from_slice(&self.memory.prediction[..n]);
+        self.estimate.copy_from_slice(&self.memory.prediction[..n]);
         self.innovation.copy_from_slice(&[
             measured.displacement,
             measured.velocity,
@@ -213,11 +165,9 @@ impl ModelPredictiveControl {
     fn predict_start(&mut self) {
         self.state.copy_from(&self.estimate);
         for command in &self.memory.command_line[..self.parameters.command_delay_samples] {
-            self.next_state
-                .gemv(1.0, &self.model.a, &self.state, 0.0);
+            self.next_state.gemv(1.0, &self.model.a, &self.state, 0.0);
             for (j, value) in command.iter().enumerate() {
-                self.next_state
-                    .axpy(*value, &self.model.b.column(j), 1.0);
+                self.next_state.axpy(*value, &self.model.b.column(j), 1.0);
             }
             std::mem::swap(&mut self.state, &mut self.next_state);
         }
@@ -240,8 +190,7 @@ impl ModelPredictiveControl {
                     let t = (first + i) as f64 * p.period;
                     Motion {
                         displacement: now.displacement
-                            + t * (now.velocity
-                                + t * (now.acceleration / 2.0 + t * change / 6.0)),
+                            + t * (now.velocity + t * (now.acceleration / 2.0 + t * change / 6.0)),
                         velocity: now.velocity + t * (now.acceleration + t * change / 2.0),
                         acceleration: now.acceleration + t * change,
                     }
@@ -324,10 +273,7 @@ impl ModelPredictiveControl {
     fn advance(&mut self, command: [f64; CHANNELS], measured: &Motion) {
         let p = &self.parameters;
         let memory = &mut self.memory;
-        let arriving = push(
-            &mut memory.command_line[..p.command_delay_samples],
-            command,
-        );
+        let arriving = push(&mut memory.command_line[..p.command_delay_samples], command);
         memory.command = command;
         let input = ThreeVariableInput {
             reference: Motion {
@@ -400,10 +346,7 @@ impl Controller for ModelPredictiveControl {
     }
 }
 
-fn design_filter(
-    model: &LoopModel,
-    p: &Parameters,
-) -> Result<SteadyStateKalmanFilter, ModelError> {
+fn design_filter(model: &LoopModel, p: &Parameters) -> Result<SteadyStateKalmanFilter, ModelError> {
     let size = model.order();
     let deviations = nalgebra::dvector![p.noise.valve, p.noise.force];
     let noise = &model.aside * DMatrix::from_diagonal(&deviations);

@@ -220,11 +220,7 @@ const RATE_WEIGHTS: [&str; CHANNELS] = [
     "velocity_rate_weight",
     "acceleration_rate_weight",
 ];
-const SCALES: [&str; CHANNELS] = [
-    "displacement_scale",
-    "velocity_scale",
-    "acceleration_scale",
-];
+const SCALES: [&str; CHANNELS] = ["displacement_scale", "velocity_scale", "acceleration_scale"];
 const MINIMA: [&str; CHANNELS] = [
     "minimum_displacement",
     "minimum_velocity",
@@ -337,7 +333,12 @@ impl Parameters {
                 ModelError::require_finite("plant", value)?;
             }
         }
-        match plant.d.view((0, 0), (CHANNELS, 1)).iter().find(|d| **d != 0.0) {
+        match plant
+            .d
+            .view((0, 0), (CHANNELS, 1))
+            .iter()
+            .find(|d| **d != 0.0)
+        {
             Some(&value) => Err(ModelError::Parameter {
                 name: "plant",
                 value,

@@ -201,7 +201,8 @@ impl LoopModel {
             let output = i + 1 + self.delay;
             let mut rows = free.rows_mut(CHANNELS * i, CHANNELS);
             rows.copy_from(&to_state[output]);
-            rows.columns_mut(n - CHANNELS, CHANNELS).fill_with_identity();
+            rows.columns_mut(n - CHANNELS, CHANNELS)
+                .fill_with_identity();
             for j in 0..p.min(output) {
                 forced
                     .view_mut((CHANNELS * i, j), (CHANNELS, 1))

@@ -112,7 +112,9 @@ impl ReducedProblem {
         let small = (&small + small.transpose()) * 0.5;
 
         let mut linear = DMatrix::zeros(p, CHANNELS * p + n + CHANNELS);
-        linear.columns_mut(0, CHANNELS * p).copy_from(&tracking_gain);
+        linear
+            .columns_mut(0, CHANNELS * p)
+            .copy_from(&tracking_gain);
         linear
             .columns_mut(CHANNELS * p, n)
             .copy_from(&-(&tracking_gain * &response.free + &price_gain * &response.offset));
@@ -208,8 +210,7 @@ impl ReducedProblem {
     pub fn optimise(&self, work: &mut Workspace, solver: &mut dyn Solver) -> Found {
         self.prepare(work);
         // The slack of the target is zero.
-        work.margin
-            .gemv(1.0, &self.constraints, &work.target, 0.0);
+        work.margin.gemv(1.0, &self.constraints, &work.target, 0.0);
         if (0..work.bound.len()).all(|i| work.margin[i] >= work.bound[i]) {
             work.solution.copy_from(&work.target);
             return if work.solution.iter().all(|w| w.is_finite()) {

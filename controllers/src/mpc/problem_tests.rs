@@ -120,7 +120,9 @@ impl LargeProblem {
 
 fn small_optimum(control: &mut ModelPredictiveControl, given: &DVector<f64>) -> DVector<f64> {
     control.work.given.copy_from(given);
-    let found = control.problem.optimise(&mut control.work, &mut *control.solver);
+    let found = control
+        .problem
+        .optimise(&mut control.work, &mut *control.solver);
     assert_ne!(found, Found::No);
     let p = control.parameters.horizon;
     DVector::from_fn(3 * p + 1, |i, _| {
@@ -203,7 +205,9 @@ fn small_problem_has_the_optimum_of_the_large_one() {
             };
             assert!(small <= best * (1.0 + gap) + 1e-15, "{small:e} {best:e}");
         }
-        println!("seed {seed}: {worst:e} V of {largest:.2} at most, {active} of 100 with active limits");
+        println!(
+            "seed {seed}: {worst:e} V of {largest:.2} at most, {active} of 100 with active limits"
+        );
         assert!(worst < 1e-6, "seed {seed}: {worst:e} V");
         assert!((10..90).contains(&active), "{active} active");
     }
@@ -221,9 +225,16 @@ fn reduction_makes_a_well_conditioned_problem_of_rank_fifteen() {
     let condition = values.max() / values.min();
     assert!((1e9..4e9).contains(&condition), "{condition:e}");
     let singular = (&large.tracking * &large.forced).singular_values();
-    let rank = singular.iter().filter(|s| **s > 1e-10 * singular.max()).count();
+    let rank = singular
+        .iter()
+        .filter(|s| **s > 1e-10 * singular.max())
+        .count();
     assert_eq!(rank, 15);
-    assert!(control.problem().condition() < 75.0, "{}", control.problem().condition());
+    assert!(
+        control.problem().condition() < 75.0,
+        "{}",
+        control.problem().condition()
+    );
 
     let continuous = ModelPredictiveControl::new(Parameters {
         law: LowLevelLaw::Continuous,
@@ -257,7 +268,10 @@ fn sampled_prediction_is_what_plant_and_law_do() {
             let predicted = &model.c * &s;
             for j in 0..3 {
                 let error = (predicted[j] - y[j]).abs();
-                assert!(error < 1e-11 * (1.0 + y[j].abs()), "seed {seed}, output {j}: {error:e}");
+                assert!(
+                    error < 1e-11 * (1.0 + y[j].abs()),
+                    "seed {seed}, output {j}: {error:e}"
+                );
             }
             let mut draw = |size: f64| random.random_range(-size..size);
             let r = [draw(0.005), draw(0.05), draw(1.0)];

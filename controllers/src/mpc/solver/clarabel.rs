@@ -89,7 +89,10 @@ impl Solver for Clarabel {
         for (i, kept) in self.bound.iter_mut().enumerate() {
             *kept = self.metric.margin(i, self.margins[i], bound);
         }
-        let violation = self.bound.iter().fold(0.0, |most: f64, margin| most.max(-margin));
+        let violation = self
+            .bound
+            .iter()
+            .fold(0.0, |most: f64, margin| most.max(-margin));
         if violation == 0.0 {
             solution.copy_from(target);
             return Outcome::Solved { iterations: 0 };

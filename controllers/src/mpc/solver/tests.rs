@@ -90,7 +90,10 @@ fn small_problems_agree_with_all_active_sets_tried() {
         let wanted = by_enumeration(&problem);
         for solver in [&mut kwik as &mut dyn Solver, &mut clarabel] {
             let (outcome, x) = solve(solver, &problem);
-            assert!(matches!(outcome, Outcome::Solved { .. }), "{case}: {outcome:?}");
+            assert!(
+                matches!(outcome, Outcome::Solved { .. }),
+                "{case}: {outcome:?}"
+            );
             let error = (&x - &wanted).amax();
             assert!(error < 1e-6, "case {case} of seed 7: {error:e}");
         }
@@ -130,8 +133,9 @@ fn constraints_given_twice_do_no_harm() {
         let (mut once, _) = both(&problem);
         let (_, wanted) = solve(&mut once, &problem);
         let (a, b) = (&problem.constraints, &problem.bound);
-        problem.constraints =
-            DMatrix::from_fn(40, 6, |i, j| a[(i / 2, j)] * if i % 2 == 0 { 1.0 } else { 3.0 });
+        problem.constraints = DMatrix::from_fn(40, 6, |i, j| {
+            a[(i / 2, j)] * if i % 2 == 0 { 1.0 } else { 3.0 }
+        });
         problem.bound = DVector::from_fn(40, |i, _| b[i / 2] * if i % 2 == 0 { 1.0 } else { 3.0 });
         let (mut twice, _) = both(&problem);
         let (outcome, x) = solve(&mut twice, &problem);
