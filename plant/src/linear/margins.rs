@@ -35,33 +35,48 @@ pub const BANDWIDTH_DROP_DB: f64 = 3.0;
 /// A sampled loop is searched up to its Nyquist frequency, where its response is real: a
 /// crossing of -180 degrees at that very end counts.
 pub fn margins(response: impl Fn(f64) -> Complex<f64>, first: f64, last: f64) -> Margins {
-    let grid = grid(first, last);
-    let values: Vec<_> = grid.iter().map(|&omega| response(omega)).collect();
+    let grid = sampled(&response, first, last);
     let mut found = Margins::default();
-    for (pair, value) in grid.windows(2).zip(values.windows(2)) {
-        if (value[0].norm() - 1.0) * (value[1].norm() - 1.0) < 0.0 {
-            let omega = bisect(pair, |omega| response(omega).norm() - 1.0);
-            let margin = (-response(omega)).arg().to_degrees();
-            if found
-                .phase_margin_deg
-                .is_none_or(|best| margin.abs() < best.abs())
-            {
-                found.crossover = Some(omega);
-                found.phase_margin_deg = Some(margin);
-            }
+    for omega in crossings(&grid, &response) {
+        let margin = (-response(omega)).arg().to_degrees();
+        if found
+            .phase_margin_deg
+            .is_none_or(|best| margin.abs() < best.abs())
+        {
+            found.crossover = Some(omega);
+            found.phase_margin_deg = Some(margin);
         }
-        if value[0].im * value[1].im < 0.0 && value[0].re.min(value[1].re) < 0.0 {
-            let omega = bisect(pair, |omega| response(omega).im);
+    }
+    for pair in grid.windows(2) {
+        let [(low, before), (high, after)] = [pair[0], pair[1]];
+        if before.im * after.im < 0.0 && before.re.min(after.re) < 0.0 {
+            let omega = bisect(low, high, |omega| response(omega).im);
             take_gain_margin(&mut found, omega, response(omega));
         }
     }
-    if let Some(end) = values.last()
-        && end.re < 0.0
+    if let Some(&(_, end)) = grid.last()
         && end.im.abs() <= 1e-9 * end.re.abs()
     {
-        take_gain_margin(&mut found, last, *end);
+        take_gain_margin(&mut found, last, end);
     }
     found
+}
+
+/// Every angular frequency (rad/s) between `first` and `last` at which the gain of the open loop
+/// crosses one, ascending.
+pub fn crossovers(response: impl Fn(f64) -> Complex<f64>, first: f64, last: f64) -> Vec<f64> {
+    crossings(&sampled(&response, first, last), &response)
+}
+
+fn crossings(
+    grid: &[(f64, Complex<f64>)],
+    response: &impl Fn(f64) -> Complex<f64>,
+) -> Vec<f64> {
+    let above = |value: Complex<f64>| value.norm() - 1.0;
+    grid.windows(2)
+        .filter(|pair| above(pair[0].1) * above(pair[1].1) < 0.0)
+        .map(|pair| bisect(pair[0].0, pair[1].0, |omega| above(response(omega))))
+        .collect()
 }
 
 fn take_gain_margin(found: &mut Margins, omega: f64, value: Complex<f64>) {
@@ -87,7 +102,7 @@ pub fn bandwidth(response: impl Fn(f64) -> Complex<f64>, first: f64, last: f64) 
     grid(first, last)
         .windows(2)
         .find(|pair| above(pair[1]) < 0.0)
-        .map(|pair| bisect(pair, above))
+        .map(|pair| bisect(pair[0], pair[1], above))
 }
 
 /// Largest magnitude of the sensitivity `1 / (1 + L)`: the inverse of the loop's distance from
@@ -119,8 +134,18 @@ fn grid(first: f64, last: f64) -> Vec<f64> {
     grid
 }
 
-fn bisect(pair: &[f64], value: impl Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high) = (pair[0], pair[1]);
+fn sampled(
+    response: &impl Fn(f64) -> Complex<f64>,
+    first: f64,
+    last: f64,
+) -> Vec<(f64, Complex<f64>)> {
+    grid(first, last)
+        .into_iter()
+        .map(|omega| (omega, response(omega)))
+        .collect()
+}
+
+fn bisect(mut low: f64, mut high: f64, value: impl Fn(f64) -> f64) -> f64 {
     let rising = value(high) > 0.0;
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
