@@ -92,9 +92,8 @@ mod tests {
             force_share,
             ..ControlAllocation::default()
         };
-        let refusal = |allocation: ControlAllocation| {
-            allocation.validate().unwrap_err().to_string()
-        };
+        let refusal =
+            |allocation: ControlAllocation| allocation.validate().unwrap_err().to_string();
         assert!(refusal(with(0.0, 0.0)).contains("`force_share`"));
         assert!(refusal(with(-0.1, 0.5)).contains("`displacement_share`"));
         assert!(refusal(with(0.1, f64::NAN)).contains("`force_share`"));

@@ -139,11 +139,7 @@ mod tests {
             pole: p,
         } = law.coefficients;
         let w = 2.0 / h;
-        let b = [
-            w * w + n1 * w + n0,
-            2.0 * (n0 - w * w),
-            w * w - n1 * w + n0,
-        ];
+        let b = [w * w + n1 * w + n0, 2.0 * (n0 - w * w), w * w - n1 * w + n0];
         let a = [w * (w + p), -2.0 * w * w, w * (w - p)];
         let (mut e, mut u) = ([0.0; 2], [0.0; 2]);
         for k in 0..2000_i32 {
@@ -155,10 +151,8 @@ mod tests {
                 },
                 h,
             );
-            let expected = (g * (b[0] * error + b[1] * e[0] + b[2] * e[1])
-                - a[1] * u[0]
-                - a[2] * u[1])
-                / a[0];
+            let expected =
+                (g * (b[0] * error + b[1] * e[0] + b[2] * e[1]) - a[1] * u[0] - a[2] * u[1]) / a[0];
             assert!((command - expected).abs() < 1e-9, "{command} {expected}");
             e = [error, e[0]];
             u = [expected, u[0]];

@@ -95,8 +95,8 @@ impl LinearLaw {
             numerator_constant: n0,
             pole: p,
         } = *coefficients;
-        let continuous =
-            TransferFunction::new(&[gain, gain * n1, gain * n0], &[1.0, p, 0.0])?.to_state_space()?;
+        let continuous = TransferFunction::new(&[gain, gain * n1, gain * n0], &[1.0, p, 0.0])?
+            .to_state_space()?;
         // Memory (error, lag, integral) of the law as it runs.
         let (half, damping) = (0.5 * period, 1.0 / (1.0 + 0.5 * period * p));
         let lag = [half * damping, (1.0 - half * p) * damping, half * damping];
@@ -318,7 +318,9 @@ impl Loop {
             ),
         };
         let n = a.nrows();
-        let measured = |signals: &Signals| DMatrix::from_row_slice(1, MEASURED, &signals.as_slice()[..MEASURED]);
+        let measured = |signals: &Signals| {
+            DMatrix::from_row_slice(1, MEASURED, &signals.as_slice()[..MEASURED])
+        };
         let memory: usize = self
             .law
             .channels

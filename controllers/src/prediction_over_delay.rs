@@ -14,7 +14,7 @@ use plant::units::{INCH, LBF};
 
 use crate::allocation::{ControlAllocation, LoopCommands};
 use crate::pid::{Pid, PidInput};
-use crate::sliding_mode::{LowLevelReferences, SlidingModeInput, leaking_displacement_loop};
+use crate::sliding_mode::{LowLevelReferences, SlidingModeInput, displacement_loop, force_loop};
 use crate::{Controller, ModelError, Motion};
 
 /// Largest delay that can be predicted over, samples.
@@ -83,7 +83,7 @@ pub struct Foreseen {
 }
 
 impl PredictionOverDelay {
-    /// For a table sampled with `period`, the low-level loops of Eq 3-6 (leaking) and 3-7.
+    /// For a table sampled with `period`, the low-level loops and shares of Section 4.3.
     ///
     /// Refuses delays out of range by name, and a table that its displacement, velocity and force
     /// do not show (no stabilising Riccati solution).
@@ -97,13 +97,14 @@ impl PredictionOverDelay {
         shake_table.validate()?;
         let (a, b) = shake_table.dynamics();
         let (transition, input) = zero_order_hold(&a, &b, period);
+        let allocation = ControlAllocation::default();
         let prediction = Self {
             loop_delay_samples,
             command_delay_samples,
             reference_ahead: false,
-            displacement_loop: leaking_displacement_loop(),
-            force_loop: Pid::equation_3_7(),
-            allocation: ControlAllocation::default(),
+            displacement_loop: displacement_loop(&allocation),
+            force_loop: force_loop(&allocation),
+            allocation,
             transition,
             input,
             observer_gain: observer_gain(&transition, &input)?,

@@ -27,6 +27,11 @@
 //! band of the motions ([`DISPLACEMENT_INTEGRAL_LEAK`]); the force loop's, which is eight times
 //! as strong, stays whole and takes the valve's null shift. In steady state the force error is then
 //! zero: a bias `b` of the force cell offsets the table by `b / (m lambda K)`, and nothing drifts.
+//!
+//! # Limits
+//! A low-level loop that stops at the valve's 10 V reaches, through its share of one half, 5 V of the
+//! valve: too little for a strong motion under a specimen. The loops' limits are therefore the
+//! valve's over their shares, and the allocation limits the sum.
 
 use std::f64::consts::TAU;
 
@@ -35,6 +40,7 @@ use plant::rig::Rig;
 use plant::specimen::LinearSpecimen;
 use plant::table::Table;
 
+use crate::allocation::ControlAllocation;
 use crate::loops::{Controlled, LinearLaw, Loop, Time};
 use crate::pid::Pid;
 use crate::prediction_over_delay::PredictionOverDelay;
@@ -48,7 +54,7 @@ pub const DISPLACEMENT_INTEGRAL_LEAK: f64 = TAU * 0.25;
 const SEPARATION: f64 = 10.0;
 
 /// `lambda = K` of [`rate_by_rule`] on the identified table at 500 Hz with `beta = 0.5`, 1/s.
-pub const IDENTIFIED_RATE: f64 = 63.8;
+pub const IDENTIFIED_RATE: f64 = 69.6;
 
 /// The sliding-mode law.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -138,8 +144,9 @@ impl SlidingMode {
         let (lambda, k) = (self.surface_rate, self.reaching_rate);
         let switching = self.switching_gain
             * (self.surface(reference, measured) / self.boundary_layer).clamp(-1.0, 1.0);
-        let displacement_force = mass * lambda * k * (reference.displacement - measured.displacement)
-            + stiffness * measured.displacement;
+        let displacement_force =
+            mass * lambda * k * (reference.displacement - measured.displacement)
+                + stiffness * measured.displacement;
         let motion_force = mass * (k + lambda) * (reference.velocity - measured.velocity)
             + mass * reference.acceleration
             + self.specimen_mass * specimen_acceleration
@@ -212,11 +219,22 @@ impl Controller for SlidingMode {
     }
 }
 
-/// Displacement control of Eq 3-6 with the leak that it needs under sliding mode.
-pub fn leaking_displacement_loop() -> Pid {
+/// Displacement control of Eq 3-6 as it runs under sliding mode: its integral leaks, and its limit
+/// leaves the limiting of the valve to the allocation.
+pub fn displacement_loop(allocation: &ControlAllocation) -> Pid {
     Pid {
         integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
+        limit: allocation.limit / allocation.displacement_share,
         ..Pid::equation_3_6()
+    }
+}
+
+/// Force control of Eq 3-7 as it runs under sliding mode: its limit leaves the limiting of the
+/// valve to the allocation.
+pub fn force_loop(allocation: &ControlAllocation) -> Pid {
+    Pid {
+        limit: allocation.limit / allocation.force_share,
+        ..Pid::equation_3_7()
     }
 }
 

@@ -68,10 +68,7 @@ pub fn crossovers(response: impl Fn(f64) -> Complex<f64>, first: f64, last: f64)
     crossings(&sampled(&response, first, last), &response)
 }
 
-fn crossings(
-    grid: &[(f64, Complex<f64>)],
-    response: &impl Fn(f64) -> Complex<f64>,
-) -> Vec<f64> {
+fn crossings(grid: &[(f64, Complex<f64>)], response: &impl Fn(f64) -> Complex<f64>) -> Vec<f64> {
     let above = |value: Complex<f64>| value.norm() - 1.0;
     grid.windows(2)
         .filter(|pair| above(pair[0].1) * above(pair[1].1) < 0.0)
@@ -115,9 +112,12 @@ pub fn peak_sensitivity(
     grid(first, last)
         .into_iter()
         .map(|omega| (1.0 / (1.0 + response(omega)).norm(), omega))
-        .fold((0.0, first), |best, next| {
-            if next.0 > best.0 { next } else { best }
-        })
+        .fold(
+            (0.0, first),
+            |best, next| {
+                if next.0 > best.0 { next } else { best }
+            },
+        )
 }
 
 /// Nyquist frequency of a sampling period (s), rad/s.
@@ -197,8 +197,7 @@ mod tests {
     #[test]
     fn a_sampled_integrator_meets_minus_one_at_its_nyquist_frequency() {
         let (gain, period) = (300.0, 0.002);
-        let response =
-            |omega: f64| gain * period / (Complex::new(0.0, omega * period).exp() - 1.0);
+        let response = |omega: f64| gain * period / (Complex::new(0.0, omega * period).exp() - 1.0);
         let found = margins(response, 1e-2, nyquist(period));
         // L(-1) = -gain h / 2.
         let expected = -20.0 * (gain * period / 2.0).log10();

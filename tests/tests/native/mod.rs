@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use controllers::allocation::{ControlAllocation, LoopCommands};
 use controllers::loop_shaping::LoopShaping;
 use controllers::pid::{Pid, PidInput};
-use controllers::sliding_mode::{SlidingMode, SlidingModeInput, leaking_displacement_loop};
+use controllers::sliding_mode::{SlidingMode, SlidingModeInput, displacement_loop, force_loop};
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion};
 use nalgebra::{DVector, dvector};
@@ -35,7 +35,10 @@ pub struct Run {
 impl Run {
     /// `100 rms(a_ref - a) / max|a_ref|`.
     pub fn time_domain_percent(&self, reference: &[Motion]) -> f64 {
-        let peak = reference.iter().map(|r| r.acceleration.abs()).fold(0.0, f64::max);
+        let peak = reference
+            .iter()
+            .map(|r| r.acceleration.abs())
+            .fold(0.0, f64::max);
         let sum: f64 = reference
             .iter()
             .zip(&self.motion)
@@ -46,14 +49,27 @@ impl Run {
 }
 
 /// Plays `reference` with `delay` samples between law and valve; `bias` is added to the sensors.
-pub fn run_biased(rig: &Rig, reference: &[Motion], delay: usize, bias: &Sensors, law: &mut dyn Law) -> Run {
+pub fn run_biased(
+    rig: &Rig,
+    reference: &[Motion],
+    delay: usize,
+    bias: &Sensors,
+    law: &mut dyn Law,
+) -> Run {
     let system = rig.state_space().sample(PERIOD);
     let mut x = DVector::zeros(system.order());
     let mut waiting = vec![0.0; delay];
-    let mut run = Run { motion: Vec::new(), command: Vec::new() };
+    let mut run = Run {
+        motion: Vec::new(),
+        command: Vec::new(),
+    };
     for r in reference {
         let y = &system.c * &x;
-        let motion = Motion { displacement: y[0], velocity: y[1], acceleration: y[2] };
+        let motion = Motion {
+            displacement: y[0],
+            velocity: y[1],
+            acceleration: y[2],
+        };
         let sensors = Sensors {
             motion: Motion {
                 displacement: y[0] + bias.motion.displacement,
@@ -81,7 +97,13 @@ pub struct ThreeVariableLaw(pub ThreeVariableControl);
 
 impl Law for ThreeVariableLaw {
     fn step(&mut self, reference: &Motion, sensors: &Sensors) -> f64 {
-        self.0.step(&ThreeVariableInput { reference: *reference, measured: sensors.motion }, PERIOD)
+        self.0.step(
+            &ThreeVariableInput {
+                reference: *reference,
+                measured: sensors.motion,
+            },
+            PERIOD,
+        )
     }
 }
 
@@ -90,7 +112,10 @@ pub struct DisplacementLaw<T>(pub T);
 impl<T: Controller<Input = PidInput, Output = f64>> Law for DisplacementLaw<T> {
     fn step(&mut self, reference: &Motion, sensors: &Sensors) -> f64 {
         self.0.step(
-            &PidInput { reference: reference.displacement, measured: sensors.motion.displacement },
+            &PidInput {
+                reference: reference.displacement,
+                measured: sensors.motion.displacement,
+            },
             PERIOD,
         )
     }
@@ -110,11 +135,12 @@ pub struct Hierarchy {
 
 impl Default for Hierarchy {
     fn default() -> Self {
+        let allocation = ControlAllocation::default();
         Self {
             sliding: SlidingMode::default(),
-            displacement: leaking_displacement_loop(),
-            force: Pid::equation_3_7(),
-            allocation: ControlAllocation::default(),
+            displacement: displacement_loop(&allocation),
+            force: force_loop(&allocation),
+            allocation,
         }
     }
 }
@@ -131,14 +157,26 @@ impl Law for Hierarchy {
             PERIOD,
         );
         let displacement_loop = self.displacement.step(
-            &PidInput { reference: references.displacement, measured: sensors.motion.displacement },
+            &PidInput {
+                reference: references.displacement,
+                measured: sensors.motion.displacement,
+            },
             PERIOD,
         );
         let force_loop = self.force.step(
-            &PidInput { reference: references.force, measured: sensors.force },
+            &PidInput {
+                reference: references.force,
+                measured: sensors.force,
+            },
             PERIOD,
         );
-        self.allocation.step(&LoopCommands { displacement_loop, force_loop }, PERIOD)
+        self.allocation.step(
+            &LoopCommands {
+                displacement_loop,
+                force_loop,
+            },
+            PERIOD,
+        )
     }
 }
 
