@@ -1,1 +1,9 @@
 //! Hydraulic shake tables as FMI components, co-simulated
+
+pub mod fmu;
+pub mod master;
+pub mod metrics;
+pub mod motion;
+pub mod report;
+pub mod system;
+pub mod units;

@@ -1,2 +1,125 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
-//! Shake table with its hydraulic actuator as an FMU
+//! Shake table with its hydraulic actuator as an FMU.
+
+use fmu_kit::{Component, ComponentResult, Dependency::Fixed, Variable};
+use plant::shake_table::{SampledShakeTable, ShakeTable as Rig, ShakeTableState};
+use serde::{Deserialize, Serialize};
+
+/// The identified shake table between valve command, specimen force and motion.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct ShakeTable {
+    rig: Rig,
+    state: ShakeTableState,
+    valve_command: f64,
+    specimen_force: f64,
+    acceleration: f64,
+    actuator_rates: [f64; 3],
+    #[serde(skip)]
+    sampled: Option<SampledShakeTable>,
+}
+
+impl Component for ShakeTable {
+    const NAME: &'static str = "ShakeTable";
+    const DESCRIPTION: &'static str = "Uniaxial shake table with its identified hydraulic actuator";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const PARTIAL_DERIVATIVES: bool = true;
+
+    fn variables() -> Vec<Variable<Self>> {
+        fmu_kit::table! { Self, s:
+            input("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0);
+            input("specimen_force", s.specimen_force, "Force of the specimen on the table", "N" => "lbf")
+                .nominal(400.0);
+            output("displacement", s.state.displacement, "Displacement of the table", "m" => "in")
+                .nominal(0.0381);
+            output("velocity", s.state.velocity, "Velocity of the table", "m/s" => "in/s")
+                .nominal(0.5).derivative_of("displacement");
+            output("acceleration", s.acceleration, "Absolute acceleration of the table", "m/s2" => "g")
+                .nominal(10.0).derivative_of("velocity")
+                .depends_on(&["specimen_force", "displacement", "velocity", "actuator_force"], Fixed)
+                .initially_depends_on(&["specimen_force", "table_mass"]);
+            output("actuator_force", s.state.actuator[0], "Force of the actuator on the table", "N" => "lbf")
+                .nominal(400.0);
+            parameter("table_mass", s.rig.table.mass, "Mass of the table", "kg" => "lbf.s2/in");
+            parameter("table_damping", s.rig.table.damping, "Viscous damping of the table", "N.s/m" => "lbf.s/in");
+            parameter("table_stiffness", s.rig.table.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
+            parameter("actuator_a2", s.rig.actuator.denominator[0], "Actuator, denominator, s^2", "1/s");
+            parameter("actuator_a1", s.rig.actuator.denominator[1], "Actuator, denominator, s", "1/s2");
+            parameter("actuator_a0", s.rig.actuator.denominator[2], "Actuator, denominator, constant", "1/s3");
+            parameter("actuator_b2", s.rig.actuator.voltage_to_force[0], "Valve command to force, s^2", "N/(V.s)" => "lbf/(V.s)");
+            parameter("actuator_b1", s.rig.actuator.voltage_to_force[1], "Valve command to force, s", "N/(V.s2)" => "lbf/(V.s2)");
+            parameter("actuator_b0", s.rig.actuator.voltage_to_force[2], "Valve command to force, constant", "N/(V.s3)" => "lbf/(V.s3)");
+            parameter("actuator_e2", s.rig.actuator.velocity_to_force[0], "Velocity to force, s^2", "N/m" => "lbf/in");
+            parameter("actuator_e1", s.rig.actuator.velocity_to_force[1], "Velocity to force, s", "N/(m.s)" => "lbf/(in.s)");
+            parameter("actuator_e0", s.rig.actuator.velocity_to_force[2], "Velocity to force, constant", "N/(m.s2)" => "lbf/(in.s2)");
+            local("actuator_state[2]", s.state.actuator[1], "Second state of the actuator", "N/s").nominal(1e5);
+            local("actuator_state[3]", s.state.actuator[2], "Third state of the actuator", "N/s2").nominal(1e6);
+            local("der(actuator_force)", s.actuator_rates[0], "Rate of the actuator's force", "N/s")
+                .derivative_of("actuator_force")
+                .depends_on(&["valve_command", "velocity", "actuator_force", "actuator_state[2]"], Fixed)
+                .initially_depends_on(&["valve_command", "actuator_b2"]);
+            local("der(actuator_state[2])", s.actuator_rates[1], "Rate of the second state", "N/s2")
+                .derivative_of("actuator_state[2]")
+                .depends_on(&["valve_command", "velocity", "actuator_force", "actuator_state[3]"], Fixed)
+                .initially_depends_on(&["valve_command", "actuator_b1"]);
+            local("der(actuator_state[3])", s.actuator_rates[2], "Rate of the third state", "N/s3")
+                .derivative_of("actuator_state[3]")
+                .depends_on(&["valve_command", "velocity", "actuator_force"], Fixed)
+                .initially_depends_on(&["valve_command", "actuator_b0"]);
+        }
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        self.rig.validate()?;
+        self.state = ShakeTableState::default();
+        self.sampled = Some(self.rig.sample(Self::STEP_SIZE));
+        Ok(())
+    }
+
+    fn update_outputs(&mut self, _time: f64) {
+        let ShakeTableState {
+            actuator: [z1, z2, z3],
+            velocity,
+            ..
+        } = self.state;
+        let actuator = &self.rig.actuator;
+        self.acceleration = self.rig.acceleration(&self.state, self.specimen_force);
+        for (i, next) in [z2, z3, 0.0].into_iter().enumerate() {
+            self.actuator_rates[i] = next - actuator.denominator[i] * z1
+                + actuator.voltage_to_force[i] * self.valve_command
+                + actuator.velocity_to_force[i] * velocity;
+        }
+    }
+
+    fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        let kept = self.sampled.filter(|sampled| sampled.step() == step_size);
+        let sampled = kept.unwrap_or_else(|| self.rig.sample(step_size));
+        self.sampled = Some(sampled);
+        self.state = sampled.advance(&self.state, self.valve_command, self.specimen_force);
+        Ok(())
+    }
+
+    fn partial_derivative(&self, unknown: &str, known: &str) -> f64 {
+        let (table, actuator) = (&self.rig.table, &self.rig.actuator);
+        let row = match unknown {
+            "acceleration" => {
+                return match known {
+                    "displacement" => -table.stiffness / table.mass,
+                    "velocity" => -table.damping / table.mass,
+                    _ => 1.0 / table.mass,
+                };
+            }
+            "der(actuator_force)" => 0,
+            "der(actuator_state[2])" => 1,
+            _ => 2,
+        };
+        match known {
+            "valve_command" => actuator.voltage_to_force[row],
+            "velocity" => actuator.velocity_to_force[row],
+            "actuator_force" => -actuator.denominator[row],
+            _ => 1.0,
+        }
+    }
+}
+
+fmu_kit::export!(ShakeTable);

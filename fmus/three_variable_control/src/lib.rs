@@ -1,2 +1,72 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
-//! Three-variable control as an FMU
+//! Three-variable control as an FMU.
+
+use controllers::{
+    Controller, Motion,
+    three_variable::{ThreeVariableControl as Law, ThreeVariableInput},
+};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use serde::{Deserialize, Serialize};
+
+/// Three-variable control from motion to valve command.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct ThreeVariableControl {
+    law: Law,
+    reference: Motion,
+    measured: Motion,
+    valve_command: f64,
+}
+
+const INPUTS: [&str; 6] = [
+    "reference_displacement",
+    "reference_velocity",
+    "reference_acceleration",
+    "measured_displacement",
+    "measured_velocity",
+    "measured_acceleration",
+];
+
+impl Component for ThreeVariableControl {
+    const NAME: &'static str = "ThreeVariableControl";
+    const DESCRIPTION: &'static str = "Three-variable control of a shake table";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+
+    fn variables() -> Vec<Variable<Self>> {
+        fmu_kit::table! { Self, s:
+            input("reference_displacement", s.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input("reference_velocity", s.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
+            input("reference_acceleration", s.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
+            input("measured_displacement", s.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+            input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
+            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0).depends_on(&INPUTS, Dependent);
+            parameter("proportional_gain", s.law.gains.proportional, "P of Table 3-2", "V/m" => "V/in");
+            parameter("integral_gain", s.law.gains.integral, "I of Table 3-2", "V/(m.s)" => "V/(in.s)");
+            parameter("velocity_feedback_gain", s.law.gains.velocity_feedback, "Kbv of Table 3-2", "V.s/m" => "V.s/in");
+            parameter("acceleration_feedback_gain", s.law.gains.acceleration_feedback, "Kba of Table 3-2", "V.s2/m" => "V.s2/in");
+            parameter("displacement_feedforward_gain", s.law.gains.displacement_feedforward, "Kfd of Table 3-2", "V/m" => "V/in");
+            parameter("velocity_feedforward_gain", s.law.gains.velocity_feedforward, "Kfv of Table 3-2", "V.s/m" => "V.s/in");
+            parameter("acceleration_feedforward_gain", s.law.gains.acceleration_feedforward, "Kfa of Table 3-2", "V.s2/m" => "V.s2/in");
+            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
+        }
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        self.law.validate()?;
+        self.law.reset();
+        self.valve_command = 0.0;
+        Ok(())
+    }
+
+    fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        let input = ThreeVariableInput {
+            reference: self.reference,
+            measured: self.measured,
+        };
+        self.valve_command = self.law.step(&input, step_size);
+        Ok(())
+    }
+}
+
+fmu_kit::export!(ThreeVariableControl);

@@ -1,0 +1,207 @@
+//! The published interface: `modelDescription.xml` of both versions and the documentation page.
+
+mod fmi2;
+mod fmi3;
+mod html;
+mod xml;
+
+pub use fmi2::fmi2;
+pub use fmi3::fmi3;
+pub use html::html;
+
+use std::collections::BTreeMap;
+
+use crate::{
+    component::Component,
+    model::Model,
+    units::{BASE, Unit},
+    variable::{Access, Causality, Dependency, Enumeration, Variability, Variable},
+};
+use xml::Element;
+
+/// End of the default experiment, s.
+const STOP_TIME: f64 = 10.0;
+
+fn causality(causality: Causality) -> &'static str {
+    match causality {
+        Causality::Parameter => "parameter",
+        Causality::Input => "input",
+        Causality::Output => "output",
+        Causality::Local => "local",
+    }
+}
+
+fn variability(variability: Variability) -> &'static str {
+    match variability {
+        Variability::Fixed => "fixed",
+        Variability::Tunable => "tunable",
+        Variability::Discrete => "discrete",
+        Variability::Continuous => "continuous",
+    }
+}
+
+fn kind(dependency: Dependency) -> &'static str {
+    match dependency {
+        Dependency::Dependent => "dependent",
+        Dependency::Constant => "constant",
+        Dependency::Fixed => "fixed",
+    }
+}
+
+/// Attribute `initial`; inputs have none.
+fn initial<C>(variable: &Variable<C>) -> Option<&'static str> {
+    match variable.causality {
+        Causality::Parameter => Some("exact"),
+        Causality::Input => None,
+        Causality::Output | Causality::Local => Some("calculated"),
+    }
+}
+
+/// The start value, for variables that have one.
+fn start<C: Component>(variable: &Variable<C>) -> Option<String> {
+    if variable.is_computed() {
+        return None;
+    }
+    let mut start = C::default();
+    Some(match &variable.access {
+        Access::Real(field) => field(&mut start).to_string(),
+        Access::Element(field, index) => field(&mut start)[*index].to_string(),
+        Access::Integer(field) | Access::Choice(field, _) => field(&mut start).to_string(),
+        Access::Boolean(field) => field(&mut start).to_string(),
+        Access::Text(field) => field(&mut start).clone(),
+    })
+}
+
+fn range<C>(variable: &Variable<C>, mut element: Element) -> Element {
+    element = element
+        .optional("min", variable.min)
+        .optional("max", variable.max);
+    if variable.access.is_real() {
+        element = element.optional("nominal", variable.nominal);
+    }
+    element
+}
+
+/// The units that the table uses, each with the display units that go with it.
+fn unit_definitions<C: Component>(model: &Model<C>) -> Option<Element> {
+    let mut units: BTreeMap<&str, Vec<&str>> = BTreeMap::from([("s", vec![])]);
+    for variable in &model.variables {
+        if let Some(unit) = variable.unit {
+            let shown = units.entry(unit).or_default();
+            shown.extend(variable.display_unit);
+            shown.sort_unstable();
+            shown.dedup();
+        }
+    }
+    let mut definitions = Element::new("UnitDefinitions");
+    for (name, shown) in units {
+        // The table was checked: its units can be read and converted.
+        let unit = Unit::parse(name).ok()?;
+        let mut base = Element::new("BaseUnit");
+        for (name, exponent) in BASE.iter().zip(unit.exponents) {
+            base = base.optional(name, (exponent != 0).then_some(exponent));
+        }
+        base = base.optional("factor", (unit.factor != 1.0).then_some(unit.factor));
+        let mut element = Element::new("Unit").attribute("name", name).child(base);
+        for name in shown {
+            let factor = unit.factor_to(&Unit::parse(name).ok()?)?;
+            element = element.child(
+                Element::new("DisplayUnit")
+                    .attribute("name", name)
+                    .attribute("factor", factor),
+            );
+        }
+        definitions = definitions.child(element);
+    }
+    Some(definitions)
+}
+
+/// The distinct enumeration types of the table.
+fn enumerations<C: Component>(model: &Model<C>) -> Vec<Enumeration> {
+    let mut types: Vec<Enumeration> = Vec::new();
+    for variable in &model.variables {
+        if let Access::Choice(_, choices) = &variable.access
+            && !types.iter().any(|t| t.name == choices.name)
+        {
+            types.push(*choices);
+        }
+    }
+    types
+}
+
+fn items(mut element: Element, choices: &Enumeration) -> Element {
+    for item in choices.items {
+        element = element.child(
+            Element::new("Item")
+                .attribute("name", item.name)
+                .attribute("value", item.value)
+                .attribute("description", item.description),
+        );
+    }
+    element
+}
+
+fn log_categories() -> Element {
+    let mut categories = Element::new("LogCategories");
+    for (name, description) in crate::log::CATEGORIES {
+        categories = categories.child(
+            Element::new("Category")
+                .attribute("name", name.to_string_lossy())
+                .attribute("description", description),
+        );
+    }
+    categories
+}
+
+fn default_experiment<C: Component>() -> Element {
+    Element::new("DefaultExperiment")
+        .attribute("startTime", 0)
+        .attribute("stopTime", STOP_TIME)
+        .attribute("stepSize", C::STEP_SIZE)
+}
+
+/// Positions of the unknowns at initialization: outputs, states, derivatives.
+fn initial_unknowns<C: Component>(model: &Model<C>) -> Vec<usize> {
+    let in_states = |i: usize| {
+        model
+            .states
+            .iter()
+            .any(|s| s.state == i || s.derivative == i)
+    };
+    (0..model.variables.len())
+        .filter(|i| model.variables[*i].causality == Causality::Output || in_states(*i))
+        .collect()
+}
+
+/// An unknown with its dependencies; `reference` is the name of the identifying attribute.
+fn unknown(
+    element: &str,
+    reference: &str,
+    index: usize,
+    on: impl Iterator<Item = (usize, Dependency)>,
+) -> Element {
+    let (mut dependencies, mut kinds) = (Vec::new(), Vec::new());
+    for (on, dependency) in on {
+        dependencies.push((on + 1).to_string());
+        kinds.push(kind(dependency));
+    }
+    Element::new(element)
+        .attribute(reference, index + 1)
+        .attribute("dependencies", dependencies.join(" "))
+        .attribute("dependenciesKind", kinds.join(" "))
+}
+
+fn initial_unknown<C: Component>(
+    model: &Model<C>,
+    element: &str,
+    reference: &str,
+    index: usize,
+) -> Element {
+    let on = model.initial_dependencies[index].iter();
+    unknown(
+        element,
+        reference,
+        index,
+        on.map(|on| (*on, Dependency::Dependent)),
+    )
+}

@@ -1,0 +1,225 @@
+//! One instance of a component: its life from instantiation to termination.
+
+use std::ffi::CString;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    component::Component,
+    fault::{Fault, Outcome},
+    log::Log,
+    model::Model,
+    phase::{Kind, Phase},
+};
+
+/// Everything about an instance that its saved state holds.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Snapshot<C: Component> {
+    /// The component's fields.
+    pub component: C,
+    /// Where it stands in the order of calls.
+    pub phase: Phase,
+    /// How it is driven.
+    pub kind: Kind,
+    /// Time, s.
+    pub time: f64,
+    /// End of the experiment, s, if the importer gave one.
+    pub stop_time: Option<f64>,
+    /// The experiment was set up.
+    pub set_up: bool,
+    /// Parameters changed since the component was last initialized.
+    pub unprepared: bool,
+    /// Something changed since the outputs were last computed.
+    pub stale: bool,
+}
+
+/// An instance of a component.
+pub struct Instance<C: Component> {
+    pub(crate) model: &'static Model<C>,
+    pub(crate) now: Snapshot<C>,
+    pub(crate) start: C,
+    pub(crate) log: Log,
+    pub(crate) poisoned: bool,
+    pub(crate) event_mode_used: bool,
+    pub(crate) texts: Vec<CString>,
+}
+
+impl<C: Component> Instance<C> {
+    /// An instance with the start values `start`.
+    pub fn new(model: &'static Model<C>, start: C, kind: Kind, log: Log) -> Self {
+        let texts = vec![CString::default(); model.variables.len()];
+        Self {
+            model,
+            now: Snapshot::new(start.clone(), kind),
+            start,
+            log,
+            poisoned: false,
+            event_mode_used: false,
+            texts,
+        }
+    }
+
+    pub(crate) fn require(&self, allowed: &[Phase]) -> Outcome {
+        if allowed.contains(&self.now.phase) {
+            return Ok(());
+        }
+        let names: Vec<_> = allowed.iter().map(|phase| phase.name()).collect();
+        Err(Fault::error(format!(
+            "wrong order of calls: not allowed {}, only {}",
+            self.now.phase.name(),
+            names.join(" or ")
+        )))
+    }
+
+    pub(crate) fn enter(&mut self, phase: Phase) {
+        self.now.phase = phase;
+        self.log
+            .event(&format!("now {}, t = {} s", phase.name(), self.now.time));
+    }
+
+    /// Sets start and end, s, of the experiment.
+    pub(crate) fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Outcome {
+        self.require(&[Phase::Instantiated])?;
+        if !start_time.is_finite() {
+            return Err(Fault::error(format!(
+                "start time {start_time} is not finite"
+            )));
+        }
+        if let Some(stop) = stop_time
+            && !(stop >= start_time)
+        {
+            return Err(Fault::error(format!(
+                "stop time {stop} s is not after the start time {start_time} s"
+            )));
+        }
+        self.now.time = start_time;
+        self.now.stop_time = stop_time;
+        self.now.set_up = true;
+        Ok(())
+    }
+
+    pub(crate) fn enter_initialization(&mut self) -> Outcome {
+        self.require(&[Phase::Instantiated])?;
+        self.now.stale = true;
+        self.now.unprepared = true;
+        self.enter(Phase::Initialization);
+        Ok(())
+    }
+
+    pub(crate) fn exit_initialization(&mut self) -> Outcome {
+        self.require(&[Phase::Initialization])?;
+        self.refresh()?;
+        self.enter(match self.now.kind {
+            Kind::CoSimulation => Phase::Step,
+            Kind::ModelExchange => Phase::Event,
+        });
+        Ok(())
+    }
+
+    /// Brings computed variables up to date.
+    #[inline]
+    pub(crate) fn refresh(&mut self) -> Outcome {
+        if !self.now.stale || !self.now.phase.computes() {
+            return Ok(());
+        }
+        if self.now.unprepared {
+            self.prepare()?;
+        }
+        self.now.component.update_outputs(self.now.time);
+        self.now.stale = false;
+        Ok(())
+    }
+
+    #[cold]
+    fn prepare(&mut self) -> Outcome {
+        if self.now.phase == Phase::Initialization {
+            let outcome = self.now.component.initialize();
+            outcome.map_err(|e| Fault::error(format!("cannot initialize: {e}")))?;
+        }
+        self.now.unprepared = false;
+        Ok(())
+    }
+
+    /// Steps from `time` to `time + step_size`, s.
+    #[inline]
+    pub(crate) fn do_step(&mut self, time: f64, step_size: f64) -> Outcome {
+        if self.now.phase != Phase::Step {
+            self.require(&[Phase::Step])?;
+        }
+        let slack = 1e-6 * step_size.abs() + 1e-12 * time.abs();
+        let in_place = (time - self.now.time).abs() <= slack;
+        let in_range = step_size > 0.0 && step_size.is_finite();
+        let in_time = self
+            .now
+            .stop_time
+            .is_none_or(|stop| time + step_size <= stop + slack);
+        let fits = C::ANY_STEP_SIZE || (step_size - C::STEP_SIZE).abs() <= slack;
+        if !(in_place && in_range && in_time && fits) {
+            return Err(self.refuse_step(time, step_size, in_place, in_range, in_time));
+        }
+        if let Err(problem) = self.now.component.step(time, step_size) {
+            self.now.phase = Phase::Failed;
+            return Err(Fault::error(format!(
+                "the step from t = {time} s to {} s failed: {problem}",
+                time + step_size
+            )));
+        }
+        self.now.time = time + step_size;
+        self.now.stale = true;
+        Ok(())
+    }
+
+    #[cold]
+    fn refuse_step(&self, t: f64, h: f64, place: bool, range: bool, in_time: bool) -> Box<Fault> {
+        Fault::error(if !range {
+            format!("step size {h} s at t = {t} s, expected a positive finite number")
+        } else if !place {
+            format!(
+                "communication point {t} s, but the instance stands at {} s",
+                self.now.time
+            )
+        } else if !in_time {
+            let stop = self.now.stop_time.unwrap_or(f64::INFINITY);
+            format!("the step from {t} s by {h} s goes past the stop time {stop} s")
+        } else {
+            format!(
+                "step size {h} s, but {} steps by {} s only",
+                C::NAME,
+                C::STEP_SIZE
+            )
+        })
+    }
+
+    pub(crate) fn terminate(&mut self) -> Outcome {
+        self.require(&[
+            Phase::Step,
+            Phase::Event,
+            Phase::ContinuousTime,
+            Phase::Failed,
+        ])?;
+        self.enter(Phase::Terminated);
+        Ok(())
+    }
+
+    /// Puts the instance back to where it was after instantiation.
+    pub(crate) fn reset(&mut self) {
+        self.now = Snapshot::new(self.start.clone(), self.now.kind);
+        self.enter(Phase::Instantiated);
+    }
+}
+
+impl<C: Component> Snapshot<C> {
+    fn new(component: C, kind: Kind) -> Self {
+        Self {
+            component,
+            phase: Phase::Instantiated,
+            kind,
+            time: 0.0,
+            stop_time: None,
+            set_up: false,
+            unprepared: true,
+            stale: true,
+        }
+    }
+}

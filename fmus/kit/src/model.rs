@@ -1,0 +1,291 @@
+//! A component's table, checked and resolved once.
+
+use std::{
+    any::{Any, TypeId},
+    collections::HashMap,
+    sync::{Mutex, PoisonError},
+};
+
+use thiserror::Error;
+
+use crate::{
+    component::Component,
+    description,
+    fault::{Fault, Outcome},
+    units::Unit,
+    variable::{Access, Causality, Dependency, Variability, Variable},
+};
+
+/// A value reference: the position in the table, counted from 1. In FMI 3.0, 0 is the time.
+pub type ValueReference = u32;
+
+/// A mistake in a component's table.
+#[derive(Debug, Error)]
+#[error("{component}: variable `{variable}`: {problem}")]
+pub struct TableError {
+    component: &'static str,
+    variable: String,
+    problem: String,
+}
+
+/// A continuous state and its derivative, as positions in the table from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct State {
+    /// The state.
+    pub state: usize,
+    /// Its time derivative.
+    pub derivative: usize,
+}
+
+/// The table of a component with everything that follows from it.
+pub struct Model<C: Component> {
+    /// The variables, by value reference less one.
+    pub variables: Vec<Variable<C>>,
+    /// Dependencies of each variable at communication points: positions and kinds, ascending.
+    pub dependencies: Vec<Vec<(usize, Dependency)>>,
+    /// Dependencies of each variable's initial value: positions, ascending.
+    pub initial_dependencies: Vec<Vec<usize>>,
+    /// The continuous states, empty if there is no model exchange.
+    pub states: Vec<State>,
+    /// The instantiation token (FMI 3.0) and GUID (FMI 2.0).
+    pub token: String,
+}
+
+impl<C: Component> Model<C> {
+    /// Checks the component's table.
+    ///
+    /// # Errors
+    /// Names the variable and the mistake: a name used twice, a bad unit, a start value out of
+    /// its range, a dependency on something unknown.
+    pub fn new() -> Result<Self, TableError> {
+        let variables = C::variables();
+        let names: HashMap<&str, usize> = variables
+            .iter()
+            .enumerate()
+            .map(|(i, v)| (v.name.as_str(), i))
+            .collect();
+        let mut start = C::default();
+        let fail = |variable: &Variable<C>, problem: String| TableError {
+            component: C::NAME,
+            variable: variable.name.clone(),
+            problem,
+        };
+        let mut dependencies = Vec::new();
+        let mut initial_dependencies = Vec::new();
+        let mut states = Vec::new();
+        for (index, variable) in variables.iter().enumerate() {
+            let wrong = |problem| fail(variable, problem);
+            if names[variable.name.as_str()] != index {
+                return Err(wrong("the name is used twice".into()));
+            }
+            check_units(variable).map_err(wrong)?;
+            check_kind(variable, &mut start).map_err(wrong)?;
+            let find = |name: &str| {
+                names
+                    .get(name)
+                    .copied()
+                    .ok_or_else(|| wrong(format!("`{name}` is no variable")))
+            };
+            let mut on = variable
+                .dependencies
+                .iter()
+                .map(|(name, kind)| Ok((find(name)?, *kind)))
+                .collect::<Result<Vec<_>, _>>()?;
+            on.sort_by_key(|(index, _)| *index);
+            dependencies.push(on);
+            let mut on = variable
+                .initial_dependencies
+                .iter()
+                .map(|name| find(name))
+                .collect::<Result<Vec<_>, _>>()?;
+            on.sort_unstable();
+            initial_dependencies.push(on);
+            if let Some(state) = &variable.state {
+                states.push(State {
+                    state: find(state)?,
+                    derivative: index,
+                });
+            }
+        }
+        for State { state, .. } in &states {
+            dependencies[*state] = vec![(*state, Dependency::Constant)];
+        }
+        let mut model = Self {
+            variables,
+            dependencies,
+            initial_dependencies,
+            states,
+            token: String::new(),
+        };
+        model.check_structure()?;
+        model.token = fingerprint(&description::fmi3(&model));
+        Ok(model)
+    }
+
+    fn check_structure(&self) -> Result<(), TableError> {
+        let is_state = |index| self.states.iter().any(|s| s.state == index);
+        for (index, variable) in self.variables.iter().enumerate() {
+            let wrong = |problem: String| TableError {
+                component: C::NAME,
+                variable: variable.name.clone(),
+                problem,
+            };
+            for (on, _) in &self.dependencies[index] {
+                let known = &self.variables[*on];
+                if known.causality != Causality::Input && !is_state(*on) {
+                    return Err(wrong(format!(
+                        "`{}` is neither input nor state",
+                        known.name
+                    )));
+                }
+            }
+            for on in &self.initial_dependencies[index] {
+                let known = &self.variables[*on];
+                if known.is_computed() {
+                    return Err(wrong(format!(
+                        "`{}` is neither input nor parameter",
+                        known.name
+                    )));
+                }
+            }
+        }
+        for State { state, derivative } in &self.states {
+            for variable in [&self.variables[*state], &self.variables[*derivative]] {
+                if !variable.is_computed() || variable.variability != Variability::Continuous {
+                    return Err(TableError {
+                        component: C::NAME,
+                        variable: variable.name.clone(),
+                        problem: "states and derivatives are continuous outputs or locals".into(),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The table of `C`, made at its first use and kept.
+    ///
+    /// # Errors
+    /// When the table holds a mistake.
+    pub fn get() -> Result<&'static Self, TableError> {
+        static MODELS: Mutex<Option<HashMap<TypeId, &'static (dyn Any + Send + Sync)>>> =
+            Mutex::new(None);
+        let mut models = MODELS.lock().unwrap_or_else(PoisonError::into_inner);
+        let models = models.get_or_insert_default();
+        if let Some(model) = models
+            .get(&TypeId::of::<C>())
+            .and_then(|m| m.downcast_ref())
+        {
+            return Ok(model);
+        }
+        let model: &'static Self = Box::leak(Box::new(Self::new()?));
+        models.insert(TypeId::of::<C>(), model);
+        Ok(model)
+    }
+
+    /// Whether the component offers model exchange.
+    pub fn offers_model_exchange(&self) -> bool {
+        !self.states.is_empty()
+    }
+
+    /// The position of a value reference in the table.
+    ///
+    /// # Errors
+    /// When it is unknown.
+    #[inline]
+    pub fn position(&self, reference: ValueReference) -> Outcome<usize> {
+        let index = (reference as usize).wrapping_sub(1);
+        if index < self.variables.len() {
+            return Ok(index);
+        }
+        Err(Fault::error(format!(
+            "value reference {reference} is unknown, {} has 1 to {}",
+            C::NAME,
+            self.variables.len()
+        )))
+    }
+
+    /// The variable of that name and its position.
+    pub fn find(&self, name: &str) -> Option<(usize, &Variable<C>)> {
+        self.variables
+            .iter()
+            .enumerate()
+            .find(|(_, v)| v.name == name)
+    }
+}
+
+fn check_units<C>(variable: &Variable<C>) -> Result<(), String> {
+    let unit = match (variable.unit, variable.display_unit) {
+        (None, None) => return Ok(()),
+        (None, Some(_)) => return Err("has a display unit but no unit".into()),
+        (Some(unit), _) => Unit::parse(unit).map_err(|e| e.to_string())?,
+    };
+    if !variable.access.is_real() {
+        return Err("only a Float64 has a unit".into());
+    }
+    if let Some(shown) = variable.display_unit {
+        let shown_unit = Unit::parse(shown).map_err(|e| e.to_string())?;
+        if unit.factor_to(&shown_unit).is_none() {
+            return Err(format!("cannot be shown in `{shown}`"));
+        }
+    }
+    Ok(())
+}
+
+fn check_kind<C>(variable: &Variable<C>, start: &mut C) -> Result<(), String> {
+    use Causality::{Input, Local, Output, Parameter};
+    use Variability::{Continuous, Discrete, Fixed, Tunable};
+    match (variable.causality, variable.variability) {
+        (Parameter, Fixed | Tunable) | (Input | Output | Local, Discrete | Continuous) => {}
+        (causality, variability) => {
+            return Err(format!("cannot be {causality:?} and {variability:?}"));
+        }
+    }
+    if variable.variability == Continuous && !variable.access.is_real() {
+        return Err("only a Float64 is continuous".into());
+    }
+    let value = match &variable.access {
+        Access::Real(field) => *field(start),
+        Access::Element(field, index) => *field(start)
+            .get(*index)
+            .ok_or_else(|| "is no element of its array".to_string())?,
+        Access::Integer(field) => f64::from(*field(start)),
+        Access::Choice(field, choices) => {
+            let value = *field(start);
+            if !choices.items.iter().any(|item| item.value == value) {
+                return Err(format!("start {value} is no choice"));
+            }
+            return Ok(());
+        }
+        Access::Boolean(_) | Access::Text(_) => return Ok(()),
+    };
+    let min = variable.min.unwrap_or(f64::NEG_INFINITY);
+    let max = variable.max.unwrap_or(f64::INFINITY);
+    if !value.is_finite() || value < min || value > max {
+        return Err(format!("start {value} is outside {min} to {max}"));
+    }
+    Ok(())
+}
+
+/// A token in the form of a GUID: two FNV-1a sums of the text.
+fn fingerprint(text: &str) -> String {
+    let sum = |seed: u64| {
+        text.bytes().fold(seed, |sum, byte| {
+            (sum ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+        })
+    };
+    let digits = format!(
+        "{:016x}{:016x}",
+        sum(0xcbf2_9ce4_8422_2325),
+        sum(0x9ae1_6a3b_2f90_404f)
+    );
+    let part = |from: usize, to: usize| &digits[from..to];
+    format!(
+        "{{{}-{}-{}-{}-{}}}",
+        part(0, 8),
+        part(8, 12),
+        part(12, 16),
+        part(16, 20),
+        part(20, 32)
+    )
+}

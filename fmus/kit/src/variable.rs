@@ -1,0 +1,296 @@
+//! One row of a component's table of variables.
+
+/// Where a variable's value comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Causality {
+    /// Set before the simulation (or during it, if tunable).
+    Parameter,
+    /// Set by the importer at communication points.
+    Input,
+    /// Computed by the component for others.
+    Output,
+    /// Computed by the component for itself, visible to the importer.
+    Local,
+}
+
+/// When a variable may change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Variability {
+    /// Only before initialization ends.
+    Fixed,
+    /// A parameter that may be changed between steps.
+    Tunable,
+    /// At steps or events.
+    Discrete,
+    /// At any time.
+    Continuous,
+}
+
+/// How an unknown depends on a known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dependency {
+    /// In a way not said further.
+    Dependent,
+    /// Linearly, by a number.
+    Constant,
+    /// Linearly, by an expression of fixed parameters.
+    Fixed,
+}
+
+/// One choice of an enumeration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Item {
+    /// Name as shown to people.
+    pub name: &'static str,
+    /// Value as exchanged.
+    pub value: i32,
+    /// What the choice means.
+    pub description: &'static str,
+}
+
+/// The choices that an enumeration variable has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Enumeration {
+    /// Name of the type.
+    pub name: &'static str,
+    /// The choices.
+    pub items: &'static [Item],
+}
+
+/// The way to a variable's field.
+pub enum Access<C> {
+    /// A Float64 field.
+    Real(fn(&mut C) -> &mut f64),
+    /// An element of an array of Float64.
+    Element(fn(&mut C) -> &mut [f64], usize),
+    /// An Int32 field.
+    Integer(fn(&mut C) -> &mut i32),
+    /// A Boolean field.
+    Boolean(fn(&mut C) -> &mut bool),
+    /// A text field.
+    Text(fn(&mut C) -> &mut String),
+    /// An Int32 field that holds one of the choices.
+    Choice(fn(&mut C) -> &mut i32, Enumeration),
+}
+
+impl<C> Access<C> {
+    /// The name of the type as FMI 3.0 calls it.
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::Real(_) | Self::Element(..) => "Float64",
+            Self::Integer(_) => "Int32",
+            Self::Boolean(_) => "Boolean",
+            Self::Text(_) => "String",
+            Self::Choice(..) => "Enumeration",
+        }
+    }
+
+    /// Whether the variable is a Float64.
+    pub fn is_real(&self) -> bool {
+        matches!(self, Self::Real(_) | Self::Element(..))
+    }
+}
+
+/// A type that a variable's field may have.
+pub trait Scalar: Sized {
+    /// Wraps the way to the field.
+    fn access<C>(field: fn(&mut C) -> &mut Self) -> Access<C>;
+}
+
+impl Scalar for f64 {
+    fn access<C>(field: fn(&mut C) -> &mut Self) -> Access<C> {
+        Access::Real(field)
+    }
+}
+
+impl Scalar for i32 {
+    fn access<C>(field: fn(&mut C) -> &mut Self) -> Access<C> {
+        Access::Integer(field)
+    }
+}
+
+impl Scalar for bool {
+    fn access<C>(field: fn(&mut C) -> &mut Self) -> Access<C> {
+        Access::Boolean(field)
+    }
+}
+
+impl Scalar for String {
+    fn access<C>(field: fn(&mut C) -> &mut Self) -> Access<C> {
+        Access::Text(field)
+    }
+}
+
+/// A variable of the component `C`: its name, its meaning and the way to its field.
+///
+/// The start value is what the field holds in `C::default()`.
+pub struct Variable<C> {
+    /// Name, unique in the component, with array elements as `name[1]`.
+    pub name: String,
+    /// What it means, in one line.
+    pub description: String,
+    /// Where its value comes from.
+    pub causality: Causality,
+    /// When it may change.
+    pub variability: Variability,
+    /// SI unit, such as `m/s2` or `N.s/m`; `None` if it has none.
+    pub unit: Option<&'static str>,
+    /// Unit of the laboratory, such as `in`.
+    pub display_unit: Option<&'static str>,
+    /// Smallest value accepted.
+    pub min: Option<f64>,
+    /// Largest value accepted.
+    pub max: Option<f64>,
+    /// Typical magnitude.
+    pub nominal: Option<f64>,
+    /// The inputs and states that it depends on at a communication point.
+    pub dependencies: Vec<(String, Dependency)>,
+    /// The inputs and parameters that its initial value depends on.
+    pub initial_dependencies: Vec<String>,
+    /// The continuous state whose time derivative it is.
+    pub state: Option<String>,
+    /// The way to the field.
+    pub access: Access<C>,
+}
+
+impl<C> Variable<C> {
+    fn new(name: String, causality: Causality, access: Access<C>) -> Self {
+        let variability = match causality {
+            Causality::Parameter => Variability::Fixed,
+            _ if access.is_real() => Variability::Continuous,
+            _ => Variability::Discrete,
+        };
+        Self {
+            name,
+            description: String::new(),
+            causality,
+            variability,
+            unit: None,
+            display_unit: None,
+            min: None,
+            max: None,
+            nominal: None,
+            dependencies: Vec::new(),
+            initial_dependencies: Vec::new(),
+            state: None,
+            access,
+        }
+    }
+
+    /// An input.
+    pub fn input<T: Scalar>(name: &str, field: fn(&mut C) -> &mut T) -> Self {
+        Self::new(name.into(), Causality::Input, T::access(field))
+    }
+
+    /// An output.
+    pub fn output<T: Scalar>(name: &str, field: fn(&mut C) -> &mut T) -> Self {
+        Self::new(name.into(), Causality::Output, T::access(field))
+    }
+
+    /// A parameter, fixed unless made [`tunable`](Self::tunable).
+    pub fn parameter<T: Scalar>(name: &str, field: fn(&mut C) -> &mut T) -> Self {
+        Self::new(name.into(), Causality::Parameter, T::access(field))
+    }
+
+    /// A local variable, such as a continuous state.
+    pub fn local<T: Scalar>(name: &str, field: fn(&mut C) -> &mut T) -> Self {
+        Self::new(name.into(), Causality::Local, T::access(field))
+    }
+
+    /// A parameter that takes one of the choices of an enumeration.
+    pub fn choice(name: &str, choices: Enumeration, field: fn(&mut C) -> &mut i32) -> Self {
+        Self::new(
+            name.into(),
+            Causality::Parameter,
+            Access::Choice(field, choices),
+        )
+    }
+
+    /// The elements `name[1]` to `name[count]` of an array.
+    pub fn array(
+        name: &str,
+        causality: Causality,
+        count: usize,
+        field: fn(&mut C) -> &mut [f64],
+    ) -> Vec<Self> {
+        (0..count)
+            .map(|i| {
+                let name = format!("{name}[{}]", i + 1);
+                Self::new(name, causality, Access::Element(field, i))
+            })
+            .collect()
+    }
+
+    /// Says what the variable means, in one line.
+    pub fn about(mut self, description: &str) -> Self {
+        self.description = description.into();
+        self
+    }
+
+    /// Gives the SI unit.
+    pub fn unit(mut self, unit: &'static str) -> Self {
+        self.unit = Some(unit);
+        self
+    }
+
+    /// Gives the unit in which a laboratory wants to see it.
+    pub fn shown_in(mut self, unit: &'static str) -> Self {
+        self.display_unit = Some(unit);
+        self
+    }
+
+    /// Gives the smallest value accepted.
+    pub fn min(mut self, min: f64) -> Self {
+        self.min = Some(min);
+        self
+    }
+
+    /// Gives the largest value accepted.
+    pub fn max(mut self, max: f64) -> Self {
+        self.max = Some(max);
+        self
+    }
+
+    /// Gives the typical magnitude.
+    pub fn nominal(mut self, nominal: f64) -> Self {
+        self.nominal = Some(nominal);
+        self
+    }
+
+    /// Makes it change at steps and events only.
+    pub fn discrete(mut self) -> Self {
+        self.variability = Variability::Discrete;
+        self
+    }
+
+    /// Lets a parameter be changed between steps.
+    pub fn tunable(mut self) -> Self {
+        self.variability = Variability::Tunable;
+        self
+    }
+
+    /// Declares that it depends directly on inputs or states.
+    pub fn depends_on(mut self, names: &[&str], kind: Dependency) -> Self {
+        self.dependencies
+            .extend(names.iter().map(|name| (name.to_string(), kind)));
+        self
+    }
+
+    /// Declares that its initial value depends on inputs or parameters.
+    pub fn initially_depends_on(mut self, names: &[&str]) -> Self {
+        self.initial_dependencies
+            .extend(names.iter().map(|name| name.to_string()));
+        self
+    }
+
+    /// Declares it the time derivative of a continuous state, an output or local of the table.
+    pub fn derivative_of(mut self, state: &str) -> Self {
+        self.state = Some(state.into());
+        self
+    }
+
+    /// Whether the component computes it.
+    pub fn is_computed(&self) -> bool {
+        matches!(self.causality, Causality::Output | Causality::Local)
+    }
+}

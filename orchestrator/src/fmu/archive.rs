@@ -1,0 +1,183 @@
+//! Unpacking an FMU without trusting it.
+
+use std::fs;
+use std::io::{Cursor, Read};
+use std::path::{Path, PathBuf};
+
+use fmi_rs::{SHARED_LIBRARY_EXTENSION, fmi2, fmi3};
+use zip::ZipArchive;
+
+use super::{FmiVersion, FmuError};
+
+/// The largest FMU that is unpacked, in bytes; a small archive may claim much more than it holds.
+const LARGEST: u64 = 2 << 30;
+
+/// The name of a file as messages give it.
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(
+        || path.display().to_string(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
+
+/// Unpacks `bytes` (the file at `fmu`) into a new temporary directory.
+pub(super) fn unpack(fmu: &Path, bytes: &[u8]) -> Result<tempfile::TempDir, FmuError> {
+    let broken = |reason: String| FmuError::Archive {
+        fmu: fmu.to_path_buf(),
+        reason,
+    };
+    if bytes.is_empty() {
+        return Err(broken("the file is empty".to_string()));
+    }
+    let mut archive = ZipArchive::new(Cursor::new(bytes))
+        .map_err(|error| broken(format!("no zip archive can be read ({error})")))?;
+    let mut names = Vec::with_capacity(archive.len());
+    let mut total = 0;
+    for index in 0..archive.len() {
+        let entry = archive
+            .by_index(index)
+            .map_err(|error| broken(format!("entry {index} cannot be read ({error})")))?;
+        let name = String::from_utf8_lossy(entry.name_raw()).into_owned();
+        if let Some(reason) = refusal(&name, entry.is_symlink()) {
+            return Err(FmuError::Hostile {
+                fmu: fmu.to_path_buf(),
+                entry: name,
+                reason,
+            });
+        }
+        total += entry.size();
+        names.push(name);
+    }
+    if total > LARGEST {
+        return Err(broken(format!(
+            "it would unpack to {} MB, at most {} MB are accepted",
+            total >> 20,
+            LARGEST >> 20
+        )));
+    }
+    if !names.iter().any(|name| name == "modelDescription.xml") {
+        return Err(broken(
+            "the archive has no modelDescription.xml at its top".to_string(),
+        ));
+    }
+    let directory = tempfile::Builder::new()
+        .prefix("shakebench-fmu-")
+        .tempdir()
+        .map_err(|error| broken(format!("no temporary directory to unpack it: {error}")))?;
+    for (index, name) in names.iter().enumerate() {
+        let target = directory.path().join(name);
+        let mut write = || -> std::io::Result<()> {
+            if name.ends_with('/') {
+                return fs::create_dir_all(&target);
+            }
+            if let Some(parent) = target.parent() {
+                fs::create_dir_all(parent)?;
+            }
+            let entry = archive.by_index(index)?;
+            std::io::copy(&mut entry.take(LARGEST), &mut fs::File::create(&target)?)?;
+            Ok(())
+        };
+        write().map_err(|error| broken(format!("`{name}` cannot be unpacked ({error})")))?;
+    }
+    // Some FMUs cannot do without the folder that they are told of.
+    let _ = fs::create_dir_all(directory.path().join("resources"));
+    Ok(directory)
+}
+
+/// Why an entry of that name is not unpacked.
+fn refusal(name: &str, is_symlink: bool) -> Option<&'static str> {
+    let drive = name.as_bytes().get(1) == Some(&b':');
+    if is_symlink {
+        Some("is a symbolic link")
+    } else if name.starts_with('/') || drive {
+        Some("is an absolute path")
+    } else if name.contains('\\') {
+        Some("has a backslash where zip archives have `/`")
+    } else if name.split('/').any(|part| part == "..") {
+        Some("points outside the archive")
+    } else if name.is_empty() || name.contains('\0') {
+        Some("is no file name")
+    } else {
+        None
+    }
+}
+
+/// The folders in `binaries`, in alphabetical order.
+pub(super) fn platforms(unpacked: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(unpacked.join("binaries"))
+        .into_iter()
+        .flatten()
+        .flatten()
+        .filter(|entry| entry.path().is_dir())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// This platform's folder in `binaries`.
+pub(super) fn this_platform(version: FmiVersion) -> &'static str {
+    match version {
+        FmiVersion::V2 => fmi2::PLATFORM,
+        FmiVersion::V3 => fmi3::native::PLATFORM_TUPLE,
+    }
+}
+
+/// The library to load, after a look at what it was built for.
+pub(super) fn binary(
+    fmu: &Path,
+    unpacked: &Path,
+    version: FmiVersion,
+    model_identifier: &str,
+) -> Result<PathBuf, FmuError> {
+    let missing = |reason: String| FmuError::Binary {
+        fmu: fmu.to_path_buf(),
+        reason,
+    };
+    let platform = this_platform(version);
+    let name = format!("{model_identifier}{SHARED_LIBRARY_EXTENSION}");
+    let relative = format!("binaries/{platform}/{name}");
+    let path = unpacked.join(&relative);
+    if !path.is_file() {
+        let there = platforms(unpacked);
+        return Err(missing(if there.is_empty() {
+            format!("no binary: `{relative}` is missing and there are none for other platforms")
+        } else if there.iter().any(|folder| folder == platform) {
+            format!("no binary: `{relative}` is missing (is the modelIdentifier right?)")
+        } else {
+            format!(
+                "no binary for this platform ({platform}); it has {}",
+                there.join(", ")
+            )
+        }));
+    }
+    let mut head = [0; 20];
+    let read = fs::File::open(&path).and_then(|mut file| file.read(&mut head));
+    read.map_err(|error| missing(format!("`{relative}`: {error}")))?;
+    match foreign(&head) {
+        Some(other) => Err(missing(format!(
+            "`{relative}` is {other}, not a library for {platform}"
+        ))),
+        None => Ok(path),
+    }
+}
+
+/// What a library is built for, if not for this machine, by the first bytes of its file.
+fn foreign(head: &[u8; 20]) -> Option<&'static str> {
+    let machine = if head.starts_with(b"\x7fELF") {
+        match (head[4], head[18]) {
+            (2, 0x3e) => ("linux", "x86_64", "a Linux x86-64 library"),
+            (2, 0xb7) => ("linux", "aarch64", "a Linux ARM64 library"),
+            _ => ("linux", "other", "a Linux library for another processor"),
+        }
+    } else if head.starts_with(b"MZ") {
+        ("windows", std::env::consts::ARCH, "a Windows library")
+    } else if matches!(head[..4], [0xcf | 0xce, 0xfa, 0xed, 0xfe] | [0xca, 0xfe, 0xba, 0xbe]) {
+        ("macos", std::env::consts::ARCH, "a macOS library")
+    } else {
+        ("none", "none", "no shared library at all")
+    };
+    let (system, processor, words) = machine;
+    let fits = system == std::env::consts::OS && processor == std::env::consts::ARCH;
+    (!fits).then_some(words)
+}

@@ -1,0 +1,139 @@
+//! What is done at a tick, prepared for doing it many times.
+
+use super::transfer::{Inputs, Outputs};
+use super::{MasterError, Part};
+
+/// The largest number of repetitions of a loop.
+pub(super) const LARGEST_REPETITION: usize = 100;
+/// Values that change by less than this part of their size stand still.
+const TOLERANCE: f64 = 1e-12;
+
+/// An [`crate::system::Operation`] with its value references.
+pub(super) enum Action {
+    /// Set some inputs of a continuous component, then read outputs.
+    Read {
+        part: usize,
+        inputs: Inputs,
+        outputs: Outputs,
+    },
+    /// Set the inputs of a sampled component, step it over its period, read its outputs.
+    Call { part: usize },
+    /// Repeat until the values stand still.
+    Iterate {
+        actions: Vec<Action>,
+        /// Sampled components among them, whose state is kept for the repetition.
+        called: Vec<usize>,
+        last: Vec<f64>,
+    },
+}
+
+/// When and how actions are carried out.
+#[derive(Clone, Copy)]
+pub(super) struct Moment {
+    /// The tick.
+    pub tick: usize,
+    /// Its time, s.
+    pub time: f64,
+    /// Coupling step, s.
+    pub step: f64,
+    /// Sampled components are stepped; otherwise only their outputs are read.
+    pub calls: bool,
+}
+
+impl Action {
+    /// Carries it out.
+    pub(super) fn perform(
+        &mut self,
+        at: Moment,
+        parts: &mut [Part],
+        signals: &mut [f64],
+        names: &[String],
+    ) -> Result<(), MasterError> {
+        match self {
+            Self::Read {
+                part,
+                inputs,
+                outputs,
+            } => {
+                let instance = &parts[*part].instance;
+                inputs.transfer(signals, instance)?;
+                outputs.read(signals, instance)?;
+            }
+            Self::Call { part } => {
+                let part = &mut parts[*part];
+                let Some(every) = part.every.filter(|every| at.tick.is_multiple_of(*every)) else {
+                    return Ok(());
+                };
+                part.inputs.transfer(signals, &part.instance)?;
+                if at.calls {
+                    part.instance.do_step(at.time, every as f64 * at.step)?;
+                }
+                part.outputs.read(signals, &part.instance)?;
+            }
+            Self::Iterate {
+                actions,
+                called,
+                last,
+            } => {
+                for &part in called.iter().filter(|_| at.calls) {
+                    let part = &mut parts[part];
+                    part.instance.save_state(&mut part.state)?;
+                }
+                for pass in 1.. {
+                    last.copy_from_slice(signals);
+                    for action in actions.iter_mut() {
+                        action.perform(at, parts, signals, names)?;
+                    }
+                    if settled(at.time, pass, last, signals, names)? {
+                        break;
+                    }
+                    for &part in called.iter().filter(|_| at.calls) {
+                        let part = &mut parts[part];
+                        part.instance.restore_state(&part.state)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Action {
+    /// Whether it reads continuous components only.
+    pub(super) fn is_continuous(&self) -> bool {
+        match self {
+            Self::Read { .. } => true,
+            Self::Call { .. } => false,
+            Self::Iterate { actions, .. } => actions.iter().all(Self::is_continuous),
+        }
+    }
+}
+
+/// Whether the values stand still; an error when they still do not after too many repetitions.
+pub(super) fn settled(
+    time: f64,
+    passes: usize,
+    last: &[f64],
+    now: &[f64],
+    names: &[String],
+) -> Result<bool, MasterError> {
+    let excess = |(before, after): (&f64, &f64)| {
+        (after - before).abs() - TOLERANCE * before.abs().max(after.abs())
+    };
+    let moving = |pair: &(&f64, &f64)| excess(*pair) > f64::MIN_POSITIVE;
+    if !last.iter().zip(now).any(|pair| moving(&pair)) {
+        return Ok(true);
+    }
+    if passes < LARGEST_REPETITION {
+        return Ok(false);
+    }
+    let pairs = last.iter().zip(now).enumerate();
+    let most = pairs.max_by(|(_, a), (_, b)| excess(*a).total_cmp(&excess(*b)));
+    let (place, (before, after)) = most.unwrap_or((0, (&0.0, &0.0)));
+    Err(MasterError::NotSettled {
+        time,
+        passes,
+        variable: names.get(place).cloned().unwrap_or_default(),
+        change: (after - before).abs(),
+    })
+}

@@ -1,0 +1,44 @@
+//! Why a run cannot begin or go on.
+
+use thiserror::Error;
+
+use crate::fmu::{CallError, FmuError};
+use crate::system::SystemError;
+
+/// Why a run cannot begin or go on.
+#[derive(Debug, Error)]
+pub enum MasterError {
+    /// An FMU cannot be loaded.
+    #[error(transparent)]
+    Fmu(#[from] FmuError),
+    /// The system cannot be ordered.
+    #[error(transparent)]
+    System(#[from] SystemError),
+    /// An FMU did not complete a call.
+    #[error(transparent)]
+    Call(#[from] Box<CallError>),
+    /// Steps and periods that do not fit together.
+    #[error("{0}")]
+    Step(String),
+    /// A component that must be repeated but cannot save its state.
+    #[error(
+        "--algorithm iterative repeats steps, but `{0}` cannot save its state \
+         (its FMU does not offer it); choose --algorithm gauss-seidel"
+    )]
+    NoState(String),
+    /// An iteration that does not settle.
+    #[error(
+        "the values do not stand still at {time} s after {passes} repetitions: `{variable}` still \
+         changes by {change:e}"
+    )]
+    NotSettled {
+        /// Time, s.
+        time: f64,
+        /// Repetitions made.
+        passes: usize,
+        /// The variable that changes most.
+        variable: String,
+        /// Its last change.
+        change: f64,
+    },
+}

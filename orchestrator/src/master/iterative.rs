@@ -1,0 +1,48 @@
+//! The coupling over a step by fixed-point iteration: inputs from continuous components are held
+//! at the mean of their values at both ends of the step, which makes the coupling of second order
+//! where held inputs are of first.
+
+use super::action::{Moment, settled};
+use super::{MasterError, Simulation};
+
+/// Continuous components over `[t_k, t_k + h]`, repeated until the values at the end stand still.
+pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
+    let (time, step) = (simulation.time(), simulation.step);
+    // Between two calls of a sampled component nothing of it changes.
+    let end = Moment {
+        tick: simulation.tick,
+        time: time + step,
+        step,
+        calls: false,
+    };
+    let Simulation {
+        parts,
+        actions,
+        signals,
+        next_signals: next,
+        last_signals: last,
+        names,
+        ..
+    } = simulation;
+    for part in parts.iter_mut().filter(|part| part.every.is_none()) {
+        part.instance.save_state(&mut part.state)?;
+    }
+    next.copy_from_slice(signals);
+    for pass in 1.. {
+        last.copy_from_slice(next);
+        for part in parts.iter_mut().filter(|part| part.every.is_none()) {
+            part.inputs.transfer_mean(signals, next, &part.instance)?;
+            part.instance.do_step(time, step)?;
+        }
+        for action in actions.iter_mut().filter(|action| action.is_continuous()) {
+            action.perform(end, parts, next, names)?;
+        }
+        if settled(time, pass, last, next, names)? {
+            return Ok(());
+        }
+        for part in parts.iter_mut().filter(|part| part.every.is_none()) {
+            part.instance.restore_state(&part.state)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,22 @@
+//! All components step from the same values; every connection delays by a step. This is what
+//! masters that know no order of calls do.
+
+use super::{MasterError, Simulation};
+
+/// All components over `[t_k, t_k + h]` from the outputs at `t_k`.
+pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
+    let (tick, time, step) = (simulation.tick, simulation.time(), simulation.step);
+    let parts = &mut simulation.parts;
+    for part in parts.iter_mut().filter(|part| part.is_due(tick)) {
+        part.inputs.transfer(&simulation.signals, &part.instance)?;
+    }
+    for part in parts.iter_mut().filter(|part| part.is_due(tick)) {
+        let ticks = part.every.unwrap_or(1);
+        part.instance.do_step(time, ticks as f64 * step)?;
+    }
+    // A sampled component's outputs are seen by the others at the next tick.
+    for part in parts.iter() {
+        part.outputs.read(&mut simulation.signals, &part.instance)?;
+    }
+    Ok(())
+}

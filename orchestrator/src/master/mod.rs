@@ -1,0 +1,145 @@
+//! The master: steps the FMUs of a system together.
+//!
+//! At tick k the outputs at `t_k = k h` become known in dependency order, sampled components being
+//! called from the reference down ([`Simulation::observe`]); then the continuous components step
+//! over `[t_k, t_k + h]` with their inputs held ([`Simulation::advance`]). A row of the record
+//! holds the outputs at `t_k` together with the commands computed from them.
+
+mod action;
+mod compile;
+mod error;
+mod gauss_seidel;
+mod iterative;
+mod jacobi;
+mod record;
+mod reference;
+mod run;
+mod start;
+mod transfer;
+
+use std::fmt;
+
+pub use error::MasterError;
+pub use record::Record;
+pub use run::{Ended, LogLine, Outcome, Pace};
+
+use crate::fmu::{Instance, State};
+use action::Action;
+use reference::Reference;
+use transfer::{Inputs, Outputs};
+
+/// The order in which components are called and values are exchanged.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Algorithm {
+    /// All inputs are set, all components step, all outputs are read: each connection adds a
+    /// sample of delay.
+    Jacobi,
+    /// In dependency order, with no delay added.
+    #[default]
+    GaussSeidel,
+    /// In dependency order; loops of direct feedthrough and the coupling over a step are repeated
+    /// until the values stand still (the FMUs must be able to save their state).
+    Iterative,
+}
+
+impl fmt::Display for Algorithm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Jacobi => "jacobi",
+            Self::GaussSeidel => "gauss-seidel",
+            Self::Iterative => "iterative",
+        })
+    }
+}
+
+/// A system loaded, connected and initialized, at some tick of its run.
+pub struct Simulation {
+    algorithm: Algorithm,
+    /// Coupling step, s.
+    step: f64,
+    tick: usize,
+    /// Ticks from one row of the record to the next: one sample of the motion.
+    ticks_per_row: usize,
+    /// The latest value of every source of connections and every output.
+    signals: Vec<f64>,
+    /// Their names.
+    names: Vec<String>,
+    reference: Reference,
+    parts: Vec<Part>,
+    actions: Vec<Action>,
+    /// The signal that ends the run when it is not 0, and how long the run goes on then, s.
+    end_when: Option<(usize, f64)>,
+    /// Signals at the end of the step, for [`Algorithm::Iterative`].
+    next_signals: Vec<f64>,
+    last_signals: Vec<f64>,
+}
+
+/// A component in a simulation.
+struct Part {
+    instance: Instance,
+    /// Every so many ticks a sampled component is called; none for a continuous one.
+    every: Option<usize>,
+    /// All its connected inputs.
+    inputs: Inputs,
+    /// All its outputs.
+    outputs: Outputs,
+    /// Where the state is kept that a repetition goes back to.
+    state: State,
+}
+
+impl Part {
+    fn is_due(&self, tick: usize) -> bool {
+        self.every.is_none_or(|every| tick.is_multiple_of(every))
+    }
+}
+
+impl Simulation {
+    /// Time of the present tick, s.
+    pub fn time(&self) -> f64 {
+        self.tick as f64 * self.step
+    }
+
+    /// Coupling step, s.
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// Names of the signals, as `component.variable`, in the order of [`Simulation::signals`].
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The latest values, SI.
+    pub fn signals(&self) -> &[f64] {
+        &self.signals
+    }
+
+    /// Makes the outputs at the present tick known; due sampled components are called.
+    ///
+    /// # Errors
+    /// A call that an FMU did not complete, or a loop that does not settle.
+    pub fn observe(&mut self) -> Result<(), MasterError> {
+        self.reference.sample(self.tick / self.ticks_per_row, &mut self.signals);
+        match self.algorithm {
+            Algorithm::Jacobi => Ok(()),
+            Algorithm::GaussSeidel | Algorithm::Iterative => gauss_seidel::observe(self),
+        }
+    }
+
+    /// Steps over `[t_k, t_k + h]`.
+    ///
+    /// # Errors
+    /// A call that an FMU did not complete, or a coupling that does not settle.
+    pub fn advance(&mut self) -> Result<(), MasterError> {
+        match self.algorithm {
+            Algorithm::Jacobi => jacobi::advance(self)?,
+            Algorithm::GaussSeidel => gauss_seidel::advance(self)?,
+            Algorithm::Iterative => iterative::advance(self)?,
+        }
+        self.tick += 1;
+        Ok(())
+    }
+}

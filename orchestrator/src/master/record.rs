@@ -1,0 +1,45 @@
+//! What was recorded: a row a sample.
+
+/// Signals over time, SI units.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Record {
+    /// Names of the columns, the first is `time`.
+    pub columns: Vec<String>,
+    values: Vec<f64>,
+}
+
+impl Record {
+    /// Makes room for so many rows, so that filling them allocates nothing.
+    pub(super) fn with_capacity(names: &[String], rows: usize) -> Self {
+        let mut columns = vec!["time".to_string()];
+        columns.extend_from_slice(names);
+        let values = Vec::with_capacity(rows * columns.len());
+        Self { columns, values }
+    }
+
+    pub(super) fn push(&mut self, time: f64, signals: &[f64]) {
+        self.values.push(time);
+        self.values.extend_from_slice(signals);
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.values.len() / self.columns.len().max(1)
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// The rows.
+    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.values.chunks_exact(self.columns.len().max(1))
+    }
+
+    /// The history of a column.
+    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let place = self.columns.iter().position(|column| column == name)?;
+        Some(self.rows().map(|row| row[place]).collect())
+    }
+}

@@ -1,0 +1,163 @@
+//! A run from its first sample to its last.
+
+use std::time::{Duration, Instant};
+
+use super::{MasterError, Record, Simulation};
+use crate::fmu::Message;
+
+/// How a run ended.
+#[derive(Debug)]
+pub enum Ended {
+    /// It was played to its end.
+    Complete,
+    /// The system asked to end it (an interlock tripped).
+    Interlock {
+        /// The output that became true.
+        signal: String,
+        /// When, s.
+        time: f64,
+    },
+    /// A component failed.
+    Failed(MasterError),
+}
+
+impl Ended {
+    /// `complete`, `interlock` or `failed`.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Complete => "complete",
+            Self::Interlock { .. } => "interlock",
+            Self::Failed(_) => "failed",
+        }
+    }
+
+    /// What happened, for people.
+    pub fn story(&self) -> String {
+        match self {
+            Self::Complete => "complete".to_string(),
+            Self::Interlock { signal, time } => format!("`{signal}` became true at {time:.3} s"),
+            Self::Failed(error) => error.to_string(),
+        }
+    }
+}
+
+/// What came of a run.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The signals, a row for each sample that was reached.
+    pub record: Record,
+    /// How it ended.
+    pub ended: Ended,
+    /// Coupling steps made.
+    pub steps: usize,
+    /// Coupling step, s.
+    pub step: f64,
+    /// Time that the stepping took, s.
+    pub wall: f64,
+    /// What the FMUs logged.
+    pub messages: Vec<LogLine>,
+}
+
+/// A line logged by a component's FMU.
+#[derive(Debug)]
+pub struct LogLine {
+    /// The component.
+    pub component: String,
+    /// What it logged.
+    pub message: Message,
+}
+
+/// How fast a run is played.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Pace {
+    /// As fast as it goes.
+    #[default]
+    Fastest,
+    /// Never ahead of the clock on the wall.
+    RealTime,
+}
+
+impl Simulation {
+    /// Plays `samples` samples; `progress` is told the number of samples reached now and then.
+    /// What was computed is returned however the run ends.
+    pub fn run(mut self, samples: usize, pace: Pace, progress: &mut dyn FnMut(usize)) -> Outcome {
+        let mut record = Record::with_capacity(&self.names, samples);
+        let begin = Instant::now();
+        let ended = self.play(samples, pace, progress, &mut record);
+        let wall = begin.elapsed().as_secs_f64();
+        progress(record.len());
+        let messages = self.parts.iter().flat_map(|part| {
+            let component = &part.instance.name;
+            part.instance.take_messages().into_iter().map(|message| LogLine {
+                component: component.clone(),
+                message,
+            })
+        });
+        Outcome {
+            record,
+            steps: self.tick,
+            step: self.step,
+            wall,
+            messages: messages.collect(),
+            ended: match ended {
+                Ok(ended) => ended,
+                Err(error) => Ended::Failed(error),
+            },
+        }
+    }
+
+    fn play(
+        &mut self,
+        samples: usize,
+        pace: Pace,
+        progress: &mut dyn FnMut(usize),
+        record: &mut Record,
+    ) -> Result<Ended, MasterError> {
+        let begin = Instant::now();
+        let mut tripped = None;
+        while self.tick < samples * self.ticks_per_row {
+            if pace == Pace::RealTime {
+                let ahead = Duration::from_secs_f64(self.time()).saturating_sub(begin.elapsed());
+                std::thread::sleep(ahead);
+            }
+            self.observe()?;
+            if self.tick.is_multiple_of(self.ticks_per_row) {
+                record.push(self.time(), &self.signals);
+                let sample = self.tick / self.ticks_per_row;
+                if sample.is_multiple_of(1024) {
+                    progress(sample);
+                }
+            }
+            if let Some((signal, after)) = self.end_when {
+                if tripped.is_none() && self.signals[signal] != 0.0 {
+                    tripped = Some((self.time(), self.time() + after));
+                }
+                if let Some((time, end)) = tripped
+                    && self.time() >= end
+                {
+                    return Ok(Ended::Interlock {
+                        signal: self.names[signal].clone(),
+                        time,
+                    });
+                }
+            }
+            self.advance()?;
+        }
+        Ok(match (tripped, self.end_when) {
+            (Some((time, _)), Some((signal, _))) => Ended::Interlock {
+                signal: self.names[signal].clone(),
+                time,
+            },
+            _ => Ended::Complete,
+        })
+    }
+}
+
+impl Drop for Simulation {
+    fn drop(&mut self) {
+        for part in &mut self.parts {
+            // A state that cannot be given back is lost with its instance.
+            let _ = part.instance.free_state(std::mem::take(&mut part.state));
+        }
+    }
+}

@@ -1,0 +1,193 @@
+"use strict";
+(() => {
+  const root = document.documentElement;
+  const source = document.getElementById("panels");
+  const panels = source ? JSON.parse(source.textContent) : [];
+  const colour = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+
+  const floats = (text) => {
+    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    return new Float32Array(bytes.buffer);
+  };
+  // Numbers as embedded, once; a value that is not finite is a gap.
+  const gaps = (values) => Array.from(values, (v) => (Number.isFinite(v) ? v : null));
+  for (const panel of panels) {
+    for (const series of panel.series) {
+      const y = gaps(floats(series.y));
+      const upper = series.upper ? gaps(floats(series.upper)) : null;
+      const x = Array.isArray(series.x)
+        ? y.map((_, n) => series.x[0] + n * series.x[1])
+        : Array.from(floats(series.x));
+      series.key = Array.isArray(series.x) ? `${series.x}:${y.length}` : series.x;
+      Object.assign(series, { x, y, upper });
+    }
+  }
+
+  const digits = (value, span) => {
+    if (value == null) return "";
+    const size = Math.max(Math.abs(value), span * 1e-3);
+    const text = size !== 0 && (size < 1e-4 || size >= 1e6)
+      ? value.toExponential(3) : value.toPrecision(4);
+    return (text.includes("e") ? text : String(+text)).replaceAll("-", "\u2212");
+  };
+  const named = (axis, unit) => axis.label + (unit[0] ? ` [${unit[0]}]` : "");
+
+  // The columns uPlot wants: one ascending x for all series, merged where they differ.
+  const columns = (panel, xUnit, yUnit) => {
+    const groups = new Map();
+    const roles = [];
+    for (const series of panel.series) {
+      let order = null;
+      if (series.style === "points" || series.style === "path") {
+        order = series.x.map((_, n) => n).sort((a, b) => series.x[a] - series.x[b]);
+      }
+      const pick = (values) => (order ? order.map((n) => values[n]) : values);
+      const key = order ? `${series.key}:sorted` : series.key;
+      if (!groups.has(key)) groups.set(key, [pick(series.x).map((v) => v / xUnit[1])]);
+      const scaled = (values) => pick(values).map((v) => {
+        if (v == null || (panel.y.log && v <= 0)) return null;
+        return v / yUnit[1];
+      });
+      const add = (values, role) => {
+        groups.get(key).push(scaled(values));
+        roles.push({ key, at: groups.get(key).length - 1, series, role });
+      };
+      add(series.y, "value");
+      if (series.upper) add(series.upper, "upper");
+    }
+    const keys = [...groups.keys()];
+    const merged = groups.size > 1 ? uPlot.join([...groups.values()]) : groups.get(keys[0]);
+    let offset = 1;
+    const first = new Map();
+    for (const key of keys) {
+      first.set(key, offset);
+      offset += groups.get(key).length - 1;
+    }
+    let data = [merged[0]];
+    for (const role of roles) data.push(merged[first.get(role.key) + role.at - 1]);
+    if (panel.x.log) {
+      const keep = data[0].map((x) => x > 0);
+      data = data.map((column) => column.filter((_, n) => keep[n]));
+    }
+    return { data, roles };
+  };
+
+  // A line in the order of its values, which may turn back.
+  const path = (series, xUnit, yUnit, stroke) => (u) => {
+    const { ctx, bbox } = u;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.beginPath();
+    let pen = false;
+    series.x.forEach((x, n) => {
+      if (series.y[n] == null) { pen = false; return; }
+      const at = [u.valToPos(x / xUnit[1], "x", true), u.valToPos(series.y[n] / yUnit[1], "y", true)];
+      if (pen) ctx.lineTo(...at); else ctx.moveTo(...at);
+      pen = true;
+    });
+    ctx.strokeStyle = stroke;
+    ctx.lineWidth = 1.4 * devicePixelRatio;
+    ctx.stroke();
+    ctx.restore();
+  };
+
+  let charts = [];
+  const draw = (place) => {
+    const panel = panels[Number(place.dataset.panel)];
+    const system = root.dataset.units;
+    const [xUnit, yUnit] = [panel.x[system], panel.y[system]];
+    const { data, roles } = columns(panel, xUnit, yUnit);
+    const span = (column) => {
+      let low = Infinity;
+      let high = -Infinity;
+      for (const v of column) if (v != null) { low = Math.min(low, v); high = Math.max(high, v); }
+      return high > low ? high - low : Math.abs(high) || 1;
+    };
+    const ySpan = Math.max(...data.slice(1).map(span));
+    const bands = [];
+    const drawn = [];
+    const series = [{ label: named(panel.x, xUnit), value: (_, v) => digits(v, span(data[0])) }];
+    roles.forEach(({ series: one, role }, n) => {
+      const stroke = colour(`--series-${one.colour === 0 ? 0 : 1 + (one.colour - 1) % 8}`);
+      const is = (style) => one.style === style;
+      series.push({
+        label: role === "upper" ? `${one.name}, upper` : one.name,
+        stroke: is("path") ? "transparent" : stroke,
+        width: is("points") || is("path") ? 0 : is("band") ? 0.6 : 1.4,
+        dash: is("dashed") ? [6, 4] : undefined,
+        points: { show: is("points"), size: 4, fill: stroke, stroke },
+        paths: is("points") || is("path") ? () => null : undefined,
+        value: (_, v) => digits(v, ySpan),
+      });
+      if (role === "upper") bands.push({ series: [n + 1, n], fill: `${stroke}33` });
+      if (is("path")) drawn.push(path(one, xUnit, yUnit, stroke));
+    });
+    const ink = colour("--soft");
+    const axis = (label, size) => ({
+      label, size, stroke: ink, labelSize: 20, labelFont: "12.5px system-ui, sans-serif",
+      font: "12px system-ui, sans-serif", labelGap: 0,
+      grid: { stroke: colour("--grid"), width: 1 }, ticks: { stroke: colour("--line"), width: 1, size: 5 },
+    });
+    const scale = (which, unit) => {
+      const made = { time: false };
+      if (which.log) { made.distr = 3; made.log = 10; }
+if (which.limits) made.range = limited(which, unit);
+      return made;
+    };
+    const options = {
+      width: place.clientWidth, height: 250,
+      scales: { x: scale(panel.x, xUnit), y: scale(panel.y, yUnit) },
+      series, bands,
+      axes: [axis(named(panel.x, xUnit), 34), axis(named(panel.y, yUnit), 58)],
+      cursor: {
+        drag: { x: true, y: false, dist: 4 },
+        sync: { key: `${panel.x.label}/${panel.x.log}`, setSeries: false },
+        points: { size: 6 },
+      },
+      hooks: { draw: drawn },
+    };
+    if (panel.y.log) options.axes[1].size = 64;
+    return new uPlot(options, data, place);
+  };
+  // Fixed limits; along x a zoom stays within them.
+  const limited = (which, unit) => {
+    const [from, to] = which.limits.map((v) => v / unit[1]);
+    return (_, low, high, key) => (key === "y" || low >= to || high <= from
+      ? [from, to] : [Math.max(low, from), Math.min(high, to)]);
+  };
+
+  const build = () => {
+    charts.forEach((chart) => chart.destroy());
+    charts = [...document.querySelectorAll(".chart")].map(draw);
+  };
+  const resize = () => charts.forEach((chart) => {
+    const width = chart.root.parentElement.clientWidth;
+    if (width > 0 && width !== chart.width) chart.setSize({ width, height: chart.height });
+  });
+
+  const remember = (key, value) => { try { localStorage.setItem(key, value); } catch { /* a private window */ } };
+  const recall = (key) => { try { return localStorage.getItem(key); } catch { return null; } };
+  const choose = (what, value, again) => {
+    root.dataset[what] = value;
+    const attribute = `data-set-${what}`;
+    for (const button of document.querySelectorAll(`[${attribute}]`)) {
+      button.setAttribute("aria-pressed", String(button.getAttribute(attribute) === value));
+      if (!again) button.addEventListener("click", () => {
+        remember(`shakebench-${what}`, button.getAttribute(attribute));
+        choose(what, button.getAttribute(attribute), true);
+        build();
+      });
+    }
+  };
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+  choose("theme", recall("shakebench-theme") || (dark ? "dark" : "light"));
+  choose("units", recall("shakebench-units") || "laboratory");
+  build();
+  let waiting = 0;
+  addEventListener("resize", () => { cancelAnimationFrame(waiting); waiting = requestAnimationFrame(resize); });
+  let before = null;
+  addEventListener("beforeprint", () => { before = root.dataset.theme; choose("theme", "light", true); build(); });
+  addEventListener("afterprint", () => { if (before) { choose("theme", before, true); build(); } });
+})();

@@ -1,0 +1,122 @@
+//! A report as one HTML file that needs nothing else.
+
+use minijinja::syntax::SyntaxConfig;
+use minijinja::{AutoEscape, Environment, Value, context};
+
+use super::chart_data::json_for_script;
+use super::number::significant;
+use super::{Cell, Report, Section, Table};
+
+const TEMPLATE: &str = include_str!("assets/report.html");
+const STYLE: &str = include_str!("assets/report.css");
+const SCRIPT: &str = include_str!("assets/report.js");
+const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
+const UPLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
+const UPLOT_LICENSE: &str = include_str!("assets/uPlot.LICENSE");
+
+/// Renders the report. All text is escaped; the file refers to nothing outside itself.
+///
+/// # Errors
+/// Only a fault of the template itself.
+pub fn html(report: &Report) -> Result<String, minijinja::Error> {
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    let mut syntax = SyntaxConfig::builder();
+    environment.set_syntax(syntax.trim_blocks(true).lstrip_blocks(true).build()?);
+    environment.add_template("report", TEMPLATE)?;
+    let mut next_panel = 0;
+    let sections: Vec<_> = report
+        .sections
+        .iter()
+        .map(|s| section(s, &mut next_panel))
+        .collect();
+    let facts: Vec<_> = report
+        .facts
+        .iter()
+        .map(|fact| context! { label => fact.label.as_str(), note => fact.note.as_str(), value => cell(&fact.value) })
+        .collect();
+    let panels = report.sections.iter().flat_map(|section| &section.panels);
+    environment.get_template("report")?.render(context! {
+        title => report.title.as_str(),
+        summary => report.summary.as_str(),
+        footer => report.footer.as_str(),
+        facts,
+        sections,
+        has_panels => next_panel > 0,
+        data => json_for_script(panels),
+        style => STYLE,
+        script => SCRIPT,
+        uplot_style => UPLOT_STYLE,
+        uplot_script => UPLOT_SCRIPT,
+        uplot_license => UPLOT_LICENSE,
+    })
+}
+
+fn section(section: &Section, next_panel: &mut usize) -> Value {
+    let panels: Vec<_> = section
+        .panels
+        .iter()
+        .map(|panel| {
+            let number = *next_panel;
+            *next_panel += 1;
+            context! { number, title => panel.title.as_str() }
+        })
+        .collect();
+    let tables: Vec<_> = section.tables.iter().map(table).collect();
+    context! {
+        heading => section.heading.as_str(),
+        text => section.text.clone(),
+        notes => section.notes.clone(),
+        tables,
+        panels,
+    }
+}
+
+fn table(table: &Table) -> Value {
+    let numeric = |column: usize| {
+        let is_number = |cell: &Cell| !matches!(cell, Cell::Text(_));
+        table
+            .rows
+            .iter()
+            .any(|row| row.get(column).is_some_and(is_number))
+    };
+    let columns: Vec<_> = table
+        .columns
+        .iter()
+        .enumerate()
+        .map(|(n, name)| context! { name => name.as_str(), numeric => numeric(n) })
+        .collect();
+    let rows: Vec<Vec<Value>> = table
+        .rows
+        .iter()
+        .map(|row| row.iter().map(cell).collect())
+        .collect();
+    context! { caption => table.caption.as_str(), columns, rows }
+}
+
+/// A cell as text in the two systems of units.
+fn cell(cell: &Cell) -> Value {
+    let (numeric, laboratory, si) = match cell {
+        Cell::Text(text) => (false, text.clone(), text.clone()),
+        Cell::Number(value, digits) => {
+            let text = significant(*value, *digits);
+            (true, text.clone(), text)
+        }
+        Cell::Quantity(value, units, digits) => {
+            let text = |factor: f64, name: &str| {
+                let number = significant(value / factor, *digits);
+                if name.is_empty() {
+                    number
+                } else {
+                    format!("{number}\u{a0}{name}")
+                }
+            };
+            (
+                true,
+                text(units.laboratory_factor, &units.laboratory),
+                text(units.si_factor, &units.si),
+            )
+        }
+    };
+    context! { numeric, one => laboratory == si, laboratory, si }
+}

@@ -1,0 +1,325 @@
+//! From a system as written to one whose names, types, units and connections hold.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::connection::{self, Quantity, Source};
+use super::file::{ComponentFile, SystemFile};
+use super::{Component, Connection, DEFAULT_PERIOD, System, SystemError, Value, hint, model, value};
+use crate::fmu::{Causality, Fmu, Kind, Variability, Variable};
+use crate::units::Unit;
+
+/// Finds the FMU of a component by what the system file calls it.
+pub type Library<'a> = dyn FnMut(&str) -> Result<Arc<Fmu>, Box<dyn std::error::Error>> + 'a;
+
+/// Checks the system `file` against the FMUs that `library` gives, with `settings` (as in
+/// `control.valve_limit=5 V`) on top of the parameters of the file.
+///
+/// # Errors
+/// Unknown names (with the nearest one), units and types that do not fit, inputs driven twice or
+/// not at all, values that cannot be read.
+pub fn assemble(
+    file: &SystemFile,
+    settings: &[String],
+    library: &mut Library,
+) -> Result<System, SystemError> {
+    let at = |place: String, reason: String| SystemError::Place {
+        origin: file.origin.clone(),
+        place,
+        reason,
+    };
+    if file.components.is_empty() {
+        return Err(at("components".to_string(), "there is none".to_string()));
+    }
+    let mut components = Vec::new();
+    for (name, part) in &file.components {
+        let place = format!("components.{name}");
+        if name == "reference" || name.is_empty() || name.contains('.') {
+            let reason = "this name cannot be given to a component (`reference` is the motion, \
+                          and `.` stands between component and variable)";
+            return Err(at(place, reason.to_string()));
+        }
+        let fmu = library(&part.fmu).map_err(|error| SystemError::Missing {
+            origin: file.origin.clone(),
+            component: name.clone(),
+            reason: error.to_string(),
+        })?;
+        components.push(component(file, name, part, fmu)?);
+    }
+    for setting in settings {
+        set(&mut components, setting).map_err(|reason| SystemError::Place {
+            origin: "command line".to_string(),
+            place: format!("--set {setting}"),
+            reason,
+        })?;
+    }
+    let mut connections = Vec::new();
+    let mut driven: HashMap<(usize, usize), String> = HashMap::new();
+    for (text, line) in file.connections.iter().zip(&file.lines) {
+        let text = text.get_ref();
+        let wrong = |reason| at(format!("connection `{text}` (line {line})"), reason);
+        for (from, to) in connection::parse(text).map_err(wrong)? {
+            let connection = connect(&components, &from, &to).map_err(wrong)?;
+            let input = (connection.component, connection.input);
+            if let Some(first) = driven.insert(input, from.clone()) {
+                return Err(wrong(format!("`{to}` is driven by `{first}` already")));
+            }
+            connections.push(connection);
+        }
+    }
+    for (index, part) in components.iter_mut().enumerate() {
+        let variables = &part.fmu.description.variables;
+        part.inputs.retain(|(input, _)| !driven.contains_key(&(index, *input)));
+        for input in part.fmu.description.of(Causality::Input) {
+            let given = part.inputs.iter().any(|(variable, _)| *variable == input);
+            if !given && !driven.contains_key(&(index, input)) {
+                let (name, input) = (&part.name, &variables[input].name);
+                return Err(at(
+                    format!("components.{name}"),
+                    format!(
+                        "the input `{name}.{input}` is open: connect it, or give it a value under \
+                         [components.{name}.inputs]"
+                    ),
+                ));
+            }
+        }
+    }
+    let (end_when, end_after) = end(file, &components)?;
+    Ok(System {
+        name: file.name.clone(),
+        description: file.description.clone(),
+        components,
+        connections,
+        end_when,
+        end_after,
+    })
+}
+
+fn component(
+    file: &SystemFile,
+    name: &str,
+    part: &ComponentFile,
+    fmu: Arc<Fmu>,
+) -> Result<Component, SystemError> {
+    let at = |place: &str, reason| SystemError::Place {
+        origin: file.origin.clone(),
+        place: format!("components.{name}{place}"),
+        reason,
+    };
+    let description = &fmu.description;
+    let mut parameters = Vec::new();
+    if let Some(model) = &part.model {
+        let set = model::parameters(model, description, file.directory.as_deref());
+        parameters = set.map_err(|reason| at(".model", reason))?;
+    }
+    for (variable, written) in &part.parameters {
+        let place = format!(".parameters.{variable}");
+        let found = find(&fmu, variable, Causality::Parameter);
+        let position = found.map_err(|reason| at(&place, reason))?;
+        let value = value::read(&description.variables[position], written);
+        put(&mut parameters, position, value.map_err(|reason| at(&place, reason))?);
+    }
+    let mut inputs = Vec::new();
+    for (variable, written) in &part.inputs {
+        let place = format!(".inputs.{variable}");
+        let found = find(&fmu, variable, Causality::Input);
+        let position = found.map_err(|reason| at(&place, reason))?;
+        let value = value::read(&description.variables[position], written);
+        put(&mut inputs, position, value.map_err(|reason| at(&place, reason))?);
+    }
+    let period = match &part.period {
+        Some(written) => Some(value::time(written).map_err(|reason| at(".period", reason))?),
+        None => sampled(&fmu).then(|| description.preferred_step.unwrap_or(DEFAULT_PERIOD)),
+    };
+    Ok(Component {
+        name: name.to_string(),
+        fmu,
+        period,
+        parameters,
+        inputs,
+    })
+}
+
+/// Whether every output that depends directly on inputs changes at samples only: such a component
+/// computes them when it is stepped, not when they are read.
+fn sampled(fmu: &Fmu) -> bool {
+    let description = &fmu.description;
+    let outputs = description.of(Causality::Output).map(|output| &description.variables[output]);
+    let mut direct = outputs.filter(|variable| !variable.dependencies.is_empty()).peekable();
+    direct.peek().is_some() && direct.all(|v| v.variability == Variability::Discrete)
+}
+
+fn put(values: &mut Vec<(usize, Value)>, position: usize, value: Value) {
+    match values.iter_mut().find(|(known, _)| *known == position) {
+        Some(entry) => entry.1 = value,
+        None => values.push((position, value)),
+    }
+}
+
+fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, String> {
+    let description = &fmu.description;
+    let word = words(causality);
+    let Some(position) = description.position(name) else {
+        let known = description.of(causality).map(|index| description.variables[index].name.as_str());
+        return Err(format!(
+            "{} ({}) has no {word} `{name}`{}",
+            description.model_name,
+            fmu.file_name(),
+            hint(name, known)
+        ));
+    };
+    let found = description.variables[position].causality;
+    if found != causality {
+        return Err(format!("`{name}` is {}, expected {word}", article(found)));
+    }
+    Ok(position)
+}
+
+fn words(causality: Causality) -> &'static str {
+    match causality {
+        Causality::Parameter => "parameter",
+        Causality::Input => "input",
+        Causality::Output => "output",
+        Causality::Local => "local variable",
+    }
+}
+
+fn article(causality: Causality) -> String {
+    let word = words(causality);
+    let vowel = word.starts_with(['i', 'o']);
+    format!("{} {word}", if vowel { "an" } else { "a" })
+}
+
+/// Carries out `component.variable=VALUE` of the command line.
+fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
+    let expected = "expected component.variable=VALUE, such as control.valve_limit=\"5 V\"";
+    let (name, text) = setting.split_once('=').ok_or(expected)?;
+    let (component, variable) = name.trim().split_once('.').ok_or(expected)?;
+    let index = component_index(components, component)?;
+    let part = &mut components[index];
+    let fmu = part.fmu.clone();
+    let is_input = fmu.description.variable(variable);
+    let is_input = is_input.is_some_and(|v| v.causality == Causality::Input);
+    let (causality, values) = if is_input {
+        (Causality::Input, &mut part.inputs)
+    } else {
+        (Causality::Parameter, &mut part.parameters)
+    };
+    let position = find(&fmu, variable, causality)?;
+    let variable = &fmu.description.variables[position];
+    let text = text.trim();
+    let written = match (&variable.kind, text.parse::<i64>()) {
+        (Kind::String, _) => toml::Value::String(text.to_string()),
+        (_, Ok(number)) => toml::Value::Integer(number),
+        _ => match text {
+            "true" => toml::Value::Boolean(true),
+            "false" => toml::Value::Boolean(false),
+            _ => toml::Value::String(text.to_string()),
+        },
+    };
+    put(values, position, value::read(variable, &written)?);
+    Ok(())
+}
+
+fn component_index(components: &[Component], name: &str) -> Result<usize, String> {
+    components.iter().position(|part| part.name == name).ok_or_else(|| {
+        let known = components.iter().map(|part| part.name.as_str());
+        format!("there is no component `{name}`{}", hint(name, known))
+    })
+}
+
+fn split(end: &str) -> Result<(&str, &str), String> {
+    end.split_once('.')
+        .ok_or_else(|| format!("`{end}` should read component.variable"))
+}
+
+fn connect(components: &[Component], from: &str, to: &str) -> Result<Connection, String> {
+    let (component, variable) = split(to)?;
+    let component = component_index(components, component)?;
+    let input = find(&components[component].fmu, variable, Causality::Input)?;
+    let target = &components[component].fmu.description.variables[input];
+
+    let (name, variable) = split(from)?;
+    let (source, kind, unit) = if name == "reference" {
+        let source = connection::reference(variable).ok_or_else(|| {
+            let known = Quantity::ALL.into_iter().map(Quantity::name);
+            format!(
+                "the reference has no `{variable}`{} (or `displacement[3]`, three samples ahead)",
+                hint(variable, known)
+            )
+        })?;
+        let Source::Reference { quantity, .. } = source else {
+            return Err(format!("`{from}` is no reference"));
+        };
+        (source, Kind::Float64, Some(quantity.unit()))
+    } else {
+        let component = component_index(components, name)?;
+        let variable = find(&components[component].fmu, variable, Causality::Output)?;
+        let output = &components[component].fmu.description.variables[variable];
+        let source = Source::Output {
+            component,
+            variable,
+        };
+        (source, output.kind.clone(), output.unit.as_deref())
+    };
+    fits(&kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
+    let factor = factor(unit, target.unit.as_deref())
+        .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
+    Ok(Connection {
+        source,
+        component,
+        input,
+        factor,
+    })
+}
+
+fn fits(kind: &Kind, target: &Variable) -> Result<(), String> {
+    let same = kind.name() == target.kind.name();
+    let widened = *kind == Kind::Int32 && target.kind == Kind::Float64;
+    if kind.is_numeric() && (same || widened) {
+        return Ok(());
+    }
+    let (from, to) = (kind.name(), target.kind.name());
+    Err(format!("is a {from} and cannot drive the {to}"))
+}
+
+/// The factor from one unit to the other; a side without a unit takes the other's.
+fn factor(from: Option<&str>, to: Option<&str>) -> Result<f64, String> {
+    match (from, to) {
+        (Some(from), Some(to)) if from != to => {
+            let unit = |text: &str| Unit::parse(text).map_err(|error| error.to_string());
+            let factor = unit(from)?.factor_to(&unit(to)?);
+            factor.map_err(|error| error.to_string())
+        }
+        _ => Ok(1.0),
+    }
+}
+
+fn end(
+    file: &SystemFile,
+    components: &[Component],
+) -> Result<(Option<(usize, usize)>, f64), SystemError> {
+    let at = |place: &str, reason| SystemError::Place {
+        origin: file.origin.clone(),
+        place: format!("experiment.{place}"),
+        reason,
+    };
+    let experiment = &file.experiment;
+    let after = experiment.end_after.as_ref().map(value::time).transpose();
+    let after = after.map_err(|reason| at("end_after", reason))?.unwrap_or(0.0);
+    let Some(name) = &experiment.end_when else {
+        return Ok((None, after));
+    };
+    let found = || {
+        let (component, variable) = split(name)?;
+        let component = component_index(components, component)?;
+        let fmu = &components[component].fmu;
+        let variable = find(fmu, variable, Causality::Output)?;
+        match fmu.description.variables[variable].kind {
+            Kind::Boolean => Ok((component, variable)),
+            _ => Err(format!("`{name}` is not Boolean")),
+        }
+    };
+    let output = found().map_err(|reason| at("end_when", reason))?;
+    Ok((Some(output), after))
+}

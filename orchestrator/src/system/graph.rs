@@ -1,0 +1,268 @@
+//! The order of calls at a sample, from what the FMUs' `ModelStructure` declares.
+//!
+//! An output of a continuous component is known as soon as the inputs that it depends on directly
+//! are; a sampled component can be called as soon as the inputs are known that any of its outputs
+//! depends on directly. Other inputs of a sampled component take the value of the last sample, if
+//! no newer one is known.
+
+use std::collections::HashMap;
+
+use super::{Connection, Source, System, SystemError};
+use crate::fmu::Causality;
+
+/// A thing to do at a sample.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Operation {
+    /// Set the inputs that these outputs of a continuous component depend on, then read them.
+    Read {
+        /// The component.
+        component: usize,
+        /// Positions of the outputs.
+        outputs: Vec<usize>,
+    },
+    /// Set the inputs of a sampled component, step it over its period, read its outputs.
+    Call {
+        /// The component.
+        component: usize,
+    },
+    /// Repeat these until their values stand still.
+    Iterate(Vec<Operation>),
+}
+
+/// What is done at a sample, in order; afterwards the continuous components step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schedule {
+    /// The operations.
+    pub operations: Vec<Operation>,
+}
+
+/// An output of a continuous component, or a whole sampled one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Node {
+    component: usize,
+    output: Option<usize>,
+}
+
+pub(super) fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
+    let nodes = nodes(system);
+    let place: HashMap<Node, usize> = nodes.iter().enumerate().map(|(i, &n)| (n, i)).collect();
+    let predecessors: Vec<Vec<usize>> = nodes
+        .iter()
+        .map(|node| {
+            drivers(system, node)
+                .filter_map(|connection| Some(place[&source_node(system, connection.source)?]))
+                .collect()
+        })
+        .collect();
+    let groups = strongly_connected(&predecessors);
+    let mut level = vec![0; nodes.len()];
+    let mut operations: Vec<(usize, Operation)> = Vec::new();
+    // Each group comes after those that it depends on.
+    for group in groups {
+        let own = |p: &usize| group.contains(p);
+        let is_loop = group.len() > 1 || predecessors[group[0]].contains(&group[0]);
+        if is_loop && !iterate {
+            return Err(cycle(system, &nodes, &predecessors, &group));
+        }
+        let before = group.iter().flat_map(|&n| &predecessors[n]).filter(|p| !own(p));
+        let at = before.map(|&p| level[p] + 1).max().unwrap_or(0);
+        for &node in &group {
+            level[node] = at;
+        }
+        let mut parts: Vec<_> = group.iter().map(|&n| operation(&nodes[n])).collect();
+        if is_loop {
+            operations.push((at, Operation::Iterate(parts)));
+        } else {
+            operations.push((at, parts.remove(0)));
+        }
+    }
+    operations.sort_by_key(|(level, operation)| (*level, order(operation)));
+    let mut merged: Vec<(usize, Operation)> = Vec::new();
+    for (at, next) in operations {
+        if let (
+            Some((level, Operation::Read { component, outputs })),
+            Operation::Read {
+                component: same,
+                outputs: more,
+            },
+        ) = (merged.last_mut(), &next)
+            && *level == at
+            && component == same
+        {
+            outputs.extend(more);
+            continue;
+        }
+        merged.push((at, next));
+    }
+    Ok(Schedule {
+        operations: merged.into_iter().map(|(_, operation)| operation).collect(),
+    })
+}
+
+fn nodes(system: &System) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    for (component, part) in system.components.iter().enumerate() {
+        if part.period.is_some() {
+            nodes.push(Node {
+                component,
+                output: None,
+            });
+            continue;
+        }
+        let description = &part.fmu.description;
+        let outputs = description.of(Causality::Output);
+        let numeric = outputs.filter(|&v| description.variables[v].kind.is_numeric());
+        nodes.extend(numeric.map(|output| Node {
+            component,
+            output: Some(output),
+        }));
+    }
+    nodes
+}
+
+/// The connections that must have been carried out before `node`.
+fn drivers<'a>(system: &'a System, node: &Node) -> impl Iterator<Item = &'a Connection> {
+    let (component, output) = (node.component, node.output);
+    let description = &system.components[component].fmu.description;
+    let inputs: Vec<usize> = match output {
+        Some(output) => description.variables[output].dependencies.clone(),
+        None => description
+            .of(Causality::Output)
+            .flat_map(|output| description.variables[output].dependencies.iter().copied())
+            .collect(),
+    };
+    let connections = system.connections.iter();
+    connections.filter(move |c| c.component == component && inputs.contains(&c.input))
+}
+
+fn source_node(system: &System, source: Source) -> Option<Node> {
+    let Source::Output {
+        component,
+        variable,
+    } = source
+    else {
+        return None;
+    };
+    let sampled = system.components[component].period.is_some();
+    Some(Node {
+        component,
+        output: (!sampled).then_some(variable),
+    })
+}
+
+fn operation(node: &Node) -> Operation {
+    let component = node.component;
+    match node.output {
+        None => Operation::Call { component },
+        Some(output) => Operation::Read {
+            component,
+            outputs: vec![output],
+        },
+    }
+}
+
+fn order(operation: &Operation) -> (usize, usize) {
+    match operation {
+        Operation::Read { component, outputs } => (*component, outputs[0]),
+        Operation::Call { component } => (*component, 0),
+        Operation::Iterate(parts) => parts.iter().map(order).min().unwrap_or_default(),
+    }
+}
+
+/// Tarjan's algorithm over edges to predecessors: groups come after what they depend on.
+fn strongly_connected(predecessors: &[Vec<usize>]) -> Vec<Vec<usize>> {
+    struct Search<'a> {
+        edges: &'a [Vec<usize>],
+        index: Vec<Option<usize>>,
+        low: Vec<usize>,
+        stack: Vec<usize>,
+        on_stack: Vec<bool>,
+        next: usize,
+        groups: Vec<Vec<usize>>,
+    }
+    impl Search<'_> {
+        fn visit(&mut self, node: usize) {
+            (self.index[node], self.low[node]) = (Some(self.next), self.next);
+            self.next += 1;
+            self.stack.push(node);
+            self.on_stack[node] = true;
+            for &to in &self.edges[node] {
+                match self.index[to] {
+                    None => {
+                        self.visit(to);
+                        self.low[node] = self.low[node].min(self.low[to]);
+                    }
+                    Some(index) if self.on_stack[to] => {
+                        self.low[node] = self.low[node].min(index);
+                    }
+                    Some(_) => {}
+                }
+            }
+            if Some(self.low[node]) == self.index[node] {
+                let mut group = Vec::new();
+                while let Some(member) = self.stack.pop() {
+                    self.on_stack[member] = false;
+                    group.push(member);
+                    if member == node {
+                        break;
+                    }
+                }
+                group.sort_unstable();
+                self.groups.push(group);
+            }
+        }
+    }
+    let n = predecessors.len();
+    let mut search = Search {
+        edges: predecessors,
+        index: vec![None; n],
+        low: vec![0; n],
+        stack: Vec::new(),
+        on_stack: vec![false; n],
+        next: 0,
+        groups: Vec::new(),
+    };
+    for node in 0..n {
+        if search.index[node].is_none() {
+            search.visit(node);
+        }
+    }
+    search.groups
+}
+
+/// Names the variables round a loop in the group, in the direction in which values travel.
+fn cycle(
+    system: &System,
+    nodes: &[Node],
+    predecessors: &[Vec<usize>],
+    group: &[usize],
+) -> SystemError {
+    // Walk against the direction of the values until a node comes again.
+    let mut path = vec![group[0]];
+    let start = loop {
+        let last = path[path.len() - 1];
+        let Some(&before) = predecessors[last].iter().find(|p| group.contains(p)) else {
+            break 0;
+        };
+        if let Some(at) = path.iter().position(|&node| node == before) {
+            break at;
+        }
+        path.push(before);
+    };
+    let round: Vec<usize> = path[start..].iter().rev().copied().collect();
+    let mut variables = Vec::new();
+    for (step, &node) in round.iter().enumerate() {
+        let from = round[(step + round.len() - 1) % round.len()];
+        let connection = drivers(system, &nodes[node])
+            .find(|c| source_node(system, c.source) == Some(nodes[from]));
+        if let Some(connection) = connection {
+            variables.push(system.source_name(connection.source));
+            variables.push(system.variable_name(connection.component, connection.input));
+        }
+    }
+    variables.extend(variables.first().cloned());
+    SystemError::Cycle {
+        system: system.name.clone(),
+        variables,
+    }
+}
