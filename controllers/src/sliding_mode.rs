@@ -76,7 +76,7 @@ pub struct SlidingMode {
 }
 
 /// What sliding mode is told.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct SlidingModeInput {
     /// Wanted motion.
     pub reference: Motion,

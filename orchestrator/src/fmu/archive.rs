@@ -172,7 +172,10 @@ fn foreign(head: &[u8; 20]) -> Option<&'static str> {
         }
     } else if head.starts_with(b"MZ") {
         ("windows", std::env::consts::ARCH, "a Windows library")
-    } else if matches!(head[..4], [0xcf | 0xce, 0xfa, 0xed, 0xfe] | [0xca, 0xfe, 0xba, 0xbe]) {
+    } else if matches!(
+        head[..4],
+        [0xcf | 0xce, 0xfa, 0xed, 0xfe] | [0xca, 0xfe, 0xba, 0xbe]
+    ) {
         ("macos", std::env::consts::ARCH, "a macOS library")
     } else {
         ("none", "none", "no shared library at all")

@@ -369,7 +369,9 @@ fn from_fmi3(text: &str) -> Result<Description, String> {
     })
 }
 
-fn preferred_step(experiment: Option<&fmi_rs::model_description::DefaultExperiment>) -> Option<f64> {
+fn preferred_step(
+    experiment: Option<&fmi_rs::model_description::DefaultExperiment>,
+) -> Option<f64> {
     let step = experiment?.stepSize.as_ref()?.parse().ok()?;
     (step > 0.0).then_some(step)
 }

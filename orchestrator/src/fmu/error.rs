@@ -70,7 +70,9 @@ pub enum FmuError {
 #[derive(Debug, Clone, Error)]
 #[error(
     "`{instance}` ({}) failed at {time} s: {call}{} {outcome}{}",
-    file_name(fmu), list(variables), said(messages)
+    file_name(fmu),
+    list(variables),
+    said(messages)
 )]
 pub struct CallError {
     /// The instance.

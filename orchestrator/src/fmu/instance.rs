@@ -10,7 +10,7 @@ use fmi_rs::fmi3::native::NativeLibrary;
 use fmi_rs::fmi3::{FMU3, Implementation};
 
 use super::messages::{Messages, STATUS};
-use super::{CallError, Fmu, FmiVersion, FmuError, Kind, Message, archive};
+use super::{CallError, FmiVersion, Fmu, FmuError, Kind, Message, archive};
 
 type Outcome<T = ()> = Result<T, Box<CallError>>;
 
@@ -179,7 +179,11 @@ impl Instance {
                 ) as i32;
                 self.check((status, "fmi3 doStep"), &[])?;
                 if end || early {
-                    let what = if end { "asked to end the run" } else { "returned early" };
+                    let what = if end {
+                        "asked to end the run"
+                    } else {
+                        "returned early"
+                    };
                     return Err(self.failure("fmi3 doStep", &[], format!("{what} at {last} s")));
                 }
                 Ok(())
@@ -220,7 +224,10 @@ impl Instance {
             (Kind::Boolean, Interface::Fmi2(fmu)) => {
                 let mut value = [0];
                 let status = fmu.getBoolean(&reference, &mut value) as i32;
-                ((status, "fmi2 getBoolean"), f64::from(u8::from(value[0] != 0)))
+                (
+                    (status, "fmi2 getBoolean"),
+                    f64::from(u8::from(value[0] != 0)),
+                )
             }
             (Kind::Boolean, Interface::Fmi3(fmu)) => {
                 let mut value = [false];
@@ -339,7 +346,10 @@ impl Instance {
         if status <= 1 {
             return Ok(());
         }
-        let name = STATUS.get(status as usize).copied().unwrap_or("an unknown status");
+        let name = STATUS
+            .get(status as usize)
+            .copied()
+            .unwrap_or("an unknown status");
         let error = self.failure(call, references, format!("returned {name}"));
         if name == "fatal" {
             self.is_dead.set(true);

@@ -160,16 +160,25 @@ impl<'a> Plan<'a> {
         let mut group = Outputs::default();
         for kind in kinds {
             let first = self.names.len();
-            let alike = outputs.iter().copied().filter(|&v| variables[v].kind == *kind);
+            let alike = outputs
+                .iter()
+                .copied()
+                .filter(|&v| variables[v].kind == *kind);
             let alike: Vec<usize> = alike.collect();
             for &output in &alike {
                 self.places.insert((component, output), self.names.len());
-                self.names.push(self.system.variable_name(component, output));
+                self.names
+                    .push(self.system.variable_name(component, output));
             }
-            group.add(kind, alike.iter().map(|&v| variables[v].reference).collect(), first);
+            group.add(
+                kind,
+                alike.iter().map(|&v| variables[v].reference).collect(),
+                first,
+            );
         }
         self.outputs[component].extend(&group);
-        self.groups.insert((component, outputs.first().copied().unwrap_or(0)), group);
+        self.groups
+            .insert((component, outputs.first().copied().unwrap_or(0)), group);
     }
 
     fn signal(&self, reference: &mut Reference, source: Source) -> usize {
@@ -204,7 +213,11 @@ impl<'a> Plan<'a> {
             Operation::Call { component } => Action::Call { part: *component },
             Operation::Read { component, outputs } => {
                 let variables = &self.system.components[*component].fmu.description.variables;
-                let needed = |input| outputs.iter().any(|&v| variables[v].dependencies.contains(&input));
+                let needed = |input| {
+                    outputs
+                        .iter()
+                        .any(|&v| variables[v].dependencies.contains(&input))
+                };
                 let group = (*component, outputs.first().copied().unwrap_or(0));
                 Action::Read {
                     part: *component,
@@ -219,7 +232,10 @@ impl<'a> Plan<'a> {
                 });
                 Action::Iterate {
                     called: called.collect(),
-                    actions: parts.iter().map(|part| self.action(reference, part)).collect(),
+                    actions: parts
+                        .iter()
+                        .map(|part| self.action(reference, part))
+                        .collect(),
                     last: vec![0.0; self.names.len()],
                 }
             }

@@ -12,7 +12,12 @@ pub(super) fn observe(simulation: &mut Simulation) -> Result<(), MasterError> {
         calls: true,
     };
     for action in &mut simulation.actions {
-        action.perform(at, &mut simulation.parts, &mut simulation.signals, &simulation.names)?;
+        action.perform(
+            at,
+            &mut simulation.parts,
+            &mut simulation.signals,
+            &simulation.names,
+        )?;
     }
     Ok(())
 }
@@ -20,7 +25,11 @@ pub(super) fn observe(simulation: &mut Simulation) -> Result<(), MasterError> {
 /// Continuous components over `[t_k, t_k + h]`, with their inputs held at their values at `t_k`.
 pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     let (time, step) = (simulation.time(), simulation.step);
-    for part in simulation.parts.iter_mut().filter(|part| part.every.is_none()) {
+    for part in simulation
+        .parts
+        .iter_mut()
+        .filter(|part| part.every.is_none())
+    {
         part.inputs.transfer(&simulation.signals, &part.instance)?;
         part.instance.do_step(time, step)?;
     }

@@ -30,7 +30,15 @@ use transfer::{Inputs, Outputs};
 
 /// The order in which components are called and values are exchanged.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize, clap::ValueEnum,
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    serde::Serialize,
+    serde::Deserialize,
+    clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Algorithm {
@@ -122,7 +130,8 @@ impl Simulation {
     /// # Errors
     /// A call that an FMU did not complete, or a loop that does not settle.
     pub fn observe(&mut self) -> Result<(), MasterError> {
-        self.reference.sample(self.tick / self.ticks_per_row, &mut self.signals);
+        self.reference
+            .sample(self.tick / self.ticks_per_row, &mut self.signals);
         match self.algorithm {
             Algorithm::Jacobi => Ok(()),
             Algorithm::GaussSeidel | Algorithm::Iterative => gauss_seidel::observe(self),

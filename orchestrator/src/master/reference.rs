@@ -24,7 +24,10 @@ impl Reference {
 
     /// The signal of a quantity `ahead` samples ahead.
     pub(super) fn tap(&mut self, quantity: Quantity, ahead: usize) -> usize {
-        let history = Quantity::ALL.iter().position(|&q| q == quantity).unwrap_or(0);
+        let history = Quantity::ALL
+            .iter()
+            .position(|&q| q == quantity)
+            .unwrap_or(0);
         let known = self.taps.iter().position(|&tap| tap == (history, ahead));
         known.unwrap_or_else(|| {
             self.taps.push((history, ahead));
@@ -42,7 +45,11 @@ impl Reference {
     pub(super) fn sample(&self, sample: usize, signals: &mut [f64]) {
         for (signal, &(history, ahead)) in signals.iter_mut().zip(&self.taps) {
             let values = &self.histories[history];
-            let at_rest = if history == 0 { values.last().copied().unwrap_or(0.0) } else { 0.0 };
+            let at_rest = if history == 0 {
+                values.last().copied().unwrap_or(0.0)
+            } else {
+                0.0
+            };
             *signal = values.get(sample + ahead).copied().unwrap_or(at_rest);
         }
     }

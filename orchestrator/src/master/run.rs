@@ -88,10 +88,13 @@ impl Simulation {
         progress(record.len());
         let messages = self.parts.iter().flat_map(|part| {
             let component = &part.instance.name;
-            part.instance.take_messages().into_iter().map(|message| LogLine {
-                component: component.clone(),
-                message,
-            })
+            part.instance
+                .take_messages()
+                .into_iter()
+                .map(|message| LogLine {
+                    component: component.clone(),
+                    message,
+                })
         });
         Outcome {
             record,

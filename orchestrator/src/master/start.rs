@@ -38,7 +38,12 @@ pub(super) fn initialize(simulation: &mut Simulation, stop: f64) -> Result<(), M
     for pass in 1.. {
         last.copy_from_slice(&simulation.signals);
         for action in &mut simulation.actions {
-            action.perform(at, &mut simulation.parts, &mut simulation.signals, &simulation.names)?;
+            action.perform(
+                at,
+                &mut simulation.parts,
+                &mut simulation.signals,
+                &simulation.names,
+            )?;
         }
         for part in &mut simulation.parts {
             part.inputs.transfer(&simulation.signals, &part.instance)?;

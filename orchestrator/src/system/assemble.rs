@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use super::connection::{self, Quantity, Source};
 use super::file::{ComponentFile, SystemFile};
-use super::{Component, Connection, DEFAULT_PERIOD, System, SystemError, Value, hint, model, value};
+use super::{
+    Component, Connection, DEFAULT_PERIOD, System, SystemError, Value, hint, model, value,
+};
 use crate::fmu::{Causality, Fmu, Kind, Variability, Variable};
 use crate::units::Unit;
 
@@ -69,7 +71,8 @@ pub fn assemble(
     }
     for (index, part) in components.iter_mut().enumerate() {
         let variables = &part.fmu.description.variables;
-        part.inputs.retain(|(input, _)| !driven.contains_key(&(index, *input)));
+        part.inputs
+            .retain(|(input, _)| !driven.contains_key(&(index, *input)));
         for input in part.fmu.description.of(Causality::Input) {
             let given = part.inputs.iter().any(|(variable, _)| *variable == input);
             if !given && !driven.contains_key(&(index, input)) {
@@ -117,7 +120,11 @@ fn component(
         let found = find(&fmu, variable, Causality::Parameter);
         let position = found.map_err(|reason| at(&place, reason))?;
         let value = value::read(&description.variables[position], written);
-        put(&mut parameters, position, value.map_err(|reason| at(&place, reason))?);
+        put(
+            &mut parameters,
+            position,
+            value.map_err(|reason| at(&place, reason))?,
+        );
     }
     let mut inputs = Vec::new();
     for (variable, written) in &part.inputs {
@@ -125,7 +132,11 @@ fn component(
         let found = find(&fmu, variable, Causality::Input);
         let position = found.map_err(|reason| at(&place, reason))?;
         let value = value::read(&description.variables[position], written);
-        put(&mut inputs, position, value.map_err(|reason| at(&place, reason))?);
+        put(
+            &mut inputs,
+            position,
+            value.map_err(|reason| at(&place, reason))?,
+        );
     }
     let period = match &part.period {
         Some(written) => Some(value::time(written).map_err(|reason| at(".period", reason))?),
@@ -144,8 +155,12 @@ fn component(
 /// computes them when it is stepped, not when they are read.
 fn sampled(fmu: &Fmu) -> bool {
     let description = &fmu.description;
-    let outputs = description.of(Causality::Output).map(|output| &description.variables[output]);
-    let mut direct = outputs.filter(|variable| !variable.dependencies.is_empty()).peekable();
+    let outputs = description
+        .of(Causality::Output)
+        .map(|output| &description.variables[output]);
+    let mut direct = outputs
+        .filter(|variable| !variable.dependencies.is_empty())
+        .peekable();
     direct.peek().is_some() && direct.all(|v| v.variability == Variability::Discrete)
 }
 
@@ -160,7 +175,9 @@ fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, String> {
     let description = &fmu.description;
     let word = words(causality);
     let Some(position) = description.position(name) else {
-        let known = description.of(causality).map(|index| description.variables[index].name.as_str());
+        let known = description
+            .of(causality)
+            .map(|index| description.variables[index].name.as_str());
         return Err(format!(
             "{} ({}) has no {word} `{name}`{}",
             description.model_name,
@@ -222,10 +239,13 @@ fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
 }
 
 fn component_index(components: &[Component], name: &str) -> Result<usize, String> {
-    components.iter().position(|part| part.name == name).ok_or_else(|| {
-        let known = components.iter().map(|part| part.name.as_str());
-        format!("there is no component `{name}`{}", hint(name, known))
-    })
+    components
+        .iter()
+        .position(|part| part.name == name)
+        .ok_or_else(|| {
+            let known = components.iter().map(|part| part.name.as_str());
+            format!("there is no component `{name}`{}", hint(name, known))
+        })
 }
 
 fn split(end: &str) -> Result<(&str, &str), String> {
@@ -306,7 +326,9 @@ fn end(
     };
     let experiment = &file.experiment;
     let after = experiment.end_after.as_ref().map(value::time).transpose();
-    let after = after.map_err(|reason| at("end_after", reason))?.unwrap_or(0.0);
+    let after = after
+        .map_err(|reason| at("end_after", reason))?
+        .unwrap_or(0.0);
     let Some(name) = &experiment.end_when else {
         return Ok((None, after));
     };

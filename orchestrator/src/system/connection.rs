@@ -82,9 +82,9 @@ fn expand(end: &str) -> Result<Vec<String>, String> {
     };
     let bound = |text: &str| text.trim().parse::<usize>().ok().filter(|&n| n < 100_000);
     match (bound(first), bound(last)) {
-        (Some(first), Some(last)) if first <= last => {
-            Ok((first..=last).map(|index| format!("{name}[{index}]")).collect())
-        }
+        (Some(first), Some(last)) if first <= last => Ok((first..=last)
+            .map(|index| format!("{name}[{index}]"))
+            .collect()),
         _ => Err(format!("`{end}` has no range such as [1..15]")),
     }
 }
@@ -95,7 +95,10 @@ pub(super) fn reference(variable: &str) -> Option<Source> {
         None => (variable, 0),
         Some(rest) => {
             let (name, index) = rest.split_once('[')?;
-            (name, index.trim().parse().ok().filter(|&ahead| ahead < 100_000)?)
+            (
+                name,
+                index.trim().parse().ok().filter(|&ahead| ahead < 100_000)?,
+            )
         }
     };
     let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name)?;

@@ -114,9 +114,9 @@ impl SystemFile {
         let mut file = Self::parse(&path.display().to_string(), &text)?;
         file.directory = path.parent().map(Path::to_path_buf);
         if file.name.is_empty() {
-            file.name = path.file_stem().map_or_else(String::new, |stem| {
-                stem.to_string_lossy().into_owned()
-            });
+            file.name = path
+                .file_stem()
+                .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         }
         Ok(file)
     }

@@ -64,7 +64,10 @@ pub(super) fn schedule(system: &System, iterate: bool) -> Result<Schedule, Syste
         if is_loop && !iterate {
             return Err(cycle(system, &nodes, &predecessors, &group));
         }
-        let before = group.iter().flat_map(|&n| &predecessors[n]).filter(|p| !own(p));
+        let before = group
+            .iter()
+            .flat_map(|&n| &predecessors[n])
+            .filter(|p| !own(p));
         let at = before.map(|&p| level[p] + 1).max().unwrap_or(0);
         for &node in &group {
             level[node] = at;

@@ -45,7 +45,9 @@ pub(super) fn parameters(
             hint(name, known)
         ));
     };
-    let actuator = published.for_simulation().map_err(|error| error.to_string())?;
+    let actuator = published
+        .for_simulation()
+        .map_err(|error| error.to_string())?;
     let table = match published {
         PublishedActuator::Derounded => Table::derounded(),
         _ => Table::equation_2_28(),
@@ -82,9 +84,10 @@ pub(super) fn parameters(
 fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>, String> {
     let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
     let file: ModelFile = toml::from_str(&text).map_err(|error| error.to_string())?;
-    let given = file.parameters.get(&component.model_name).ok_or_else(|| {
-        format!("there is no [parameters.{}]", component.model_name)
-    })?;
+    let given = file
+        .parameters
+        .get(&component.model_name)
+        .ok_or_else(|| format!("there is no [parameters.{}]", component.model_name))?;
     let read = |(name, written): (&String, &toml::Value)| {
         let at = |reason: String| format!("parameters.{}.{name}: {reason}", component.model_name);
         let position = component

@@ -48,11 +48,15 @@ pub(super) fn read(variable: &Variable, written: &toml::Value) -> Result<Value, 
             misfit(&format!("one of {}", names.join(", ")))
         }
         (Kind::Enumeration(items), Toml::String(name)) => {
-            let found = items.iter().find(|(item, _)| item.eq_ignore_ascii_case(name));
-            found.map(|(_, value)| Value::Number(*value as f64)).ok_or_else(|| {
-                let known = items.iter().map(|(item, _)| item.as_str());
-                format!("`{name}` is no choice{}", hint(name, known))
-            })
+            let found = items
+                .iter()
+                .find(|(item, _)| item.eq_ignore_ascii_case(name));
+            found
+                .map(|(_, value)| Value::Number(*value as f64))
+                .ok_or_else(|| {
+                    let known = items.iter().map(|(item, _)| item.as_str());
+                    format!("`{name}` is no choice{}", hint(name, known))
+                })
         }
         (Kind::Enumeration(_), _) => misfit("the name of a choice"),
         (Kind::String, Toml::String(text)) => Ok(Value::Text(text.clone())),
@@ -71,7 +75,9 @@ pub(super) fn quantity(text: &str, unit: Option<&str>) -> Result<f64, String> {
         // A number alone is in the variable's own unit.
         _ if quantity.unit.text.is_empty() => Ok(quantity.value),
         Some(unit) if quantity.unit.text == unit => Ok(quantity.value),
-        unit => quantity.to(unit.unwrap_or("")).map_err(|error| error.to_string()),
+        unit => quantity
+            .to(unit.unwrap_or(""))
+            .map_err(|error| error.to_string()),
     }
 }
 
