@@ -1,2 +1,7 @@
 //! The program `shakebench`.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    shakebench::cli::main()
+}

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::SystemError;
+use super::{SystemError, value};
 
 /// A system file.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -119,6 +119,23 @@ impl SystemFile {
                 .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         }
         Ok(file)
+    }
+
+    /// `step` or `duration` of the experiment, s.
+    ///
+    /// # Errors
+    /// What stands there is no time.
+    pub fn time(&self, name: &str) -> Result<Option<f64>, SystemError> {
+        let written = match name {
+            "step" => &self.experiment.step,
+            _ => &self.experiment.duration,
+        };
+        let time = written.as_ref().map(value::time).transpose();
+        time.map_err(|reason| SystemError::Place {
+            origin: self.origin.clone(),
+            place: format!("experiment.{name}"),
+            reason,
+        })
     }
 
     /// Adds the components, connections and experiment of `part`; what `part` says goes before.

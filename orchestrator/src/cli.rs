@@ -1,0 +1,42 @@
+//! The command line.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::commands::{build, info, run};
+
+/// Hydraulic shake tables as FMI components, co-simulated.
+///
+/// Without a command, the built-in system is run on the built-in motion.
+#[derive(Debug, Parser)]
+#[command(name = "shakebench", version, after_help = "Exit status: 0 done; 1 the run ended early \
+    (what was computed is saved); 2 the input is at fault (nothing is written).")]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Build the components and pack them as FMUs
+    Build(build::Arguments),
+    /// Show what an .fmu, system or motion file holds
+    Info(info::Arguments),
+    /// Run a system on a motion
+    Run(run::Arguments),
+}
+
+/// Reads the command line, does what it says and gives the exit status.
+pub fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        None => run::execute(&run::Arguments::default()),
+        Some(Command::Build(arguments)) => build::execute(&arguments),
+        Some(Command::Info(arguments)) => info::execute(&arguments),
+        Some(Command::Run(arguments)) => run::execute(&arguments),
+    };
+    done.unwrap_or_else(|error| {
+        eprintln!("error: {error}");
+        ExitCode::from(2)
+    })
+}

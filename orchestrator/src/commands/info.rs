@@ -1,0 +1,192 @@
+//! `shakebench info`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::table::{aligned, significant};
+use crate::error::Error;
+use crate::fmu::{Causality, FmiVersion, Fmu};
+use crate::library::FmuLibrary;
+use crate::motion;
+use crate::system::{self, Operation, SystemFile, built_in};
+use crate::units::STANDARD_GRAVITY;
+
+/// Options of `shakebench info`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    shakebench info target/fmus/fmi3/ShakeTable.fmu\n  \
+    shakebench info three-variable\n  \
+    shakebench info records/RSN1633_MANJIL_ABBAR--L.AT2")]
+pub struct Arguments {
+    /// An .fmu, a system (.toml or built-in), or a motion (.AT2, .csv)
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+}
+
+/// Prints what a file holds.
+///
+/// # Errors
+/// A file at fault.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let path = &arguments.file;
+    let name = path.to_string_lossy();
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let text = match extension.as_deref() {
+        Some("fmu") => fmu(&*Fmu::open(path)?),
+        Some("toml") => system(&SystemFile::read(path)?)?,
+        Some("at2" | "csv") => motion(path)?,
+        _ if built_in::names().any(|known| known == name) => system(&built_in::system(
+            &name,
+            built_in::DEFAULT_PLANT,
+            built_in::DEFAULT_SPECIMEN,
+        )?)?,
+        _ => {
+            let reason = format!(
+                "expected an .fmu, .toml, .AT2 or .csv file, or a built-in system ({})",
+                built_in::names().collect::<Vec<_>>().join(", ")
+            );
+            return Err(Error::File {
+                path: path.clone(),
+                reason,
+            });
+        }
+    };
+    print!("{text}");
+    Ok(ExitCode::SUCCESS)
+}
+
+fn fmu(fmu: &Fmu) -> String {
+    let d = &fmu.description;
+    let yes = |truth| if truth { "yes" } else { "no" };
+    let mut text = format!("{}: {}\n", d.model_name, d.about);
+    let row = |name: &str, value: &str| format!("  {name:<20}{value}\n");
+    text += &row("FMI", &d.version.to_string());
+    text += &row("token", &d.token);
+    text += &row("made by", &d.generation_tool);
+    text += &row("platforms", &fmu.platforms.join(", "));
+    text += &row("model exchange", yes(d.offers_model_exchange));
+    text += &row("saves its state", yes(d.saves_state));
+    if let Some(step) = d.preferred_step {
+        text += &row("preferred step", &format!("{step} s"));
+    }
+    text += &row("SHA-256", &fmu.sha256);
+    for (causality, heading) in [
+        (Causality::Input, "inputs"),
+        (Causality::Output, "outputs"),
+        (Causality::Parameter, "parameters"),
+        (Causality::Local, "locals"),
+    ] {
+        let rows: Vec<Vec<String>> = d
+            .of(causality)
+            .map(|index| {
+                let v = &d.variables[index];
+                let known = v.dependencies.iter().map(|&on| d.variables[on].name.as_str());
+                let known: Vec<&str> = known.collect();
+                let mut about = v.description.clone();
+                if !known.is_empty() {
+                    about += &format!(" (directly from {})", known.join(", "));
+                }
+                vec![
+                    format!("  {}", v.name),
+                    v.kind.name().to_string(),
+                    v.start.clone().unwrap_or_default(),
+                    v.unit.clone().unwrap_or_default(),
+                    about,
+                ]
+            })
+            .collect();
+        if !rows.is_empty() {
+            text += &format!("\n{heading}\n{}", last_left(rows));
+        }
+    }
+    for remark in &d.remarks {
+        text += &format!("\nremark: {remark}\n");
+    }
+    text
+}
+
+/// As [`aligned`], with the last column aligned left.
+fn last_left(mut rows: Vec<Vec<String>>) -> String {
+    let last: Vec<String> = rows.iter_mut().filter_map(Vec::pop).collect();
+    let width = rows.iter().flat_map(|row| row.last()).map(|c| c.chars().count()).max();
+    for row in &mut rows {
+        if let Some(cell) = row.last_mut() {
+            *cell = format!("{cell:<0$}", width.unwrap_or(0));
+        }
+    }
+    let table = aligned(&rows);
+    let full = table.lines().map(|line| line.chars().count()).max().unwrap_or(0);
+    let lines = table.lines().zip(last);
+    lines.map(|(line, last)| format!("{line:<full$}  {last}").trim_end().to_string() + "\n").collect()
+}
+
+fn system(file: &SystemFile) -> Result<String, Error> {
+    let mut library = FmuLibrary::new(FmiVersion::V3, file.directory.as_deref());
+    let system = system::assemble(file, &[], &mut |name| library.find(name))?;
+    let mut text = format!("{}: {}\n\ncomponents\n", system.name, system.description);
+    let rows = system.components.iter().map(|component| {
+        let sampled = match component.period {
+            Some(period) => format!("sampled every {} ms", 1e3 * period),
+            None => "continuous".to_string(),
+        };
+        let model = component.fmu.description.model_name.clone();
+        vec![format!("  {}", component.name), model, sampled]
+    });
+    text += &last_left(rows.collect());
+    text += "\nconnections\n";
+    let rows = system.connections.iter().map(|connection| {
+        let to = system.variable_name(connection.component, connection.input);
+        vec![format!("  {}", system.source_name(connection.source)), format!("-> {to}")]
+    });
+    text += &last_left(rows.collect());
+    text += "\norder of calls at a sample\n";
+    for (number, operation) in system.schedule(true)?.operations.iter().enumerate() {
+        text += &format!("  {}. {}\n", number + 1, words(&system, operation));
+    }
+    text += "  then the continuous components step\n";
+    Ok(text)
+}
+
+fn words(system: &system::System, operation: &Operation) -> String {
+    match operation {
+        Operation::Call { component } => format!("call {}", system.components[*component].name),
+        Operation::Read { component, outputs } => {
+            let names = outputs.iter().map(|&output| system.variable_name(*component, output));
+            format!("read {}", names.collect::<Vec<_>>().join(", "))
+        }
+        Operation::Iterate(parts) => {
+            let parts = parts.iter().map(|part| words(system, part));
+            format!("repeat until settled: {}", parts.collect::<Vec<_>>().join("; "))
+        }
+    }
+}
+
+fn motion(path: &Path) -> Result<String, Error> {
+    let record = motion::read_record(path);
+    let playable = match &record {
+        Ok(_) => motion::load(path, &motion::Options::default())?,
+        // Not an acceleration alone: a reference, perhaps.
+        Err(_) => motion::load_reference(path, &motion::Options::default()).or_else(|error| {
+            Err::<_, Error>(match record {
+                Err(first) => first.into(),
+                Ok(_) => error.into(),
+            })
+        })?,
+    };
+    let mut text = format!("{}\n", playable.name);
+    for note in &playable.notes {
+        text += &format!("  {note}\n");
+    }
+    text += &format!(
+        "  as played: {} s, {} samples of {} ms, {} g, {} m/s, {} in\n",
+        significant(playable.duration(), 4),
+        playable.len(),
+        1e3 * playable.dt,
+        significant(playable.peak_acceleration() / STANDARD_GRAVITY, 4),
+        significant(playable.peak_velocity(), 4),
+        significant(playable.peak_displacement() / crate::units::INCH, 4),
+    );
+    Ok(text)
+}

@@ -1,0 +1,32 @@
+//! One file a command.
+
+pub mod build;
+pub mod info;
+pub mod run;
+mod summary;
+mod table;
+
+use clap::ValueEnum;
+
+use crate::fmu::FmiVersion;
+
+/// `--fmi` where one version is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum OneVersion {
+    /// FMI 2.0
+    #[value(name = "2")]
+    Two,
+    /// FMI 3.0
+    #[default]
+    #[value(name = "3")]
+    Three,
+}
+
+impl From<OneVersion> for FmiVersion {
+    fn from(version: OneVersion) -> Self {
+        match version {
+            OneVersion::Two => Self::V2,
+            OneVersion::Three => Self::V3,
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! `shakebench run`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::{Deserialize, Serialize};
+
+use super::{OneVersion, summary};
+use crate::error::Error;
+use crate::fmu::FmiVersion;
+use crate::library::FmuLibrary;
+use crate::manifest::Manifest;
+use crate::master::{Algorithm, Ended, Pace, Simulation};
+use crate::motion::{self, Motion, Scaling};
+use crate::results::Results;
+use crate::system::{self, System, SystemFile, built_in};
+use crate::units::{Quantity, STANDARD_GRAVITY};
+
+/// Options of `shakebench run`.
+#[derive(Debug, Default, Args)]
+#[command(after_help = "Examples:\n  \
+    shakebench run three-variable --record NGA/RSN1633_MANJIL_ABBAR--L.AT2\n  \
+    shakebench run displacement-pid --specimen none --pga 0.2 --set control.integral_gain=\"0.5 V/(in s)\"\n  \
+    shakebench run my-rig.toml --algorithm jacobi --step 1ms --json\n  \
+    shakebench run --manifest shakebench-results/three-variable-synthetic-1/manifest.json")]
+pub struct Arguments {
+    /// Built-in system or .toml file [default: three-variable]
+    #[arg(value_name = "SYSTEM")]
+    system: Option<String>,
+    /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
+    #[arg(long, value_name = "FILE", conflicts_with = "reference")]
+    record: Option<PathBuf>,
+    /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// Plant of a built-in system [default: identified]
+    #[arg(long)]
+    plant: Option<String>,
+    /// Specimen of a built-in system: none, linear [default: linear]
+    #[arg(long)]
+    specimen: Option<String>,
+    /// Parameter, such as control.valve_limit="5 V"; may be given several times
+    #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
+    set: Vec<String>,
+    /// Version of FMI of the components
+    #[arg(long, value_enum, default_value_t)]
+    fmi: OneVersion,
+    /// Order of calls
+    #[arg(long, value_enum, default_value_t)]
+    algorithm: Algorithm,
+    /// Coupling step, such as "0.5 ms"; controllers keep their own period [default: 2 ms]
+    #[arg(long, value_name = "T")]
+    step: Option<String>,
+    /// Play only the beginning of the motion, such as "10 s"
+    #[arg(long, value_name = "T")]
+    duration: Option<String>,
+    /// Scale of the motion: a factor
+    #[arg(long, value_name = "FACTOR", group = "scaling")]
+    scale: Option<f64>,
+    /// Scale of the motion: peak acceleration in g
+    #[arg(long, value_name = "G", group = "scaling")]
+    pga: Option<String>,
+    /// Scale of the motion: peak displacement, such as "1.2 in" (a number alone is in m)
+    #[arg(long, value_name = "L", group = "scaling")]
+    peak: Option<String>,
+    /// Seed of the built-in motion [default: 1]
+    #[arg(long, conflicts_with_all = ["record", "reference"])]
+    seed: Option<u64>,
+    /// Keep pace with the clock on the wall
+    #[arg(long)]
+    real_time: bool,
+    /// Folder for the results [default: shakebench-results/SYSTEM-MOTION]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+    /// Repeat the run of a manifest.json and check that it agrees to the bit
+    #[arg(long, value_name = "FILE", conflicts_with_all = [
+        "system", "record", "reference", "plant", "specimen", "set", "fmi", "algorithm", "step",
+        "duration", "scaling", "seed",
+    ])]
+    manifest: Option<PathBuf>,
+}
+
+/// What a run is asked to be; a manifest keeps it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Request {
+    /// Built-in system or path of a file.
+    pub system: String,
+    /// Plant of a built-in system.
+    pub plant: String,
+    /// Specimen of a built-in system.
+    pub specimen: String,
+    /// Record to play.
+    pub record: Option<PathBuf>,
+    /// Reference to play.
+    pub reference: Option<PathBuf>,
+    /// Seed of the built-in motion.
+    pub seed: u64,
+    /// How large it is played.
+    pub scaling: Option<Scale>,
+    /// Parameters.
+    pub set: Vec<String>,
+    /// Version of FMI of the project's own components.
+    pub fmi: FmiVersion,
+    /// Order of calls.
+    pub algorithm: Algorithm,
+    /// Coupling step, s.
+    pub step_s: Option<f64>,
+    /// Length played, s.
+    pub duration_s: Option<f64>,
+}
+
+/// How large a motion is played.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scale {
+    /// A factor.
+    Factor(f64),
+    /// Peak acceleration, m/s².
+    PeakAcceleration(f64),
+    /// Peak displacement, m.
+    PeakDisplacement(f64),
+}
+
+/// A request with everything it needs, checked.
+pub struct Prepared {
+    /// The system.
+    pub system: System,
+    /// The motion.
+    pub motion: Motion,
+    /// Coupling step, s.
+    pub step: f64,
+    /// Samples to play.
+    pub samples: usize,
+}
+
+/// Runs a system on a motion and writes the results.
+///
+/// # Errors
+/// Input at fault; nothing is written then.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let written = arguments.manifest.as_deref().map(Manifest::read).transpose()?;
+    let request = match &written {
+        Some(manifest) => manifest.request.clone(),
+        None => Request::new(arguments)?,
+    };
+    let prepared = prepare(&request)?;
+    let Prepared {
+        system,
+        motion,
+        step,
+        samples,
+    } = &prepared;
+    let folder = arguments.out.clone().unwrap_or_else(|| {
+        let name = format!("{}-{}", system.name, motion.name);
+        Path::new("shakebench-results").join(name.replace(['/', '\\', ' '], "-"))
+    });
+    Results::check(&folder)?;
+    let simulation = Simulation::new(system, motion, request.algorithm, *step)?;
+    let bar = progress_bar(*samples);
+    let pace = if arguments.real_time { Pace::RealTime } else { Pace::Fastest };
+    let outcome = simulation.run(*samples, pace, &mut |sample| bar.set_position(sample as u64));
+    bar.finish_and_clear();
+
+    let plan = (request.algorithm, *step, *samples);
+    let manifest = Manifest::new(&request, system, motion, plan, &outcome.record);
+    let summary = summary::Summary::new(&request, &prepared, &outcome);
+    let files = summary::write(&folder, &prepared, &outcome, &summary, &manifest)?;
+    for line in &summary.warnings {
+        eprintln!("warning: {line}");
+    }
+    if arguments.json {
+        println!("{}", serde_json::json!(summary));
+    } else {
+        print!("{}", summary.table(motion));
+        println!("\nwritten:");
+        for file in files {
+            println!("  {}", file.display());
+        }
+    }
+    if let Some(written) = written {
+        let differences = written.differences(&manifest);
+        if !differences.is_empty() {
+            eprintln!("error: the run was not repeated to the bit");
+            differences.iter().for_each(|line| eprintln!("  {line}"));
+            return Ok(ExitCode::from(1));
+        }
+        eprintln!("the run was repeated to the bit");
+    }
+    if matches!(outcome.ended, Ended::Complete) {
+        return Ok(ExitCode::SUCCESS);
+    }
+    eprintln!("error: the run ended early: {}", outcome.ended.story());
+    eprintln!("what was computed until then is saved");
+    Ok(ExitCode::from(1))
+}
+
+impl Request {
+    /// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.
+    ///
+    /// # Errors
+    /// Values that cannot be read.
+    pub fn new(arguments: &Arguments) -> Result<Self, Error> {
+        let system = arguments.system.clone().unwrap_or(built_in::DEFAULT_SYSTEM.to_string());
+        let is_file = is_file(&system);
+        for (option, given) in [
+            ("--plant", &arguments.plant),
+            ("--specimen", &arguments.specimen),
+        ] {
+            if let (true, Some(_)) = (is_file, given) {
+                let reason = format!("{system} is a file and has its own; edit it instead");
+                return Err(Error::Option { option, reason });
+            }
+        }
+        let or = |given: &Option<String>, default: &str| given.clone().unwrap_or(default.into());
+        let text = |option, given: &Option<String>, unit: &'static str| {
+            given.as_ref().map(|text| quantity(option, text, unit)).transpose()
+        };
+        let scaling = match (arguments.scale, &arguments.pga, &arguments.peak) {
+            (Some(factor), _, _) => Some(Scale::Factor(factor)),
+            (_, Some(pga), _) => {
+                Some(Scale::PeakAcceleration(quantity("--pga", pga, "g")? * STANDARD_GRAVITY))
+            }
+            (_, _, Some(peak)) => Some(Scale::PeakDisplacement(quantity("--peak", peak, "m")?)),
+            _ => None,
+        };
+        Ok(Self {
+            system: if is_file { absolute(Path::new(&system)).display().to_string() } else { system },
+            plant: or(&arguments.plant, built_in::DEFAULT_PLANT),
+            specimen: or(&arguments.specimen, built_in::DEFAULT_SPECIMEN),
+            record: arguments.record.as_deref().map(absolute),
+            reference: arguments.reference.as_deref().map(absolute),
+            seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),
+            scaling,
+            set: arguments.set.clone(),
+            fmi: arguments.fmi.into(),
+            algorithm: arguments.algorithm,
+            step_s: text("--step", &arguments.step, "s")?,
+            duration_s: text("--duration", &arguments.duration, "s")?,
+        })
+    }
+}
+
+/// Reads and checks everything that a request names.
+///
+/// # Errors
+/// Whatever is at fault.
+pub fn prepare(request: &Request) -> Result<Prepared, Error> {
+    let file = if is_file(&request.system) {
+        SystemFile::read(Path::new(&request.system))?
+    } else {
+        built_in::system(&request.system, &request.plant, &request.specimen)?
+    };
+    let motion = motion(request, &file)?;
+    let mut library = FmuLibrary::new(request.fmi, file.directory.as_deref());
+    let system = system::assemble(&file, &request.set, &mut |name| library.find(name))?;
+    let step = request.step_s.or(file.time("step")?).unwrap_or(motion.dt);
+    let mut samples = motion.len();
+    if let Some(duration) = request.duration_s.or(file.time("duration")?) {
+        if !(duration >= motion.dt && duration.is_finite()) {
+            let reason = format!("{duration} s is shorter than a sample of {} s", motion.dt);
+            return Err(Error::Option {
+                option: "--duration",
+                reason,
+            });
+        }
+        samples = samples.min((duration / motion.dt).round() as usize);
+    }
+    Ok(Prepared {
+        system,
+        motion,
+        step,
+        samples,
+    })
+}
+
+fn motion(request: &Request, file: &SystemFile) -> Result<Motion, Error> {
+    let options = motion::Options {
+        scaling: request.scaling.map(|scale| match scale {
+            Scale::Factor(factor) => Scaling::Factor(factor),
+            Scale::PeakAcceleration(peak) => Scaling::PeakAcceleration(peak),
+            Scale::PeakDisplacement(peak) => Scaling::PeakDisplacement(peak),
+        }),
+        ..motion::Options::default()
+    };
+    let beside = |path: &String| file.directory.as_deref().unwrap_or(Path::new("")).join(path);
+    let own = request.record.is_none() && request.reference.is_none();
+    let record = request.record.clone();
+    let record = record.or(file.experiment.record.as_ref().filter(|_| own).map(beside));
+    let reference = request.reference.clone();
+    let reference = reference.or(file.experiment.reference.as_ref().filter(|_| own).map(beside));
+    Ok(match (record, reference) {
+        (_, Some(path)) => motion::load_reference(&path, &options)?,
+        (Some(path), None) => motion::load(&path, &options)?,
+        (None, None) => motion::built_in(request.seed, &options)?,
+    })
+}
+
+fn is_file(system: &str) -> bool {
+    system.ends_with(".toml") || system.contains(['/', '\\'])
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
+}
+
+/// A positive quantity; a number alone is in `unit`.
+fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
+    let fault = |reason: String| Error::Option { option, reason };
+    let quantity = Quantity::parse(text).map_err(|error| fault(error.to_string()))?;
+    let value = if quantity.unit.text.is_empty() {
+        Ok(quantity.value)
+    } else {
+        quantity.to(unit)
+    };
+    let value = value.map_err(|error| fault(error.to_string()))?;
+    if value > 0.0 {
+        return Ok(value);
+    }
+    Err(fault(format!("`{text}` is not positive")))
+}
+
+fn progress_bar(samples: usize) -> ProgressBar {
+    let bar = ProgressBar::new(samples as u64);
+    // A template that cannot be read leaves the plain bar.
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent} %, {eta} left") {
+        bar.set_style(style);
+    }
+    bar
+}

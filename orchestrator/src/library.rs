@@ -1,0 +1,72 @@
+//! Where the FMUs of a system come from: files, or the components of this project, which are built
+//! and packed when they are missing or stale.
+
+use std::collections::HashMap;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::fmu::{FmiVersion, Fmu};
+use crate::pack;
+use crate::system::hint;
+
+/// FMUs by the name that a system file gives them, each opened once.
+pub struct FmuLibrary {
+    version: FmiVersion,
+    /// Paths in the system file count from here.
+    directory: Option<PathBuf>,
+    packed: Option<Vec<pack::PackedFmu>>,
+    open: HashMap<PathBuf, Arc<Fmu>>,
+}
+
+impl FmuLibrary {
+    /// A library whose own components are of the given version.
+    pub fn new(version: FmiVersion, directory: Option<&Path>) -> Self {
+        Self {
+            version,
+            directory: directory.map(Path::to_path_buf),
+            packed: None,
+            open: HashMap::new(),
+        }
+    }
+
+    /// The FMU called `name`: a path that ends in `.fmu`, or a component of this project.
+    ///
+    /// # Errors
+    /// An unknown name (with the nearest one), a component that does not build, an FMU at fault.
+    pub fn find(&mut self, name: &str) -> Result<Arc<Fmu>, Box<dyn Error>> {
+        let path = if name.ends_with(".fmu") {
+            self.directory.as_deref().unwrap_or(Path::new("")).join(name)
+        } else {
+            self.component(name)?
+        };
+        if let Some(fmu) = self.open.get(&path) {
+            return Ok(fmu.clone());
+        }
+        let fmu = Fmu::open(&path)?;
+        self.open.insert(path, fmu.clone());
+        Ok(fmu)
+    }
+
+    fn component(&mut self, name: &str) -> Result<PathBuf, Box<dyn Error>> {
+        let packed = match &mut self.packed {
+            Some(packed) => packed,
+            missing => {
+                let version = match self.version {
+                    FmiVersion::V2 => pack::FmiVersion::Two,
+                    FmiVersion::V3 => pack::FmiVersion::Three,
+                };
+                missing.insert(pack::build_fmus(&pack::default_folder()?, &[version])?)
+            }
+        };
+        let found = packed.iter().find(|fmu| fmu.name == name);
+        let found = found.ok_or_else(|| {
+            let known = packed.iter().map(|fmu| fmu.name.as_str());
+            format!(
+                "`{name}` is no component and no path to an .fmu file{}",
+                hint(name, known)
+            )
+        })?;
+        Ok(found.path.clone())
+    }
+}

@@ -1,0 +1,140 @@
+//! The files of a run, written as a whole or not at all.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::master::Record;
+
+/// Why results cannot be written.
+#[derive(Debug, Error)]
+pub enum ResultsError {
+    /// The folder cannot be made or written.
+    #[error("{}: results cannot be written here: {source}", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// The operating system's word.
+        source: io::Error,
+    },
+    /// A file cannot be written.
+    #[error("{}: cannot be written: {source}", file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// The operating system's word.
+        source: io::Error,
+    },
+}
+
+/// Files on their way into a folder: they appear there together, when all of them are complete.
+pub struct Results {
+    folder: PathBuf,
+    staging: tempfile::TempDir,
+    names: Vec<String>,
+}
+
+impl Results {
+    /// Makes a place for the files of `folder`, which need not exist yet.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn begin(folder: &Path) -> Result<Self, ResultsError> {
+        let failed = |source| ResultsError::Folder {
+            folder: folder.to_path_buf(),
+            source,
+        };
+        if folder.exists() && !folder.is_dir() {
+            return Err(failed(io::Error::other("it is a file, not a folder")));
+        }
+        let absolute = std::path::absolute(folder).map_err(failed)?;
+        // On the same file system, so that files can be moved.
+        let place = absolute.ancestors().find(|place| place.is_dir());
+        let staging = tempfile::Builder::new()
+            .prefix(".shakebench-")
+            .tempdir_in(place.unwrap_or(Path::new(".")))
+            .map_err(failed)?;
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            staging,
+            names: Vec::new(),
+        })
+    }
+
+    /// Whether `folder` could be written, without leaving anything there.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn check(folder: &Path) -> Result<(), ResultsError> {
+        Self::begin(folder).map(drop)
+    }
+
+    /// Writes a file.
+    ///
+    /// # Errors
+    /// A disk that is full, and the like.
+    pub fn write(
+        &mut self,
+        name: &str,
+        content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    ) -> Result<(), ResultsError> {
+        let written = || {
+            let mut file = BufWriter::new(File::create(self.staging.path().join(name))?);
+            content(&mut file)?;
+            file.flush()
+        };
+        written().map_err(|source| ResultsError::File {
+            file: self.folder.join(name),
+            source,
+        })?;
+        self.names.push(name.to_string());
+        Ok(())
+    }
+
+    /// Writes a text.
+    ///
+    /// # Errors
+    /// As [`Results::write`].
+    pub fn write_text(&mut self, name: &str, text: &str) -> Result<(), ResultsError> {
+        self.write(name, |file| file.write_all(text.as_bytes()))
+    }
+
+    /// Moves the files into their folder; files of the same name are replaced, others stay.
+    ///
+    /// # Errors
+    /// A folder that cannot be made.
+    pub fn finish(self) -> Result<Vec<PathBuf>, ResultsError> {
+        fs::create_dir_all(&self.folder).map_err(|source| ResultsError::Folder {
+            folder: self.folder.clone(),
+            source,
+        })?;
+        let mut files = Vec::new();
+        for name in &self.names {
+            let file = self.folder.join(name);
+            fs::rename(self.staging.path().join(name), &file).map_err(|source| {
+                ResultsError::File {
+                    file: file.clone(),
+                    source,
+                }
+            })?;
+            files.push(file);
+        }
+        Ok(files)
+    }
+}
+
+/// Writes a record as CSV: a line of names, then a line a sample; every number reads back to the
+/// same bits.
+///
+/// # Errors
+/// A disk that is full, and the like.
+pub fn write_csv(record: &Record, file: impl Write) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(file);
+    csv.write_record(&record.columns)?;
+    for row in record.rows() {
+        csv.serialize(row).map_err(io::Error::other)?;
+    }
+    csv.flush()
+}
