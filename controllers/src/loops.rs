@@ -361,7 +361,7 @@ impl Loop {
         })
     }
 
-    /// Margins between `first` (rad/s) and the Nyquist frequency, in continuous time a thousand
+    /// Margins between `first` (rad/s) and the Nyquist frequency, in continuous time a hundred
     /// times beyond it.
     pub fn margins(&self, time: Time, first: f64) -> Margins {
         margins::margins(|omega| self.open(time, omega), first, self.last(time))
@@ -375,7 +375,7 @@ impl Loop {
     fn last(&self, time: Time) -> f64 {
         let nyquist = margins::nyquist(self.law.period);
         match time {
-            Time::Continuous => 1e3 * nyquist,
+            Time::Continuous => 1e2 * nyquist,
             Time::Sampled => nyquist,
         }
     }

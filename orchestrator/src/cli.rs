@@ -4,14 +4,18 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{build, info, run};
+use crate::commands::{build, design, info, run};
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
 /// Without a command, the built-in system is run on the built-in motion.
 #[derive(Debug, Parser)]
-#[command(name = "shakebench", version, after_help = "Exit status: 0 done; 1 the run ended early \
-    (what was computed is saved); 2 the input is at fault (nothing is written).")]
+#[command(
+    name = "shakebench",
+    version,
+    after_help = "Exit status: 0 done; 1 the run ended early \
+    (what was computed is saved); 2 the input is at fault (nothing is written)."
+)]
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -21,6 +25,8 @@ pub struct Cli {
 enum Command {
     /// Build the components and pack them as FMUs
     Build(build::Arguments),
+    /// Print margins of the loops and draw their frequency responses
+    Design(design::Arguments),
     /// Show what an .fmu, system or motion file holds
     Info(info::Arguments),
     /// Run a system on a motion
@@ -32,6 +38,7 @@ pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Build(arguments)) => build::execute(&arguments),
+        Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
     };

@@ -24,7 +24,7 @@ pub struct Margins {
 }
 
 /// Points of the grid on which crossings are sought, per decade.
-const POINTS_PER_DECADE: f64 = 500.0;
+const POINTS_PER_DECADE: f64 = 200.0;
 
 /// A fall of this many decibels ends the bandwidth.
 pub const BANDWIDTH_DROP_DB: f64 = 3.0;
