@@ -367,9 +367,15 @@ impl Loop {
         margins::margins(|omega| self.open(time, omega), first, self.last(time))
     }
 
-    /// Bandwidth of the closed loop in rad/s, see [`margins::bandwidth`].
-    pub fn bandwidth(&self, time: Time, first: f64) -> Option<f64> {
-        margins::bandwidth(|omega| self.closed(time, omega), first, self.last(time))
+    /// Every crossover from `first` (rad/s) upwards, ascending.
+    pub fn crossovers(&self, time: Time, first: f64) -> Vec<f64> {
+        margins::crossovers(|omega| self.open(time, omega), first, self.last(time))
+    }
+
+    /// Bandwidth of the closed loop in rad/s: see [`margins::bandwidth`].
+    pub fn bandwidth(&self, time: Time, lowest: f64, first: f64) -> Option<f64> {
+        let closed = |omega| self.closed(time, omega);
+        margins::bandwidth(closed, lowest, first, self.last(time))
     }
 
     fn last(&self, time: Time) -> f64 {

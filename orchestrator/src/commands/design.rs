@@ -50,6 +50,8 @@ pub struct Arguments {
 
 /// Lowest frequency that is looked at, rad/s: a decade below the slow zero of the plant.
 const LOWEST: f64 = 1e-3;
+/// Lower edge of the band of the motions, rad/s: 0.25 Hz.
+const BAND: f64 = std::f64::consts::TAU * 0.25;
 
 /// A loop with its name.
 pub(super) struct NamedLoop {
@@ -72,11 +74,17 @@ pub(super) const NAMES: [&str; 6] = [
 struct Figures {
     stable: bool,
     crossover_rad_s: Option<f64>,
+    /// All crossovers, ascending; the margin is smallest at the one above.
+    crossovers_rad_s: Vec<f64>,
     phase_margin_deg: Option<f64>,
     phase_crossover_rad_s: Option<f64>,
     gain_margin_db: Option<f64>,
-    /// Of the closed loop; absent where that is unstable.
+    /// Where the closed loop has fallen by 3 dB, sought from the band of the motions upwards; absent
+    /// where the loop is unstable or does not fall so far below the Nyquist frequency.
     bandwidth_hz: Option<f64>,
+    /// The same sought from frequency zero upwards: feedforward beside feedback can leave a dip
+    /// far below the band.
+    bandwidth_from_zero_hz: Option<f64>,
     /// The closed-loop pole nearest to instability (or farthest in it): real and imaginary part,
     /// in 1/s, as sampled in the z plane.
     critical_pole: [f64; 2],
@@ -258,16 +266,21 @@ fn figures(rig_loop: &Loop, time: Time) -> Figures {
     };
     let critical = poles.iter().max_by(|a, b| growth(a).total_cmp(&growth(b)));
     let stable = rig_loop.is_stable(time);
+    let bandwidth = |from| {
+        let found = stable
+            .then(|| rig_loop.bandwidth(time, LOWEST, from))
+            .flatten();
+        found.map(|omega| omega / std::f64::consts::TAU)
+    };
     Figures {
         stable,
         crossover_rad_s: margins.crossover,
+        crossovers_rad_s: rig_loop.crossovers(time, LOWEST),
         phase_margin_deg: margins.phase_margin_deg,
         phase_crossover_rad_s: margins.phase_crossover,
         gain_margin_db: margins.gain_margin_db,
-        bandwidth_hz: stable
-            .then(|| rig_loop.bandwidth(time, LOWEST))
-            .flatten()
-            .map(|omega| omega / std::f64::consts::TAU),
+        bandwidth_hz: bandwidth(BAND),
+        bandwidth_from_zero_hz: bandwidth(LOWEST),
         critical_pole: critical.map_or([0.0; 2], |pole| [pole.re, pole.im]),
     }
 }

@@ -91,14 +91,19 @@ fn take_gain_margin(found: &mut Margins, omega: f64, value: Complex<f64>) {
 }
 
 /// The lowest angular frequency (rad/s) above `first` at which the gain of the closed loop
-/// `response(omega)` has fallen by [`BANDWIDTH_DROP_DB`] from its value at `first`; `None` where
-/// it does not fall so far below `last`.
-pub fn bandwidth(response: impl Fn(f64) -> Complex<f64>, first: f64, last: f64) -> Option<f64> {
-    let threshold = response(first).norm() * 10f64.powf(-BANDWIDTH_DROP_DB / 20.0);
+/// `response(omega)` falls by [`BANDWIDTH_DROP_DB`] from its value at `lowest`; `None` where it
+/// does not fall so far below `last`.
+pub fn bandwidth(
+    response: impl Fn(f64) -> Complex<f64>,
+    lowest: f64,
+    first: f64,
+    last: f64,
+) -> Option<f64> {
+    let threshold = response(lowest).norm() * 10f64.powf(-BANDWIDTH_DROP_DB / 20.0);
     let above = |omega: f64| response(omega).norm() - threshold;
     grid(first, last)
         .windows(2)
-        .find(|pair| above(pair[1]) < 0.0)
+        .find(|pair| above(pair[0]) >= 0.0 && above(pair[1]) < 0.0)
         .map(|pair| bisect(pair[0], pair[1], above))
 }
 
@@ -190,8 +195,8 @@ mod tests {
         // |7 / (jw + 7)| = 10^(-3/20).
         let expected = 7.0 * (10f64.powf(0.3) - 1.0).sqrt();
         let closed = |omega: f64| 7.0 / Complex::new(7.0, omega);
-        assert!((bandwidth(closed, 1e-6, 1e4).unwrap() - expected).abs() < 1e-9);
-        assert!(bandwidth(closed, 1e-6, 1.0).is_none());
+        assert!((bandwidth(closed, 1e-6, 1e-6, 1e4).unwrap() - expected).abs() < 1e-9);
+        assert!(bandwidth(closed, 1e-6, 1e-6, 1.0).is_none());
     }
 
     #[test]
