@@ -159,6 +159,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             "loops": rows,
             "specimen": arguments.specimen.as_deref().unwrap_or("none"),
             "synthesis": synthesis,
+            "sliding_mode_rate_1_s": sliding_mode::IDENTIFIED_RATE,
             "report": file,
         });
         println!("{json}");
