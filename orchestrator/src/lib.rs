@@ -4,6 +4,7 @@ pub mod cli;
 pub mod commands;
 pub mod component_library;
 pub mod error;
+pub mod experiment;
 pub mod fmu;
 pub mod library;
 pub mod manifest;

@@ -15,7 +15,6 @@ pub struct FmuLibrary {
     version: FmiVersion,
     /// Paths in the system file count from here.
     directory: Option<PathBuf>,
-    packed: Option<Vec<pack::PackedFmu>>,
     open: HashMap<PathBuf, Arc<Fmu>>,
 }
 
@@ -25,7 +24,6 @@ impl FmuLibrary {
         Self {
             version,
             directory: directory.map(Path::to_path_buf),
-            packed: None,
             open: HashMap::new(),
         }
     }
@@ -36,7 +34,10 @@ impl FmuLibrary {
     /// An unknown name (with the nearest one), a component that does not build, an FMU at fault.
     pub fn find(&mut self, name: &str) -> Result<Arc<Fmu>, Box<dyn Error>> {
         let path = if name.ends_with(".fmu") {
-            self.directory.as_deref().unwrap_or(Path::new("")).join(name)
+            self.directory
+                .as_deref()
+                .unwrap_or(Path::new(""))
+                .join(name)
         } else {
             self.component(name)?
         };
@@ -48,17 +49,15 @@ impl FmuLibrary {
         Ok(fmu)
     }
 
-    fn component(&mut self, name: &str) -> Result<PathBuf, Box<dyn Error>> {
-        let packed = match &mut self.packed {
-            Some(packed) => packed,
-            missing => {
-                let version = match self.version {
-                    FmiVersion::V2 => pack::FmiVersion::Two,
-                    FmiVersion::V3 => pack::FmiVersion::Three,
-                };
-                missing.insert(pack::build_fmus(&pack::default_folder()?, &[version])?)
-            }
+    fn component(&self, name: &str) -> Result<PathBuf, Box<dyn Error>> {
+        let version = match self.version {
+            FmiVersion::V2 => pack::FmiVersion::Two,
+            FmiVersion::V3 => pack::FmiVersion::Three,
         };
+        let packed: Vec<_> = pack::all_fmus()?
+            .iter()
+            .filter(|fmu| fmu.version == version)
+            .collect();
         let found = packed.iter().find(|fmu| fmu.name == name);
         let found = found.ok_or_else(|| {
             let known = packed.iter().map(|fmu| fmu.name.as_str());

@@ -82,7 +82,10 @@ fn fmu(fmu: &Fmu) -> String {
             .of(causality)
             .map(|index| {
                 let v = &d.variables[index];
-                let known = v.dependencies.iter().map(|&on| d.variables[on].name.as_str());
+                let known = v
+                    .dependencies
+                    .iter()
+                    .map(|&on| d.variables[on].name.as_str());
                 let known: Vec<&str> = known.collect();
                 let mut about = v.description.clone();
                 if !known.is_empty() {
@@ -110,16 +113,26 @@ fn fmu(fmu: &Fmu) -> String {
 /// As [`aligned`], with the last column aligned left.
 fn last_left(mut rows: Vec<Vec<String>>) -> String {
     let last: Vec<String> = rows.iter_mut().filter_map(Vec::pop).collect();
-    let width = rows.iter().flat_map(|row| row.last()).map(|c| c.chars().count()).max();
+    let width = rows
+        .iter()
+        .flat_map(|row| row.last())
+        .map(|c| c.chars().count())
+        .max();
     for row in &mut rows {
         if let Some(cell) = row.last_mut() {
             *cell = format!("{cell:<0$}", width.unwrap_or(0));
         }
     }
     let table = aligned(&rows);
-    let full = table.lines().map(|line| line.chars().count()).max().unwrap_or(0);
+    let full = table
+        .lines()
+        .map(|line| line.chars().count())
+        .max()
+        .unwrap_or(0);
     let lines = table.lines().zip(last);
-    lines.map(|(line, last)| format!("{line:<full$}  {last}").trim_end().to_string() + "\n").collect()
+    lines
+        .map(|(line, last)| format!("{line:<full$}  {last}").trim_end().to_string() + "\n")
+        .collect()
 }
 
 fn system(file: &SystemFile) -> Result<String, Error> {
@@ -138,7 +151,10 @@ fn system(file: &SystemFile) -> Result<String, Error> {
     text += "\nconnections\n";
     let rows = system.connections.iter().map(|connection| {
         let to = system.variable_name(connection.component, connection.input);
-        vec![format!("  {}", system.source_name(connection.source)), format!("-> {to}")]
+        vec![
+            format!("  {}", system.source_name(connection.source)),
+            format!("-> {to}"),
+        ]
     });
     text += &last_left(rows.collect());
     text += "\norder of calls at a sample\n";
@@ -153,12 +169,17 @@ fn words(system: &system::System, operation: &Operation) -> String {
     match operation {
         Operation::Call { component } => format!("call {}", system.components[*component].name),
         Operation::Read { component, outputs } => {
-            let names = outputs.iter().map(|&output| system.variable_name(*component, output));
+            let names = outputs
+                .iter()
+                .map(|&output| system.variable_name(*component, output));
             format!("read {}", names.collect::<Vec<_>>().join(", "))
         }
         Operation::Iterate(parts) => {
             let parts = parts.iter().map(|part| words(system, part));
-            format!("repeat until settled: {}", parts.collect::<Vec<_>>().join("; "))
+            format!(
+                "repeat until settled: {}",
+                parts.collect::<Vec<_>>().join("; ")
+            )
         }
     }
 }

@@ -5,17 +5,15 @@ use std::process::ExitCode;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use serde::{Deserialize, Serialize};
 
 use super::{OneVersion, summary};
 use crate::error::Error;
-use crate::fmu::FmiVersion;
-use crate::library::FmuLibrary;
+use crate::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::manifest::Manifest;
-use crate::master::{Algorithm, Ended, Pace, Simulation};
-use crate::motion::{self, Motion, Scaling};
+use crate::master::{Algorithm, Ended, Pace};
+use crate::motion;
 use crate::results::Results;
-use crate::system::{self, System, SystemFile, built_in};
+use crate::system::built_in;
 use crate::units::{Quantity, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
@@ -85,68 +83,19 @@ pub struct Arguments {
     manifest: Option<PathBuf>,
 }
 
-/// What a run is asked to be; a manifest keeps it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Request {
-    /// Built-in system or path of a file.
-    pub system: String,
-    /// Plant of a built-in system.
-    pub plant: String,
-    /// Specimen of a built-in system.
-    pub specimen: String,
-    /// Record to play.
-    pub record: Option<PathBuf>,
-    /// Reference to play.
-    pub reference: Option<PathBuf>,
-    /// Seed of the built-in motion.
-    pub seed: u64,
-    /// How large it is played.
-    pub scaling: Option<Scale>,
-    /// Parameters.
-    pub set: Vec<String>,
-    /// Version of FMI of the project's own components.
-    pub fmi: FmiVersion,
-    /// Order of calls.
-    pub algorithm: Algorithm,
-    /// Coupling step, s.
-    pub step_s: Option<f64>,
-    /// Length played, s.
-    pub duration_s: Option<f64>,
-}
-
-/// How large a motion is played.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Scale {
-    /// A factor.
-    Factor(f64),
-    /// Peak acceleration, m/s².
-    PeakAcceleration(f64),
-    /// Peak displacement, m.
-    PeakDisplacement(f64),
-}
-
-/// A request with everything it needs, checked.
-pub struct Prepared {
-    /// The system.
-    pub system: System,
-    /// The motion.
-    pub motion: Motion,
-    /// Coupling step, s.
-    pub step: f64,
-    /// Samples to play.
-    pub samples: usize,
-}
-
 /// Runs a system on a motion and writes the results.
 ///
 /// # Errors
 /// Input at fault; nothing is written then.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
-    let written = arguments.manifest.as_deref().map(Manifest::read).transpose()?;
+    let written = arguments
+        .manifest
+        .as_deref()
+        .map(Manifest::read)
+        .transpose()?;
     let request = match &written {
         Some(manifest) => manifest.request.clone(),
-        None => Request::new(arguments)?,
+        None => request(arguments)?,
     };
     let prepared = prepare(&request)?;
     let Prepared {
@@ -160,10 +109,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Path::new("shakebench-results").join(name.replace(['/', '\\', ' '], "-"))
     });
     Results::check(&folder)?;
-    let simulation = Simulation::new(system, motion, request.algorithm, *step)?;
+    let simulation = prepared.simulation(request.algorithm)?;
     let bar = progress_bar(*samples);
-    let pace = if arguments.real_time { Pace::RealTime } else { Pace::Fastest };
-    let outcome = simulation.run(*samples, pace, &mut |sample| bar.set_position(sample as u64));
+    let pace = if arguments.real_time {
+        Pace::RealTime
+    } else {
+        Pace::Fastest
+    };
+    let outcome = simulation.run(*samples, pace, &mut |sample| {
+        bar.set_position(sample as u64)
+    });
     bar.finish_and_clear();
 
     let plan = (request.algorithm, *step, *samples);
@@ -199,109 +154,58 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::from(1))
 }
 
-impl Request {
-    /// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.
-    ///
-    /// # Errors
-    /// Values that cannot be read.
-    pub fn new(arguments: &Arguments) -> Result<Self, Error> {
-        let system = arguments.system.clone().unwrap_or(built_in::DEFAULT_SYSTEM.to_string());
-        let is_file = is_file(&system);
-        for (option, given) in [
-            ("--plant", &arguments.plant),
-            ("--specimen", &arguments.specimen),
-        ] {
-            if let (true, Some(_)) = (is_file, given) {
-                let reason = format!("{system} is a file and has its own; edit it instead");
-                return Err(Error::Option { option, reason });
-            }
-        }
-        let or = |given: &Option<String>, default: &str| given.clone().unwrap_or(default.into());
-        let text = |option, given: &Option<String>, unit: &'static str| {
-            given.as_ref().map(|text| quantity(option, text, unit)).transpose()
-        };
-        let scaling = match (arguments.scale, &arguments.pga, &arguments.peak) {
-            (Some(factor), _, _) => Some(Scale::Factor(factor)),
-            (_, Some(pga), _) => {
-                Some(Scale::PeakAcceleration(quantity("--pga", pga, "g")? * STANDARD_GRAVITY))
-            }
-            (_, _, Some(peak)) => Some(Scale::PeakDisplacement(quantity("--peak", peak, "m")?)),
-            _ => None,
-        };
-        Ok(Self {
-            system: if is_file { absolute(Path::new(&system)).display().to_string() } else { system },
-            plant: or(&arguments.plant, built_in::DEFAULT_PLANT),
-            specimen: or(&arguments.specimen, built_in::DEFAULT_SPECIMEN),
-            record: arguments.record.as_deref().map(absolute),
-            reference: arguments.reference.as_deref().map(absolute),
-            seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),
-            scaling,
-            set: arguments.set.clone(),
-            fmi: arguments.fmi.into(),
-            algorithm: arguments.algorithm,
-            step_s: text("--step", &arguments.step, "s")?,
-            duration_s: text("--duration", &arguments.duration, "s")?,
-        })
-    }
-}
-
-/// Reads and checks everything that a request names.
+/// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.
 ///
 /// # Errors
-/// Whatever is at fault.
-pub fn prepare(request: &Request) -> Result<Prepared, Error> {
-    let file = if is_file(&request.system) {
-        SystemFile::read(Path::new(&request.system))?
-    } else {
-        built_in::system(&request.system, &request.plant, &request.specimen)?
-    };
-    let motion = motion(request, &file)?;
-    let mut library = FmuLibrary::new(request.fmi, file.directory.as_deref());
-    let system = system::assemble(&file, &request.set, &mut |name| library.find(name))?;
-    let step = request.step_s.or(file.time("step")?).unwrap_or(motion.dt);
-    let mut samples = motion.len();
-    if let Some(duration) = request.duration_s.or(file.time("duration")?) {
-        if !(duration >= motion.dt && duration.is_finite()) {
-            let reason = format!("{duration} s is shorter than a sample of {} s", motion.dt);
-            return Err(Error::Option {
-                option: "--duration",
-                reason,
-            });
+/// Values that cannot be read.
+fn request(arguments: &Arguments) -> Result<Request, Error> {
+    let system = arguments
+        .system
+        .clone()
+        .unwrap_or(built_in::DEFAULT_SYSTEM.to_string());
+    let is_file = is_file(&system);
+    for (option, given) in [
+        ("--plant", &arguments.plant),
+        ("--specimen", &arguments.specimen),
+    ] {
+        if let (true, Some(_)) = (is_file, given) {
+            let reason = format!("{system} is a file and has its own; edit it instead");
+            return Err(Error::Option { option, reason });
         }
-        samples = samples.min((duration / motion.dt).round() as usize);
     }
-    Ok(Prepared {
-        system,
-        motion,
-        step,
-        samples,
-    })
-}
-
-fn motion(request: &Request, file: &SystemFile) -> Result<Motion, Error> {
-    let options = motion::Options {
-        scaling: request.scaling.map(|scale| match scale {
-            Scale::Factor(factor) => Scaling::Factor(factor),
-            Scale::PeakAcceleration(peak) => Scaling::PeakAcceleration(peak),
-            Scale::PeakDisplacement(peak) => Scaling::PeakDisplacement(peak),
-        }),
-        ..motion::Options::default()
+    let or = |given: &Option<String>, default: &str| given.clone().unwrap_or(default.into());
+    let text = |option, given: &Option<String>, unit: &'static str| {
+        given
+            .as_ref()
+            .map(|text| quantity(option, text, unit))
+            .transpose()
     };
-    let beside = |path: &String| file.directory.as_deref().unwrap_or(Path::new("")).join(path);
-    let own = request.record.is_none() && request.reference.is_none();
-    let record = request.record.clone();
-    let record = record.or(file.experiment.record.as_ref().filter(|_| own).map(beside));
-    let reference = request.reference.clone();
-    let reference = reference.or(file.experiment.reference.as_ref().filter(|_| own).map(beside));
-    Ok(match (record, reference) {
-        (_, Some(path)) => motion::load_reference(&path, &options)?,
-        (Some(path), None) => motion::load(&path, &options)?,
-        (None, None) => motion::built_in(request.seed, &options)?,
+    let scaling = match (arguments.scale, &arguments.pga, &arguments.peak) {
+        (Some(factor), _, _) => Some(Scale::Factor(factor)),
+        (_, Some(pga), _) => Some(Scale::PeakAcceleration(
+            quantity("--pga", pga, "g")? * STANDARD_GRAVITY,
+        )),
+        (_, _, Some(peak)) => Some(Scale::PeakDisplacement(quantity("--peak", peak, "m")?)),
+        _ => None,
+    };
+    Ok(Request {
+        system: if is_file {
+            absolute(Path::new(&system)).display().to_string()
+        } else {
+            system
+        },
+        plant: or(&arguments.plant, built_in::DEFAULT_PLANT),
+        specimen: or(&arguments.specimen, built_in::DEFAULT_SPECIMEN),
+        record: arguments.record.as_deref().map(absolute),
+        reference: arguments.reference.as_deref().map(absolute),
+        seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),
+        scaling,
+        set: arguments.set.clone(),
+        fmi: arguments.fmi.into(),
+        algorithm: arguments.algorithm,
+        step_s: text("--step", &arguments.step, "s")?,
+        duration_s: text("--duration", &arguments.duration, "s")?,
     })
-}
-
-fn is_file(system: &str) -> bool {
-    system.ends_with(".toml") || system.contains(['/', '\\'])
 }
 
 fn absolute(path: &Path) -> PathBuf {

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::run::{Prepared, Request};
 use super::table::{aligned, significant};
 use crate::error::Error;
+use crate::experiment::{Prepared, Request};
 use crate::manifest::Manifest;
 use crate::master::{Ended, Outcome};
 use crate::metrics::{self, Tracking};
@@ -133,7 +133,9 @@ impl Summary {
         text += &format!(
             "\n{} steps of {} ms (FMI {}, {}), {} times real time, {}\n\n",
             self.steps,
-            significant(1e3 * self.step_s, 3).trim_end_matches('0').trim_end_matches('.'),
+            significant(1e3 * self.step_s, 3)
+                .trim_end_matches('0')
+                .trim_end_matches('.'),
             self.fmi,
             self.algorithm,
             significant(self.real_time_factor, 2),
@@ -151,25 +153,46 @@ impl Summary {
         let gravity = |value: f64| format!("{:.4} g", value / STANDARD_GRAVITY);
         let percent = |value: f64| format!("{value:.4} %");
         text += &aligned(&[
-            row("", ["reference".into(), "table".into(), "largest error".into()]),
-            row("displacement, peak", [
-                inches(motion.peak_displacement()),
-                inches(tracking.peak_displacement),
-                inches(tracking.peak_displacement_error),
-            ]),
-            row("acceleration, peak", [
-                gravity(motion.peak_acceleration()),
-                gravity(tracking.peak_acceleration),
-                gravity(tracking.peak_acceleration_error),
-            ]),
+            row(
+                "",
+                ["reference".into(), "table".into(), "largest error".into()],
+            ),
+            row(
+                "displacement, peak",
+                [
+                    inches(motion.peak_displacement()),
+                    inches(tracking.peak_displacement),
+                    inches(tracking.peak_displacement_error),
+                ],
+            ),
+            row(
+                "acceleration, peak",
+                [
+                    gravity(motion.peak_acceleration()),
+                    gravity(tracking.peak_acceleration),
+                    gravity(tracking.peak_acceleration_error),
+                ],
+            ),
         ]);
         text += "\n";
         let pair = |name: &str, value: String| vec![name.to_string(), value];
         text += &aligned(&[
-            pair("error in time, acceleration", percent(tracking.time_domain_percent)),
-            pair("error in frequency, acceleration", percent(tracking.frequency_domain_percent)),
-            pair("error in time, displacement", percent(tracking.displacement_percent)),
-            pair("delay of the table", format!("{:.1} ms", 1e3 * tracking.delay)),
+            pair(
+                "error in time, acceleration",
+                percent(tracking.time_domain_percent),
+            ),
+            pair(
+                "error in frequency, acceleration",
+                percent(tracking.frequency_domain_percent),
+            ),
+            pair(
+                "error in time, displacement",
+                percent(tracking.displacement_percent),
+            ),
+            pair(
+                "delay of the table",
+                format!("{:.1} ms", 1e3 * tracking.delay),
+            ),
         ]);
         text
     }
@@ -220,7 +243,6 @@ pub(super) fn write(
 ) -> Result<Vec<PathBuf>, Error> {
     let mut results = Results::begin(folder)?;
     results.write("results.csv", |file| write_csv(&outcome.record, file))?;
-    let json = |value: &dyn erased::Json| value.pretty();
     results.write_text("summary.json", &json(summary))?;
     results.write_text("manifest.json", &json(manifest))?;
     if let Some(page) = page(prepared, outcome, summary) {
@@ -229,29 +251,31 @@ pub(super) fn write(
     Ok(results.finish()?)
 }
 
-/// Anything that serialises, as indented JSON.
-mod erased {
-    pub(super) trait Json {
-        fn pretty(&self) -> String;
-    }
-
-    impl<T: serde::Serialize> Json for T {
-        fn pretty(&self) -> String {
-            serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
-        }
-    }
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
 }
 
 fn page(prepared: &Prepared, outcome: &Outcome, summary: &Summary) -> Option<String> {
     let table = Table::find(&prepared.system)?;
-    let column = |output| outcome.record.column(&table.name(output)).unwrap_or_default();
+    let column = |output| {
+        outcome
+            .record
+            .column(&table.name(output))
+            .unwrap_or_default()
+    };
     let valve = table.valve().and_then(|name| outcome.record.column(&name));
     let row = |name: &str, value: String| (name.to_string(), Cell::from(value));
     let mut settings = vec![
         row("FMI", summary.fmi.clone()),
         row("Algorithm", summary.algorithm.clone()),
         row("Step", format!("{} ms", 1e3 * summary.step_s)),
-        row("Speed", format!("{} times real time", significant(summary.real_time_factor, 2))),
+        row(
+            "Speed",
+            format!(
+                "{} times real time",
+                significant(summary.real_time_factor, 2)
+            ),
+        ),
     ];
     for component in &prepared.system.components {
         let fmu = &component.fmu;

@@ -3,13 +3,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::connection::{self, Quantity, Source};
+use super::connection::{self, connect, split};
 use super::file::{ComponentFile, SystemFile};
-use super::{
-    Component, Connection, DEFAULT_PERIOD, System, SystemError, Value, hint, model, value,
-};
-use crate::fmu::{Causality, Fmu, Kind, Variability, Variable};
-use crate::units::Unit;
+use super::{Component, DEFAULT_PERIOD, System, SystemError, Value, hint, model, value};
+use crate::fmu::{Causality, Fmu, Kind, Variability};
 
 /// Finds the FMU of a component by what the system file calls it.
 pub type Library<'a> = dyn FnMut(&str) -> Result<Arc<Fmu>, Box<dyn std::error::Error>> + 'a;
@@ -171,7 +168,11 @@ fn put(values: &mut Vec<(usize, Value)>, position: usize, value: Value) {
     }
 }
 
-fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, String> {
+/// The position of the variable `name`, which has to be of that causality.
+///
+/// # Errors
+/// Another causality, or no such name (with the nearest one).
+pub(super) fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, String> {
     let description = &fmu.description;
     let word = words(causality);
     let Some(position) = description.position(name) else {
@@ -238,7 +239,11 @@ fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn component_index(components: &[Component], name: &str) -> Result<usize, String> {
+/// The position of a component.
+///
+/// # Errors
+/// No such name (with the nearest one).
+pub(super) fn component_index(components: &[Component], name: &str) -> Result<usize, String> {
     components
         .iter()
         .position(|part| part.name == name)
@@ -246,73 +251,6 @@ fn component_index(components: &[Component], name: &str) -> Result<usize, String
             let known = components.iter().map(|part| part.name.as_str());
             format!("there is no component `{name}`{}", hint(name, known))
         })
-}
-
-fn split(end: &str) -> Result<(&str, &str), String> {
-    end.split_once('.')
-        .ok_or_else(|| format!("`{end}` should read component.variable"))
-}
-
-fn connect(components: &[Component], from: &str, to: &str) -> Result<Connection, String> {
-    let (component, variable) = split(to)?;
-    let component = component_index(components, component)?;
-    let input = find(&components[component].fmu, variable, Causality::Input)?;
-    let target = &components[component].fmu.description.variables[input];
-
-    let (name, variable) = split(from)?;
-    let (source, kind, unit) = if name == "reference" {
-        let source = connection::reference(variable).ok_or_else(|| {
-            let known = Quantity::ALL.into_iter().map(Quantity::name);
-            format!(
-                "the reference has no `{variable}`{} (or `displacement[3]`, three samples ahead)",
-                hint(variable, known)
-            )
-        })?;
-        let Source::Reference { quantity, .. } = source else {
-            return Err(format!("`{from}` is no reference"));
-        };
-        (source, Kind::Float64, Some(quantity.unit()))
-    } else {
-        let component = component_index(components, name)?;
-        let variable = find(&components[component].fmu, variable, Causality::Output)?;
-        let output = &components[component].fmu.description.variables[variable];
-        let source = Source::Output {
-            component,
-            variable,
-        };
-        (source, output.kind.clone(), output.unit.as_deref())
-    };
-    fits(&kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
-    let factor = factor(unit, target.unit.as_deref())
-        .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
-    Ok(Connection {
-        source,
-        component,
-        input,
-        factor,
-    })
-}
-
-fn fits(kind: &Kind, target: &Variable) -> Result<(), String> {
-    let same = kind.name() == target.kind.name();
-    let widened = *kind == Kind::Int32 && target.kind == Kind::Float64;
-    if kind.is_numeric() && (same || widened) {
-        return Ok(());
-    }
-    let (from, to) = (kind.name(), target.kind.name());
-    Err(format!("is a {from} and cannot drive the {to}"))
-}
-
-/// The factor from one unit to the other; a side without a unit takes the other's.
-fn factor(from: Option<&str>, to: Option<&str>) -> Result<f64, String> {
-    match (from, to) {
-        (Some(from), Some(to)) if from != to => {
-            let unit = |text: &str| Unit::parse(text).map_err(|error| error.to_string());
-            let factor = unit(from)?.factor_to(&unit(to)?);
-            factor.map_err(|error| error.to_string())
-        }
-        _ => Ok(1.0),
-    }
 }
 
 fn end(

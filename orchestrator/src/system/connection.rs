@@ -1,5 +1,10 @@
 //! `"table.displacement -> control.measured_displacement"`.
 
+use super::assemble::{component_index, find};
+use super::{Component, Connection, hint};
+use crate::fmu::{Causality, Kind, Variable};
+use crate::units::Unit;
+
 /// Where a connection's value comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Source {
@@ -90,7 +95,7 @@ fn expand(end: &str) -> Result<Vec<String>, String> {
 }
 
 /// `displacement` or `displacement[3]` of the reference.
-pub(super) fn reference(variable: &str) -> Option<Source> {
+fn reference(variable: &str) -> Option<Source> {
     let (name, ahead) = match variable.strip_suffix(']') {
         None => (variable, 0),
         Some(rest) => {
@@ -103,4 +108,79 @@ pub(super) fn reference(variable: &str) -> Option<Source> {
     };
     let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name)?;
     Some(Source::Reference { quantity, ahead })
+}
+
+pub(super) fn split(end: &str) -> Result<(&str, &str), String> {
+    end.split_once('.')
+        .ok_or_else(|| format!("`{end}` should read component.variable"))
+}
+
+/// The connection of `from` to `to`, after its names, types and units were checked.
+///
+/// # Errors
+/// What does not hold.
+pub(super) fn connect(
+    components: &[Component],
+    from: &str,
+    to: &str,
+) -> Result<Connection, String> {
+    let (component, variable) = split(to)?;
+    let component = component_index(components, component)?;
+    let input = find(&components[component].fmu, variable, Causality::Input)?;
+    let target = &components[component].fmu.description.variables[input];
+
+    let (name, variable) = split(from)?;
+    let (source, kind, unit) = if name == "reference" {
+        let source = reference(variable).ok_or_else(|| {
+            let known = Quantity::ALL.into_iter().map(Quantity::name);
+            format!(
+                "the reference has no `{variable}`{} (or `displacement[3]`, three samples ahead)",
+                hint(variable, known)
+            )
+        })?;
+        let Source::Reference { quantity, .. } = source else {
+            return Err(format!("`{from}` is no reference"));
+        };
+        (source, Kind::Float64, Some(quantity.unit()))
+    } else {
+        let component = component_index(components, name)?;
+        let variable = find(&components[component].fmu, variable, Causality::Output)?;
+        let output = &components[component].fmu.description.variables[variable];
+        let source = Source::Output {
+            component,
+            variable,
+        };
+        (source, output.kind.clone(), output.unit.as_deref())
+    };
+    fits(&kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
+    let factor = factor(unit, target.unit.as_deref())
+        .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
+    Ok(Connection {
+        source,
+        component,
+        input,
+        factor,
+    })
+}
+
+fn fits(kind: &Kind, target: &Variable) -> Result<(), String> {
+    let same = kind.name() == target.kind.name();
+    let widened = *kind == Kind::Int32 && target.kind == Kind::Float64;
+    if kind.is_numeric() && (same || widened) {
+        return Ok(());
+    }
+    let (from, to) = (kind.name(), target.kind.name());
+    Err(format!("is a {from} and cannot drive the {to}"))
+}
+
+/// The factor from one unit to the other; a side without a unit takes the other's.
+fn factor(from: Option<&str>, to: Option<&str>) -> Result<f64, String> {
+    match (from, to) {
+        (Some(from), Some(to)) if from != to => {
+            let unit = |text: &str| Unit::parse(text).map_err(|error| error.to_string());
+            let factor = unit(from)?.factor_to(&unit(to)?);
+            factor.map_err(|error| error.to_string())
+        }
+        _ => Ok(1.0),
+    }
 }
