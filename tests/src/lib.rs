@@ -1,1 +1,3 @@
 //! Acceptance tests: the thesis's tables, importers, hidden effects
+
+pub mod python;
