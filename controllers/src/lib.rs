@@ -4,7 +4,13 @@
 //! period with what the sensors gave, and the command they return is held until the next call.
 
 pub mod mpc;
+pub mod allocation;
+pub mod loop_shaping;
+pub mod loops;
 pub mod pid;
+pub mod prediction_over_delay;
+pub mod sliding_mode;
+pub mod synthesis;
 pub mod three_variable;
 
 pub use plant::ModelError;
