@@ -7,6 +7,7 @@ pub mod mpc;
 pub mod allocation;
 pub mod loop_shaping;
 pub mod loops;
+pub mod interlock;
 pub mod pid;
 pub mod prediction_over_delay;
 pub mod sliding_mode;
