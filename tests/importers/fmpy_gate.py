@@ -1,5 +1,6 @@
 """Every FMU in fmpy: description, simulation, saved states, instances, refusals."""
 
+import ctypes
 import sys
 
 import numpy as np
@@ -196,6 +197,46 @@ def wrong_token_is_refused_with_a_reason(archive):
     check(any("token" in n for n in notes), f"no reason in the log: {notes}")
 
 
+def event_mode_that_is_not_offered_does_no_harm(archive):
+    if archive.is2:
+        return "FMI 3.0 only"
+    outputs = outputs_of(archive)
+    rows = excitation(archive, 20, seed=7)
+    plain, eager = archive.open(), archive.open(eventModeUsed=True)
+    check(any("event mode" in m for _, _, m in eager.log), f"no warning in {eager.log}")
+    for instance in (plain, eager):
+        instance.initialize()
+    eager.fmu.updateDiscreteStates()
+    eager.fmu.enterStepMode()
+    first = eager.run(rows, outputs)
+    check(np.array_equal(first, plain.run(rows, outputs)), "event mode changes the result")
+    eager.fmu.enterEventMode()
+    eager.fmu.updateDiscreteStates()
+    eager.fmu.enterStepMode()
+    plain.refused("event mode", plain.fmu.enterEventMode, "wrong order")
+    for instance in (plain, eager):
+        instance.free()
+
+
+def dependencies_are_those_of_the_description(archive):
+    if archive.is2:
+        return "FMI 3.0 only"
+    instance = archive.open()
+    for output in archive.description.outputs:
+        # fmpy's own wrapper asks for the number with a type instead of a value, so by hand.
+        reference, count = output.variable.valueReference, ctypes.c_size_t()
+        fmu, component = instance.fmu, instance.fmu.component
+        fmu.fmi3GetNumberOfVariableDependencies(component, reference, ctypes.byref(count))
+        sizes = [(ctypes.c_size_t * count.value)() for _ in range(2)]
+        references, kinds = (ctypes.c_uint32 * count.value)(), (ctypes.c_int * count.value)()
+        fmu.fmi3GetVariableDependencies(
+            component, reference, sizes[0], references, sizes[1], kinds, count)
+        found = list(references)
+        expected = [v.valueReference for v in output.dependencies]
+        check(found == expected, f"{output.variable.name}: {found} against {expected}")
+    instance.free()
+
+
 def debug_logging_can_be_switched(archive):
     instance = archive.open(debug=True)
     instance.initialize()
@@ -255,6 +296,8 @@ if __name__ == "__main__":
             instances_do_not_disturb_each_other,
             wrong_calls_are_refused_with_a_reason,
             wrong_token_is_refused_with_a_reason,
+            event_mode_that_is_not_offered_does_no_harm,
+            dependencies_are_those_of_the_description,
             debug_logging_can_be_switched,
             derivatives_agree_with_differences,
         ],

@@ -4,7 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use acceptance::python::run_script;
-use shakebench::pack::{FmiVersion, PackedFmu, all_fmus, build_package, default_folder};
+use shakebench::pack::{
+    FmiVersion, PackedFmu, StartValue, all_fmus, build_package, default_folder, write_variant,
+};
 
 fn paths(wanted: impl Fn(&PackedFmu) -> bool) -> Vec<PathBuf> {
     let fmus = all_fmus().unwrap_or_else(|e| panic!("{e}"));
@@ -64,6 +66,46 @@ fn faults_inside_a_component_reach_the_importer_as_errors() {
     assert!(
         all_fmus().unwrap().iter().all(|fmu| fmu.name != "Faulty"),
         "the component for tests is packed as a product"
+    );
+}
+
+#[test]
+fn variant_of_an_fmu_starts_with_its_own_values_in_fmpy() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut pairs = Vec::new();
+    for fmu in all_fmus()
+        .unwrap()
+        .iter()
+        .filter(|fmu| fmu.name == "ShakeTable")
+    {
+        let out = folder.path().join(format!("{}.fmu", fmu.version.folder()));
+        let mass = StartValue {
+            name: "table_mass".into(),
+            value: 1.0 / 3.0,
+            note: "identified, standard error < 0.1 kg".into(),
+        };
+        write_variant(&fmu.path, &out, "ShakeTable & payload", &[mass]).unwrap();
+        let unknown = StartValue {
+            name: "displacement".into(),
+            value: 1.0,
+            note: String::new(),
+        };
+        let refused = write_variant(&fmu.path, &out, "x", &[unknown]).unwrap_err();
+        assert!(
+            refused
+                .to_string()
+                .ends_with("`displacement` is no parameter of it"),
+            "{refused}"
+        );
+        let again = write_variant(&out, &out, "x", &[]).unwrap_err();
+        assert!(again.to_string().contains("is a variant itself"), "{again}");
+        pairs.extend([fmu.path.clone(), out]);
+    }
+    let report = run_script("fmpy_variant.py", &pairs);
+    assert_eq!(
+        report.matches("table_mass = 0.333333").count(),
+        2,
+        "{report}"
     );
 }
 

@@ -268,7 +268,7 @@ fn check_kind<C>(variable: &Variable<C>, start: &mut C) -> Result<(), String> {
 }
 
 /// A token in the form of a GUID: two FNV-1a sums of the text.
-fn fingerprint(text: &str) -> String {
+pub(crate) fn fingerprint(text: &str) -> String {
     let sum = |seed: u64| {
         text.bytes().fold(seed, |sum, byte| {
             (sum ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
