@@ -69,3 +69,36 @@ impl Component for DisplacementPid {
 }
 
 fmu_kit::export!(DisplacementPid);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmu_kit::conformance::number;
+
+    #[test]
+    fn parameters_and_inputs_arrive_where_they_belong() {
+        let mut component = DisplacementPid::default();
+        let names = [
+            "proportional_gain",
+            "integral_gain",
+            "derivative_gain",
+            "derivative_lag",
+            "valve_limit",
+            "reference_displacement",
+            "measured_displacement",
+        ];
+        number(&mut component, &names);
+        let law = Pid {
+            proportional: 1.0,
+            integral: 2.0,
+            derivative: 3.0,
+            derivative_lag: 4.0,
+            limit: 5.0,
+            ..Pid::equation_3_6()
+        };
+        assert_eq!(component.law, law);
+        component.step(0.0, 0.5).unwrap();
+        // Error -1: -1 - 2 * 0.5, and no rate at the first sample.
+        assert_eq!(component.valve_command, -2.0);
+    }
+}

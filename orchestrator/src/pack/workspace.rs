@@ -2,8 +2,9 @@
 
 use std::{
     fs::{self, File},
+    io::{self, IsTerminal},
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
     sync::{Mutex, PoisonError},
 };
 
@@ -37,9 +38,16 @@ impl Workspace {
 
     fn cargo(&self, arguments: &[&str]) -> Result<String, PackError> {
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+        // On a terminal people see cargo's progress; elsewhere it goes into the error, if any.
+        let watched = io::stderr().is_terminal();
         let output = Command::new(&cargo)
             .args(arguments)
             .current_dir(&self.root)
+            .stderr(if watched {
+                Stdio::inherit()
+            } else {
+                Stdio::piped()
+            })
             .output()
             .map_err(|error| PackError::NoCargo {
                 cargo: cargo.clone(),
