@@ -8,11 +8,11 @@ use std::{
 
 use shakebench::pack::{FmiVersion, build_fmus};
 
-fn names(path: &Path) -> BTreeSet<String> {
-    let archive = zip::ZipArchive::new(File::open(path).unwrap()).unwrap();
+fn names(path: &Path) -> zip::result::ZipResult<BTreeSet<String>> {
+    let archive = zip::ZipArchive::new(File::open(path)?)?;
     archive
         .file_names()
-        .map(|name| name.unwrap().to_string())
+        .map(|name| Ok(name?.to_string()))
         .collect()
 }
 
@@ -61,7 +61,7 @@ fn same_components_give_the_same_bytes_and_are_not_written_again() {
 fn every_fmu_has_its_documentation_and_licences() {
     let folder = tempfile::tempdir().unwrap();
     for fmu in build_fmus(folder.path(), &FmiVersion::ALL).unwrap() {
-        let names = names(&fmu.path);
+        let names = names(&fmu.path).unwrap();
         let library = format!(
             "{}/{}{}",
             fmu.version.binaries(),

@@ -37,6 +37,7 @@
 //! }
 //! ```
 
+mod checksum;
 mod component;
 mod derivative;
 mod exchange;

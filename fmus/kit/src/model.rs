@@ -9,6 +9,7 @@ use std::{
 use thiserror::Error;
 
 use crate::{
+    checksum::{SEED, checksum},
     component::Component,
     description,
     fault::{Fault, Outcome},
@@ -267,18 +268,11 @@ fn check_kind<C>(variable: &Variable<C>, start: &mut C) -> Result<(), String> {
     Ok(())
 }
 
-/// A token in the form of a GUID: two FNV-1a sums of the text.
+/// A token in the form of a GUID: two sums of the text.
 pub(crate) fn fingerprint(text: &str) -> String {
-    let sum = |seed: u64| {
-        text.bytes().fold(seed, |sum, byte| {
-            (sum ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-        })
-    };
-    let digits = format!(
-        "{:016x}{:016x}",
-        sum(0xcbf2_9ce4_8422_2325),
-        sum(0x9ae1_6a3b_2f90_404f)
-    );
+    let second = checksum(SEED, b"second");
+    let sum = |seed| checksum(seed, text.as_bytes());
+    let digits = format!("{:016x}{:016x}", sum(SEED), sum(second));
     let part = |from: usize, to: usize| &digits[from..to];
     format!(
         "{{{}-{}-{}-{}-{}}}",

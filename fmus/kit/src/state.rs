@@ -9,6 +9,7 @@ use std::{
 };
 
 use crate::{
+    checksum::{SEED, checksum},
     component::Component,
     fault::{Fault, Outcome},
     instance::{Instance, Snapshot},
@@ -110,7 +111,7 @@ fn serialize<C: Component>(snapshot: &Snapshot<C>) -> Outcome<Vec<u8>> {
     bytes.extend(FORMAT.to_le_bytes());
     bytes.extend((body.len() as u64).to_le_bytes());
     bytes.extend(&body);
-    bytes.extend(checksum(&body).to_le_bytes());
+    bytes.extend(checksum(SEED, &body).to_le_bytes());
     Ok(bytes)
 }
 
@@ -141,7 +142,7 @@ fn deserialize<C: Component>(bytes: &[u8]) -> Outcome<Snapshot<C>> {
             bytes.len()
         )));
     }
-    if checksum(body) != u64::from_le_bytes(*sum) {
+    if checksum(SEED, body) != u64::from_le_bytes(*sum) {
         return Err(fail("damaged, the checksum differs".into()));
     }
     let unreadable = |e: postcard::Error| fail(format!("cannot be read: {e}"));
@@ -152,13 +153,6 @@ fn deserialize<C: Component>(bytes: &[u8]) -> Outcome<Snapshot<C>> {
         return Err(fail(format!("of {name} {version}, expected {own} {its}")));
     }
     postcard::from_bytes(body).map_err(unreadable)
-}
-
-/// FNV-1a.
-fn checksum(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |sum, byte| {
-        (sum ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
 }
 
 #[cfg(test)]
@@ -256,7 +250,7 @@ mod tests {
         bytes.extend(FORMAT.to_le_bytes());
         bytes.extend((body.len() as u64).to_le_bytes());
         bytes.extend(&body);
-        bytes.extend(checksum(&body).to_le_bytes());
+        bytes.extend(checksum(SEED, &body).to_le_bytes());
         let problem = deserialize::<Oscillator>(&bytes).err().unwrap().message;
         let own = Oscillator::VERSION;
         assert_eq!(
