@@ -24,22 +24,35 @@ def model_exchange_agrees_with_co_simulation(archive):
         dtype=[("time", float)] + [(v.name, float) for v in inputs],
     )
     names = [v.name for v in archive.variables("output")]
-    runs = {}
-    for kind in ("CoSimulation", "ModelExchange"):
-        runs[kind] = simulate_fmu(
-            archive.path, fmi_type=kind, stop_time=STEPS * STEP, step_size=STEP,
-            output_interval=STEP, relative_tolerance=1e-9, input=signal, output=names,
+
+    def run(kind, interval):
+        return simulate_fmu(
+            archive.path, fmi_type=kind, stop_time=STEPS * STEP, step_size=interval,
+            output_interval=interval, relative_tolerance=1e-9, input=signal, output=names,
             record_events=False,
         )
-    a, b = runs["CoSimulation"], runs["ModelExchange"]
-    check(len(a) == len(b), f"{len(a)} rows against {len(b)}")
-    worst = 0.0
-    for name in names:
-        scale = np.abs(a[name]).max()
-        check(scale > 0, f"`{name}` does not move")
-        worst = max(worst, np.abs(a[name] - b[name]).max() / scale)
-    check(worst < 1e-5, f"differ by {worst:g} of the largest value")
-    return f"largest difference {worst:.1g} of the largest value"
+
+    exchange = run("ModelExchange", STEP)
+
+    def difference(parts):
+        """Largest difference when co-simulation takes its steps in so many parts."""
+        cosimulation = run("CoSimulation", STEP / parts)[::parts]
+        check(len(cosimulation) == len(exchange), f"{len(cosimulation)} rows")
+        worst = 0.0
+        for name in names:
+            scale = np.abs(exchange[name]).max()
+            check(scale > 0, f"`{name}` does not move")
+            worst = max(worst, np.abs(cosimulation[name] - exchange[name]).max() / scale)
+        return worst
+
+    coarse = difference(1)
+    if coarse < 1e-5:
+        return f"largest difference {coarse:.1g} of the largest value"
+    # A component with an integrator of its own is less exact than the importer's solver at this
+    # tolerance; both must be on their way to the same solution.
+    fine = difference(8)
+    check(coarse < 1e-3 and fine < coarse / 3, f"differ by {coarse:g}, in eighths of a step {fine:g}")
+    return f"largest difference {coarse:.1g} of the largest value, in eighths of a step {fine:.1g}"
 
 
 def states_and_derivatives_are_refused_out_of_order(archive):
