@@ -36,7 +36,9 @@ class Archive:
 
     def __init__(self, path):
         self.path = path
-        self.folder = tempfile.mkdtemp(prefix="fmu-")
+        # Kept until the archive goes; a library that is still loaded may keep it longer.
+        self.kept = tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True)
+        self.folder = self.kept.name
         extract(path, unzipdir=self.folder)
         self.description: ModelDescription = read_model_description(path)
         self.name = self.description.modelName
