@@ -127,7 +127,7 @@ fn model_descriptions_that_cannot_be_used() {
             vec!["not well-formed XML"],
         ),
         ("<fmiModelDescription", "<html", vec!["not well-formed XML"]),
-        ("fmiVersion=", "version=", vec!["fmiVersion is missing"]),
+        ("fmiVersion=", "fmuVersion=", vec!["fmiVersion is missing"]),
         (
             "fmiVersion=\"",
             "fmiVersion=\"1",

@@ -51,7 +51,7 @@ fn the_system_as_it_stands_runs() {
 
 #[test]
 fn no_toml() {
-    changed("connections = [", "connections = ", &["line 2"]);
+    changed("connections = [", "connections = ", &["line 3"]);
     changed("period", "perriod", &["perriod", "line"]);
 }
 
