@@ -166,8 +166,9 @@ fn integrate(
 
     let mut planner = RealFftPlanner::<f64>::new();
     let inverse = planner.plan_fft_inverse(period);
-    let mut spectra = [0, 1, 2].map(|_| inverse.make_input_vec());
-    for k in 1..=last {
+    let [mut x, mut v, mut a] = [0, 1, 2].map(|_| inverse.make_input_vec());
+    let lines = x.iter_mut().zip(&mut v).zip(&mut a).enumerate();
+    for (k, ((x, v), a)) in lines.take(last + 1).skip(1) {
         let frequency = k as f64 * step;
         let gain = 1.0
             / (1.0 + (low / frequency).powi(2 * POLES))
@@ -176,11 +177,11 @@ fn integrate(
         let scale = gain * dt * step;
         let line = spectrum_at(acceleration, TAU * frequency * dt) * scale;
         let rate = Complex64::new(0.0, TAU * frequency);
-        spectra[0][k] = line / (rate * rate);
-        spectra[1][k] = line / rate;
-        spectra[2][k] = line;
+        *x = line / (rate * rate);
+        *v = line / rate;
+        *a = line;
     }
-    spectra.map(|mut spectrum| {
+    [x, v, a].map(|mut spectrum| {
         let mut history = inverse.make_output_vec();
         // The lengths come from the plan itself, and lines 0 and N/2 are zero: it cannot fail.
         let done = inverse.process(&mut spectrum, &mut history);

@@ -74,11 +74,9 @@ fn section(section: &Section, next_panel: &mut usize) -> Value {
 
 fn table(table: &Table) -> Value {
     let numeric = |column: usize| {
-        let is_number = |cell: &Cell| !matches!(cell, Cell::Text(_));
-        table
-            .rows
-            .iter()
-            .any(|row| row.get(column).is_some_and(is_number))
+        let mut cells = table.rows.iter().filter_map(|row| row.get(column));
+        let is_words = |cell: &Cell| matches!(cell, Cell::Text(text) if !text.is_empty());
+        !cells.clone().any(is_words) && cells.any(|cell| !matches!(cell, Cell::Text(_)))
     };
     let columns: Vec<_> = table
         .columns
@@ -96,11 +94,11 @@ fn table(table: &Table) -> Value {
 
 /// A cell as text in the two systems of units.
 fn cell(cell: &Cell) -> Value {
-    let (numeric, laboratory, si) = match cell {
-        Cell::Text(text) => (false, text.clone(), text.clone()),
+    let (laboratory, si) = match cell {
+        Cell::Text(text) => (text.clone(), text.clone()),
         Cell::Number(value, digits) => {
             let text = significant(*value, *digits);
-            (true, text.clone(), text)
+            (text.clone(), text)
         }
         Cell::Quantity(value, units, digits) => {
             let text = |factor: f64, name: &str| {
@@ -112,11 +110,10 @@ fn cell(cell: &Cell) -> Value {
                 }
             };
             (
-                true,
                 text(units.laboratory_factor, &units.laboratory),
                 text(units.si_factor, &units.si),
             )
         }
     };
-    context! { numeric, one => laboratory == si, laboratory, si }
+    context! { one => laboratory == si, laboratory, si }
 }

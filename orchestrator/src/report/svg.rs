@@ -40,10 +40,13 @@ pub fn svg(panel: &Panel) -> String {
          fill=\"#17202b\">\n<title>{title}</title>\n\
          <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#ffffff\"/>\n\
          <text x=\"{LEFT}\" y=\"24\" font-size=\"14\" font-weight=\"600\">{title}</text>\n\
-         <clipPath id=\"plot\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{}\" height=\"{}\"/>\
+         <clipPath id=\"plot\"><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\
          </clipPath>\n",
-        WIDTH - RIGHT - LEFT,
-        HEIGHT - BOTTOM - TOP,
+        // A little wider than the plot, so that a dot on its edge is whole.
+        LEFT - 3.0,
+        TOP - 3.0,
+        WIDTH - RIGHT - LEFT + 6.0,
+        HEIGHT - BOTTOM - TOP + 6.0,
         title = escaped(&panel.title),
     );
     grid(&mut out, panel, &x, &y);
@@ -122,12 +125,12 @@ impl Scale {
     fn ticks(&self) -> Vec<(f64, String)> {
         let span = self.high - self.low;
         if self.logarithmic && span >= 1.0 {
-            let decades = self.low.ceil() as i32..=self.high.floor() as i32;
+            let within: &[f64] = if span < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+            let decades = self.low.floor() as i32..=self.high.floor() as i32;
             return decades
-                .map(|decade| {
-                    let value = 10_f64.powi(decade);
-                    (self.place(f64::from(decade)), significant(value, 1))
-                })
+                .flat_map(|decade| within.iter().map(move |digit| digit * 10_f64.powi(decade)))
+                .filter(|value| (self.low - 1e-9..=self.high + 1e-9).contains(&value.log10()))
+                .map(|value| (self.place(value.log10()), significant(value, 1)))
                 .collect();
         }
         let rough = span / 6.0;
@@ -246,11 +249,17 @@ fn draw(out: &mut String, series: &Series, colour: &str, x: &Scale, y: &Scale) {
         path
     };
     let forward = line(&mut series.values.iter().copied().enumerate());
+    // A reference lies wide and pale behind what follows it, so that both are seen.
+    let pen = if colour == COLOURS[0] {
+        "3.6\" stroke-opacity=\"0.5"
+    } else {
+        "1.2"
+    };
     let _ = match &series.style {
         Style::Line | Style::Path => {
             writeln!(
                 out,
-                "<path d=\"{forward}\" stroke=\"{colour}\" stroke-width=\"1.3\"/>"
+                "<path d=\"{forward}\" stroke=\"{colour}\" stroke-width=\"{pen}\"/>"
             )
         }
         Style::Dashed => writeln!(

@@ -72,6 +72,27 @@
     return { data, roles };
   };
 
+  // Ticks of a logarithmic axis: decades, 1-2-5 where few decades show, even steps within one.
+  const logTicks = (low, high) => {
+    if (!(low > 0 && high > low)) return [];
+    const decades = Math.log10(high / low);
+    const ticks = [];
+    if (decades < 0.6) {
+      const rough = (high - low) / 6;
+      const power = 10 ** Math.floor(Math.log10(rough));
+      const step = [1, 2, 5, 10].map((m) => m * power).find((m) => m >= rough);
+      for (let n = Math.ceil(low / step); n * step <= high; n++) ticks.push(+(n * step).toPrecision(12));
+      return ticks;
+    }
+    for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
+      for (const m of decades < 2.5 ? [1, 2, 5] : [1]) {
+        const tick = Number(`${m}e${power}`);
+        if (tick >= low && tick <= high) ticks.push(tick);
+      }
+    }
+    return ticks;
+  };
+
   // A line in the order of its values, which may turn back.
   const path = (series, xUnit, yUnit, stroke) => (u) => {
     const { ctx, bbox } = u;
@@ -94,6 +115,7 @@
   };
 
   let charts = [];
+  let printing = false;
   const draw = (place) => {
     const panel = panels[Number(place.dataset.panel)];
     const system = root.dataset.units;
@@ -112,12 +134,15 @@
     roles.forEach(({ series: one, role }, n) => {
       const stroke = colour(`--series-${one.colour === 0 ? 0 : 1 + (one.colour - 1) % 8}`);
       const is = (style) => one.style === style;
+      const wide = one.colour === 0 && is("line");
       series.push({
         label: role === "upper" ? `${one.name}, upper` : one.name,
-        stroke: is("path") ? "transparent" : stroke,
-        width: is("points") || is("path") ? 0 : is("band") ? 0.6 : 1.4,
+        stroke: is("path") ? "transparent" : wide ? `${stroke}88` : stroke,
+        // A reference lies wide and pale behind what follows it, so that both are seen.
+        width: is("points") || is("path") ? 0 : is("band") ? 0.6 : wide ? 4 : 1.2,
+        pxAlign: 0,
         dash: is("dashed") ? [6, 4] : undefined,
-        points: { show: is("points"), size: 4, fill: stroke, stroke },
+        points: { show: is("points"), size: 6, fill: stroke, stroke },
         paths: is("points") || is("path") ? () => null : undefined,
         value: (_, v) => digits(v, ySpan),
       });
@@ -125,22 +150,30 @@
       if (is("path")) drawn.push(path(one, xUnit, yUnit, stroke));
     });
     const ink = colour("--soft");
-    const axis = (label, size) => ({
-      label, size, stroke: ink, labelSize: 20, labelFont: "12.5px system-ui, sans-serif",
+    const axis = (which, unit, size) => ({
+      ...(which.log && {
+        splits: (_, __, low, high) => logTicks(low, high),
+        filter: (_, ticks) => ticks,
+        values: (_, ticks) => ticks.map((tick) => String(+tick.toPrecision(6))),
+      }),
+      label: named(which, unit), size, stroke: ink, labelSize: 20, labelFont: "12.5px system-ui, sans-serif",
       font: "12px system-ui, sans-serif", labelGap: 0,
       grid: { stroke: colour("--grid"), width: 1 }, ticks: { stroke: colour("--line"), width: 1, size: 5 },
     });
     const scale = (which, unit) => {
       const made = { time: false };
       if (which.log) { made.distr = 3; made.log = 10; }
-if (which.limits) made.range = limited(which, unit);
+      if (which.log && which === panel.x) {
+        made.range = (_, low, high) => (low > 0 ? [0.98 * low, 1.02 * high] : [null, null]);
+      }
+      if (which.limits) made.range = limited(which, unit);
       return made;
     };
     const options = {
-      width: place.clientWidth, height: 250,
+      width: place.clientWidth, height: printing ? 175 : 250,
       scales: { x: scale(panel.x, xUnit), y: scale(panel.y, yUnit) },
       series, bands,
-      axes: [axis(named(panel.x, xUnit), 34), axis(named(panel.y, yUnit), 58)],
+      axes: [axis(panel.x, xUnit, 34), axis(panel.y, yUnit, panel.y.log ? 64 : 58)],
       cursor: {
         drag: { x: true, y: false, dist: 4 },
         sync: { key: `${panel.x.label}/${panel.x.log}`, setSeries: false },
@@ -148,7 +181,6 @@ if (which.limits) made.range = limited(which, unit);
       },
       hooks: { draw: drawn },
     };
-    if (panel.y.log) options.axes[1].size = 64;
     return new uPlot(options, data, place);
   };
   // Fixed limits; along x a zoom stays within them.
@@ -160,7 +192,13 @@ if (which.limits) made.range = limited(which, unit);
 
   const build = () => {
     charts.forEach((chart) => chart.destroy());
-    charts = [...document.querySelectorAll(".chart")].map(draw);
+    charts = [...document.querySelectorAll(".chart")].flatMap((place) => {
+      try { return [draw(place)]; } catch (error) {
+        // The other plots are worth seeing even if one cannot be drawn.
+        place.textContent = `This plot could not be drawn (${error.message}).`;
+        return [];
+      }
+    });
   };
   const resize = () => charts.forEach((chart) => {
     const width = chart.root.parentElement.clientWidth;
@@ -188,6 +226,15 @@ if (which.limits) made.range = limited(which, unit);
   let waiting = 0;
   addEventListener("resize", () => { cancelAnimationFrame(waiting); waiting = requestAnimationFrame(resize); });
   let before = null;
-  addEventListener("beforeprint", () => { before = root.dataset.theme; choose("theme", "light", true); build(); });
-  addEventListener("afterprint", () => { if (before) { choose("theme", before, true); build(); } });
+  addEventListener("beforeprint", () => {
+    before = root.dataset.theme;
+    printing = true;
+    choose("theme", "light", true);
+    build();
+  });
+  addEventListener("afterprint", () => {
+    printing = false;
+    choose("theme", before, true);
+    build();
+  });
 })();

@@ -27,10 +27,10 @@ fn quantities_as_people_write_them() {
     close(si("1 kN"), 1000.0);
     close(si("25 mm"), 0.025);
     close(si("2 ms"), 0.002);
-    close(si("3000 psi"), 3000.0 * 6894.757_293_168_361);
+    close(si("3000 psi"), 3000.0 * 6_894.757_293_168_361);
     close(
         si("1 in^3/s/V/sqrt(psi)"),
-        1.638_706_4e-5 / 6894.757_293_168_361_f64.sqrt(),
+        1.638_706_4e-5 / 6_894.757_293_168_361_f64.sqrt(),
     );
     close(si("5 %"), 0.05);
     close(si("7"), 7.0);
@@ -133,6 +133,18 @@ fn what_cannot_be_read_says_where_and_what_was_expected() {
     for text in ["nan in", "inf", "1e999 in", "", "--1 in"] {
         assert!(Quantity::parse(text).is_err(), "{text}");
     }
+}
+
+#[test]
+fn a_number_alone_is_in_the_unit_that_is_meant() {
+    close(value_in("0.3", "g").unwrap(), 0.3);
+    close(value_in("0.3 g", "g").unwrap(), 0.3);
+    close(value_in("3.2 ft/s^2", "in/s^2").unwrap(), 38.4);
+    close(value_in("5 %", "1").unwrap(), 0.05);
+    assert_eq!(
+        value_in("1.2 g", "m").unwrap_err().to_string(),
+        "unit \"g\" (m s^-2) does not fit \"m\" (m)"
+    );
 }
 
 #[test]
