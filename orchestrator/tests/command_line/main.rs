@@ -2,6 +2,7 @@
 
 mod archives;
 mod contract;
+mod failures;
 mod motions;
 mod systems;
 
