@@ -1,5 +1,7 @@
 //! The program as scripts and people use it: files, exit status, and what it says of bad input.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 mod archives;
 mod contract;
 mod failures;
