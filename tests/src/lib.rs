@@ -1,4 +1,5 @@
 //! Acceptance tests: the thesis's tables, importers, hidden effects
 
 pub mod monolithic;
+pub mod python;
 pub mod shared;

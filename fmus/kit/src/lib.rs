@@ -45,6 +45,8 @@ mod fault;
 mod guard;
 mod instance;
 mod log;
+#[cfg(test)]
+mod oscillator;
 mod phase;
 mod pointers;
 mod shared;
