@@ -2,6 +2,12 @@
 //! the same three components without FMI. 20 s of motion over the time of a run is the factor over
 //! real time.
 
+#![allow(
+    clippy::unwrap_used,
+    missing_docs,
+    reason = "a benchmark that cannot go on has failed"
+)]
+
 use std::hint::black_box;
 
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};

@@ -30,7 +30,7 @@ enum Command {
     /// Show what an .fmu, system or motion file holds
     Info(info::Arguments),
     /// Run a system on a motion
-    Run(run::Arguments),
+    Run(Box<run::Arguments>),
 }
 
 /// Reads the command line, does what it says and gives the exit status.

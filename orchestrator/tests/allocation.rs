@@ -1,5 +1,7 @@
 //! Nothing is allocated while a simulation steps, neither by the master nor by the components.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -48,7 +50,10 @@ fn allocations(action: impl FnOnce()) -> usize {
 
 #[test]
 fn the_counter_counts() {
-    assert_eq!(allocations(|| drop(std::hint::black_box(vec![1.0; 100]))), 1);
+    assert_eq!(
+        allocations(|| drop(std::hint::black_box(vec![1.0; 100]))),
+        1
+    );
 }
 
 #[test]
