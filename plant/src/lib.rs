@@ -5,8 +5,10 @@
 
 pub mod actuator;
 pub mod error;
+pub mod integration;
 pub mod linear;
 pub mod rig;
+pub mod servo_hydraulic;
 pub mod shake_table;
 pub mod specimen;
 pub mod table;
