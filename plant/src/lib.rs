@@ -5,12 +5,14 @@
 
 pub mod actuator;
 pub mod error;
+pub mod hysteresis;
 pub mod integration;
 pub mod linear;
 pub mod rig;
 pub mod servo_hydraulic;
 pub mod shake_table;
 pub mod specimen;
+pub mod specimens;
 pub mod table;
 pub mod units;
 

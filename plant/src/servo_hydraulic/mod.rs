@@ -9,6 +9,7 @@ mod cylinder;
 mod energy;
 mod friction;
 mod linearisation;
+mod rig;
 mod stops;
 mod supply;
 mod valve;
@@ -16,6 +17,7 @@ mod valve;
 pub use cylinder::Cylinder;
 pub use energy::{Powers, StoredEnergy};
 pub use friction::SealFriction;
+pub use rig::{ServoHydraulicRig, ServoHydraulicRigState};
 pub use stops::Stops;
 pub use supply::Supply;
 pub use valve::{ServoValve, ValveFlows};
@@ -251,3 +253,6 @@ impl Dynamics<STATES> for Driven<'_> {
         diagonal
     }
 }
+
+#[cfg(test)]
+mod tests;
