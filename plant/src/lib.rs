@@ -6,9 +6,11 @@
 pub mod actuator;
 pub mod error;
 pub mod hysteresis;
+pub mod instrumentation;
 pub mod integration;
 pub mod linear;
 pub mod rig;
+pub mod sensor;
 pub mod servo_hydraulic;
 pub mod shake_table;
 pub mod specimen;

@@ -49,9 +49,9 @@ impl ServoHydraulicTable {
         }
     }
 
-    /// Where energy flows in `state` under `input`. Hydraulic side: `supplied = throttled + leaked
-    /// + piston + d(oil)/dt`; mechanical side: `piston + specimen = rubbed + damped +
-    /// d(kinetic + springs)/dt`.
+    /// Where energy flows in `state` under `input`. On the hydraulic side
+    /// `supplied = throttled + leaked + piston + d(oil)/dt`, on the mechanical side
+    /// `piston + specimen = rubbed + damped + d(kinetic + springs)/dt`.
     ///
     /// Oil that passes a restriction brings its work `p` and its compression to the other side,
     /// both per volume; what is missing there is heat.
