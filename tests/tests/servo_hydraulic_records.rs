@@ -24,15 +24,31 @@ struct Outcome {
     peak_force: f64,
 }
 
-fn run(motion: &Motion, gains: ThreeVariableGains, delay: f64, seed: u64, specimen_on: bool) -> Outcome {
+fn run(
+    motion: &Motion,
+    gains: ThreeVariableGains,
+    delay: f64,
+    seed: u64,
+    specimen_on: bool,
+) -> Outcome {
     let table = ServoHydraulicTable::default();
     let specimen = YieldingSpecimen::default();
-    let sensors = Instrumentation { delay, ..Instrumentation::laboratory(seed) };
+    let sensors = Instrumentation {
+        delay,
+        ..Instrumentation::laboratory(seed)
+    };
     sensors.validate(H).unwrap();
     let filter = sensors.velocity_filter(H).unwrap();
-    let mut law = ThreeVariableControl { gains, ..ThreeVariableControl::table_3_2() };
+    let mut law = ThreeVariableControl {
+        gains,
+        ..ThreeVariableControl::table_3_2()
+    };
     let mut interlock = Interlock::laboratory();
-    let (mut s, mut d, mut memory) = (table.rest(), YieldingState::default(), InstrumentationState::default());
+    let (mut s, mut d, mut memory) = (
+        table.rest(),
+        YieldingState::default(),
+        InstrumentationState::default(),
+    );
     let (mut squares, mut peak, mut drift, mut worst): (f64, f64, f64, f64) = (0.0, 0.0, 0.0, 0.0);
     let (mut pv, mut pf): (f64, f64) = (0.0, 0.0);
     for k in 0..motion.len() {
@@ -46,13 +62,23 @@ fn run(motion: &Motion, gains: ThreeVariableGains, delay: f64, seed: u64, specim
             specimen_acceleration: specimen.acceleration(&d),
         };
         let m = sensors.sample(&mut memory, &filter, &truth, H);
-        let measured = Sample { displacement: m.displacement, velocity: m.velocity, acceleration: m.acceleration };
+        let measured = Sample {
+            displacement: m.displacement,
+            velocity: m.velocity,
+            acceleration: m.acceleration,
+        };
         let reference = Sample {
             displacement: motion.displacement[k],
             velocity: motion.velocity[k],
             acceleration: motion.acceleration[k],
         };
-        let command = law.step(&ThreeVariableInput { reference, measured }, H);
+        let command = law.step(
+            &ThreeVariableInput {
+                reference,
+                measured,
+            },
+            H,
+        );
         let valve_command = interlock.step(
             &InterlockInput {
                 valve_command: command,
@@ -70,7 +96,11 @@ fn run(motion: &Motion, gains: ThreeVariableGains, delay: f64, seed: u64, specim
         pv = pv.max(s.velocity.abs());
         pf = pf.max(truth.actuator_force.abs());
         worst = worst.max((s.displacement - reference.displacement).abs());
-        let input = ServoHydraulicInput { valve_command, specimen_force: force, supply_lost: false };
+        let input = ServoHydraulicInput {
+            valve_command,
+            specimen_force: force,
+            supply_lost: false,
+        };
         s = table.advance(&s, &input, H);
         d = specimen.advance(&d, acceleration, H);
     }
@@ -94,9 +124,15 @@ fn records() -> Vec<Motion> {
     let Ok(folder) = std::fs::read_dir(shared.join("records")) else {
         return Vec::new();
     };
-    let mut files: Vec<_> = folder.filter_map(|entry| Some(entry.ok()?.path())).filter(|p| p.extension().is_some_and(|e| e == "csv" || e == "AT2")).collect();
+    let mut files: Vec<_> = folder
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|p| p.extension().is_some_and(|e| e == "csv" || e == "AT2"))
+        .collect();
     files.sort();
-    files.iter().map(|path| shakebench::motion::load(path, &Options::default()).unwrap()).collect()
+    files
+        .iter()
+        .map(|path| shakebench::motion::load(path, &Options::default()).unwrap())
+        .collect()
 }
 
 #[test]
@@ -106,8 +142,18 @@ fn explore() {
             let o = run(&m, ThreeVariableGains::table_3_2(), delay, 1, on);
             println!(
                 "{delay} {on} {:40} {:6.1} % peak {:.2} in trip {:?} at {:.2} drift {:.2} in tracking {:.2} in v {:.1} F {:.0} lbf; ref {:.2} in {:.2} g {:.1} in/s",
-                m.name, o.error_percent, o.peak / INCH, o.trip, o.trip_time, o.drift / INCH, o.worst_tracking / INCH, o.peak_velocity/INCH, o.peak_force/4.448,
-                m.peak_displacement() / INCH, m.peak_acceleration()/9.81, m.peak_velocity()/INCH
+                m.name,
+                o.error_percent,
+                o.peak / INCH,
+                o.trip,
+                o.trip_time,
+                o.drift / INCH,
+                o.worst_tracking / INCH,
+                o.peak_velocity / INCH,
+                o.peak_force / 4.448,
+                m.peak_displacement() / INCH,
+                m.peak_acceleration() / 9.81,
+                m.peak_velocity() / INCH
             );
         }
     }
