@@ -138,7 +138,8 @@ fn check_dependencies<C: Component>(model: &Model<C>, component: &C) {
     let unknowns: Vec<usize> = (0..model.variables.len())
         .filter(|i| {
             let is_derivative = model.states.iter().any(|s| s.derivative == *i);
-            model.variables[*i].causality == Causality::Output || is_derivative
+            let variable = &model.variables[*i];
+            variable.access.is_real() && (variable.causality == Causality::Output || is_derivative)
         })
         .collect();
     let knowns = (0..model.variables.len()).filter(|i| {
