@@ -99,9 +99,6 @@ impl Component for ServoHydraulicTable {
                 .nominal(400.0).depends_on(&MOTION, Dependent).depends_on(&OIL, Dependent);
             output("supply_pressure", s.state.supply_pressure, "Pressure of the supply", "Pa" => "psi")
                 .nominal(2e7).initially_depends_on(&VALVE);
-            output("stop_hit", s.stop_hit, "Whether a hard stop is touched");
-            output("displacement_error", s.displacement_error, "Estimated error of the displacement made in the last step, if asked for", "m" => "in")
-                .discrete().nominal(1e-6);
             parameter("estimate_error", s.estimate_error, "Estimate the error of every step");
             parameter("pump_pressure", s.rig.supply.pressure, "Pressure at which the pump stops delivering", "Pa" => "psi");
             parameter("pump_gain", s.rig.supply.pump_gain, "Pump flow per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
@@ -139,6 +136,9 @@ impl Component for ServoHydraulicTable {
             parameter("table_stiffness", s.rig.table.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
             parameter("added_payload", s.rig.added_payload, "Mass on the table that a model does not know of", "kg" => "lbf.s2/in");
             parameter("cubic_stiffness", s.rig.cubic_stiffness, "Factor of an additional force with the cube of the displacement", "N/m3" => "lbf/in3");
+            local("stop_hit", s.stop_hit, "Whether a hard stop is touched");
+            local("displacement_error", s.displacement_error, "Estimated error of the displacement made in the last step, if asked for", "m" => "in")
+                .discrete().nominal(1e-6);
             local("spool", s.state.spool, "Position of the spool", "V").nominal(10.0);
             local("spool_velocity", s.state.spool_velocity, "Velocity of the spool", "V/s")
                 .nominal(1e3).derivative_of("spool");
