@@ -89,8 +89,9 @@ pub struct Instrumentation {
     pub delay: f64,
     /// Source of the velocity.
     pub velocity_estimate: VelocityEstimate,
-    /// `c` of `v_k = v_(k-1) + c ((x_k - x_(k-1))/h - v_(k-1))`, 1 for plain differences.
-    pub velocity_filter: f64,
+    /// `T` of the differentiated velocity, s:
+    /// `v_k = v_(k-1) + h/(h + T) ((x_k - x_(k-1))/h - v_(k-1))`, 0 for plain differences.
+    pub velocity_lag: f64,
     /// Seed of the noise.
     pub seed: u64,
     /// What fails.
@@ -111,7 +112,7 @@ impl Default for Instrumentation {
             accelerometer_tilt: 0.0,
             delay: 0.0,
             velocity_estimate: VelocityEstimate::default(),
-            velocity_filter: 1.0,
+            velocity_lag: 0.0,
             seed: 1,
             fault: SensorFault::None,
             fault_channel: 0,
@@ -189,14 +190,7 @@ impl Instrumentation {
                 expected: "the number of a channel",
             });
         }
-        if self.velocity_filter > 0.0 && self.velocity_filter <= 1.0 {
-            return Ok(());
-        }
-        Err(ModelError::Parameter {
-            name: "velocity_filter",
-            value: self.velocity_filter,
-            expected: "a number above 0, up to 1",
-        })
+        ModelError::require_non_negative("velocity_lag", self.velocity_lag)
     }
 
     /// Solves for the gains of the velocity's Kalman filter at the sampling `period` (s). The
@@ -266,7 +260,8 @@ impl Instrumentation {
         let velocity = match self.velocity_estimate {
             VelocityEstimate::Differentiated => {
                 let rate = (x - state.previous[0]) / period;
-                state.estimate[1] += self.velocity_filter * (rate - state.estimate[1]);
+                let weight = period / (period + self.velocity_lag);
+                state.estimate[1] += weight * (rate - state.estimate[1]);
                 state.estimate[1]
             }
             VelocityEstimate::Kalman => {
@@ -386,15 +381,15 @@ mod tests {
     #[test]
     fn the_kalman_velocity_is_far_better_than_the_differentiated_one() {
         let kalman = Instrumentation::laboratory(3);
-        let differentiated = |velocity_filter: f64| Instrumentation {
+        let differentiated = |velocity_lag: f64| Instrumentation {
             velocity_estimate: VelocityEstimate::Differentiated,
-            velocity_filter,
+            velocity_lag,
             ..kalman
         };
         let errors = [
             velocity_error(&kalman),
-            velocity_error(&differentiated(1.0)),
-            velocity_error(&differentiated(0.25)),
+            velocity_error(&differentiated(0.0)),
+            velocity_error(&differentiated(3.0 * PERIOD)),
         ];
         println!("velocity errors {:?} in/s rms", errors.map(|e| e / INCH));
         assert!(errors[0] < 0.25 * errors[1].min(errors[2]), "{errors:?}");

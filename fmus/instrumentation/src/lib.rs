@@ -17,6 +17,7 @@ pub struct Instrumentation {
     period: f64,
     motion: TrueMotion,
     measured: Measured,
+    valid: bool,
     velocity_estimate: i32,
     fault: i32,
     fault_channel: i32,
@@ -76,6 +77,7 @@ impl Default for Instrumentation {
             period: 0.0,
             motion: TrueMotion::default(),
             measured: Measured::default(),
+            valid: true,
             velocity_estimate: 0,
             fault: 0,
             fault_channel: 0,
@@ -107,15 +109,16 @@ impl Component for Instrumentation {
             input("actuator_force", s.motion.actuator_force, "Force of the actuator", "N" => "lbf").nominal(400.0);
             input("specimen_acceleration", s.motion.specimen_acceleration, "Absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
             output("measured_displacement", s.measured.displacement, "Displacement of the table, as measured", "m" => "in")
-                .discrete().any_number().nominal(0.0381).depends_on(&["displacement"], Dependent);
+                .discrete().nominal(0.0381).depends_on(&["displacement"], Dependent);
             output("measured_velocity", s.measured.velocity, "Velocity of the table, as measured", "m/s" => "in/s")
-                .discrete().any_number().nominal(0.5).depends_on(&["displacement", "velocity", "acceleration"], Dependent);
+                .discrete().nominal(0.5).depends_on(&["displacement", "velocity", "acceleration"], Dependent);
             output("measured_acceleration", s.measured.acceleration, "Absolute acceleration of the table, as measured", "m/s2" => "g")
-                .discrete().any_number().nominal(10.0).depends_on(&["displacement", "acceleration"], Dependent);
+                .discrete().nominal(10.0).depends_on(&["displacement", "acceleration"], Dependent);
             output("measured_force", s.measured.actuator_force, "Force of the actuator, as measured", "N" => "lbf")
-                .discrete().any_number().nominal(400.0).depends_on(&["actuator_force"], Dependent);
+                .discrete().nominal(400.0).depends_on(&["actuator_force"], Dependent);
             output("measured_specimen_acceleration", s.measured.specimen_acceleration, "Absolute acceleration of the specimen, as measured", "m/s2" => "g")
-                .discrete().any_number().nominal(10.0).depends_on(&["specimen_acceleration"], Dependent);
+                .discrete().nominal(10.0).depends_on(&["specimen_acceleration"], Dependent);
+            output("measurement_valid", s.valid, "Whether all readings are numbers; those that are not keep their last value");
             parameter("displacement_corner", s.sensors.displacement.corner, "Displacement: corner of the first-order lag, 0 without one", "Hz");
             parameter("displacement_delay", s.sensors.displacement.delay, "Displacement: lateness", "s");
             parameter("displacement_scale_error", s.sensors.displacement.scale_error, "Displacement: relative error of the scale");
@@ -154,8 +157,7 @@ impl Component for Instrumentation {
             parameter("specimen_acceleration_resolution", s.sensors.specimen_acceleration.resolution, "Specimen's accelerometer: step of the converter, 0 for none", "m/s2" => "in/s2");
             parameter("accelerometer_tilt", s.sensors.accelerometer_tilt, "Pitch of the table per displacement", "rad/m" => "rad/in");
             parameter("delay", s.sensors.delay, "Lateness of all channels together", "s");
-            parameter("velocity_filter", s.sensors.velocity_filter, "Weight of a new difference in the differentiated velocity, above 0 to 1");
-            parameter("seed", s.seed, "Seed of the noise");
+            parameter("velocity_lag", s.sensors.velocity_lag, "Lag of the differentiated velocity", "s");
             parameter("fault_time", s.sensors.fault_time, "When the fault occurs", "s");
         };
         variables.extend([
@@ -189,6 +191,7 @@ impl Component for Instrumentation {
         self.prepare(Self::STEP_SIZE)?;
         self.state = InstrumentationState::default();
         self.measured = Measured::default();
+        self.valid = true;
         Ok(())
     }
 
@@ -196,9 +199,24 @@ impl Component for Instrumentation {
         if step_size != self.period {
             self.prepare(step_size)?;
         }
-        self.measured =
-            self.sensors
-                .sample(&mut self.state, &self.filter, &self.motion, self.period);
+        let reading = self
+            .sensors
+            .sample(&mut self.state, &self.filter, &self.motion, self.period);
+        // FMI carries no number that is none: the last one stays and is marked.
+        let held = self.measured;
+        let mut valid = true;
+        let mut keep = |now: f64, before: f64| {
+            valid &= now.is_finite();
+            if now.is_finite() { now } else { before }
+        };
+        self.measured = Measured {
+            displacement: keep(reading.displacement, held.displacement),
+            velocity: keep(reading.velocity, held.velocity),
+            acceleration: keep(reading.acceleration, held.acceleration),
+            actuator_force: keep(reading.actuator_force, held.actuator_force),
+            specimen_acceleration: keep(reading.specimen_acceleration, held.specimen_acceleration),
+        };
+        self.valid = valid;
         Ok(())
     }
 }

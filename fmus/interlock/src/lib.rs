@@ -3,10 +3,7 @@
 
 use controllers::Controller;
 use controllers::interlock::{Interlock as Law, InterlockInput, Trip};
-use fmu_kit::variable::Variability;
-use fmu_kit::{
-    Causality, Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Variable,
-};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Passes the controller's command on to the valve, or brings the valve to null.
@@ -19,6 +16,7 @@ pub struct Interlock {
     reference_displacement: f64,
     measured: controllers::Motion,
     measured_force: f64,
+    measurement_valid: bool,
     heartbeat: i32,
     stop: bool,
     reset: bool,
@@ -37,6 +35,7 @@ impl Default for Interlock {
             reference_displacement: 0.0,
             measured: controllers::Motion::default(),
             measured_force: 0.0,
+            measurement_valid: true,
             heartbeat: 0,
             stop: false,
             reset: false,
@@ -45,64 +44,6 @@ impl Default for Interlock {
         }
     }
 }
-
-const fn item(trip: Trip, name: &'static str, description: &'static str) -> Item {
-    Item {
-        name,
-        value: trip as i32,
-        description,
-    }
-}
-
-const CAUSES: Enumeration = Enumeration {
-    name: "TripCause",
-    items: &[
-        item(Trip::None, "none", "Not tripped"),
-        item(
-            Trip::NotFinite,
-            "not_finite",
-            "An input is not a finite number",
-        ),
-        item(
-            Trip::Stale,
-            "stale",
-            "A measurement repeats itself while the reference moves",
-        ),
-        item(Trip::Heartbeat, "heartbeat", "The heartbeat stood still"),
-        item(
-            Trip::Displacement,
-            "displacement",
-            "The displacement is beyond its limit",
-        ),
-        item(
-            Trip::StoppingDistance,
-            "stopping_distance",
-            "The stopping distance reaches beyond the displacement limit",
-        ),
-        item(
-            Trip::Velocity,
-            "velocity",
-            "The velocity is beyond its limit",
-        ),
-        item(
-            Trip::Acceleration,
-            "acceleration",
-            "The acceleration is beyond its limit",
-        ),
-        item(Trip::Force, "force", "The force is beyond its limit"),
-        item(
-            Trip::TrackingError,
-            "tracking_error",
-            "The displacement is too far from the reference",
-        ),
-        item(
-            Trip::Saturation,
-            "saturation",
-            "The valve command was saturated for too long",
-        ),
-        item(Trip::Stop, "stop", "The operator pressed stop"),
-    ],
-};
 
 impl Component for Interlock {
     const NAME: &'static str = "Interlock";
@@ -119,20 +60,22 @@ impl Component for Interlock {
             "measured_acceleration",
             "measured_force",
         ];
-        let mut variables = fmu_kit::table! { Self, s:
-            input("controller_command", s.controller_command, "Command of the controller", "V").any_number().nominal(10.0);
-            input("reference_displacement", s.reference_displacement, "Wanted displacement", "m" => "in").any_number().nominal(0.0381);
-            input("measured_displacement", s.measured.displacement, "Measured displacement", "m" => "in").any_number().nominal(0.0381);
-            input("measured_velocity", s.measured.velocity, "Measured velocity", "m/s" => "in/s").any_number().nominal(0.5);
-            input("measured_acceleration", s.measured.acceleration, "Measured acceleration", "m/s2" => "g").any_number().nominal(10.0);
-            input("measured_force", s.measured_force, "Measured force of the actuator", "N" => "lbf").any_number().nominal(400.0);
+        fmu_kit::table! { Self, s:
+            input("controller_command", s.controller_command, "Command of the controller", "V").nominal(10.0);
+            input("reference_displacement", s.reference_displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input("measured_displacement", s.measured.displacement, "Measured displacement", "m" => "in").nominal(0.0381);
+            input("measured_velocity", s.measured.velocity, "Measured velocity", "m/s" => "in/s").nominal(0.5);
+            input("measured_acceleration", s.measured.acceleration, "Measured acceleration", "m/s2" => "g").nominal(10.0);
+            input("measured_force", s.measured_force, "Measured force of the actuator", "N" => "lbf").nominal(400.0);
+            input("measurement_valid", s.measurement_valid, "Whether all measurements are numbers");
             input("heartbeat", s.heartbeat, "A number that the controller changes at every sample");
             input("stop", s.stop, "The operator's stop");
             input("reset", s.reset, "A rising edge ends a trip whose cause is gone");
             output("valve_command", s.law.memory.command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0).depends_on(&INPUTS, Dependent)
-                .depends_on(&["heartbeat", "stop", "reset"], Dependent);
+                .depends_on(&["measurement_valid", "heartbeat", "stop", "reset"], Dependent);
             output("tripped", s.tripped, "Whether the interlock has tripped");
+            output("trip_cause", s.trip_cause, "Why it tripped, by its number in the documentation, 0 if it did not");
             output("trip_time", s.law.memory.trip_time, "When it tripped, 0 if it did not", "s").discrete();
             parameter("displacement_limit", s.law.displacement_limit, "Largest displacement, measured or predicted", "m" => "in");
             parameter("velocity_limit", s.law.velocity_limit, "Largest velocity", "m/s" => "in/s");
@@ -146,12 +89,7 @@ impl Component for Interlock {
             parameter("stale_samples", s.stale_samples, "Repetitions that make a channel stale ...").min(1.0);
             parameter("stale_travel", s.law.stale_travel, "... while the reference travels this far", "m" => "in");
             parameter("heartbeat_samples", s.heartbeat_samples, "Samples after which the heartbeat must have changed, 0 without one").min(0.0);
-        };
-        let mut cause = Variable::choice("trip_cause", CAUSES, |s: &mut Self| &mut s.trip_cause)
-            .about("Why it tripped");
-        (cause.causality, cause.variability) = (Causality::Output, Variability::Discrete);
-        variables.push(cause);
-        variables
+        }
     }
 
     fn initialize(&mut self) -> ComponentResult {
@@ -170,7 +108,12 @@ impl Component for Interlock {
                 valve_command: self.controller_command,
                 reference_displacement: self.reference_displacement,
                 measured: self.measured,
-                measured_force: self.measured_force,
+                // FMI carries no number that is none.
+                measured_force: if self.measurement_valid {
+                    self.measured_force
+                } else {
+                    f64::NAN
+                },
                 heartbeat: self.heartbeat,
                 stop: self.stop,
                 reset: self.reset,

@@ -59,7 +59,7 @@ impl<C: Component> Instance<C> {
             Access::Element(field, index) => field(component)[*index],
             _ => return Err(wrong_type(variable, "Float64")),
         };
-        if value.is_finite() || variable.any_number {
+        if value.is_finite() {
             return Ok(value);
         }
         Err(Fault::error(format!(
@@ -77,7 +77,7 @@ impl<C: Component> Instance<C> {
         }
         let above = variable.min.is_none_or(|min| value >= min);
         let below = variable.max.is_none_or(|max| value <= max);
-        if variable.any_number || value.is_finite() && above && below {
+        if value.is_finite() && above && below {
             return Ok(());
         }
         Err(out_of_range(variable, value))

@@ -149,8 +149,6 @@ pub struct Variable<C> {
     pub initial_dependencies: Vec<String>,
     /// The continuous state whose time derivative it is.
     pub state: Option<String>,
-    /// Whether it may also be infinite or not a number, as the reading of a failed sensor.
-    pub any_number: bool,
     /// The way to the field.
     pub access: Access<C>,
 }
@@ -175,7 +173,6 @@ impl<C> Variable<C> {
             dependencies: Vec::new(),
             initial_dependencies: Vec::new(),
             state: None,
-            any_number: false,
             access,
         }
     }
@@ -257,12 +254,6 @@ impl<C> Variable<C> {
     /// Gives the typical magnitude.
     pub fn nominal(mut self, nominal: f64) -> Self {
         self.nominal = Some(nominal);
-        self
-    }
-
-    /// Lets it be infinite or not a number, as the reading of a failed sensor may be.
-    pub fn any_number(mut self) -> Self {
-        self.any_number = true;
         self
     }
 
