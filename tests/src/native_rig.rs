@@ -86,8 +86,13 @@ impl NativeRig {
     /// With parameters that cannot be simulated.
     pub fn play(&self, motion: &Motion) -> NativeRun {
         self.table.validate().expect("the table can be simulated");
-        self.sensors.validate(PERIOD).expect("the sensors can be simulated");
-        let filter = self.sensors.velocity_filter(PERIOD).expect("the filter exists");
+        self.sensors
+            .validate(PERIOD)
+            .expect("the sensors can be simulated");
+        let filter = self
+            .sensors
+            .velocity_filter(PERIOD)
+            .expect("the filter exists");
         let mut law = ThreeVariableControl {
             gains: self.gains,
             ..ThreeVariableControl::table_3_2()
@@ -125,7 +130,13 @@ impl NativeRig {
                 acceleration: motion.acceleration[k],
             };
             if !matches!(self.injected, Injected::ControllerFails(at) if off(at)) {
-                command = law.step(&ThreeVariableInput { reference, measured }, PERIOD);
+                command = law.step(
+                    &ThreeVariableInput {
+                        reference,
+                        measured,
+                    },
+                    PERIOD,
+                );
                 heartbeat += 1;
             }
             let valve_command = interlock.step(
@@ -163,6 +174,8 @@ impl NativeRig {
 impl NativeRun {
     /// Largest magnitude of the displacement, m.
     pub fn peak_displacement(&self) -> f64 {
-        self.displacement.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
+        self.displacement
+            .iter()
+            .fold(0.0, |m: f64, x| m.max(x.abs()))
     }
 }

@@ -34,8 +34,15 @@ fn check(name: &str, run: &NativeRun, causes: &[Trip], within: f64) {
     );
     assert!(causes.contains(&m.trip), "{name}: {:?}", m.trip);
     assert!(m.trip_time >= AT - 1e-9, "{name} tripped before the fault");
-    assert!(time_to_null(run) <= within, "{name}: {} s", time_to_null(run));
-    assert!(run.displacement.iter().all(|x| x.abs() < STROKE), "{name} hit the stop");
+    assert!(
+        time_to_null(run) <= within,
+        "{name}: {} s",
+        time_to_null(run)
+    );
+    assert!(
+        run.displacement.iter().all(|x| x.abs() < STROKE),
+        "{name} hit the stop"
+    );
     for pair in run.valve_command.windows(2) {
         assert!((pair[1] - pair[0]).abs() < 5.0, "{name}: the valve jumps");
     }
@@ -56,7 +63,12 @@ fn a_reading_that_is_no_number_brings_the_valve_to_null_in_22_ms() {
         rig.sensors.fault_channel = channel;
         rig.sensors.fault_time = AT;
         let run = rig.play(&motion());
-        check(&format!("{name} is no number"), &run, &[Trip::NotFinite], 0.022);
+        check(
+            &format!("{name} is no number"),
+            &run,
+            &[Trip::NotFinite],
+            0.022,
+        );
     }
 }
 

@@ -19,11 +19,16 @@ fn records(options: &Options) -> Vec<Motion> {
         println!("skipped: no records in {}", folder.display());
         return Vec::new();
     };
-    let mut files: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    let mut files: Vec<_> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .collect();
     files.retain(|path| path.extension().is_some_and(|e| e == "csv" || e == "AT2"));
     files.sort();
     assert_eq!(files.len(), 8);
-    files.iter().map(|path| motion::load(path, options).unwrap()).collect()
+    files
+        .iter()
+        .map(|path| motion::load(path, options).unwrap())
+        .collect()
 }
 
 #[test]
@@ -46,8 +51,16 @@ fn no_record_diverges_or_trips_and_the_specimen_yields() {
         );
         assert_eq!(run.interlock.memory.trip, Trip::None, "{}", motion.name);
         assert!(tracking.time_domain_percent < 20.0, "{}", motion.name);
-        assert!(tracking.peak_displacement_error < 0.3 * INCH, "{}", motion.name);
-        assert!(drift > 2.0 * 0.147 * INCH, "{} yields the specimen", motion.name);
+        assert!(
+            tracking.peak_displacement_error < 0.3 * INCH,
+            "{}",
+            motion.name
+        );
+        assert!(
+            drift > 2.0 * 0.147 * INCH,
+            "{} yields the specimen",
+            motion.name
+        );
     }
 }
 
@@ -92,7 +105,11 @@ fn runs_that_leave_the_stroke_are_stopped_before_the_stop() {
             guarded.peak_displacement() / INCH,
             unguarded.peak_displacement() / INCH
         );
-        assert!(unguarded.peak_displacement() >= STROKE, "{} hits the stop", motion.name);
+        assert!(
+            unguarded.peak_displacement() >= STROKE,
+            "{} hits the stop",
+            motion.name
+        );
         assert_ne!(m.trip, Trip::None);
         assert!(guarded.peak_displacement() < STROKE, "{}", motion.name);
     }
@@ -109,7 +126,9 @@ fn sine(amplitude: f64, frequency: f64) -> Motion {
         name: format!("sine {frequency} Hz"),
         dt: 0.002,
         displacement: (0..count).map(|k| at(time(k))).collect(),
-        velocity: (0..count).map(|k| (at(time(k) + e) - at(time(k) - e)) / (2.0 * e)).collect(),
+        velocity: (0..count)
+            .map(|k| (at(time(k) + e) - at(time(k) - e)) / (2.0 * e))
+            .collect(),
         acceleration: (0..count)
             .map(|k| (at(time(k) + e) - 2.0 * at(time(k)) + at(time(k) - e)) / (e * e))
             .collect(),
