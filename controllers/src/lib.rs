@@ -6,6 +6,7 @@
 pub mod interlock;
 pub mod pid;
 pub mod three_variable;
+pub mod three_variable_tuning;
 
 pub use plant::ModelError;
 
