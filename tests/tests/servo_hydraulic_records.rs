@@ -3,10 +3,12 @@
 
 use std::path::PathBuf;
 
-use acceptance::native_rig::NativeRig;
+use acceptance::native_rig::{NativeRig, PERIOD};
 use controllers::interlock::Trip;
+use controllers::three_variable::ThreeVariableGains;
 use plant::units::{INCH, STROKE};
 use rayon::prelude::*;
+use shakebench::metrics;
 use shakebench::motion::{self, Motion, Options, Scaling};
 
 fn records(options: &Options) -> Vec<Motion> {
@@ -39,8 +41,7 @@ fn no_record_diverges_or_trips_and_the_specimen_yields() {
         .map(|motion| (motion, NativeRig::laboratory(7).play(motion)))
         .collect();
     for (motion, run) in rows {
-        let tracking =
-            shakebench::metrics::tracking(motion, &run.displacement, &run.acceleration).unwrap();
+        let tracking = metrics::tracking(motion, &run.displacement, &run.acceleration).unwrap();
         let drift = run.drift.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
         println!(
             "{:32} {:5.1} % of peak acceleration, peak {:.2} in, drift {:.2} in",
@@ -62,6 +63,37 @@ fn no_record_diverges_or_trips_and_the_specimen_yields() {
             motion.name
         );
     }
+}
+
+#[test]
+fn gains_tuned_on_a_model_of_the_rig_follow_better_in_the_median() {
+    let records = records(&Options::default());
+    if records.is_empty() {
+        return;
+    }
+    let printed = NativeRig::laboratory(7);
+    let model = printed.table.fitted().unwrap();
+    let tuned = NativeRig {
+        gains: ThreeVariableGains::tuned(&model, 1, PERIOD).unwrap(),
+        ..printed
+    };
+    let errors = |rig: &NativeRig| {
+        let mut errors: Vec<f64> = records
+            .par_iter()
+            .map(|motion| {
+                let run = rig.play(motion);
+                assert_eq!(run.interlock.memory.trip, Trip::None, "{}", motion.name);
+                metrics::tracking(motion, &run.displacement, &run.acceleration)
+                    .unwrap()
+                    .time_domain_percent
+            })
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        errors
+    };
+    let (printed, tuned) = (errors(&printed), errors(&tuned));
+    println!("printed gains {printed:.1?} %, tuned {tuned:.1?} %");
+    assert!(tuned[3] + tuned[4] < printed[3] + printed[4]);
 }
 
 #[test]
