@@ -1,8 +1,6 @@
 //! The eight records on the physical rig with the yielding specimen, sensor noise and one sample
 //! of delay, under three-variable control and behind the interlock.
 
-use std::path::PathBuf;
-
 use acceptance::native_rig::{NativeRig, PERIOD};
 use controllers::interlock::Trip;
 use controllers::three_variable::ThreeVariableGains;
@@ -12,21 +10,7 @@ use shakebench::metrics;
 use shakebench::motion::{self, Motion, Options, Scaling};
 
 fn records(options: &Options) -> Vec<Motion> {
-    let shared = std::env::var_os("SHAKEBENCH_SHARED").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-        PathBuf::from,
-    );
-    let folder = shared.join("records");
-    let Ok(entries) = std::fs::read_dir(&folder) else {
-        println!("skipped: no records in {}", folder.display());
-        return Vec::new();
-    };
-    let mut files: Vec<_> = entries
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .collect();
-    files.retain(|path| path.extension().is_some_and(|e| e == "csv" || e == "AT2"));
-    files.sort();
-    assert_eq!(files.len(), 8);
+    let files = acceptance::shared::records();
     files
         .iter()
         .map(|path| motion::load(path, options).unwrap())

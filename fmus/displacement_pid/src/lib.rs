@@ -44,6 +44,7 @@ impl Component for DisplacementPid {
                 .depends_on(&["reference_displacement", "measured_displacement"], Dependent);
             parameter("proportional_gain", s.law.proportional, "Proportional gain", "V/m" => "V/in");
             parameter("integral_gain", s.law.integral, "Integral gain", "V/(m.s)" => "V/(in.s)");
+            parameter("integral_leak", s.law.integral_leak, "Rate at which the integral leaks away", "1/s");
             parameter("derivative_gain", s.law.derivative, "Derivative gain", "V.s/m" => "V.s/in");
             parameter("derivative_lag", s.law.derivative_lag, "Time constant of the derivative's lag", "s");
             parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
