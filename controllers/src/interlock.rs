@@ -164,7 +164,7 @@ impl Interlock {
     /// (10 V) and the capacity of the actuator (1.1 kip, Section 2.3.1).
     pub fn laboratory() -> Self {
         Self {
-            displacement_limit: STROKE - 0.05 * INCH,
+            displacement_limit: STROKE - 0.1 * INCH,
             velocity_limit: 40.0 * INCH,
             acceleration_limit: 3.5 * G,
             force_limit: 1000.0 * LBF,

@@ -1,160 +1,154 @@
-//! The eight records on the physical rig with the yielding specimen.
+//! The eight records on the physical rig with the yielding specimen, sensor noise and one sample
+//! of delay, under three-variable control and behind the interlock.
 
-use std::path::PathBuf;
+use acceptance::native_rig::{NativeRig, PERIOD};
+use controllers::interlock::Trip;
+use controllers::three_variable::ThreeVariableGains;
+use plant::units::{INCH, STROKE};
+use rayon::prelude::*;
+use shakebench::metrics;
+use shakebench::motion::{self, Motion, Options, Scaling};
 
-use controllers::interlock::{Interlock, InterlockInput, Trip};
-use controllers::three_variable::{ThreeVariableControl, ThreeVariableGains, ThreeVariableInput};
-use controllers::{Controller, Motion as Sample};
-use plant::instrumentation::{Instrumentation, InstrumentationState, TrueMotion};
-use plant::servo_hydraulic::{ServoHydraulicInput, ServoHydraulicTable};
-use plant::specimens::{YieldingSpecimen, YieldingState};
-use plant::units::INCH;
-use shakebench::motion::{Motion, Options};
-
-const H: f64 = 0.002;
-
-struct Outcome {
-    error_percent: f64,
-    peak: f64,
-    trip: Trip,
-    trip_time: f64,
-    drift: f64,
-    worst_tracking: f64,
-    peak_velocity: f64,
-    peak_force: f64,
-}
-
-fn run(
-    motion: &Motion,
-    gains: ThreeVariableGains,
-    delay: f64,
-    seed: u64,
-    specimen_on: bool,
-) -> Outcome {
-    let table = ServoHydraulicTable::default();
-    let specimen = YieldingSpecimen::default();
-    let sensors = Instrumentation {
-        delay,
-        ..Instrumentation::laboratory(seed)
-    };
-    sensors.validate(H).unwrap();
-    let filter = sensors.velocity_filter(H).unwrap();
-    let mut law = ThreeVariableControl {
-        gains,
-        ..ThreeVariableControl::table_3_2()
-    };
-    let mut interlock = Interlock::laboratory();
-    let (mut s, mut d, mut memory) = (
-        table.rest(),
-        YieldingState::default(),
-        InstrumentationState::default(),
-    );
-    let (mut squares, mut peak, mut drift, mut worst): (f64, f64, f64, f64) = (0.0, 0.0, 0.0, 0.0);
-    let (mut pv, mut pf): (f64, f64) = (0.0, 0.0);
-    for k in 0..motion.len() {
-        let force = if specimen_on { specimen.force(&d) } else { 0.0 };
-        let acceleration = table.acceleration(&s, force);
-        let truth = TrueMotion {
-            displacement: s.displacement,
-            velocity: s.velocity,
-            acceleration,
-            actuator_force: table.actuator_force(&s),
-            specimen_acceleration: specimen.acceleration(&d),
-        };
-        let m = sensors.sample(&mut memory, &filter, &truth, H);
-        let measured = Sample {
-            displacement: m.displacement,
-            velocity: m.velocity,
-            acceleration: m.acceleration,
-        };
-        let reference = Sample {
-            displacement: motion.displacement[k],
-            velocity: motion.velocity[k],
-            acceleration: motion.acceleration[k],
-        };
-        let command = law.step(
-            &ThreeVariableInput {
-                reference,
-                measured,
-            },
-            H,
-        );
-        let valve_command = interlock.step(
-            &InterlockInput {
-                valve_command: command,
-                reference_displacement: reference.displacement,
-                measured,
-                measured_force: m.actuator_force,
-                heartbeat: k as i32,
-                ..InterlockInput::default()
-            },
-            H,
-        );
-        squares += (reference.acceleration - acceleration).powi(2);
-        peak = peak.max(s.displacement.abs());
-        drift = drift.max(d.drift.abs());
-        pv = pv.max(s.velocity.abs());
-        pf = pf.max(truth.actuator_force.abs());
-        worst = worst.max((s.displacement - reference.displacement).abs());
-        let input = ServoHydraulicInput {
-            valve_command,
-            specimen_force: force,
-            supply_lost: false,
-        };
-        s = table.advance(&s, &input, H);
-        d = specimen.advance(&d, acceleration, H);
-    }
-    Outcome {
-        error_percent: 100.0 * (squares / motion.len() as f64).sqrt() / motion.peak_acceleration(),
-        peak,
-        trip: interlock.memory.trip,
-        trip_time: interlock.memory.trip_time,
-        drift,
-        worst_tracking: worst,
-        peak_velocity: pv,
-        peak_force: pf,
-    }
-}
-
-fn records() -> Vec<Motion> {
-    let shared = std::env::var_os("SHAKEBENCH_SHARED").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-        PathBuf::from,
-    );
-    let Ok(folder) = std::fs::read_dir(shared.join("records")) else {
-        return Vec::new();
-    };
-    let mut files: Vec<_> = folder
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|p| p.extension().is_some_and(|e| e == "csv" || e == "AT2"))
-        .collect();
-    files.sort();
+fn records(options: &Options) -> Vec<Motion> {
+    let files = acceptance::shared::records();
     files
         .iter()
-        .map(|path| shakebench::motion::load(path, &Options::default()).unwrap())
+        .map(|path| motion::load(path, options).unwrap())
         .collect()
 }
 
 #[test]
-fn explore() {
-    for (delay, on) in [(0.0, true), (0.002, true), (0.0, false), (0.002, false)] {
-        for m in records() {
-            let o = run(&m, ThreeVariableGains::table_3_2(), delay, 1, on);
-            println!(
-                "{delay} {on} {:40} {:6.1} % peak {:.2} in trip {:?} at {:.2} drift {:.2} in tracking {:.2} in v {:.1} F {:.0} lbf; ref {:.2} in {:.2} g {:.1} in/s",
-                m.name,
-                o.error_percent,
-                o.peak / INCH,
-                o.trip,
-                o.trip_time,
-                o.drift / INCH,
-                o.worst_tracking / INCH,
-                o.peak_velocity / INCH,
-                o.peak_force / 4.448,
-                m.peak_displacement() / INCH,
-                m.peak_acceleration() / 9.81,
-                m.peak_velocity() / INCH
-            );
-        }
+fn no_record_diverges_or_trips_and_the_specimen_yields() {
+    let records = records(&Options::default());
+    let rows: Vec<_> = records
+        .par_iter()
+        .map(|motion| (motion, NativeRig::laboratory(7).play(motion)))
+        .collect();
+    for (motion, run) in rows {
+        let tracking = metrics::tracking(motion, &run.displacement, &run.acceleration).unwrap();
+        let drift = run.drift.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+        println!(
+            "{:32} {:5.1} % of peak acceleration, peak {:.2} in, drift {:.2} in",
+            motion.name,
+            tracking.time_domain_percent,
+            run.peak_displacement() / INCH,
+            drift / INCH
+        );
+        assert_eq!(run.interlock.memory.trip, Trip::None, "{}", motion.name);
+        assert!(tracking.time_domain_percent < 20.0, "{}", motion.name);
+        assert!(
+            tracking.peak_displacement_error < 0.3 * INCH,
+            "{}",
+            motion.name
+        );
+        assert!(
+            drift > 2.0 * 0.147 * INCH,
+            "{} yields the specimen",
+            motion.name
+        );
+    }
+}
+
+#[test]
+fn gains_tuned_on_a_model_of_the_rig_follow_better_in_the_median() {
+    let records = records(&Options::default());
+    if records.is_empty() {
+        return;
+    }
+    let printed = NativeRig::laboratory(7);
+    let model = printed.table.fitted().unwrap();
+    let tuned = NativeRig {
+        gains: ThreeVariableGains::tuned(&model, 1, PERIOD).unwrap(),
+        ..printed
+    };
+    let errors = |rig: &NativeRig| {
+        let mut errors: Vec<f64> = records
+            .par_iter()
+            .map(|motion| {
+                let run = rig.play(motion);
+                assert_eq!(run.interlock.memory.trip, Trip::None, "{}", motion.name);
+                metrics::tracking(motion, &run.displacement, &run.acceleration)
+                    .unwrap()
+                    .time_domain_percent
+            })
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        errors
+    };
+    let (printed, tuned) = (errors(&printed), errors(&tuned));
+    println!("printed gains {printed:.1?} %, tuned {tuned:.1?} %");
+    assert!(tuned[3] + tuned[4] < printed[3] + printed[4]);
+}
+
+#[test]
+fn runs_that_leave_the_stroke_are_stopped_before_the_stop() {
+    let options = Options {
+        scaling: Some(Scaling::PeakDisplacement(2.5 * INCH)),
+        stroke: 3.0 * INCH,
+        ..Options::default()
+    };
+    let records = records(&options);
+    // Also much faster than any of them: sines that run into the stop at up to 35 in/s.
+    let sines = [0.5, 1.0, 2.0, 3.0].map(|frequency| sine(2.0 * INCH, frequency));
+    let results: Vec<_> = records
+        .par_iter()
+        .chain(&sines)
+        .map(|motion| {
+            let rig = NativeRig::laboratory(11);
+            let guarded = rig.play(motion);
+            let unguarded = NativeRig {
+                interlock: controllers::interlock::Interlock {
+                    displacement_limit: 1.0,
+                    tracking_limit: 1.0,
+                    velocity_limit: 10.0,
+                    acceleration_limit: 1e6,
+                    force_limit: 1e6,
+                    saturation_time: 1e3,
+                    ..rig.interlock
+                },
+                ..rig
+            };
+            (motion, guarded, unguarded.play(motion))
+        })
+        .collect();
+    for (motion, guarded, unguarded) in results {
+        let m = guarded.interlock.memory;
+        println!(
+            "{:32} {:?} at {:.2} s, farthest {:.3} in (without interlock {:.3} in)",
+            motion.name,
+            m.trip,
+            m.trip_time,
+            guarded.peak_displacement() / INCH,
+            unguarded.peak_displacement() / INCH
+        );
+        assert!(
+            unguarded.peak_displacement() >= STROKE,
+            "{} hits the stop",
+            motion.name
+        );
+        assert_ne!(m.trip, Trip::None);
+        assert!(guarded.peak_displacement() < STROKE, "{}", motion.name);
+    }
+}
+
+/// A sine that grows to `amplitude` (m) over four periods.
+fn sine(amplitude: f64, frequency: f64) -> Motion {
+    let omega = std::f64::consts::TAU * frequency;
+    let at = |t: f64| amplitude * (t * frequency / 4.0).min(1.0) * (omega * t).sin();
+    let time = |k: usize| 0.002 * k as f64;
+    let e = 1e-4;
+    let count = (6.0 / frequency / 0.002) as usize + 500;
+    Motion {
+        name: format!("sine {frequency} Hz"),
+        dt: 0.002,
+        displacement: (0..count).map(|k| at(time(k))).collect(),
+        velocity: (0..count)
+            .map(|k| (at(time(k) + e) - at(time(k) - e)) / (2.0 * e))
+            .collect(),
+        acceleration: (0..count)
+            .map(|k| (at(time(k) + e) - 2.0 * at(time(k)) + at(time(k) - e)) / (e * e))
+            .collect(),
+        notes: Vec::new(),
+        seed: None,
     }
 }

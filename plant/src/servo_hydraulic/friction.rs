@@ -79,7 +79,9 @@ impl SealFriction {
     }
 
     fn bump(&self, velocity: f64) -> f64 {
-        (-(velocity / self.stribeck_velocity).powi(2)).exp()
+        let square = (velocity / self.stribeck_velocity).powi(2);
+        // Beyond this the exponential is below a rounding of 1, and most of the time is spent there.
+        if square > 40.0 { 0.0 } else { (-square).exp() }
     }
 
     /// α and its slope with respect to `|z|`.

@@ -7,6 +7,7 @@
 
 mod cylinder;
 mod energy;
+mod fitted;
 mod friction;
 mod linearisation;
 mod rig;
