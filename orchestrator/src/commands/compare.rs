@@ -106,6 +106,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let json = serde_json::json!({
         "rows": rows,
         "medians": medians,
+        "plant": plant(arguments),
         "specimen": specimen(arguments),
     });
     let folder = arguments.out.clone();
@@ -115,7 +116,11 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.json {
         println!("{json}");
     } else {
-        println!("plant identified, specimen {}\n", specimen(arguments));
+        println!(
+            "plant {}, specimen {}\n",
+            plant(arguments),
+            specimen(arguments)
+        );
         for table in &tables {
             println!("{}", table.text());
         }
@@ -136,6 +141,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     } else {
         ExitCode::from(1)
     })
+}
+
+fn plant(arguments: &Arguments) -> &str {
+    arguments
+        .plant
+        .as_deref()
+        .unwrap_or(built_in::DEFAULT_PLANT)
 }
 
 fn specimen(arguments: &Arguments) -> &str {
@@ -205,10 +217,6 @@ fn records_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 }
 
 fn request(arguments: &Arguments, controller: &str, played: &Played) -> Request {
-    let plant = arguments
-        .plant
-        .as_deref()
-        .unwrap_or(built_in::DEFAULT_PLANT);
     let (mut record, mut reference, mut seed) = (None, None, motion::DEFAULT_SEED);
     match played {
         Played::Record(path) => record = Some(path.clone()),
@@ -217,7 +225,7 @@ fn request(arguments: &Arguments, controller: &str, played: &Played) -> Request 
     }
     Request {
         system: controller.to_string(),
-        plant: plant.to_string(),
+        plant: plant(arguments).to_string(),
         specimen: specimen(arguments).to_string(),
         record,
         reference,
