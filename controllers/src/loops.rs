@@ -280,11 +280,7 @@ impl Loop {
 
     /// Responses at `omega` from valve command to the measured signals, and from all signals to the
     /// valve command.
-    fn responses(
-        &self,
-        time: Time,
-        omega: f64,
-    ) -> Option<(DMatrix<Complex<f64>>, [Complex<f64>; 8])> {
+    fn responses(&self, time: Time, omega: f64) -> Option<Responses> {
         let s = Complex::new(0.0, omega);
         let z = (s * self.law.period).exp();
         let plant = match time {
@@ -387,6 +383,7 @@ impl Loop {
     }
 }
 
+type Responses = (DMatrix<Complex<f64>>, [Complex<f64>; 8]);
 type Matrices<'a> = (
     &'a DMatrix<f64>,
     &'a DMatrix<f64>,

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{build, design, info, run};
+use crate::commands::{build, compare, design, info, run};
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -25,6 +25,8 @@ pub struct Cli {
 enum Command {
     /// Build the components and pack them as FMUs
     Build(build::Arguments),
+    /// Run controllers on records and print the thesis's tables beside the results
+    Compare(compare::Arguments),
     /// Print margins of the loops and draw their frequency responses
     Design(design::Arguments),
     /// Show what an .fmu, system or motion file holds
@@ -38,6 +40,7 @@ pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Build(arguments)) => build::execute(&arguments),
+        Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),

@@ -61,7 +61,7 @@ pub(super) struct NamedLoop {
 }
 
 /// Names of the loops.
-pub(super) const NAMES: [&str; 6] = [
+pub const NAMES: [&str; 6] = [
     "displacement-pid",
     "force-pid",
     "loop-shaping",
@@ -112,12 +112,24 @@ struct Synthesis {
     hankel_singular_values: Vec<f64>,
 }
 
-/// Prints margins, crossover, bandwidth and stability of the loops and draws their responses.
+/// Loops with their figures.
+pub struct Design {
+    loops: Vec<NamedLoop>,
+    rows: Vec<Row>,
+    shaping: LoopShapingDesign,
+    specimen: String,
+}
+
+/// Finds the figures of the loop `only` (or of all), with the loop-shaping synthesis for the target
+/// `crossover` in rad/s and `specimen` (none or linear) on the table.
 ///
 /// # Errors
 /// An unknown name, or a crossover for which there is no controller.
-pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
-    let only = arguments.only.as_deref();
+pub fn design(
+    only: Option<&str>,
+    crossover: Option<f64>,
+    specimen: Option<&str>,
+) -> Result<Design, Error> {
     if let Some(name) = only
         && !NAMES.contains(&name)
     {
@@ -127,57 +139,77 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             reason,
         });
     }
+    let specimen = specimen.unwrap_or("none");
     let rig = Rig {
-        specimen: specimen(arguments.specimen.as_deref().unwrap_or("none"))?,
+        specimen: linear_specimen(specimen)?,
         ..Rig::default()
     };
-    let crossover = arguments.crossover.unwrap_or(EQUATION_3_10_CROSSOVER);
     let fault = |option| {
         move |error: ModelError| Error::Option {
             option,
             reason: error.to_string(),
         }
     };
-    let design =
-        synthesis::loop_shaping(&ShakeTable::default().voltage_to_displacement(), crossover)
-            .map_err(fault("--crossover"))?;
-    let all = loops(&rig, &design).map_err(fault("design"))?;
-    let chosen: Vec<&NamedLoop> = all
-        .iter()
-        .filter(|one| only.is_none_or(|name| name == one.name))
-        .collect();
-    let rows: Vec<Row> = chosen.iter().map(|one| row(one)).collect();
+    let shaping = synthesis::loop_shaping(
+        &ShakeTable::default().voltage_to_displacement(),
+        crossover.unwrap_or(EQUATION_3_10_CROSSOVER),
+    )
+    .map_err(fault("--crossover"))?;
+    let mut loops = loops(&rig, &shaping).map_err(fault("design"))?;
+    loops.retain(|one| only.is_none_or(|name| name == one.name));
+    Ok(Design {
+        rows: loops.iter().map(row).collect(),
+        loops,
+        shaping,
+        specimen: specimen.to_string(),
+    })
+}
 
-    let folder = arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| "shakebench-results/design".into());
-    let file = design_report::write(&folder, &chosen, &all, &design, &table(&rows))?;
-    let synthesis = Synthesis::from(&design);
-    if arguments.json {
-        let json = serde_json::json!({
-            "loops": rows,
-            "specimen": arguments.specimen.as_deref().unwrap_or("none"),
-            "synthesis": synthesis,
+impl Design {
+    /// What `--json` prints.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "loops": self.rows,
+            "specimen": self.specimen,
+            "synthesis": Synthesis::from(&self.shaping),
             "sliding_mode_rate_1_s": sliding_mode::IDENTIFIED_RATE,
-            "report": file,
-        });
+        })
+    }
+}
+
+/// Prints margins, crossover, bandwidth and stability of the loops and draws their responses.
+///
+/// # Errors
+/// What [`design`] refuses, or a report that cannot be written.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let design = design(
+        arguments.only.as_deref(),
+        arguments.crossover,
+        arguments.specimen.as_deref(),
+    )?;
+    let rows = &design.rows;
+    let folder = arguments.out.clone();
+    let folder = folder.unwrap_or_else(|| "shakebench-results/design".into());
+    let file = design_report::write(&folder, &design.loops, &design.shaping, &table(rows))?;
+    if arguments.json {
+        let mut json = design.json();
+        json["report"] = file.display().to_string().into();
         println!("{json}");
         return Ok(ExitCode::SUCCESS);
     }
-    print!("{}", aligned(&table(&rows)));
+    print!("{}", aligned(&table(rows)));
     println!();
     for row in rows.iter().filter(|row| !row.note.is_empty()) {
         println!("{}: {}", row.name, row.note);
     }
-    if only.is_none_or(|name| name == "loop-shaping-synthesis") {
-        print!("{}", synthesis.words());
+    if rows.iter().any(|row| row.name == "loop-shaping-synthesis") {
+        print!("{}", Synthesis::from(&design.shaping).words());
     }
     println!("\nwritten:\n  {}", file.display());
     Ok(ExitCode::SUCCESS)
 }
 
-fn specimen(name: &str) -> Result<Option<LinearSpecimen>, Error> {
+fn linear_specimen(name: &str) -> Result<Option<LinearSpecimen>, Error> {
     match name {
         "none" => Ok(None),
         "linear" => Ok(Some(LinearSpecimen::appendix_a())),

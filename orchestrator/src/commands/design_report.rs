@@ -13,7 +13,7 @@ use plant::linear::{FrequencyResponse, log_space};
 use plant::shake_table::ShakeTable;
 use plant::units::SAMPLING_PERIOD;
 
-use super::design::NamedLoop;
+use super::design::{NAMES, NamedLoop};
 use crate::error::Error;
 use crate::report::{
     self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units,
@@ -26,8 +26,7 @@ const FIRST_HZ: f64 = 0.01;
 /// Writes `report.html` into `folder`; says where.
 pub(super) fn write(
     folder: &Path,
-    chosen: &[&NamedLoop],
-    all: &[NamedLoop],
+    loops: &[NamedLoop],
     design: &LoopShapingDesign,
     table: &[Vec<String>],
 ) -> Result<PathBuf, Error> {
@@ -36,19 +35,14 @@ pub(super) fn write(
         path: path.clone(),
         reason,
     };
-    let page = report::html(&report(chosen, all, design, table));
+    let page = report::html(&report(loops, design, table));
     let page = page.map_err(|error| fault(error.to_string()))?;
     std::fs::create_dir_all(folder).map_err(|error| fault(error.to_string()))?;
     std::fs::write(&path, page).map_err(|error| fault(error.to_string()))?;
     Ok(path)
 }
 
-fn report(
-    chosen: &[&NamedLoop],
-    all: &[NamedLoop],
-    design: &LoopShapingDesign,
-    table: &[Vec<String>],
-) -> Report {
+fn report(loops: &[NamedLoop], design: &LoopShapingDesign, table: &[Vec<String>]) -> Report {
     let mut heads = table.iter().take(2);
     let (names, units) = (heads.next(), heads.next());
     let columns = names.into_iter().flatten().zip(units.into_iter().flatten());
@@ -77,9 +71,9 @@ fn report(
         tables: vec![figures],
         ..Section::default()
     }];
-    sections.extend(chosen.iter().map(|one| loop_section(one)));
-    if chosen.len() == all.len() {
-        sections.push(comparison(all));
+    sections.extend(loops.iter().map(loop_section));
+    if loops.len() == NAMES.len() {
+        sections.push(comparison(loops));
         sections.push(shaping(design));
     }
     Report {

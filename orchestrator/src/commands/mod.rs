@@ -1,6 +1,8 @@
 //! One file a command.
 
 pub mod build;
+pub mod compare;
+mod compare_tables;
 pub mod design;
 mod design_report;
 pub mod info;

@@ -107,24 +107,6 @@ pub fn bandwidth(
         .map(|pair| bisect(pair[0], pair[1], above))
 }
 
-/// Largest magnitude of the sensitivity `1 / (1 + L)`: the inverse of the loop's distance from
-/// -1, and where it is, rad/s.
-pub fn peak_sensitivity(
-    response: impl Fn(f64) -> Complex<f64>,
-    first: f64,
-    last: f64,
-) -> (f64, f64) {
-    grid(first, last)
-        .into_iter()
-        .map(|omega| (1.0 / (1.0 + response(omega)).norm(), omega))
-        .fold(
-            (0.0, first),
-            |best, next| {
-                if next.0 > best.0 { next } else { best }
-            },
-        )
-}
-
 /// Nyquist frequency of a sampling period (s), rad/s.
 pub fn nyquist(period: f64) -> f64 {
     PI / period
@@ -207,8 +189,5 @@ mod tests {
         // L(-1) = -gain h / 2.
         let expected = -20.0 * (gain * period / 2.0).log10();
         assert!((found.gain_margin_db.unwrap() - expected).abs() < 1e-9);
-        let (peak, at) = peak_sensitivity(response, 1e-2, nyquist(period));
-        assert!((peak - 1.0 / (1.0 - gain * period / 2.0)).abs() < 1e-9);
-        assert!((at - nyquist(period)).abs() < 1e-9);
     }
 }
