@@ -68,8 +68,7 @@ impl Kwik {
 
     /// Most violated constraint, if any is violated beyond rounding.
     fn most_violated(&mut self, bound: &DVector<f64>) -> Option<usize> {
-        self.margins
-            .gemv_tr(1.0, &self.metric.normals, &self.y, 0.0);
+        self.margins.gemv(1.0, &self.metric.rows, &self.y, 0.0);
         let size = 1.0 + self.y.amax();
         let (mut worst, mut at) = (-TOLERANCE * size, None);
         for i in 0..self.margins.len() {
@@ -86,8 +85,14 @@ impl Kwik {
     /// `R^-1 d`.
     fn find_steps(&mut self, constraint: usize) -> f64 {
         let count = self.active.len();
-        self.d
-            .gemv_tr(1.0, &self.q, &self.metric.normals.column(constraint), 0.0);
+        let normal = self.metric.normals.column(constraint);
+        if count == 0 {
+            // `Q` is the identity and the normal has length one.
+            self.d.copy_from(&normal);
+            self.step.copy_from(&normal);
+            return self.d.norm_squared();
+        }
+        self.d.gemv_tr(1.0, &self.q, &normal, 0.0);
         self.step.gemv(
             1.0,
             &self.q.columns(count, self.n - count),
@@ -104,19 +109,21 @@ impl Kwik {
         self.d.rows(count, self.n - count).norm_squared()
     }
 
+    /// Appends the constraint of the latest [`Self::find_steps`]: a reflection turns the part of
+    /// `d` across the active normals into one number.
     fn add(&mut self, constraint: usize) {
         let count = self.active.len();
-        for i in (count + 1..self.n).rev() {
-            let (cosine, sine, length) = rotation(self.d[i - 1], self.d[i]);
-            if sine == 0.0 {
-                continue;
-            }
-            self.d[i - 1] = length;
-            rotate_columns(&mut self.q, i - 1, cosine, sine);
-        }
-        for i in 0..=count {
+        let length = self.d.rows(count, self.n - count).norm();
+        let pivot = if self.d[count] > 0.0 { -length } else { length };
+        for i in 0..count {
             self.r[(i, count)] = self.d[i];
         }
+        self.r[(count, count)] = pivot;
+        self.d[count] -= pivot;
+        let normal = self.d.rows(count, self.n - count);
+        let mut across = self.q.columns_mut(count, self.n - count);
+        self.step.gemv(1.0, &across, &normal, 0.0);
+        across.ger(-2.0 / normal.norm_squared(), &self.step, &normal, 1.0);
         self.active.push(constraint);
         self.is_active[constraint] = true;
     }
@@ -147,7 +154,7 @@ fn rotation(a: f64, b: f64) -> (f64, f64, f64) {
     if b == 0.0 {
         return (1.0, 0.0, a);
     }
-    let length = a.hypot(b);
+    let length = (a * a + b * b).sqrt();
     (a / length, b / length, length)
 }
 

@@ -12,6 +12,8 @@ pub(super) struct Metric {
     pub from: DMatrix<f64>,
     /// Normals, n x m, one column a constraint.
     pub normals: DMatrix<f64>,
+    /// The same, m x n.
+    pub rows: DMatrix<f64>,
     /// Lengths that the normals had.
     pub lengths: DVector<f64>,
 }
@@ -43,6 +45,7 @@ impl Metric {
         Ok(Self {
             to: lower.transpose(),
             from,
+            rows: normals.transpose(),
             normals,
             lengths,
         })
