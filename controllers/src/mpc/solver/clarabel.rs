@@ -86,7 +86,7 @@ impl Solver for Clarabel {
         self.y.gemv(1.0, &self.metric.to, target, 0.0);
         self.margins.gemv(1.0, &self.metric.rows, &self.y, 0.0);
         for (i, kept) in self.bound.iter_mut().enumerate() {
-            *kept = self.metric.margin(i, self.margins[i], bound);
+            *kept = self.margins[i] - bound[i] * self.metric.inverse_lengths[i];
         }
         let violation = self
             .bound

@@ -22,7 +22,7 @@ pub struct Kwik {
     time_limit: Option<Duration>,
     /// Constraint rows over the lengths of their normals, m x n.
     rows: DMatrix<f64>,
-    lengths: DVector<f64>,
+    inverse_lengths: DVector<f64>,
     /// Where a multiplier of one moves the solution, n x m.
     directions: DMatrix<f64>,
     /// Products of the normals, m x m.
@@ -62,7 +62,7 @@ impl Kwik {
             rows: &metric.rows * &metric.to,
             directions: &metric.from * &metric.normals,
             products: &metric.rows * &metric.normals,
-            lengths: metric.lengths,
+            inverse_lengths: metric.inverse_lengths,
             margins: DVector::zeros(m),
             change: DVector::zeros(m),
             r: DMatrix::zeros(n, n),
@@ -76,14 +76,9 @@ impl Kwik {
 
     /// Margins of all constraints at `x`.
     fn measure(&mut self, x: &DVector<f64>, bound: &DVector<f64>) {
-        self.margins.gemv(1.0, &self.rows, x, 0.0);
-        for i in 0..bound.len() {
-            self.margins[i] = if self.lengths[i] > 0.0 {
-                self.margins[i] - bound[i] / self.lengths[i]
-            } else {
-                -bound[i]
-            };
-        }
+        self.margins.copy_from(bound);
+        self.margins.component_mul_assign(&self.inverse_lengths);
+        self.margins.gemv(1.0, &self.rows, x, -1.0);
     }
 
     /// Most violated constraint, if any is violated by more than `tolerance`.
