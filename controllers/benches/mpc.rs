@@ -7,7 +7,9 @@
 //!
 //! The peers run where `SHAKEBENCH_PYTHON` (default `python3`) has the packages `osqp`, `daqp`,
 //! `numpy` and `scipy`. Ours is the whole step: measurement update, optimisation, command, time
-//! update. Theirs is the time their own library reports for one solve, after a set-up done once.
+//! update; and of it the optimisation alone, from reference and state to the optimum. Theirs is
+//! the optimisation from linear term and bounds to the optimum, after a set-up done once; those
+//! two are made for them.
 
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -19,6 +21,7 @@ use std::time::Instant;
 use controllers::mpc::{
     ModelPredictiveControl, ModelPredictiveInput, Parameters, SolverChoice, Weights,
     prediction_plant,
+    solver::{Clarabel, Kwik, Solver},
 };
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion};
@@ -59,6 +62,7 @@ fn motion(lines: &[(f64, f64)]) -> Vec<Motion> {
 struct Step {
     constrained: bool,
     nanoseconds: f64,
+    optimisation: f64,
     target: DVector<f64>,
     bound: DVector<f64>,
     solution: DVector<f64>,
@@ -66,6 +70,7 @@ struct Step {
 
 fn run(
     control: &mut ModelPredictiveControl,
+    solver: &mut dyn Solver,
     reference: &[Motion],
 ) -> Result<Vec<Step>, Box<dyn Error>> {
     let rig = Rig::default().state_space().sample(H);
@@ -91,10 +96,17 @@ fn run(
         }
         let mut work = control.workspace().clone();
         let solution = work.solution.clone();
+        let mut optimisation = f64::INFINITY;
+        for _ in 0..REPEATS {
+            let start = Instant::now();
+            std::hint::black_box(control.problem().optimise(&mut work, solver));
+            optimisation = optimisation.min(start.elapsed().as_nanos() as f64);
+        }
         let (target, bound) = control.problem().instance(&mut work);
         steps.push(Step {
             constrained: control.memory.counters.shortcuts == before.counters.shortcuts,
             nanoseconds: fastest,
+            optimisation,
             target: target.clone(),
             bound: bound.clone(),
             solution,
@@ -111,15 +123,15 @@ fn run(
     Ok(steps)
 }
 
-fn row(name: &str, steps: &[&Step]) {
+fn row(name: &str, steps: &[&Step], time: fn(&Step) -> f64) {
     if steps.is_empty() {
         return;
     }
-    let mut times: Vec<f64> = steps.iter().map(|step| step.nanoseconds).collect();
+    let mut times: Vec<f64> = steps.iter().map(|step| time(step)).collect();
     times.sort_by(f64::total_cmp);
     let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize] / 1e3;
     println!(
-        "{name:<42} {:>6} {:>9.2} {:>9.2} {:>9.2}",
+        "{name:<64} {:>6} {:>9.2} {:>9.2} {:>9.2}",
         steps.len(),
         at(0.5),
         at(0.999),
@@ -151,7 +163,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..Weights::TABLE_5_1
     };
     println!(
-        "microseconds a step (fastest of {REPEATS})        steps    median    99.9 %   longest"
+        "{:<64}  steps    median    99.9 %   longest",
+        format!("microseconds (fastest of {REPEATS})")
     );
     for (name, weights, reference) in [
         ("smooth motion", Weights::TABLE_5_1, &smooth),
@@ -169,15 +182,45 @@ fn main() -> Result<(), Box<dyn Error>> {
                 solver,
                 ..Parameters::default()
             })?;
-            let steps = run(&mut control, reference)?;
+            let (hessian, constraints) = {
+                let problem = control.problem();
+                (problem.hessian.clone(), problem.constraints.clone())
+            };
+            let mut alone: Box<dyn Solver> = match solver {
+                SolverChoice::Kwik => {
+                    Box::new(Kwik::new(&hessian, &constraints, 200, f64::INFINITY)?)
+                }
+                SolverChoice::Clarabel => {
+                    Box::new(Clarabel::new(&hessian, &constraints, 200, f64::INFINITY)?)
+                }
+            };
+            let steps = run(&mut control, &mut *alone, reference)?;
             let (constrained, free): (Vec<&Step>, _) = steps.iter().partition(|s| s.constrained);
             if solver == SolverChoice::Kwik {
-                row(&format!("{name}: shortcut"), &free);
+                row(
+                    &format!("{name}: no limit active, whole step"),
+                    &free,
+                    |s| s.nanoseconds,
+                );
+                row(
+                    &format!("{name}: no limit active, optimisation"),
+                    &free,
+                    |s| s.optimisation,
+                );
                 let path = folder.join(format!("{}.f64", name.replace([' ', ','], "-")));
                 write(&path, &control, &steps)?;
                 files.push(path);
             }
-            row(&format!("{name}: constrained, {label}"), &constrained);
+            row(
+                &format!("{name}: constrained, whole step, {label}"),
+                &constrained,
+                |s| s.nanoseconds,
+            );
+            row(
+                &format!("{name}: constrained, optimisation, {label}"),
+                &constrained,
+                |s| s.optimisation,
+            );
         }
         peers(name, &files);
     }

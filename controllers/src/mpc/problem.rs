@@ -34,6 +34,12 @@ pub struct ReducedProblem {
     /// Constraints from this one on are the valve's: the first half its lower, the rest its upper
     /// limit.
     first_valve_row: usize,
+    valve_limit: f64,
+    /// The limited outputs to `w` and to the state, and their limits.
+    limited_forced: DMatrix<f64>,
+    limited_free: DMatrix<f64>,
+    lowest: DVector<f64>,
+    highest: DVector<f64>,
     /// Stacked commands from `w`, from the state and from the previous command.
     plan_sequence: DMatrix<f64>,
     plan_state: DMatrix<f64>,
@@ -51,7 +57,7 @@ pub struct Workspace {
     pub solution: DVector<f64>,
     target: DVector<f64>,
     bound: DVector<f64>,
-    margin: DVector<f64>,
+    limited: DVector<f64>,
 }
 
 /// How a step's optimum was found.
@@ -161,6 +167,16 @@ impl ReducedProblem {
             bound_constant[i] = bound;
         }
 
+        let limited: Vec<usize> = (0..CHANNELS * p)
+            .filter(|output| {
+                let channel = output % CHANNELS;
+                limits.minimum[channel].is_finite() || limits.maximum[channel].is_finite()
+            })
+            .collect();
+        let bounds = |bound: &[f64; CHANNELS]| {
+            DVector::from_iterator(limited.len(), limited.iter().map(|i| bound[i % CHANNELS]))
+        };
+
         let projection = to_commands * price;
         Ok(Self {
             horizon: p,
@@ -170,6 +186,11 @@ impl ReducedProblem {
             bound_constant,
             bound_state,
             first_valve_row,
+            valve_limit: valve_limit.unwrap_or(f64::INFINITY),
+            limited_forced: g.select_rows(&limited),
+            limited_free: response.free.select_rows(&limited),
+            lowest: bounds(&limits.minimum),
+            highest: bounds(&limits.maximum),
             plan_sequence: &projection * big_n,
             plan_state: &projection * &response.offset,
             plan_previous: &repeat - &projection * m * &repeat,
@@ -185,7 +206,7 @@ impl ReducedProblem {
             solution: DVector::zeros(self.horizon + 1),
             target: DVector::zeros(self.horizon + 1),
             bound: DVector::zeros(rows),
-            margin: DVector::zeros(rows),
+            limited: DVector::zeros(self.lowest.len()),
         }
     }
 
@@ -208,10 +229,8 @@ impl ReducedProblem {
     /// Finds the optimum for `work.given` into `work.solution`: by the shortcut where the
     /// minimiser without limits keeps them, else by `solver`.
     pub fn optimise(&self, work: &mut Workspace, solver: &mut dyn Solver) -> Found {
-        self.prepare(work);
-        // The slack of the target is zero.
-        work.margin.gemv(1.0, &self.constraints, &work.target, 0.0);
-        if (0..work.bound.len()).all(|i| work.margin[i] >= work.bound[i]) {
+        self.minimise_without_limits(work);
+        if self.keeps_limits(work) {
             work.solution.copy_from(&work.target);
             return if work.solution.iter().all(|w| w.is_finite()) {
                 Found::Shortcut
@@ -219,6 +238,7 @@ impl ReducedProblem {
                 Found::No
             };
         }
+        self.bound(work);
         match solver.nearest(&work.target, &work.bound, &mut work.solution) {
             Outcome::Solved { iterations } if work.solution.iter().all(|x| x.is_finite()) => {
                 Found::Solver(iterations)
@@ -227,12 +247,37 @@ impl ReducedProblem {
         }
     }
 
-    /// Minimiser without limits and the bounds of the step.
-    fn prepare(&self, work: &mut Workspace) {
-        let (p, n) = (self.horizon, self.bound_state.ncols());
+    fn minimise_without_limits(&self, work: &mut Workspace) {
         work.target
-            .rows_mut(0, p)
+            .rows_mut(0, self.horizon)
             .gemv(1.0, &self.minimiser, &work.given, 0.0);
+    }
+
+    /// Whether the minimiser without limits keeps them all, without slack.
+    fn keeps_limits(&self, work: &mut Workspace) -> bool {
+        let (p, n) = (self.horizon, self.bound_state.ncols());
+        let w = work.target.rows(0, p);
+        let offset = work.valve_offset;
+        if w.iter().any(|w| (w + offset).abs() > self.valve_limit) {
+            return false;
+        }
+        work.limited.gemv(1.0, &self.limited_forced, &w, 0.0);
+        work.limited.gemv(
+            1.0,
+            &self.limited_free,
+            &work.given.rows(CHANNELS * p, n),
+            1.0,
+        );
+        let limits = self.lowest.iter().zip(&self.highest);
+        work.limited
+            .iter()
+            .zip(limits)
+            .all(|(y, (low, high))| (low..=high).contains(&y))
+    }
+
+    /// The bounds of the step.
+    fn bound(&self, work: &mut Workspace) {
+        let (p, n) = (self.horizon, self.bound_state.ncols());
         work.bound.copy_from(&self.bound_constant);
         work.bound.rows_mut(0, self.first_valve_row).gemv(
             1.0,
@@ -274,7 +319,8 @@ impl ReducedProblem {
     /// Target and bounds of `work.given` for a solver: the optimum is the nearest point to the
     /// first, in the metric of [`Self::hessian`], that keeps [`Self::constraints`].
     pub fn instance<'a>(&self, work: &'a mut Workspace) -> (&'a DVector<f64>, &'a DVector<f64>) {
-        self.prepare(work);
+        self.minimise_without_limits(work);
+        self.bound(work);
         (&work.target, &work.bound)
     }
 }

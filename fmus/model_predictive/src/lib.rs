@@ -215,3 +215,52 @@ impl Component for ModelPredictive {
 }
 
 fmu_kit::export!(ModelPredictive);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmu_kit::conformance::allocations;
+
+    #[test]
+    fn steps_at_a_limit_do_not_allocate_either() {
+        let mut component = ModelPredictive::default();
+        component.initialize().unwrap();
+        let counted = allocations(|| {
+            for k in 0..1000 {
+                let time = 0.002 * f64::from(k);
+                component.reference.displacement = 0.05 * (3.0 * time).sin();
+                component.measured = component.reference;
+                component.step(time, 0.002).unwrap();
+            }
+        });
+        assert_eq!(counted, 0);
+        assert!(component.counts.solved > 50, "{:?}", component.counts);
+        assert_eq!(component.counts.fallbacks, 0);
+    }
+
+    #[test]
+    fn what_no_controller_is_built_from_is_refused_by_name() {
+        let set = |component: &mut ModelPredictive, name: &str, value: f64| {
+            let variables = ModelPredictive::variables();
+            let variable = variables.iter().find(|v| v.name == name).unwrap();
+            match &variable.access {
+                fmu_kit::variable::Access::Real(field) => *field(component) = value,
+                fmu_kit::variable::Access::Integer(field) => *field(component) = value as i32,
+                _ => panic!("{name} is no number"),
+            }
+        };
+        for (name, value) in [
+            ("prediction_horizon", 0.0),
+            ("displacement_weight", -1.0),
+            ("minimum_displacement", 0.1),
+            ("violation_weight", 0.0),
+            ("valve_limit", 0.0),
+            ("table_mass", 0.0),
+        ] {
+            let mut component = ModelPredictive::default();
+            set(&mut component, name, value);
+            let error = component.initialize().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{name}`")), "{name}: {error}");
+        }
+    }
+}

@@ -10,11 +10,12 @@ macro_rules! parts {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [(&str, &str); 4] = parts![
+const CONTROLLERS: [(&str, &str); 5] = parts![
     "displacement-pid",
     "three-variable",
     "loop-shaping",
     "sliding-mode",
+    "mpc",
 ];
 /// Tables with their actuators.
 const PLANTS: [(&str, &str); 1] = parts!["plant/identified"];

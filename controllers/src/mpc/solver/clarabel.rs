@@ -57,7 +57,7 @@ impl Clarabel {
         let solver = DefaultSolver::new(
             &CscMatrix::identity(n),
             &vec![0.0; n],
-            &dense(&-metric.normals.transpose()),
+            &dense(&-&metric.rows),
             &vec![0.0; m],
             if m > 0 { &cones } else { &[] },
             settings,
@@ -84,10 +84,9 @@ impl Solver for Clarabel {
         solution: &mut DVector<f64>,
     ) -> Outcome {
         self.y.gemv(1.0, &self.metric.to, target, 0.0);
-        self.margins
-            .gemv_tr(1.0, &self.metric.normals, &self.y, 0.0);
+        self.margins.gemv(1.0, &self.metric.rows, &self.y, 0.0);
         for (i, kept) in self.bound.iter_mut().enumerate() {
-            *kept = self.metric.margin(i, self.margins[i], bound);
+            *kept = self.margins[i] - bound[i] * self.metric.inverse_lengths[i];
         }
         let violation = self
             .bound

@@ -11,32 +11,39 @@ use crate::ModelError;
 /// for solving strictly convex quadratic programs", 1983).
 ///
 /// It starts at the minimiser without constraints and adds the most violated constraint, dropping
-/// those whose multiplier would turn negative, until none is violated. All of it happens in the
-/// metric of the Hessian, whose factors and the constraints' normals there are made once. `Q` and
-/// `R` factor the active normals.
+/// those whose multiplier would turn negative, until none is violated. All of it happens on the
+/// constraints' products with each other in the metric of the Hessian, which are made once: with
+/// `n_i` the normals of length one there, a step along constraint `p` moves the margin of `i` by
+/// `n_i'n_p - n_i'N r`, `N'N r = N'n_p`, `N` the active normals. `R'R = N'N` is kept up to date.
+/// At the end multipliers and margins are refined against the constraints themselves.
 #[derive(Debug, Clone)]
 pub struct Kwik {
-    n: usize,
     iteration_limit: usize,
     time_limit: Option<Duration>,
-    metric: Metric,
+    /// Constraint rows over the lengths of their normals, m x n.
+    rows: DMatrix<f64>,
+    inverse_lengths: DVector<f64>,
+    /// Where a multiplier of one moves the solution, n x m.
+    directions: DMatrix<f64>,
+    /// Products of the normals, m x m.
+    products: DMatrix<f64>,
     // Work of a solve.
-    y: DVector<f64>,
     margins: DVector<f64>,
-    q: DMatrix<f64>,
+    change: DVector<f64>,
     r: DMatrix<f64>,
-    d: DVector<f64>,
-    step: DVector<f64>,
+    forward: Vec<f64>,
     dual: Vec<f64>,
     multipliers: Vec<f64>,
     active: Vec<usize>,
     is_active: Vec<bool>,
 }
 
-/// Violations and steps below this, in units of the largest number of the problem, are rounding.
+/// Violations below this, in units of the largest margin, are rounding.
 const TOLERANCE: f64 = 1e-13;
-/// Normals closer than this to the span of the active ones depend on them.
+/// Normals closer than this (squared) to the span of the active ones depend on them.
 const DEPENDENT: f64 = 1e-12;
+/// Most times that the multipliers are refined after the last constraint.
+const REFINEMENTS: usize = 2;
 
 impl Kwik {
     /// Hessian (n x n, positive definite) and constraint rows (m x n); gives up after
@@ -48,33 +55,36 @@ impl Kwik {
         time_limit: f64,
     ) -> Result<Self, ModelError> {
         let (m, n) = constraints.shape();
+        let metric = Metric::new(hessian, constraints)?;
         Ok(Self {
-            n,
             iteration_limit,
             time_limit: Duration::try_from_secs_f64(time_limit).ok(),
-            metric: Metric::new(hessian, constraints)?,
-            y: DVector::zeros(n),
+            rows: &metric.rows * &metric.to,
+            directions: &metric.from * &metric.normals,
+            products: &metric.rows * &metric.normals,
+            inverse_lengths: metric.inverse_lengths,
             margins: DVector::zeros(m),
-            q: DMatrix::identity(n, n),
+            change: DVector::zeros(m),
             r: DMatrix::zeros(n, n),
-            d: DVector::zeros(n),
-            step: DVector::zeros(n),
+            forward: vec![0.0; n],
             dual: vec![0.0; n],
             multipliers: vec![0.0; n + 1],
-            active: Vec::with_capacity(n),
+            active: Vec::with_capacity(n + 1),
             is_active: vec![false; m],
         })
     }
 
-    /// Most violated constraint, if any is violated beyond rounding.
-    fn most_violated(&mut self, bound: &DVector<f64>) -> Option<usize> {
-        self.margins
-            .gemv_tr(1.0, &self.metric.normals, &self.y, 0.0);
-        let size = 1.0 + self.y.amax();
-        let (mut worst, mut at) = (-TOLERANCE * size, None);
-        for i in 0..self.margins.len() {
-            let margin = self.metric.margin(i, self.margins[i], bound);
-            self.margins[i] = margin;
+    /// Margins of all constraints at `x`.
+    fn measure(&mut self, x: &DVector<f64>, bound: &DVector<f64>) {
+        self.margins.copy_from(bound);
+        self.margins.component_mul_assign(&self.inverse_lengths);
+        self.margins.gemv(1.0, &self.rows, x, -1.0);
+    }
+
+    /// Most violated constraint, if any is violated by more than `tolerance`.
+    fn most_violated(&self, tolerance: f64) -> Option<usize> {
+        let (mut worst, mut at) = (-tolerance, None);
+        for (i, &margin) in self.margins.iter().enumerate() {
             if margin < worst && !self.is_active[i] {
                 (worst, at) = (margin, Some(i));
             }
@@ -82,41 +92,50 @@ impl Kwik {
         at
     }
 
-    /// `d = Q' normal`, the primal step (its part across the active normals) and the dual step
-    /// `R^-1 d`.
-    fn find_steps(&mut self, constraint: usize) -> f64 {
+    /// `self.dual = (N'N)^-1 rhs` where `self.dual` holds `rhs`; `self.forward = R^-T rhs`.
+    fn solve_active(&mut self) {
         let count = self.active.len();
-        self.d
-            .gemv_tr(1.0, &self.q, &self.metric.normals.column(constraint), 0.0);
-        self.step.gemv(
-            1.0,
-            &self.q.columns(count, self.n - count),
-            &self.d.rows(count, self.n - count),
-            0.0,
-        );
+        for i in 0..count {
+            let mut value = self.dual[i];
+            for j in 0..i {
+                value -= self.r[(j, i)] * self.forward[j];
+            }
+            self.forward[i] = value / self.r[(i, i)];
+        }
         for i in (0..count).rev() {
-            let mut value = self.d[i];
+            let mut value = self.forward[i];
             for j in i + 1..count {
                 value -= self.r[(i, j)] * self.dual[j];
             }
             self.dual[i] = value / self.r[(i, i)];
         }
-        self.d.rows(count, self.n - count).norm_squared()
     }
 
-    fn add(&mut self, constraint: usize) {
+    /// Finds the step along `constraint`: of the active multipliers (`self.dual`, downwards) and
+    /// of the margins (`self.change`). Returns the squared length of its normal's part across the
+    /// active ones.
+    fn find_step(&mut self, constraint: usize) -> f64 {
+        for (dual, &other) in self.dual.iter_mut().zip(&self.active) {
+            *dual = self.products[(other, constraint)];
+        }
+        self.solve_active();
         let count = self.active.len();
-        for i in (count + 1..self.n).rev() {
-            let (cosine, sine, length) = rotation(self.d[i - 1], self.d[i]);
-            if sine == 0.0 {
-                continue;
-            }
-            self.d[i - 1] = length;
-            rotate_columns(&mut self.q, i - 1, cosine, sine);
+        self.change.copy_from(&self.products.column(constraint));
+        for i in 0..count {
+            let column = self.products.column(self.active[i]);
+            self.change.axpy(-self.dual[i], &column, 1.0);
         }
-        for i in 0..=count {
-            self.r[(i, count)] = self.d[i];
+        let along: f64 = self.forward[..count].iter().map(|t| t * t).sum();
+        self.products[(constraint, constraint)] - along
+    }
+
+    /// Appends the constraint of the latest [`Self::find_step`].
+    fn add(&mut self, constraint: usize, across: f64) {
+        let count = self.active.len();
+        for i in 0..count {
+            self.r[(i, count)] = self.forward[i];
         }
+        self.r[(count, count)] = across.sqrt();
         self.active.push(constraint);
         self.is_active[constraint] = true;
     }
@@ -127,7 +146,9 @@ impl Kwik {
             for i in 0..=j {
                 self.r[(i, j - 1)] = self.r[(i, j)];
             }
-            let (cosine, sine, length) = rotation(self.r[(j - 1, j - 1)], self.r[(j, j - 1)]);
+            let (a, b) = (self.r[(j - 1, j - 1)], self.r[(j, j - 1)]);
+            let length = (a * a + b * b).sqrt();
+            let (cosine, sine) = (a / length, b / length);
             self.r[(j - 1, j - 1)] = length;
             // The remaining columns have not moved yet.
             for column in j + 1..count {
@@ -135,28 +156,35 @@ impl Kwik {
                 self.r[(j - 1, column)] = cosine * upper + sine * lower;
                 self.r[(j, column)] = cosine * lower - sine * upper;
             }
-            rotate_columns(&mut self.q, j - 1, cosine, sine);
         }
         self.multipliers.copy_within(position + 1..=count, position);
         self.is_active[self.active.remove(position)] = false;
     }
-}
 
-/// Cosine, sine and length that turn `(a, b)` into `(length, 0)`.
-fn rotation(a: f64, b: f64) -> (f64, f64, f64) {
-    if b == 0.0 {
-        return (1.0, 0.0, a);
+    /// The solution that belongs to the multipliers, and its margins.
+    fn place(&mut self, target: &DVector<f64>, bound: &DVector<f64>, x: &mut DVector<f64>) {
+        x.copy_from(target);
+        for (&multiplier, &constraint) in self.multipliers.iter().zip(&self.active) {
+            x.axpy(multiplier, &self.directions.column(constraint), 1.0);
+        }
+        self.measure(x, bound);
     }
-    let length = a.hypot(b);
-    (a / length, b / length, length)
-}
 
-fn rotate_columns(matrix: &mut DMatrix<f64>, first: usize, cosine: f64, sine: f64) {
-    let rows = matrix.nrows();
-    let pair = &mut matrix.as_mut_slice()[first * rows..(first + 2) * rows];
-    let (left, right) = pair.split_at_mut(rows);
-    for (l, r) in left.iter_mut().zip(right) {
-        (*l, *r) = (cosine * *l + sine * *r, cosine * *r - sine * *l);
+    /// Largest margin, to either side, of an active constraint.
+    fn worst_active(&self) -> f64 {
+        let margins = self.active.iter().map(|&i| self.margins[i].abs());
+        margins.fold(0.0, f64::max)
+    }
+
+    /// Moves the multipliers so that the active constraints are met to rounding.
+    fn refine(&mut self) {
+        for (dual, &constraint) in self.dual.iter_mut().zip(&self.active) {
+            *dual = -self.margins[constraint];
+        }
+        self.solve_active();
+        for i in 0..self.active.len() {
+            self.multipliers[i] += self.dual[i];
+        }
     }
 }
 
@@ -173,12 +201,27 @@ impl Solver for Kwik {
         let start = self.time_limit.map(|limit| (Instant::now(), limit));
         self.active.clear();
         self.is_active.fill(false);
-        self.q.fill_with_identity();
-        self.y.gemv(1.0, &self.metric.to, target, 0.0);
+        self.place(target, bound, solution);
+        let tolerance = TOLERANCE * (1.0 + self.margins.amax());
 
-        let mut iterations = 0;
-        while let Some(constraint) = self.most_violated(bound) {
-            let mut margin = self.margins[constraint];
+        let (mut iterations, mut measured) = (0, true);
+        loop {
+            let Some(constraint) = self.most_violated(tolerance) else {
+                if measured {
+                    return Outcome::Solved { iterations };
+                }
+                self.place(target, bound, solution);
+                for _ in 0..REFINEMENTS {
+                    if self.worst_active() <= tolerance {
+                        break;
+                    }
+                    self.refine();
+                    self.place(target, bound, solution);
+                }
+                measured = true;
+                continue;
+            };
+            measured = false;
             let mut multiplier = 0.0;
             loop {
                 iterations += 1;
@@ -187,7 +230,7 @@ impl Solver for Kwik {
                 {
                     return Outcome::OutOfTime;
                 }
-                let across = self.find_steps(constraint);
+                let across = self.find_step(constraint);
                 let count = self.active.len();
                 let (mut shortest, mut blocking) = (f64::INFINITY, None);
                 for i in 0..count {
@@ -198,8 +241,8 @@ impl Solver for Kwik {
                         }
                     }
                 }
-                let full = if across > DEPENDENT {
-                    -margin / across
+                let full = if across > DEPENDENT && count < self.r.ncols() {
+                    -self.margins[constraint] / across
                 } else {
                     f64::INFINITY
                 };
@@ -212,20 +255,17 @@ impl Solver for Kwik {
                 }
                 multiplier += length;
                 if full.is_finite() {
-                    self.y.axpy(length, &self.step, 1.0);
-                    margin += length * across;
+                    self.margins.axpy(length, &self.change, 1.0);
                 }
                 match blocking {
                     Some(position) if shortest < full => self.drop(position),
                     _ => {
                         self.multipliers[count] = multiplier;
-                        self.add(constraint);
+                        self.add(constraint, across);
                         break;
                     }
                 }
             }
         }
-        solution.gemv(1.0, &self.metric.from, &self.y, 0.0);
-        Outcome::Solved { iterations }
     }
 }

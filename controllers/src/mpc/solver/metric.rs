@@ -12,8 +12,10 @@ pub(super) struct Metric {
     pub from: DMatrix<f64>,
     /// Normals, n x m, one column a constraint.
     pub normals: DMatrix<f64>,
-    /// Lengths that the normals had.
-    pub lengths: DVector<f64>,
+    /// The same, m x n.
+    pub rows: DMatrix<f64>,
+    /// One over the lengths that the normals had; one for a normal of length zero.
+    pub inverse_lengths: DVector<f64>,
 }
 
 impl Metric {
@@ -34,26 +36,19 @@ impl Metric {
             .transpose()
             .solve_upper_triangular(&DMatrix::identity(n, n))
             .ok_or_else(|| no_solution("its Hessian is singular"))?;
-        let lengths = DVector::from_fn(m, |i, _| normals.column(i).norm());
-        for (mut normal, &length) in normals.column_iter_mut().zip(lengths.iter()) {
-            if length > 0.0 {
-                normal /= length;
-            }
+        let inverse_lengths = DVector::from_fn(m, |i, _| match normals.column(i).norm() {
+            0.0 => 1.0,
+            length => 1.0 / length,
+        });
+        for (mut normal, &factor) in normals.column_iter_mut().zip(inverse_lengths.iter()) {
+            normal *= factor;
         }
         Ok(Self {
             to: lower.transpose(),
             from,
+            rows: normals.transpose(),
             normals,
-            lengths,
+            inverse_lengths,
         })
-    }
-
-    /// Distance by which constraint `i` is kept, given its normal's product with `y`.
-    pub fn margin(&self, i: usize, product: f64, bound: &DVector<f64>) -> f64 {
-        if self.lengths[i] > 0.0 {
-            product - bound[i] / self.lengths[i]
-        } else {
-            -bound[i]
-        }
     }
 }
