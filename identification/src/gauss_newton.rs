@@ -29,7 +29,7 @@ pub struct Parameter {
     pub name: String,
     /// Start value.
     pub start: f64,
-    /// A change that matters little: derivatives are differences over a thousandth of it.
+    /// A change that matters little: derivatives are differences over a hundred-thousandth of it.
     pub scale: f64,
     /// Smallest and largest value allowed.
     pub bounds: (f64, f64),
@@ -122,19 +122,20 @@ struct Sensitivity<const P: usize> {
 }
 
 const MAX_ITERATIONS: usize = 60;
-/// Iterations end when another would move the estimate by less than about this many standard
-/// errors.
-const TOLERANCE: f64 = 0.02;
+/// A tolerance for [`fit`] that costs no accuracy.
+pub const FINE: f64 = 0.02;
 /// Eigenvalues of the information matrix below this, relative to the unit diagonal, are flat.
 const FLAT: f64 = 1e-11;
 
-/// Fits the free parameters.
+/// Fits the free parameters, until another iteration would move the estimate by less than about
+/// `tolerance` standard errors.
 ///
 /// # Errors
 /// The start makes no model, or no optimum is reached in 60 iterations.
 pub fn fit<const P: usize>(
     model: &impl PredictionModel<P>,
     parameters: &[Parameter],
+    tolerance: f64,
 ) -> Result<Estimate, IdentificationError> {
     let failed = |reason: &str| IdentificationError::NotConverged {
         method: "the Gauss-Newton refinement",
@@ -153,13 +154,11 @@ pub fn fit<const P: usize>(
         for _ in 0..12 {
             let step = damped_step(&information, &gradient, &active, damping);
             let mut trial = values.clone();
-            let mut shrink: f64 = 1.0;
             for &i in &active {
-                shrink = shrink.min(parameters[i].largest_step / step[i].abs().max(f64::MIN_POSITIVE));
-            }
-            for &i in &active {
-                let (low, high) = parameters[i].bounds;
-                trial[i] = (values[i] + shrink * step[i]).clamp(low, high);
+                let parameter = &parameters[i];
+                let (low, high) = parameter.bounds;
+                let most = parameter.largest_step;
+                trial[i] = (values[i] + step[i].clamp(-most, most)).clamp(low, high);
             }
             let decrement = -active.iter().map(|&i| gradient[i] * step[i]).sum::<f64>();
             let next = evaluate(model, &trial);
@@ -175,12 +174,12 @@ pub fn fit<const P: usize>(
                 }
                 damping = (damping * 0.1).max(1e-9);
                 accepted = true;
-                if decrement.abs() < TOLERANCE * TOLERANCE && gained < TOLERANCE {
+                if decrement.abs() < tolerance * tolerance && gained < tolerance * tolerance {
                     return finish(model, parameters, values, &base, cost, iteration);
                 }
                 break;
             }
-            if decrement.abs() < TOLERANCE * TOLERANCE {
+            if decrement.abs() < tolerance * tolerance {
                 return finish(model, parameters, values, &base, cost, iteration);
             }
             damping *= if damping < 1e-4 { 100.0 } else { 10.0 };
@@ -314,7 +313,7 @@ fn sensitivity<const P: usize>(
     index: usize,
 ) -> Option<Sensitivity<P>> {
     let parameter = &parameters[index];
-    let mut change = 1e-3 * parameter.scale;
+    let mut change = 1e-5 * parameter.scale;
     if values[index] + change > parameter.bounds.1 {
         change = -change;
     }
@@ -474,7 +473,7 @@ mod tests {
             Parameter::new("size", 1.0, 1.0),
             Parameter::new("log noise", -2.0, 1.0),
         ];
-        let got = fit(&model, &start).unwrap();
+        let got = fit(&model, &start, FINE).unwrap();
         assert!((got.parameters[0] - 3.0).abs() < 3.0 * got.standard_error(0));
         assert!((got.parameters[1] - 2.0).abs() < 3.0 * got.standard_error(1));
         // Noise uniform in +-1e-3: standard deviation 1e-3 / sqrt(3).

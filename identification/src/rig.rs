@@ -9,7 +9,7 @@ use plant::rig::Rig;
 
 use crate::checks;
 use crate::data::Recording;
-use crate::gauss_newton::{self, Estimate, Parameter};
+use crate::gauss_newton::{self, Estimate, FINE, Parameter};
 use crate::identifiability;
 use crate::residuals::{ResidualTest, residual_test};
 use crate::rig_model::{
@@ -129,14 +129,15 @@ pub fn identify(
         parameters[found.hold].free = false;
         identifiable = false;
     }
-    let mut estimate = gauss_newton::fit(&model, &parameters)?;
+    approach(&model, &mut parameters)?;
+    let mut estimate = gauss_newton::fit(&model, &parameters, FINE)?;
     if options.delay && identifiable {
         let (late, error) = gauss_newton::score_test(&model, &parameters, &estimate, DELAY)?;
         if late > 4.0 * error && late > 1e-3 * model.experiments[0].period {
             restart(&mut parameters, &estimate);
             parameters[DELAY].free = true;
             parameters[DELAY].start = late.min(0.05);
-            estimate = gauss_newton::fit(&model, &parameters)?;
+            estimate = gauss_newton::fit(&model, &parameters, FINE)?;
         }
     }
     if identifiable {
@@ -274,6 +275,30 @@ fn parameters(
     parameters
 }
 
+/// First steps with the noise held and much of it put on command and table: the predictor then
+/// leans on the measurements, and a start that is off by half still converges.
+fn approach(model: &RigModel, parameters: &mut [Parameter]) -> Result<(), IdentificationError> {
+    const COARSE: f64 = 3.0;
+    let mut held = parameters.to_vec();
+    for experiment in 0..model.experiments.len() {
+        for channel in 0..OUTPUTS + 2 {
+            let noise = &mut held[model.noise(experiment, channel)];
+            noise.free = false;
+            if channel >= OUTPUTS {
+                noise.start = 0.1f64.ln();
+            }
+        }
+    }
+    let estimate = gauss_newton::fit(model, &held, COARSE)?;
+    restart(parameters, &estimate);
+    for experiment in 0..model.experiments.len() {
+        for channel in OUTPUTS..OUTPUTS + 2 {
+            parameters[model.noise(experiment, channel)].start = 0.002f64.ln();
+        }
+    }
+    Ok(())
+}
+
 fn restart(parameters: &mut [Parameter], estimate: &Estimate) {
     for (parameter, value) in parameters.iter_mut().zip(&estimate.parameters) {
         parameter.start = *value;
@@ -311,7 +336,7 @@ fn hold_undetermined_slow_zero(
         parameters[i].start = 0.0;
         parameters[i].free = false;
     }
-    gauss_newton::fit(model, parameters)
+    gauss_newton::fit(model, parameters, FINE)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -375,7 +400,7 @@ fn finish(
         full.push(whole);
     }
     let whole = RigModel { experiments: full };
-    let fits = validation::fits(&whole, &model, &estimate.parameters, identifiable);
+    let fits = validation::fits(&whole, &model, &estimate.parameters);
     let residuals = validation_residuals(&whole, &model, &estimate.parameters);
     for (recording, channel, test) in &residuals {
         if !test.is_white() {

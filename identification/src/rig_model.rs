@@ -250,6 +250,23 @@ impl RigModel {
         })
     }
 
+    /// All outputs from the command, with nothing but the displacement to hold the model to its
+    /// path (the uncontrolled plant is slightly unstable), SI, channel by channel.
+    pub fn held_by_displacement(
+        &self,
+        experiment: usize,
+        parameters: &[f64],
+    ) -> Option<Vec<Vec<f64>>> {
+        let mut own = parameters.to_vec();
+        let data = &self.experiments[experiment];
+        for i in 1..OUTPUTS {
+            if data.measured[i] {
+                own[self.noise(experiment, i)] = 1e3f64.ln();
+            }
+        }
+        self.one_step_predictions(experiment, &own)
+    }
+
     /// Outputs predicted one sample ahead, SI, channel by channel.
     pub fn one_step_predictions(&self, experiment: usize, parameters: &[f64]) -> Option<Vec<Vec<f64>>> {
         let data = &self.experiments[experiment];
