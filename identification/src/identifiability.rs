@@ -64,7 +64,7 @@ pub(crate) fn inseparable(model: &RigModel, parameters: &[Parameter]) -> Option<
     let named: Vec<&str> = columns
         .iter()
         .enumerate()
-        .filter(|(column, i)| direction[*column].abs() > 0.02 && **i < PHYSICAL)
+        .filter(|(column, i)| direction[*column].abs() > 1e-5 && **i < PHYSICAL)
         .map(|(_, &i)| PHYSICAL_NAMES[i])
         .collect();
     let hold = columns

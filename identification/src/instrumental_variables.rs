@@ -57,7 +57,8 @@ pub struct Signals<'a> {
 /// the denominator's order).
 ///
 /// `powers[i]` lists the powers of `s` in the numerator of input `i`. Offsets of all channels are
-/// taken up by one constant an experiment.
+/// taken up by one constant an experiment. `known` gives coefficients of the denominator that are
+/// not fitted: the power of `s` and its value.
 ///
 /// # Errors
 /// Too few samples, or regressors that are not independent.
@@ -66,6 +67,7 @@ pub fn regress(
     powers: &[Vec<usize>],
     period: f64,
     filter_denominator: &[f64],
+    known: &[(usize, f64)],
 ) -> Result<Estimate, IdentificationError> {
     let order = filter_denominator.len() - 1;
     let shared = order + powers.iter().map(Vec::len).sum::<usize>();
@@ -122,13 +124,27 @@ pub fn regress(
             regressors[(row, shared + index)] = 1.0;
             instruments[(row, shared + index)] = 1.0;
             target[row] = measured[order][settle + row - first];
+            for &(power, value) in known {
+                target[row] += value * measured[power][settle + row - first];
+            }
         }
         first += count;
+    }
+    for &(power, _) in known {
+        // A column that takes up the first row and nothing else.
+        for matrix in [&mut regressors, &mut instruments] {
+            let mut column = matrix.column_mut(order - 1 - power);
+            column.fill(0.0);
+            column[0] = 1.0;
+        }
     }
 
     let theta = solve(&regressors, &instruments, &target)?;
     let mut denominator = vec![1.0];
     denominator.extend(theta.rows(0, order).iter());
+    for &(power, value) in known {
+        denominator[order - power] = value;
+    }
     let mut numerators = Vec::new();
     let mut at = order;
     for powers in powers {
@@ -217,7 +233,7 @@ pub fn refine_open_loop(
             output: signal,
             inputs: vec![Signal::exact(input, between)],
         };
-        let next = regress(&[signals], &powers, period, &denominator)?;
+        let next = regress(&[signals], &powers, period, &denominator, &[])?;
         denominator = stabilised(&next.denominator);
         instrument = simulate(&next.numerators[0], &denominator, input, period, between);
         let done = estimate.as_ref().is_some_and(|before: &Estimate| {

@@ -91,6 +91,31 @@ impl RigIdentification {
         relative * self.model.experiments[recording].scale[output]
     }
 
+    /// Takes over the numbers of an estimate.
+    fn take(&mut self, parameters: &[Parameter], estimate: Estimate) {
+        self.physical = estimate.parameters[..PHYSICAL].to_vec();
+        self.covariance = estimate
+            .covariance
+            .view((0, 0), (PHYSICAL, PHYSICAL))
+            .into_owned();
+        self.standard_error = (0..PHYSICAL)
+            .map(|i| {
+                if parameters[i].free {
+                    estimate.standard_error(i)
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        self.payload = (0..self.model.experiments.len())
+            .map(|index| {
+                let at = self.model.nuisance(index);
+                (estimate.parameters[at], estimate.standard_error(at))
+            })
+            .collect();
+        self.parameters = estimate.parameters;
+    }
+
     /// Largest relative standard error of the responses of G1 and G2 over `frequencies` (Hz).
     pub fn response_error(&self, frequencies: &[f64]) -> [f64; 2] {
         response_error(&self.physical, &self.covariance, frequencies)
@@ -143,7 +168,30 @@ pub fn identify(
     if identifiable {
         estimate = hold_undetermined_slow_zero(&model, &mut parameters, estimate, &mut warnings)?;
     }
-    finish(recordings, model, &parameters, estimate, identifiable, warnings, start.singular_values)
+    let whole = whole_recordings(recordings, &model)?;
+    let mut found = assess(&whole, &model, &parameters, &estimate, identifiable, warnings)?;
+    // What was validated is then fitted to everything there is.
+    restart(&mut parameters, &estimate);
+    let estimate = gauss_newton::fit(&whole, &parameters, FINE)?;
+    found.iterations += estimate.iterations;
+    found.singular_values = start.singular_values;
+    found.take(&parameters, estimate);
+    Ok(found)
+}
+
+/// The same experiments to their end, with the scales of the fitted part.
+fn whole_recordings(
+    recordings: &[Recording],
+    model: &RigModel,
+) -> Result<RigModel, IdentificationError> {
+    let mut experiments = Vec::new();
+    for (recording, data) in recordings.iter().zip(&model.experiments) {
+        let mut whole = scaled_experiment(recording, &recording.cut(0, data.command.len()))?;
+        whole.scale = data.scale;
+        whole.command_scale = data.command_scale;
+        experiments.push(whole);
+    }
+    Ok(RigModel { experiments })
 }
 
 /// One recording's fit part, scaled.
@@ -204,7 +252,7 @@ fn parameters(
     let specimen = model.experiments.iter().any(|e| e.specimen);
     // What each coefficient is worth beside its neighbour at 0.01 to 5 rad/s.
     let natural = [
-        s[0].abs(),
+        s[0].abs().max(0.5 * s[1].abs().sqrt()),
         s[1].abs(),
         s[2].abs().max(0.01 * s[1].abs()),
         s[3].abs(),
@@ -262,7 +310,7 @@ fn parameters(
         for i in 0..OUTPUTS + 2 {
             let (start, low) = match i {
                 0..OUTPUTS => (start.noise[index][i].clamp(1e-5, 0.3).ln(), 1e-6f64.ln()),
-                _ => (0.01f64.ln(), 1e-4f64.ln()),
+                _ => (0.02f64.ln(), 1e-4f64.ln()),
             };
             let mut noise = own("logarithm of noise", start, 1.0);
             noise.free = i >= OUTPUTS || data.measured[i];
@@ -275,27 +323,25 @@ fn parameters(
     parameters
 }
 
-/// First steps with the noise held and much of it put on command and table: the predictor then
-/// leans on the measurements, and a start that is off by half still converges.
+/// First steps with the noise held: offsets and initial states alone, which enter linearly, then
+/// everything but the noise.
 fn approach(model: &RigModel, parameters: &mut [Parameter]) -> Result<(), IdentificationError> {
     const COARSE: f64 = 3.0;
     let mut held = parameters.to_vec();
     for experiment in 0..model.experiments.len() {
         for channel in 0..OUTPUTS + 2 {
-            let noise = &mut held[model.noise(experiment, channel)];
-            noise.free = false;
-            if channel >= OUTPUTS {
-                noise.start = 0.1f64.ln();
-            }
+            held[model.noise(experiment, channel)].free = false;
         }
     }
+    let mut linear = held.clone();
+    for (i, parameter) in linear.iter_mut().enumerate() {
+        let payload = (0..model.experiments.len()).any(|e| i == model.nuisance(e));
+        parameter.free &= i >= PHYSICAL && !payload;
+    }
+    let estimate = gauss_newton::fit(model, &linear, COARSE)?;
+    restart(&mut held, &estimate);
     let estimate = gauss_newton::fit(model, &held, COARSE)?;
     restart(parameters, &estimate);
-    for experiment in 0..model.experiments.len() {
-        for channel in OUTPUTS..OUTPUTS + 2 {
-            parameters[model.noise(experiment, channel)].start = 0.002f64.ln();
-        }
-    }
     Ok(())
 }
 
@@ -339,23 +385,17 @@ fn hold_undetermined_slow_zero(
     gauss_newton::fit(model, parameters, FINE)
 }
 
-#[allow(clippy::too_many_arguments)]
-fn finish(
-    recordings: &[Recording],
-    model: RigModel,
+/// Refuses a rig that is none, and compares what was fitted with what was not.
+fn assess(
+    whole: &RigModel,
+    fitted: &RigModel,
     parameters: &[Parameter],
-    estimate: Estimate,
+    estimate: &Estimate,
     identifiable: bool,
     mut warnings: Vec<String>,
-    singular_values: DVector<f64>,
 ) -> Result<RigIdentification, IdentificationError> {
-    let physical = estimate.parameters[..PHYSICAL].to_vec();
-    let specimen = model.experiments.iter().any(|e| e.specimen);
-    let covariance = estimate
-        .covariance
-        .view((0, 0), (PHYSICAL, PHYSICAL))
-        .into_owned();
-    let rig = rig_from(&physical, 0.0, specimen);
+    let specimen = fitted.experiments.iter().any(|e| e.specimen);
+    let rig = rig_from(&estimate.parameters, 0.0, specimen);
     let table = rig.shake_table.table;
     if table.stiffness <= 0.0 || table.damping < 0.0 {
         return Err(IdentificationError::Unstable {
@@ -366,42 +406,8 @@ fn finish(
             remedy: "record the free decay, or excite around the table's natural frequency".into(),
         });
     }
-    let mut identifiable = identifiable;
-    if identifiable {
-        let unstable = rig.shake_table.actuator.g1().poles();
-        if let Some(pole) = unstable.iter().find(|pole| pole.re > 1e-9) {
-            return Err(IdentificationError::Unstable {
-                what: format!(
-                    "the actuator has a pole at {:+.4} {:+.4}i 1/s",
-                    pole.re, pole.im
-                ),
-                remedy: "check the sign of valve_command and actuator_force, and record a longer \
-                         test with a specimen or two payloads"
-                    .into(),
-            });
-        }
-        let grid: Vec<f64> = (0..30).map(|k| 0.1 * 300f64.powf(f64::from(k) / 29.0)).collect();
-        let [g1, g2] = response_error(&physical, &covariance, &grid);
-        if g1.max(g2) > 0.5 {
-            identifiable = false;
-            warnings.push(format!(
-                "the data hardly separate denominator and velocity path: G1 and G2 are uncertain \
-                 by {:.0} and {:.0} %; measure with a heavier specimen or two payloads that \
-                 differ more",
-                100.0 * g1,
-                100.0 * g2
-            ));
-        }
-    }
-    let mut full = Vec::new();
-    for (recording, data) in recordings.iter().zip(&model.experiments) {
-        let mut whole = scaled_experiment(recording, &recording.cut(0, data.command.len()))?;
-        whole.scale = data.scale;
-        full.push(whole);
-    }
-    let whole = RigModel { experiments: full };
-    let fits = validation::fits(&whole, &model, &estimate.parameters);
-    let residuals = validation_residuals(&whole, &model, &estimate.parameters);
+    let fits = validation::fits(whole, fitted, &estimate.parameters);
+    let residuals = validation_residuals(whole, fitted, &estimate.parameters);
     for (recording, channel, test) in &residuals {
         if !test.is_white() {
             warnings.push(format!(
@@ -412,36 +418,50 @@ fn finish(
             ));
         }
     }
-    let payload = (0..model.experiments.len())
-        .map(|index| {
-            let at = model.nuisance(index);
-            (estimate.parameters[at], estimate.standard_error(at))
-        })
-        .collect();
-    let standard_error = (0..PHYSICAL)
-        .map(|i| {
-            if parameters[i].free {
-                estimate.standard_error(i)
-            } else {
-                0.0
-            }
-        })
-        .collect();
-    Ok(RigIdentification {
-        physical,
-        standard_error,
-        covariance,
+    let mut found = RigIdentification {
+        physical: Vec::new(),
+        standard_error: Vec::new(),
+        covariance: DMatrix::zeros(0, 0),
         specimen,
-        payload,
+        payload: Vec::new(),
         identifiable,
         warnings,
-        parameters: estimate.parameters,
-        model: whole,
+        parameters: Vec::new(),
+        model: whole.clone(),
         fits,
         residuals,
-        singular_values,
+        singular_values: DVector::zeros(0),
         iterations: estimate.iterations,
-    })
+    };
+    found.take(parameters, estimate.clone());
+    if !identifiable {
+        return Ok(found);
+    }
+    if let Some(pole) = found.actuator_poles().iter().find(|pole| pole.re > 1e-9) {
+        return Err(IdentificationError::Unstable {
+            what: format!(
+                "the actuator has a pole at {:+.4} {:+.4}i 1/s",
+                pole.re, pole.im
+            ),
+            remedy: "check the sign of valve_command and actuator_force, and record a longer \
+                     test with a specimen or two payloads"
+                .into(),
+        });
+    }
+    let grid: Vec<f64> = (0..30)
+        .map(|k| 0.1 * 300f64.powf(f64::from(k) / 29.0))
+        .collect();
+    let [g1, g2] = found.response_error(&grid);
+    if g1.max(g2) > 0.5 {
+        found.identifiable = false;
+        found.warnings.push(format!(
+            "the data hardly separate denominator and velocity path: G1 and G2 are uncertain by \
+             {:.0} and {:.0} %; measure with a heavier specimen or two payloads that differ more",
+            100.0 * g1,
+            100.0 * g2
+        ));
+    }
+    Ok(found)
 }
 
 fn validation_residuals(
