@@ -105,9 +105,8 @@ fn square_root(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 ///
 /// Both are differenced first, so that drift does not hide the delay.
 pub fn delay_by_correlation(input: &[f64], output: &[f64], period: f64, longest: f64) -> f64 {
-    let difference = |values: &[f64]| -> Vec<f64> {
-        values.windows(2).map(|pair| pair[1] - pair[0]).collect()
-    };
+    let difference =
+        |values: &[f64]| -> Vec<f64> { values.windows(2).map(|pair| pair[1] - pair[0]).collect() };
     let (u, y) = (difference(input), difference(output));
     let most = ((longest / period) as usize).min(y.len().saturating_sub(2));
     let correlation: Vec<f64> = (0..=most + 1)
@@ -119,7 +118,11 @@ pub fn delay_by_correlation(input: &[f64], output: &[f64], period: f64, longest:
     if best == 0 {
         return 0.0;
     }
-    let (before, at, after) = (correlation[best - 1], correlation[best], correlation[best + 1]);
+    let (before, at, after) = (
+        correlation[best - 1],
+        correlation[best],
+        correlation[best + 1],
+    );
     let curvature = before - 2.0 * at + after;
     let shift = if curvature < 0.0 {
         0.5 * (before - after) / curvature

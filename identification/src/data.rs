@@ -115,7 +115,11 @@ impl Recording {
             .position(|pair| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater))
         {
             return Err(unreadable(
-                format!("time does not increase at row {} ({} s)", at + 2, time[at + 1]),
+                format!(
+                    "time does not increase at row {} ({} s)",
+                    at + 2,
+                    time[at + 1]
+                ),
                 "time stamps that increase",
             ));
         }
@@ -149,7 +153,11 @@ impl Recording {
         for (channel, values) in &mut channels {
             if values.len() != time.len() {
                 return Err(unreadable(
-                    format!("`{channel}` has {} samples, not {}", values.len(), time.len()),
+                    format!(
+                        "`{channel}` has {} samples, not {}",
+                        values.len(),
+                        time.len()
+                    ),
                     "columns of one length",
                 ));
             }
@@ -354,7 +362,11 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
 /// `100 (1 - ||y - m|| / ||y - mean(y)||)`, per cent.
 pub fn fit_percent(measured: &[f64], model: &[f64]) -> f64 {
     let (mean, _) = mean_and_deviation(measured);
-    let error: f64 = measured.iter().zip(model).map(|(y, m)| (y - m) * (y - m)).sum();
+    let error: f64 = measured
+        .iter()
+        .zip(model)
+        .map(|(y, m)| (y - m) * (y - m))
+        .sum();
     let size: f64 = measured.iter().map(|y| (y - mean) * (y - mean)).sum();
     100.0 * (1.0 - (error / size).sqrt())
 }
@@ -470,7 +482,9 @@ mod tests {
         let mut values = wave(500);
         values[100..102].fill(f64::NAN);
         let (recordings, findings) = read(&even(500), values);
-        assert!(findings.contains("drop-outs in `force`: 2 samples in 1 places, the first at 0.200 s"));
+        assert!(
+            findings.contains("drop-outs in `force`: 2 samples in 1 places, the first at 0.200 s")
+        );
         assert_eq!(recordings.len(), 1);
 
         let mut values = wave(500);
@@ -490,8 +504,16 @@ mod tests {
 
         let mut stuck = wave(500);
         stuck[50..100].fill(0.25);
-        assert!(read(&even(500), stuck).1.contains("repeats for 0.100 s from 0.100 s"));
-        assert!(read(&even(500), vec![3.0; 500]).1.contains("`force` is constant"));
+        assert!(
+            read(&even(500), stuck)
+                .1
+                .contains("repeats for 0.100 s from 0.100 s")
+        );
+        assert!(
+            read(&even(500), vec![3.0; 500])
+                .1
+                .contains("`force` is constant")
+        );
     }
 
     #[test]

@@ -34,11 +34,7 @@ struct Spectra {
 }
 
 impl Spectra {
-    fn new(
-        channels: &[&[f64]],
-        period: f64,
-        segment: usize,
-    ) -> Result<Self, IdentificationError> {
+    fn new(channels: &[&[f64]], period: f64, segment: usize) -> Result<Self, IdentificationError> {
         let samples = channels.iter().map(|c| c.len()).min().unwrap_or(0);
         if segment < 16 || samples < 2 * segment {
             return Err(IdentificationError::TooShort {

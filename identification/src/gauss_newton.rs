@@ -99,7 +99,11 @@ impl<const P: usize> Whitened<P> {
     fn new(innovations: &Innovations<P>) -> Option<Self> {
         let root = innovations.covariance.cholesky()?.l();
         let inverse_root = root.try_inverse()?;
-        let errors: Vec<_> = innovations.errors.iter().map(|e| inverse_root * e).collect();
+        let errors: Vec<_> = innovations
+            .errors
+            .iter()
+            .map(|e| inverse_root * e)
+            .collect();
         let log_determinant = root.diagonal().iter().map(|l| l.ln()).sum::<f64>();
         log_determinant.is_finite().then_some(Self {
             log_determinant: log_determinant * errors.len() as f64,
@@ -260,21 +264,25 @@ fn scoring<const P: usize>(
         let sensitivities: Vec<Sensitivity<P>> = wanted
             .par_iter()
             .map(|&i| {
-                sensitivity(model, parameters, values, experiment, &reference, whitened, i)
-                    .ok_or_else(|| IdentificationError::NotConverged {
-                        method: "the Gauss-Newton refinement",
-                        reason: format!(
-                            "no model beside the present one along `{}`",
-                            parameters[i].name
-                        ),
-                    })
+                sensitivity(
+                    model, parameters, values, experiment, &reference, whitened, i,
+                )
+                .ok_or_else(|| IdentificationError::NotConverged {
+                    method: "the Gauss-Newton refinement",
+                    reason: format!(
+                        "no model beside the present one along `{}`",
+                        parameters[i].name
+                    ),
+                })
             })
             .collect::<Result<_, _>>()?;
         let samples = whitened.errors.len() as f64;
         let moment = whitened
             .errors
             .iter()
-            .fold(SMatrix::<f64, P, P>::zeros(), |sum, w| sum + w * w.transpose());
+            .fold(SMatrix::<f64, P, P>::zeros(), |sum, w| {
+                sum + w * w.transpose()
+            });
         let rows: Vec<(usize, usize, f64)> = (0..sensitivities.len())
             .into_par_iter()
             .flat_map_iter(|i| {
@@ -336,7 +344,9 @@ fn sensitivity<const P: usize>(
             .zip(&reference.errors)
             .map(|(a, b)| l * (a - b))
             .collect(),
-        covariance: l * (next.covariance - reference.covariance) * whitened.inverse_root.transpose(),
+        covariance: l
+            * (next.covariance - reference.covariance)
+            * whitened.inverse_root.transpose(),
     })
 }
 
@@ -399,10 +409,7 @@ fn finish<const P: usize>(
     let active: Vec<usize> = (0..count)
         .filter(|&i| {
             let (low, high) = parameters[i].bounds;
-            parameters[i].free
-                && values[i] > low
-                && values[i] < high
-                && information[(i, i)] > 0.0
+            parameters[i].free && values[i] > low && values[i] < high && information[(i, i)] > 0.0
         })
         .collect();
     let (h, scale) = scaled(&information, &active);
@@ -453,7 +460,9 @@ mod tests {
             let errors = self.measured.iter().enumerate();
             Some(Innovations {
                 errors: errors
-                    .map(|(k, y)| SVector::<f64, 1>::new(y - p[1] * (-p[0] * 0.01 * k as f64).exp()))
+                    .map(|(k, y)| {
+                        SVector::<f64, 1>::new(y - p[1] * (-p[0] * 0.01 * k as f64).exp())
+                    })
                     .collect(),
                 covariance: SMatrix::<f64, 1, 1>::new((2.0 * p[2]).exp()),
             })

@@ -93,8 +93,7 @@ fn responses(model: &RigModel, values: &[f64]) -> Option<Vec<Complex<f64>>> {
         for k in 0..40 {
             let s = Complex::new(0.0, TAU * 0.03 * 1600f64.powf(f64::from(k) / 39.0));
             // Force over displacement: the table and, if there is one, the specimen.
-            let mut impedance =
-                (s * table.mass + table.damping) * s + table.stiffness;
+            let mut impedance = (s * table.mass + table.damping) * s + table.stiffness;
             let mut carried = Complex::new(0.0, 0.0);
             if let Some(specimen) = rig.specimen {
                 let spring = s * specimen.damping + specimen.stiffness;

@@ -73,9 +73,8 @@ pub fn regress(
     let shared = order + powers.iter().map(Vec::len).sum::<usize>();
     let columns = shared + experiments.len();
     let samples: usize = experiments.iter().map(|e| e.output.measured.len()).sum();
-    let settle = |e: &Signals| {
-        settling_samples(filter_denominator, period).min(e.output.measured.len() / 4)
-    };
+    let settle =
+        |e: &Signals| settling_samples(filter_denominator, period).min(e.output.measured.len() / 4);
     let rows: usize = experiments
         .iter()
         .map(|e| e.output.measured.len() - settle(e))
@@ -238,7 +237,9 @@ pub fn refine_open_loop(
         instrument = simulate(&next.numerators[0], &denominator, input, period, between);
         let done = estimate.as_ref().is_some_and(|before: &Estimate| {
             let pairs = before.denominator.iter().zip(&next.denominator);
-            pairs.into_iter().all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs())
+            pairs
+                .into_iter()
+                .all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs())
         });
         estimate = Some(next);
         if done {

@@ -15,6 +15,8 @@ use plant::units::{INCH, LBF};
 use serde::{Deserialize, Serialize};
 
 use crate::IdentificationError;
+use crate::rig::RigIdentification;
+use crate::rig_model::{DELAY, MASS, OUTPUT_NAMES, SPECIMEN};
 
 /// The name of the thesis's units, and the default of a file that names none.
 pub const INCH_POUND: &str = "inch, lbf, second, volt";
@@ -121,11 +123,12 @@ impl ModelFile {
     /// that make no rig.
     pub fn read(path: &Path) -> Result<Self, IdentificationError> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| IdentificationError::ModelFile {
-            path: name.clone(),
-            what: error.to_string(),
-            expected: "a model file, as `shakebench identify` writes it",
-        })?;
+        let text =
+            std::fs::read_to_string(path).map_err(|error| IdentificationError::ModelFile {
+                path: name.clone(),
+                what: error.to_string(),
+                expected: "a model file, as `shakebench identify` writes it",
+            })?;
         Self::parse(&text, &name)
     }
 
@@ -159,7 +162,10 @@ impl ModelFile {
             ] {
                 if values.len() != length {
                     return Err(wrong(
-                        format!("[actuator] {key} has {} numbers, not {length}", values.len()),
+                        format!(
+                            "[actuator] {key} has {} numbers, not {length}",
+                            values.len()
+                        ),
                         "a monic cubic denominator and two quadratic numerators, highest power \
                          first",
                     ));
@@ -280,6 +286,64 @@ impl ModelFile {
         Ok(shake_table)
     }
 
+    /// What an identification found, in inch and pound-force. The actuator is left out where the
+    /// data do not determine it.
+    pub fn from_identification(found: &RigIdentification) -> Self {
+        let units = Units::INCH_POUND;
+        let (rig, errors) = (found.rig(), &found.standard_error);
+        let table = rig.shake_table.table;
+        let three = |first: usize| [errors[first], errors[first + 1], errors[first + 2]];
+        let actuator_errors = IdentifiedActuator {
+            denominator: three(0),
+            voltage_to_force: three(3),
+            velocity_to_force: three(6),
+        };
+        let mut actuator_errors = Self::actuator_section(&actuator_errors, units);
+        actuator_errors.denominator[0] = 0.0;
+        let delay = found.physical[DELAY];
+        let mut noise = toml::Table::new();
+        for (i, name) in OUTPUT_NAMES.iter().enumerate() {
+            if found
+                .model
+                .experiments
+                .first()
+                .is_some_and(|e| e.measured[i])
+            {
+                let factor = if *name == "actuator_force" {
+                    units.force
+                } else {
+                    units.length
+                };
+                noise.insert((*name).to_string(), (found.noise(0, i) / factor).into());
+            }
+        }
+        Self {
+            units: INCH_POUND.to_string(),
+            sample_rate: found
+                .model
+                .experiments
+                .first()
+                .map(|experiment| 1.0 / experiment.period),
+            command_delay: (delay > 0.0).then_some(delay),
+            actuator: found
+                .identifiable
+                .then(|| Self::actuator_section(&rig.shake_table.actuator, units)),
+            table: Self::body_section([table.mass, table.damping, table.stiffness], units),
+            specimen: rig
+                .specimen
+                .map(|s| Self::body_section([s.mass, s.damping, s.stiffness], units)),
+            noise: Some(noise),
+            standard_errors: Some(StandardErrors {
+                actuator: found.identifiable.then_some(actuator_errors),
+                table: Self::body_section(three(MASS), units),
+                specimen: rig
+                    .specimen
+                    .map(|_| Self::body_section(three(SPECIMEN), units)),
+                command_delay: (delay > 0.0).then_some(errors[DELAY]),
+            }),
+        }
+    }
+
     /// The actuator's section from SI coefficients, in `units`.
     pub fn actuator_section(actuator: &IdentifiedActuator, units: Units) -> ActuatorSection {
         let mut denominator = vec![1.0];
@@ -327,7 +391,10 @@ mod tests {
     #[test]
     fn writing_and_reading_is_the_identity() {
         let file = ModelFile::parse(NOMINAL, "a").unwrap();
-        assert_eq!(ModelFile::parse(&file.to_toml().unwrap(), "b").unwrap(), file);
+        assert_eq!(
+            ModelFile::parse(&file.to_toml().unwrap(), "b").unwrap(),
+            file
+        );
     }
 
     #[test]
@@ -337,9 +404,15 @@ mod tests {
         let error = message(&text);
         assert!(error.starts_with("m.toml: line 7: invalid type"), "{error}");
         let error = message(&NOMINAL.replace(", 178.2", ""));
-        assert!(error.contains("[actuator] denominator has 3 numbers, not 4"), "{error}");
+        assert!(
+            error.contains("[actuator] denominator has 3 numbers, not 4"),
+            "{error}"
+        );
         let error = message(&NOMINAL.replace("mass = 0.", "mass = -0."));
-        assert!(error.contains("[table]: parameter `table_mass` is -21"), "{error}");
+        assert!(
+            error.contains("[table]: parameter `table_mass` is -21"),
+            "{error}"
+        );
         let error = message(&format!("units = \"furlong\"\n{NOMINAL}"));
         assert!(error.contains("units = \"furlong\""), "{error}");
         let without = format!("[table]{}", NOMINAL.split("[table]").nth(1).unwrap());

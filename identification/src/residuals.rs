@@ -73,7 +73,9 @@ fn outside(values: &[f64], band: f64) -> f64 {
 }
 
 fn small(values: &[f64], band: f64) -> bool {
-    let largest = values.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+    let largest = values
+        .iter()
+        .fold(0.0f64, |most, value| most.max(value.abs()));
     outside(values, band) <= 0.1 && largest <= 2.0 * band
 }
 

@@ -7,6 +7,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use plant::actuator::IdentifiedActuator;
 use plant::rig::Rig;
 
+use crate::IdentificationError;
 use crate::checks;
 use crate::data::Recording;
 use crate::gauss_newton::{self, Estimate, FINE, Parameter};
@@ -18,7 +19,6 @@ use crate::rig_model::{
 };
 use crate::rig_start;
 use crate::validation::{self, ChannelFit};
-use crate::IdentificationError;
 
 /// How to identify.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -169,7 +169,14 @@ pub fn identify(
         estimate = hold_undetermined_slow_zero(&model, &mut parameters, estimate, &mut warnings)?;
     }
     let whole = whole_recordings(recordings, &model)?;
-    let mut found = assess(&whole, &model, &parameters, &estimate, identifiable, warnings)?;
+    let mut found = assess(
+        &whole,
+        &model,
+        &parameters,
+        &estimate,
+        identifiable,
+        warnings,
+    )?;
     // What was validated is then fitted to everything there is.
     restart(&mut parameters, &estimate);
     let estimate = gauss_newton::fit(&whole, &parameters, FINE)?;
@@ -205,8 +212,7 @@ pub(crate) fn scaled_experiment(
     recording: &Recording,
     fitted: &Recording,
 ) -> Result<Experiment, IdentificationError> {
-    const NEEDED: &str =
-        "valve_command, displacement, acceleration, actuator_force and, with a specimen, \
+    const NEEDED: &str = "valve_command, displacement, acceleration, actuator_force and, with a specimen, \
          specimen_acceleration";
     let command = fitted.require("valve_command", NEEDED)?;
     let command_scale = crate::data::mean_and_deviation(command).1;
@@ -262,10 +268,14 @@ fn parameters(
         s[7].abs().max(5.0 * s[6].abs()),
         s[8].abs(),
         s[MASS],
-        s[MASS + 1].abs().max(0.02 * (s[MASS] * s[MASS + 2].abs()).sqrt()),
+        s[MASS + 1]
+            .abs()
+            .max(0.02 * (s[MASS] * s[MASS + 2].abs()).sqrt()),
         s[MASS + 2].abs(),
         s[SPECIMEN].abs(),
-        s[SPECIMEN + 1].abs().max(0.01 * (s[SPECIMEN] * s[SPECIMEN + 2].abs()).sqrt()),
+        s[SPECIMEN + 1]
+            .abs()
+            .max(0.01 * (s[SPECIMEN] * s[SPECIMEN + 2].abs()).sqrt()),
         s[SPECIMEN + 2].abs(),
         model.experiments[0].period,
     ];
@@ -289,7 +299,8 @@ fn parameters(
             parameter.experiment = Some(index);
             parameter
         };
-        let earlier = (0..index).any(|before| recordings[before].source == recordings[index].source);
+        let earlier =
+            (0..index).any(|before| recordings[before].source == recordings[index].source);
         let mut payload = own("payload", start.mass[index] - s[MASS], 0.1 * s[MASS]);
         payload.free = index > 0 && !earlier;
         if !payload.free {

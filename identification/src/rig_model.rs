@@ -225,11 +225,12 @@ impl RigModel {
         let force = sampled.b.columns(1, 1);
         let q = &command * command.transpose() * variance(OUTPUTS)
             + force * force.transpose() * variance(OUTPUTS + 1);
-        let noise = SMatrix::<f64, OUTPUTS, OUTPUTS>::from_fn(|i, j| match (i == j, data.measured[i]) {
-            (false, _) => 0.0,
-            (true, true) => variance(i),
-            (true, false) => 1.0,
-        });
+        let noise =
+            SMatrix::<f64, OUTPUTS, OUTPUTS>::from_fn(|i, j| match (i == j, data.measured[i]) {
+                (false, _) => 0.0,
+                (true, true) => variance(i),
+                (true, false) => 1.0,
+            });
         let c_transposed = DMatrix::from_fn(STATES, OUTPUTS, |i, j| c[(j, i)]);
         let r = DMatrix::from_fn(OUTPUTS, OUTPUTS, |i, j| noise[(i, j)]);
         let p = discrete_riccati(&sampled.a.transpose(), &c_transposed, &q, &r).ok()?;
@@ -268,7 +269,11 @@ impl RigModel {
     }
 
     /// Outputs predicted one sample ahead, SI, channel by channel.
-    pub fn one_step_predictions(&self, experiment: usize, parameters: &[f64]) -> Option<Vec<Vec<f64>>> {
+    pub fn one_step_predictions(
+        &self,
+        experiment: usize,
+        parameters: &[f64],
+    ) -> Option<Vec<Vec<f64>>> {
         let data = &self.experiments[experiment];
         let errors = self.innovations(experiment, parameters)?.errors;
         Some(

@@ -185,7 +185,10 @@ fn table(experiments: &[Experiment], channels: &[Channels]) -> Result<Tables, Id
         .collect();
     let scaled = DMatrix::from_fn(count, count, |i, j| cross[(i, j)] / (scale[i] * scale[j]));
     let target = DVector::from_fn(count, |i, _| right[i] / scale[i]);
-    let solution = scaled.lu().solve(&target).filter(|s| s.iter().all(|v| v.is_finite()));
+    let solution = scaled
+        .lu()
+        .solve(&target)
+        .filter(|s| s.iter().all(|v| v.is_finite()));
     let Some(solution) = solution else {
         return Err(IdentificationError::RankDeficient {
             what: "force, acceleration and displacement do not determine mass, damping and \
@@ -196,7 +199,9 @@ fn table(experiments: &[Experiment], channels: &[Channels]) -> Result<Tables, Id
     };
     let value = |i: usize| solution[i] / scale[i];
     let tables = Tables {
-        mass: (0..channels.len()).map(|index| value(3 + 2 * index)).collect(),
+        mass: (0..channels.len())
+            .map(|index| value(3 + 2 * index))
+            .collect(),
         damping: value(0),
         stiffness: value(1),
         specimen_mass: value(2),
@@ -232,7 +237,13 @@ fn specimen(
     if sets.is_empty() {
         return Ok(None);
     }
-    let estimate = regress(&sets, &[vec![1, 0]], period, &equal_lags(0.25 * CORNER, 2), &[])?;
+    let estimate = regress(
+        &sets,
+        &[vec![1, 0]],
+        period,
+        &equal_lags(0.25 * CORNER, 2),
+        &[],
+    )?;
     let d = stabilised(&estimate.denominator);
     Ok(Some([d[1], d[2]]))
 }

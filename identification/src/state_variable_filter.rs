@@ -17,12 +17,7 @@ pub enum Between {
 ///
 /// `denominator` is monic in descending powers, of degree `order`, and stable. The filter starts
 /// at rest at the first sample's value.
-pub fn filter(
-    signal: &[f64],
-    period: f64,
-    denominator: &[f64],
-    between: Between,
-) -> Vec<Vec<f64>> {
+pub fn filter(signal: &[f64], period: f64, denominator: &[f64], between: Between) -> Vec<Vec<f64>> {
     let n = denominator.len() - 1;
     let gain = denominator[n];
     let (a, now, next) = transition(denominator, period, between);
@@ -114,7 +109,10 @@ mod tests {
             let phasor = nalgebra::Complex::new(0.0, omega * h * k as f64).exp();
             for (i, derivative) in got.iter().enumerate() {
                 let want = (s.powu(i as u32) * l * phasor).im;
-                assert!((derivative[k] - want).abs() < 2e-4 * omega.powi(i as i32), "{i}");
+                assert!(
+                    (derivative[k] - want).abs() < 2e-4 * omega.powi(i as i32),
+                    "{i}"
+                );
             }
         }
     }

@@ -197,7 +197,14 @@ pub fn identify(
     });
     let (abk, _) = state_rows.solve(RANK)?;
     let abk = abk.transpose();
-    Ok(scaled.restore(&abk, &cd.transpose(), order, period, singular_values, predictions))
+    Ok(scaled.restore(
+        &abk,
+        &cd.transpose(),
+        order,
+        period,
+        singular_values,
+        predictions,
+    ))
 }
 
 /// The order after which the singular values fall most, by ratio.
@@ -205,9 +212,7 @@ pub fn largest_drop(singular_values: &DVector<f64>, largest_order: usize) -> usi
     let floor = singular_values.max() * 1e-14;
     (1..singular_values.len().min(largest_order + 1))
         .max_by(|&a, &b| {
-            let drop = |n: usize| {
-                singular_values[n - 1].max(floor) / singular_values[n].max(floor)
-            };
+            let drop = |n: usize| singular_values[n - 1].max(floor) / singular_values[n].max(floor);
             // Equal drops: the lower order.
             drop(a).total_cmp(&drop(b)).then(b.cmp(&a))
         })
@@ -243,7 +248,9 @@ impl Scaled {
                     what: format!("{kind} {number} is constant"),
                 });
             }
-            scaled.channels.push(values.iter().map(|v| (v - mean) / size).collect());
+            scaled
+                .channels
+                .push(values.iter().map(|v| (v - mean) / size).collect());
             scaled.means.push(mean);
             scaled.sizes.push(size);
         }

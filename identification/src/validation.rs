@@ -32,11 +32,7 @@ pub struct ChannelFit {
 }
 
 /// Fits of all channels on the stretch after the fitted part.
-pub(crate) fn fits(
-    whole: &RigModel,
-    fitted: &RigModel,
-    parameters: &[f64],
-) -> Vec<ChannelFit> {
+pub(crate) fn fits(whole: &RigModel, fitted: &RigModel, parameters: &[f64]) -> Vec<ChannelFit> {
     let mut fits = Vec::new();
     for (index, data) in whole.experiments.iter().enumerate() {
         let first = fitted.experiments[index].command.len();
@@ -59,7 +55,9 @@ pub(crate) fn fits(
             fits.push(ChannelFit {
                 recording: data.name.clone(),
                 channel: OUTPUT_NAMES[i],
-                simulated: simulated.as_ref().map_or(f64::NAN, |m| fit_percent(&measured, m)),
+                simulated: simulated
+                    .as_ref()
+                    .map_or(f64::NAN, |m| fit_percent(&measured, m)),
                 predicted,
                 start: first as f64 * data.period,
                 model: simulated.unwrap_or_default(),
@@ -92,12 +90,7 @@ impl Channels {
 
 /// Simulates `system` from one input that runs straight between samples; initial state and offset
 /// by least squares on `measured`.
-fn simulate(
-    system: &StateSpace,
-    input: &[f64],
-    measured: &[f64],
-    period: f64,
-) -> Option<Vec<f64>> {
+fn simulate(system: &StateSpace, input: &[f64], measured: &[f64], period: f64) -> Option<Vec<f64>> {
     let n = system.order();
     let mut a = DMatrix::zeros(n + 2, n + 2);
     a.view_mut((0, 0), (n, n)).copy_from(&system.a);
@@ -115,7 +108,9 @@ fn simulate(
     let mut basis = DMatrix::zeros(measured.len(), n + 1);
     for k in 0..measured.len() {
         forced.push(system.c.row(0).tr_dot(&state));
-        basis.view_mut((k, 0), (1, n)).copy_from(&(system.c.row(0) * &free));
+        basis
+            .view_mut((k, 0), (1, n))
+            .copy_from(&(system.c.row(0) * &free));
         basis[(k, n)] = 1.0;
         let next = input.get(k + 1).unwrap_or(&input[k]);
         state = &a * &state + &held * input[k] + &slope * (next - input[k]);
@@ -125,7 +120,11 @@ fn simulate(
     let normal = basis.tr_mul(&basis).svd(true, true);
     let coordinates = normal.solve(&basis.tr_mul(&target), 1e-14).ok()?;
     let correction = basis * coordinates;
-    let model: Vec<f64> = forced.iter().zip(correction.iter()).map(|(f, c)| f + c).collect();
+    let model: Vec<f64> = forced
+        .iter()
+        .zip(correction.iter())
+        .map(|(f, c)| f + c)
+        .collect();
     model.iter().all(|value| value.is_finite()).then_some(model)
 }
 

@@ -25,7 +25,10 @@ fn truth() -> Vec<f64> {
 fn pole_error(got: &[Complex<f64>], want: &[Complex<f64>]) -> f64 {
     want.iter()
         .map(|pole| {
-            let nearest = got.iter().map(|g| (g - pole).norm()).fold(f64::MAX, f64::min);
+            let nearest = got
+                .iter()
+                .map(|g| (g - pole).norm())
+                .fold(f64::MAX, f64::min);
             nearest / pole.norm()
         })
         .fold(0.0, f64::max)
@@ -33,7 +36,10 @@ fn pole_error(got: &[Complex<f64>], want: &[Complex<f64>]) -> f64 {
 
 /// Largest relative error of the responses of G1 and G2 between two frequencies.
 fn response_error(found: &RigIdentification, low: f64, high: f64) -> f64 {
-    let (got, want) = (found.rig().shake_table.actuator, ShakeTable::default().actuator);
+    let (got, want) = (
+        found.rig().shake_table.actuator,
+        ShakeTable::default().actuator,
+    );
     (0..100)
         .map(|k| {
             let f = low * (high / low).powf(f64::from(k) / 99.0);
@@ -91,7 +97,10 @@ fn two_payloads_without_a_specimen_do_as_well() {
     assert!(pole_error(&found.table_poles(), &rig.table.transfer_function().poles()) < 0.02);
     assert!(response_error(&found, 0.1, 30.0) < 0.02);
     let (payload, error) = found.payload[1];
-    assert!((payload - 25.0).abs() < 4.0 * error && error < 0.25, "{payload} {error}");
+    assert!(
+        (payload - 25.0).abs() < 4.0 * error && error < 0.25,
+        "{payload} {error}"
+    );
 }
 
 #[test]
@@ -104,7 +113,10 @@ fn a_bare_table_is_recognised_as_inseparable() {
     let found = identify(&[recording], Options::default()).unwrap();
     assert!(!found.identifiable);
     let message = found.warnings.join("\n");
-    assert!(message.contains("inseparable (a1, e2, e1, e0 move together"), "{message}");
+    assert!(
+        message.contains("inseparable (a1, e2, e1, e0 move together"),
+        "{message}"
+    );
     assert!(message.contains("with two payloads"), "{message}");
     // The table itself is determined.
     let table = ShakeTable::default().table;
@@ -119,7 +131,10 @@ fn the_slow_zero_is_claimed_only_where_the_excitation_reaches_it() {
             ..Test::default()
         };
         let found = identify(&[test.record()], Options::default()).unwrap();
-        let told = found.warnings.iter().any(|w| w.contains("slow pole and zero"));
+        let told = found
+            .warnings
+            .iter()
+            .any(|w| w.contains("slow pole and zero"));
         (found.standard_error[5] / found.physical[5].abs(), told)
     };
     let (reached, told) = relative((0.02, 30.0));

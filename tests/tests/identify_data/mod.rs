@@ -83,7 +83,12 @@ impl Test {
         Recording::new(&format!("test {}", self.seed), PERIOD, columns).unwrap()
     }
 
-    fn play(&self, reference: &[Motion], noise: [f64; 5], random: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
+    fn play(
+        &self,
+        reference: &[Motion],
+        noise: [f64; 5],
+        random: &mut ChaCha8Rng,
+    ) -> Vec<Vec<f64>> {
         let mut shake_table = self.shake_table;
         shake_table.table.mass += self.payload;
         let rig = Rig {
