@@ -16,6 +16,7 @@ pub mod rig_model;
 mod rig_start;
 pub mod state_variable_filter;
 pub mod subspace;
+pub mod transfer_function;
 pub mod validation;
 
 pub use error::IdentificationError;

@@ -375,18 +375,24 @@ fn hold_undetermined_slow_zero(
     let lost = [A0, B0]
         .iter()
         .any(|&i| estimate.standard_error(i) > 0.5 * estimate.parameters[i].abs());
-    if !lost {
-        return Ok(estimate);
+    if lost {
+        warnings.push(
+            "the slow pole and zero of the actuator (a0, b0) are not determined by these data: \
+             excite down to 0.02 Hz for a minute or longer to find them"
+                .into(),
+        );
     }
-    warnings.push(
-        "the slow pole and zero of the actuator (a0, b0) are not determined by these data: \
-         excite down to 0.02 Hz for a minute or longer to find them"
-            .into(),
-    );
     let p = &estimate.parameters;
     let actuator = rig_from(p, 0.0, false).shake_table.actuator;
     if p[A0] >= 0.0 && p[B0] >= 0.0 && actuator.validate().is_ok() {
         return Ok(estimate);
+    }
+    if !lost {
+        warnings.push(
+            "slow drift that this model lacks gave the actuator a slow pole or zero that must \
+             not be simulated; both are held at zero, where they cancel"
+                .into(),
+        );
     }
     restart(parameters, &estimate);
     for i in [A0, B0] {
