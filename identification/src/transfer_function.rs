@@ -103,10 +103,13 @@ impl PredictionModel<1> for OutputError<'_> {
             .zip(&model)
             .map(|(y, m)| SVector::<f64, 1>::new((y - m) / self.size))
             .collect();
-        errors.iter().all(|e| e[0].is_finite()).then(|| Innovations {
-            errors,
-            covariance: SMatrix::<f64, 1, 1>::new((2.0 * p[p.len() - 1]).exp()),
-        })
+        errors
+            .iter()
+            .all(|e| e[0].is_finite())
+            .then(|| Innovations {
+                errors,
+                covariance: SMatrix::<f64, 1, 1>::new((2.0 * p[p.len() - 1]).exp()),
+            })
     }
 }
 
@@ -190,12 +193,18 @@ pub fn identify(
         });
     }
     let simulated = model.simulate(p);
-    let square: f64 = output.iter().zip(&simulated).map(|(y, m)| (y - m).powi(2)).sum();
+    let square: f64 = output
+        .iter()
+        .zip(&simulated)
+        .map(|(y, m)| (y - m).powi(2))
+        .sum();
     Ok(Estimate {
         numerator: p[..=zeros].to_vec(),
         denominator,
         delay: p[zeros + 1 + order],
-        standard_error: (0..zeros + order + 2).map(|i| found.standard_error(i)).collect(),
+        standard_error: (0..zeros + order + 2)
+            .map(|i| found.standard_error(i))
+            .collect(),
         normalised_error: (square / output.len() as f64).sqrt() / size,
         simulated,
     })

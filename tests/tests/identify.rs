@@ -186,6 +186,9 @@ fn a_late_command_is_found_with_its_delay() {
     .record();
     let found = identify(&[recording], Options::default()).unwrap();
     let (delay, error) = (found.physical[15], found.standard_error[15]);
-    assert!((delay - 0.004).abs() < 4.0 * error && error < 2e-4, "{delay} {error}");
+    assert!(
+        (delay - 0.004).abs() < 4.0 * error && error < 2e-4,
+        "{delay} {error}"
+    );
     assert!(response_error(&found, 0.1, 30.0) < 0.03);
 }

@@ -7,7 +7,9 @@ use identification::rig::{Options, identify};
 use identify_data::{PERIOD, Test};
 
 fn refused(recording: Recording) -> String {
-    identify(&[recording], Options::default()).unwrap_err().to_string()
+    identify(&[recording], Options::default())
+        .unwrap_err()
+        .to_string()
 }
 
 fn with(recording: &Recording, name: &str, values: Vec<f64>) -> Recording {
@@ -36,9 +38,19 @@ fn good() -> Recording {
 #[test]
 fn a_command_that_stands_still_is_no_excitation() {
     let recording = good();
-    let message = refused(with(&recording, "valve_command", vec![0.1; recording.len()]));
-    assert!(message.contains("no excitation: valve_command stands at 0.1000 V"), "{message}");
-    assert!(message.contains("band-limited noise or an earthquake"), "{message}");
+    let message = refused(with(
+        &recording,
+        "valve_command",
+        vec![0.1; recording.len()],
+    ));
+    assert!(
+        message.contains("no excitation: valve_command stands at 0.1000 V"),
+        "{message}"
+    );
+    assert!(
+        message.contains("band-limited noise or an earthquake"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -48,14 +60,23 @@ fn sensors_that_see_only_noise_are_no_excitation() {
         .map(|k| ((k * 7919 % 1009) as f64 / 1009.0 - 0.5) * 1e-5)
         .collect();
     let message = refused(with(&recording, "displacement", noise));
-    assert!(message.contains("no excitation: `displacement` is noise for the most part"), "{message}");
+    assert!(
+        message.contains("no excitation: `displacement` is noise for the most part"),
+        "{message}"
+    );
 }
 
 #[test]
 fn a_short_recording_says_how_long_it_must_be() {
     let message = refused(good().cut(0, 900));
-    assert!(message.contains("900 samples are too short to fit 33 parameters"), "{message}");
-    assert!(message.contains("record at least 1760 samples (3.5 s)"), "{message}");
+    assert!(
+        message.contains("900 samples are too short to fit 33 parameters"),
+        "{message}"
+    );
+    assert!(
+        message.contains("record at least 1760 samples (3.5 s)"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -67,9 +88,15 @@ fn a_missing_and_a_dead_channel_are_named() {
         .map(|name| (name.to_string(), recording.channel(name).unwrap().to_vec()))
         .collect();
     let message = refused(Recording::new("test", PERIOD, columns).unwrap());
-    assert!(message.contains("test: no column `actuator_force`"), "{message}");
+    assert!(
+        message.contains("test: no column `actuator_force`"),
+        "{message}"
+    );
     let message = refused(with(&recording, "acceleration", vec![0.0; recording.len()]));
-    assert!(message.contains("channel `acceleration` is constant at 0"), "{message}");
+    assert!(
+        message.contains("channel `acceleration` is constant at 0"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -97,7 +124,10 @@ fn a_sine_has_too_few_frequencies() {
         .map(|u| u + 0.002 * u.powi(3))
         .collect();
     let message = refused(with(&pure, "valve_command", bent));
-    assert!(message.starts_with("rank deficiency") || message.contains("feedback"), "{message}");
+    assert!(
+        message.starts_with("rank deficiency") || message.contains("feedback"),
+        "{message}"
+    );
     assert!(
         message.contains("instead of a sine") || message.contains("test signal"),
         "{message}"
@@ -109,10 +139,20 @@ fn pure_feedback_is_unidentifiable() {
     let recording = good();
     let x = recording.channel("displacement").unwrap();
     let a = recording.channel("acceleration").unwrap();
-    let command = x.iter().zip(a).map(|(x, a)| -240.0 * x - 0.004 * a).collect();
+    let command = x
+        .iter()
+        .zip(a)
+        .map(|(x, a)| -240.0 * x - 0.004 * a)
+        .collect();
     let message = refused(with(&recording, "valve_command", command));
-    assert!(message.contains("feedback makes the plant unidentifiable"), "{message}");
-    assert!(message.contains("add a test signal to the command"), "{message}");
+    assert!(
+        message.contains("feedback makes the plant unidentifiable"),
+        "{message}"
+    );
+    assert!(
+        message.contains("add a test signal to the command"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -121,6 +161,12 @@ fn a_force_of_the_wrong_sign_is_an_unstable_result() {
     let force = recording.channel("actuator_force").unwrap();
     let turned = force.iter().map(|f| -f).collect();
     let message = refused(with(&recording, "actuator_force", turned));
-    assert!(message.contains("unstable result where a stable one is expected"), "{message}");
-    assert!(message.contains("check the signs of actuator_force"), "{message}");
+    assert!(
+        message.contains("unstable result where a stable one is expected"),
+        "{message}"
+    );
+    assert!(
+        message.contains("check the signs of actuator_force"),
+        "{message}"
+    );
 }

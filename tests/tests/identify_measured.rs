@@ -56,7 +56,11 @@ fn the_press_is_one_pole_and_a_delay_of_four_milliseconds() {
     // Fitted to the first two thirds of the sweep, judged on the last.
     let part = 2 * command.len() / 3;
     let half = identify(&command[..part], &position[..part], 0.001, structure).unwrap();
-    println!("first two thirds: delay {:.2} ms, error {:.2} %", 1e3 * half.delay, 100.0 * half.normalised_error);
+    println!(
+        "first two thirds: delay {:.2} ms, error {:.2} %",
+        1e3 * half.delay,
+        100.0 * half.normalised_error
+    );
 
     let two = Structure {
         order: 2,
@@ -64,7 +68,11 @@ fn the_press_is_one_pole_and_a_delay_of_four_milliseconds() {
         ..structure
     };
     let found = identify(command, position, 0.001, two).unwrap();
-    println!("two poles {:?}: error {:.2} %", found.denominator, 100.0 * found.normalised_error);
+    println!(
+        "two poles {:?}: error {:.2} %",
+        found.denominator,
+        100.0 * found.normalised_error
+    );
     assert!(found.normalised_error < 0.052);
 }
 
@@ -97,7 +105,9 @@ fn the_drive_s_force_follows_from_its_motion() {
     let fit = |columns: &[&Vec<f64>]| -> (Vec<f64>, f64) {
         let n = columns.len();
         let normal = nalgebra::DMatrix::from_fn(n, n, |i, j| {
-            (200..count).map(|k| columns[i][k] * columns[j][k]).sum::<f64>()
+            (200..count)
+                .map(|k| columns[i][k] * columns[j][k])
+                .sum::<f64>()
         });
         let right = nalgebra::DVector::from_fn(n, |i, _| {
             (200..count).map(|k| columns[i][k] * force[k]).sum::<f64>()
@@ -106,13 +116,18 @@ fn the_drive_s_force_follows_from_its_motion() {
         let model: Vec<f64> = (0..count)
             .map(|k| (0..n).map(|i| theta[i] * columns[i][k]).sum())
             .collect();
-        let error = (200..count).map(|k| (force[k] - model[k]).powi(2)).sum::<f64>();
+        let error = (200..count)
+            .map(|k| (force[k] - model[k]).powi(2))
+            .sum::<f64>();
         let size = (200..count).map(|k| force[k].powi(2)).sum::<f64>();
         assert!(fit_percent(&force[200..], &model[200..]) > 90.0);
         (theta.as_slice().to_vec(), 100.0 * (error / size).sqrt())
     };
     let (symmetric, error) = fit(&[&position[2], &position[1], &both, &one]);
-    println!("symmetric: mass {:.2} kg, viscous {:.1} N s/m, Coulomb {:.2} N, offset {:.2} N: error {error:.2} %", symmetric[0], symmetric[1], symmetric[2], symmetric[3]);
+    println!(
+        "symmetric: mass {:.2} kg, viscous {:.1} N s/m, Coulomb {:.2} N, offset {:.2} N: error {error:.2} %",
+        symmetric[0], symmetric[1], symmetric[2], symmetric[3]
+    );
     assert!(error < 4.08, "{error}");
     assert!((symmetric[0] - 95.0).abs() < 3.0);
     let turning: Vec<f64> = position[1].iter().map(|v| v.max(0.0)).collect();

@@ -85,9 +85,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     warnings.extend(found.warnings.iter().cloned());
     let model = ModelFile::from_identification(&found);
     let summary = summary(arguments, &found, warnings, started);
-    write(arguments, &model.to_toml()?, &printed::report(&found, &summary))?;
+    write(
+        arguments,
+        &model.to_toml()?,
+        &printed::report(&found, &summary),
+    )?;
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&summary).unwrap_or_default());
+        println!(
+            "{}",
+            serde_json::to_string_pretty(&summary).unwrap_or_default()
+        );
     } else {
         print!("{}", printed::text(&found, &summary));
     }

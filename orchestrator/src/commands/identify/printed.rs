@@ -7,9 +7,7 @@ use identification::rig::RigIdentification;
 
 use super::Summary;
 use crate::commands::table::{aligned, significant};
-use crate::report::{
-    Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units,
-};
+use crate::report::{Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units};
 
 /// Rows of name, value, standard error and unit, in inch and pound-force.
 fn parameters(found: &RigIdentification) -> Vec<[String; 4]> {
@@ -26,22 +24,43 @@ fn parameters(found: &RigIdentification) -> Vec<[String; 4]> {
             unit.to_string(),
         ]);
     };
-    if let (Some(actuator), StandardErrors { actuator: Some(own), .. }) = (&file.actuator, &errors)
+    if let (
+        Some(actuator),
+        StandardErrors {
+            actuator: Some(own),
+            ..
+        },
+    ) = (&file.actuator, &errors)
     {
         let units = ["1/s", "1/s^2", "1/s^3"];
         for i in 0..3 {
             let name = format!("denominator a{}", 2 - i);
-            row(&name, actuator.denominator[i + 1], own.denominator[i + 1], units[i]);
+            row(
+                &name,
+                actuator.denominator[i + 1],
+                own.denominator[i + 1],
+                units[i],
+            );
         }
         let units = ["lbf/(V s)", "lbf/(V s^2)", "lbf/(V s^3)"];
         for i in 0..3 {
             let name = format!("voltage to force b{}", 2 - i);
-            row(&name, actuator.voltage_to_force[i], own.voltage_to_force[i], units[i]);
+            row(
+                &name,
+                actuator.voltage_to_force[i],
+                own.voltage_to_force[i],
+                units[i],
+            );
         }
         let units = ["lbf/in", "lbf/(in s)", "lbf/(in s^2)"];
         for i in 0..3 {
             let name = format!("velocity to force e{}", 2 - i);
-            row(&name, actuator.velocity_to_force[i], own.velocity_to_force[i], units[i]);
+            row(
+                &name,
+                actuator.velocity_to_force[i],
+                own.velocity_to_force[i],
+                units[i],
+            );
         }
     }
     let mut bodies = vec![("table", file.table, errors.table)];
@@ -50,8 +69,18 @@ fn parameters(found: &RigIdentification) -> Vec<[String; 4]> {
     }
     for (name, body, error) in bodies {
         row(&format!("{name} mass"), body.mass, error.mass, "lbf s^2/in");
-        row(&format!("{name} damping"), body.damping, error.damping, "lbf s/in");
-        row(&format!("{name} stiffness"), body.stiffness, error.stiffness, "lbf/in");
+        row(
+            &format!("{name} damping"),
+            body.damping,
+            error.damping,
+            "lbf s/in",
+        );
+        row(
+            &format!("{name} stiffness"),
+            body.stiffness,
+            error.stiffness,
+            "lbf/in",
+        );
     }
     if let (Some(delay), Some(error)) = (file.command_delay, errors.command_delay) {
         row("command delay", 1e3 * delay, 1e3 * error, "ms");
@@ -84,7 +113,11 @@ pub(super) fn text(found: &RigIdentification, summary: &Summary) -> String {
     for own in &summary.table_poles_rad_s {
         text += &format!("  {}\n", pole(own));
     }
-    let mut rows = vec![["parameter", "value", "standard error", "unit"].map(String::from).to_vec()];
+    let mut rows = vec![
+        ["parameter", "value", "standard error", "unit"]
+            .map(String::from)
+            .to_vec(),
+    ];
     rows.extend(parameters(found).into_iter().map(|row| row.to_vec()));
     text += &format!("\n{}", aligned(&rows));
     for (index, (payload, error)) in found.payload.iter().enumerate().skip(1) {
@@ -96,9 +129,15 @@ pub(super) fn text(found: &RigIdentification, summary: &Summary) -> String {
         );
     }
     let mut rows = vec![
-        ["recording, channel", "simulated %", "one step %", "lags outside 99 %", "with command"]
-            .map(String::from)
-            .to_vec(),
+        [
+            "recording, channel",
+            "simulated %",
+            "one step %",
+            "lags outside 99 %",
+            "with command",
+        ]
+        .map(String::from)
+        .to_vec(),
     ];
     for fit in &found.fits {
         let test = found
@@ -106,7 +145,8 @@ pub(super) fn text(found: &RigIdentification, summary: &Summary) -> String {
             .iter()
             .find(|(recording, channel, _)| *recording == fit.recording && *channel == fit.channel)
             .map(|(_, _, test)| (test.outside(), test.cross_outside()));
-        let share = |value: Option<f64>| value.map_or("-".into(), |v| format!("{:.0} %", 100.0 * v));
+        let share =
+            |value: Option<f64>| value.map_or("-".into(), |v| format!("{:.0} %", 100.0 * v));
         rows.push(vec![
             format!("{}, {}", fit.recording, fit.channel),
             format!("{:.2}", fit.simulated),
@@ -122,7 +162,11 @@ pub(super) fn text(found: &RigIdentification, summary: &Summary) -> String {
             text += &format!("  {warning}\n");
         }
     }
-    text += &format!("\nwritten: {} ({:.1} s)\n", summary.model.display(), summary.wall_s);
+    text += &format!(
+        "\nwritten: {} ({:.1} s)\n",
+        summary.model.display(),
+        summary.wall_s
+    );
     text
 }
 
@@ -130,7 +174,9 @@ pub(super) fn text(found: &RigIdentification, summary: &Summary) -> String {
 pub(super) fn report(found: &RigIdentification, summary: &Summary) -> Report {
     let table = Table {
         caption: "Parameters with standard errors".into(),
-        columns: ["parameter", "value", "standard error", "unit"].map(String::from).to_vec(),
+        columns: ["parameter", "value", "standard error", "unit"]
+            .map(String::from)
+            .to_vec(),
         rows: parameters(found)
             .into_iter()
             .map(|row| row.map(Cell::from).to_vec())
@@ -160,7 +206,10 @@ pub(super) fn report(found: &RigIdentification, summary: &Summary) -> Report {
                 Series::line(name, abscissa, values.to_vec())
             };
             Panel {
-                title: format!("{}: {} ({:.2} %)", fit.recording, fit.channel, fit.simulated),
+                title: format!(
+                    "{}: {} ({:.2} %)",
+                    fit.recording, fit.channel, fit.simulated
+                ),
                 x: Axis::linear("time", Units::TIME),
                 y: Axis::linear(fit.channel, units),
                 series: vec![
@@ -181,7 +230,9 @@ pub(super) fn report(found: &RigIdentification, summary: &Summary) -> Report {
         panels,
         ..Section::default()
     });
-    let orders = (1..=found.singular_values.len().min(20)).map(|n| n as f64).collect();
+    let orders = (1..=found.singular_values.len().min(20))
+        .map(|n| n as f64)
+        .collect();
     sections.push(Section {
         heading: "Order".into(),
         panels: vec![Panel {
