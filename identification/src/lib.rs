@@ -1,1 +1,22 @@
 //! From measured data to a model, and what a model gets wrong
+
+mod checks;
+pub mod continuous;
+pub mod data;
+mod error;
+pub mod frequency_response;
+pub mod gauss_newton;
+mod identifiability;
+pub mod instrumental_variables;
+mod least_squares;
+pub mod model_file;
+pub mod residuals;
+pub mod rig;
+pub mod rig_model;
+mod rig_start;
+pub mod state_variable_filter;
+pub mod subspace;
+pub mod transfer_function;
+pub mod validation;
+
+pub use error::IdentificationError;
