@@ -4,10 +4,12 @@
 //! pound-force, second, volt) beside their conversion. No control and no FMI.
 
 pub mod actuator;
+pub mod effects;
 pub mod error;
 pub mod hysteresis;
 pub mod instrumentation;
 pub mod integration;
+pub mod identified_rig;
 pub mod linear;
 pub mod rig;
 pub mod sensor;
