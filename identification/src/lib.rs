@@ -1,8 +1,11 @@
 //! From measured data to a model, and what a model gets wrong
 
+pub mod case;
+pub mod catalogue;
 mod checks;
 pub mod continuous;
 pub mod data;
+pub mod diagnosis;
 mod error;
 pub mod frequency_response;
 pub mod gauss_newton;
@@ -10,6 +13,7 @@ mod identifiability;
 pub mod instrumental_variables;
 mod least_squares;
 pub mod model_file;
+pub mod predictor;
 pub mod residuals;
 pub mod rig;
 pub mod rig_model;
