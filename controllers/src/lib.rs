@@ -3,8 +3,17 @@
 //! One law, one file; every law meets [`Controller`]. Laws are sampled: they are called once a
 //! period with what the sensors gave, and the command they return is held until the next call.
 
+pub mod allocation;
+pub mod interlock;
+pub mod loop_shaping;
+pub mod loops;
+pub mod mpc;
 pub mod pid;
+pub mod prediction_over_delay;
+pub mod sliding_mode;
+pub mod synthesis;
 pub mod three_variable;
+pub mod three_variable_tuning;
 
 pub use plant::ModelError;
 

@@ -14,6 +14,9 @@ pub struct Pid {
     pub proportional: f64,
     /// Integral gain, V per unit and second.
     pub integral: f64,
+    /// Rate at which the integral leaks away, 1/s: `I / (s + leak)` in place of `I / s`. Two loops
+    /// that integrate through one valve need it in one of them (see [`crate::sliding_mode`]).
+    pub integral_leak: f64,
     /// Derivative gain, V s per unit.
     pub derivative: f64,
     /// Time constant of the lag on the derivative, s.
@@ -62,6 +65,7 @@ impl Pid {
         Self {
             proportional,
             integral,
+            integral_leak: 0.0,
             derivative: 0.0,
             derivative_lag: 0.0,
             limit: VALVE_LIMIT,
@@ -77,6 +81,7 @@ impl Controller for Pid {
     fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_finite("proportional_gain", self.proportional)?;
         ModelError::require_finite("integral_gain", self.integral)?;
+        ModelError::require_non_negative("integral_leak", self.integral_leak)?;
         ModelError::require_finite("derivative_gain", self.derivative)?;
         ModelError::require_non_negative("derivative_lag", self.derivative_lag)?;
         ModelError::require_positive("valve_limit", self.limit)
@@ -87,6 +92,7 @@ impl Controller for Pid {
         let rate = (error - self.memory.error.unwrap_or(error)) / period;
         self.memory.rate += (rate - self.memory.rate) * period / (period + self.derivative_lag);
         self.memory.error = Some(error);
+        self.memory.integral *= (-self.integral_leak * period).exp();
         let increment = self.integral * error * period;
         let others = self.proportional * error + self.derivative * self.memory.rate;
         limit_and_integrate(&mut self.memory.integral, increment, others, self.limit)
@@ -140,6 +146,27 @@ mod tests {
             (command - (2.0 + 3.0 * 0.505 + 0.5)).abs() < 1e-12,
             "{command}"
         );
+    }
+
+    #[test]
+    fn a_leaking_integral_settles_at_gain_over_leak() {
+        let mut pid = Pid {
+            proportional: 0.0,
+            integral: 3.0,
+            integral_leak: 2.0,
+            ..Pid::equation_3_6()
+        };
+        let h = 1e-4;
+        let mut at = |samples: u32| {
+            let input = PidInput {
+                reference: 1.0,
+                measured: 0.0,
+            };
+            (0..samples).fold(0.0, |_, _| pid.step(&input, h))
+        };
+        // 3 / 2 (1 - exp(-2 t)).
+        assert!((at(5000) - 1.5 * (1.0 - (-1f64).exp())).abs() < 3e-4);
+        assert!((at(100_000) - 1.5).abs() < 3e-4);
     }
 
     #[test]

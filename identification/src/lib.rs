@@ -2,6 +2,26 @@
 
 pub mod case;
 pub mod catalogue;
+mod checks;
+pub mod continuous;
+pub mod data;
 pub mod diagnosis;
+mod error;
+pub mod frequency_response;
+pub mod gauss_newton;
+mod identifiability;
+pub mod instrumental_variables;
+mod least_squares;
+pub mod model_file;
 pub mod predictor;
+pub mod residuals;
+pub mod rig;
+pub mod rig_model;
+mod rig_start;
 pub mod rigs;
+pub mod state_variable_filter;
+pub mod subspace;
+pub mod transfer_function;
+pub mod validation;
+
+pub use error::IdentificationError;

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{build, info, run};
+use crate::commands::{build, compare, design, identify, info, run};
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -25,10 +25,16 @@ pub struct Cli {
 enum Command {
     /// Build the components and pack them as FMUs
     Build(build::Arguments),
+    /// Run controllers on records and print the thesis's tables beside the results
+    Compare(compare::Arguments),
+    /// Print margins of the loops and draw their frequency responses
+    Design(design::Arguments),
+    /// Find a rig's parameters from measured data
+    Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
     Info(info::Arguments),
     /// Run a system on a motion
-    Run(run::Arguments),
+    Run(Box<run::Arguments>),
 }
 
 /// Reads the command line, does what it says and gives the exit status.
@@ -36,6 +42,9 @@ pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Build(arguments)) => build::execute(&arguments),
+        Some(Command::Compare(arguments)) => compare::execute(&arguments),
+        Some(Command::Design(arguments)) => design::execute(&arguments),
+        Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
     };

@@ -32,6 +32,9 @@ pub enum Error {
     /// Results cannot be written.
     #[error(transparent)]
     Results(#[from] ResultsError),
+    /// Measured data give no model.
+    #[error(transparent)]
+    Identification(#[from] identification::IdentificationError),
     /// An option is at fault.
     #[error("{option}: {reason}")]
     Option {

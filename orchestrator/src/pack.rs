@@ -3,19 +3,21 @@
 //! A component is a library crate of type `cdylib` under `fmus/`; nothing else lists it. Cargo
 //! builds it, and the built library tells its own name, model descriptions and documentation.
 
+mod archive;
+mod variant;
+mod workspace;
+
 use std::{
-    fs::{self, File},
-    io::{self, Write},
+    io,
     path::{Path, PathBuf},
-    process::Command,
-    sync::{Mutex, OnceLock, PoisonError},
+    sync::OnceLock,
 };
 
-use sha2::{Digest, Sha256};
 use thiserror::Error;
-use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 use crate::component_library::{ComponentLibrary, Descriptions};
+pub use variant::{StartValue, write_variant};
+use workspace::Workspace;
 
 /// Version of the FMI standard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -111,6 +113,14 @@ pub enum PackError {
         /// What the system says.
         error: io::Error,
     },
+    /// An FMU cannot be varied as asked.
+    #[error("{path}: {problem}")]
+    Variant {
+        /// The FMU.
+        path: PathBuf,
+        /// What is wrong and what was expected.
+        problem: String,
+    },
     /// FMUs could not be packed earlier in this process.
     #[error("{0}")]
     Earlier(String),
@@ -192,255 +202,4 @@ pub fn model_descriptions() -> Result<Vec<(PathBuf, String)>, PackError> {
 /// When the program does not run inside its workspace.
 pub fn workspace_root() -> Result<PathBuf, PackError> {
     Ok(Workspace::find()?.root)
-}
-
-struct Workspace {
-    root: PathBuf,
-}
-
-impl Workspace {
-    /// Looks upwards from the package that cargo runs, the present folder and the program.
-    fn find() -> Result<Self, PackError> {
-        let here = std::env::current_dir().unwrap_or_default();
-        let package = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
-        let program = std::env::current_exe().ok();
-        let places = [package, Some(here.clone()), program];
-        places
-            .iter()
-            .flatten()
-            .flat_map(|place| place.ancestors())
-            .find(|folder| folder.join("fmus/kit/Cargo.toml").is_file())
-            .map(|root| Self { root: root.into() })
-            .ok_or(PackError::NoWorkspace(here))
-    }
-
-    fn cargo(&self, arguments: &[&str]) -> Result<String, PackError> {
-        let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
-        let output = Command::new(&cargo)
-            .args(arguments)
-            .current_dir(&self.root)
-            .output()
-            .map_err(|error| PackError::NoCargo {
-                cargo: cargo.clone(),
-                error,
-            })?;
-        if !output.status.success() {
-            return Err(PackError::Cargo {
-                command: format!("cargo {}", arguments.join(" ")),
-                output: String::from_utf8_lossy(&output.stderr).trim().into(),
-            });
-        }
-        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
-    }
-
-    /// Names of the packages under a folder that have a `cdylib`.
-    fn packages_under(&self, folder: &str) -> Result<Vec<String>, PackError> {
-        let answer = self.cargo(&["metadata", "--no-deps", "--format-version", "1"])?;
-        let fail = |problem: String| PackError::Answer {
-            command: "metadata",
-            problem,
-        };
-        let metadata: serde_json::Value =
-            serde_json::from_str(&answer).map_err(|e| fail(e.to_string()))?;
-        let packages = metadata["packages"]
-            .as_array()
-            .ok_or_else(|| fail("no `packages`".into()))?;
-        let within = |package: &&serde_json::Value| {
-            let manifest = package["manifest_path"].as_str().map(Path::new);
-            let above = manifest.and_then(|m| m.parent()?.parent()?.file_name());
-            above.is_some_and(|above| above == folder)
-        };
-        Ok(packages
-            .iter()
-            .filter(within)
-            .filter(|package| targets(&package["targets"]).any(|t| kinds(t, "cdylib")))
-            .filter_map(|package| package["name"].as_str().map(String::from))
-            .collect())
-    }
-
-    /// Builds packages and returns their dynamic libraries.
-    fn build(&self, packages: &[String]) -> Result<Vec<PathBuf>, PackError> {
-        let mut arguments = vec![
-            "build",
-            "--release",
-            "--message-format",
-            "json-render-diagnostics",
-        ];
-        for package in packages {
-            arguments.extend(["-p", package]);
-        }
-        let answer = self.cargo(&arguments)?;
-        let fail = |problem: String| PackError::Answer {
-            command: "build",
-            problem,
-        };
-        let mut libraries = Vec::new();
-        for line in answer.lines() {
-            let message: serde_json::Value =
-                serde_json::from_str(line).map_err(|e| fail(e.to_string()))?;
-            let manifest = message["manifest_path"].as_str().map(Path::new);
-            let ours = manifest.is_some_and(|manifest| manifest.starts_with(&self.root));
-            if !ours || !kinds(&message["target"], "cdylib") {
-                continue;
-            }
-            let files = message["filenames"].as_array().into_iter().flatten();
-            let extension = std::env::consts::DLL_EXTENSION;
-            libraries.extend(
-                files
-                    .filter_map(|file| file.as_str().map(PathBuf::from))
-                    .filter(|file| file.extension().is_some_and(|e| e == extension)),
-            );
-        }
-        if libraries.len() != packages.len() {
-            let (found, wanted) = (libraries.len(), packages.join(", "));
-            return Err(fail(format!("{found} dynamic libraries for {wanted}")));
-        }
-        Ok(libraries)
-    }
-
-    fn pack(
-        &self,
-        packages: &[String],
-        out: &Path,
-        versions: &[FmiVersion],
-    ) -> Result<Vec<PackedFmu>, PackError> {
-        // One process at a time builds and packs: the first does the work, the others find it
-        // done. Threads of one process share the lock of the file, so they need one of their own.
-        static THREADS: Mutex<()> = Mutex::new(());
-        let _turn = THREADS.lock().unwrap_or_else(PoisonError::into_inner);
-        fs::create_dir_all(out).map_err(file_error(out))?;
-        let lock_path = out.join(".lock");
-        let lock = File::create(&lock_path).map_err(file_error(&lock_path))?;
-        lock.lock().map_err(file_error(&lock_path))?;
-        let licences = self.licences()?;
-        let mut packed = Vec::new();
-        for library in self.build(packages)? {
-            let binary = fs::read(&library).map_err(file_error(&library))?;
-            let descriptions = ComponentLibrary::open(&library)?.describe()?;
-            for version in versions {
-                let folder = out.join(version.folder());
-                fs::create_dir_all(&folder).map_err(file_error(&folder))?;
-                let path = folder.join(format!("{}.fmu", descriptions.name));
-                let entries = entries(*version, &descriptions, &binary, &licences);
-                write_archive(&path, &entries)?;
-                packed.push(PackedFmu {
-                    name: descriptions.name.clone(),
-                    version: *version,
-                    path,
-                });
-            }
-        }
-        packed.sort_by(|a, b| (&a.name, a.version).cmp(&(&b.name, b.version)));
-        Ok(packed)
-    }
-
-    fn licences(&self) -> Result<Vec<(String, Vec<u8>)>, PackError> {
-        let mut licences = Vec::new();
-        for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
-            let path = self.root.join(name);
-            let text = fs::read(&path).map_err(file_error(&path))?;
-            licences.push((format!("documentation/licenses/{name}.txt"), text));
-        }
-        Ok(licences)
-    }
-}
-
-fn targets(targets: &serde_json::Value) -> impl Iterator<Item = &serde_json::Value> {
-    targets.as_array().into_iter().flatten()
-}
-
-fn kinds(target: &serde_json::Value, kind: &str) -> bool {
-    target["kind"]
-        .as_array()
-        .is_some_and(|kinds| kinds.iter().any(|k| k == kind))
-}
-
-const LICENCE: &str = "This FMU is licensed under either of the Apache License, Version 2.0, or \
-                       the MIT license, at your option; both texts lie beside this file.\n";
-
-/// Names and contents of an FMU's files, sorted; a name that ends in a slash is a folder.
-fn entries(
-    version: FmiVersion,
-    descriptions: &Descriptions,
-    binary: &[u8],
-    licences: &[(String, Vec<u8>)],
-) -> Vec<(String, Vec<u8>)> {
-    let description = match version {
-        FmiVersion::Two => &descriptions.fmi2,
-        FmiVersion::Three => &descriptions.fmi3,
-    };
-    let library = format!(
-        "{}/{}{}",
-        version.binaries(),
-        descriptions.name,
-        std::env::consts::DLL_SUFFIX
-    );
-    let mut entries = vec![
-        (
-            "modelDescription.xml".to_string(),
-            description.clone().into_bytes(),
-        ),
-        (
-            "documentation/index.html".into(),
-            descriptions.documentation.clone().into_bytes(),
-        ),
-        ("documentation/licenses/license.txt".into(), LICENCE.into()),
-        ("resources/".into(), Vec::new()),
-        (library, binary.to_vec()),
-    ];
-    entries.extend_from_slice(licences);
-    entries.sort();
-    entries
-}
-
-/// Writes an archive unless it is there with the same contents. The same contents give the same
-/// bytes; a reader never sees half an archive.
-fn write_archive(path: &Path, entries: &[(String, Vec<u8>)]) -> Result<(), PackError> {
-    let mut sum = Sha256::new();
-    for (name, content) in entries {
-        sum.update((name.len() as u64).to_le_bytes());
-        sum.update(name);
-        sum.update((content.len() as u64).to_le_bytes());
-        sum.update(content);
-    }
-    let stamp: String = sum
-        .finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
-    let old = File::open(path)
-        .ok()
-        .and_then(|file| ZipArchive::new(file).ok());
-    if old.is_some_and(|archive| archive.comment() == stamp.as_bytes()) {
-        return Ok(());
-    }
-    let draft = path.with_extension(format!("fmu.{}", std::process::id()));
-    let written = write_entries(&draft, entries, stamp);
-    let moved = written.and_then(|()| fs::rename(&draft, path));
-    if moved.is_err() {
-        let _ = fs::remove_file(&draft);
-    }
-    moved.map_err(file_error(path))
-}
-
-fn write_entries(path: &Path, entries: &[(String, Vec<u8>)], stamp: String) -> io::Result<()> {
-    let options = SimpleFileOptions::default()
-        .compression_method(CompressionMethod::Deflated)
-        .last_modified_time(DateTime::default());
-    let mut archive = ZipWriter::new(File::create(path)?);
-    archive.set_comment(stamp).map_err(io::Error::from)?;
-    for (name, content) in entries {
-        if let Some(folder) = name.strip_suffix('/') {
-            archive.add_directory(folder, options.unix_permissions(0o755))?;
-            continue;
-        }
-        let mode = if name.starts_with("binaries/") {
-            0o755
-        } else {
-            0o644
-        };
-        archive.start_file(name, options.unix_permissions(mode))?;
-        archive.write_all(content)?;
-    }
-    archive.finish()?.sync_all()
 }

@@ -55,7 +55,8 @@ impl Results {
         let staging = tempfile::Builder::new()
             .prefix(".shakebench-")
             .tempdir_in(place.unwrap_or(Path::new(".")))
-            .map_err(failed)?;
+            // Without the name of the temporary folder.
+            .map_err(|error| failed(error.kind().into()))?;
         Ok(Self {
             folder: folder.to_path_buf(),
             staging,

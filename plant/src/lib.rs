@@ -6,11 +6,17 @@
 pub mod actuator;
 pub mod effects;
 pub mod error;
+pub mod hysteresis;
 pub mod identified_rig;
+pub mod instrumentation;
+pub mod integration;
 pub mod linear;
 pub mod rig;
+pub mod sensor;
+pub mod servo_hydraulic;
 pub mod shake_table;
 pub mod specimen;
+pub mod specimens;
 pub mod table;
 pub mod units;
 

@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::ModelError;
 use crate::actuator::{IdentifiedActuator, PublishedActuator};
-use crate::linear::{StateSpace, zero_order_hold};
+use crate::linear::{StateSpace, TransferFunction, zero_order_hold};
 use crate::table::Table;
 
 /// The identified shake table: actuator (Eq 2-13, 2-14) and table (Eq 2-28).
@@ -96,6 +96,31 @@ impl ShakeTable {
         }
     }
 
+    /// `G_ux`, valve command (V) to displacement (m), without a specimen (Eq 3-5 multiplied out).
+    pub fn voltage_to_displacement(&self) -> TransferFunction {
+        let g2 = self.actuator.g2();
+        let Table {
+            mass,
+            damping,
+            stiffness,
+        } = self.table;
+        let [e2, e1, e0] = self.actuator.velocity_to_force;
+        // (s³ + a2 s² + a1 s + a0) (m s² + c s + k) - (e2 s² + e1 s + e0) s.
+        let mut denominator = vec![0.0; 6];
+        for (i, a) in g2.denominator.iter().enumerate() {
+            for (j, b) in [mass, damping, stiffness].iter().enumerate() {
+                denominator[i + j] += a * b;
+            }
+        }
+        for (place, e) in denominator[2..5].iter_mut().zip([e2, e1, e0]) {
+            *place -= e;
+        }
+        TransferFunction {
+            numerator: self.actuator.voltage_to_force.to_vec(),
+            denominator,
+        }
+    }
+
     /// Acceleration of the table in m/s² under `specimen_force` (N).
     pub fn acceleration(&self, state: &ShakeTableState, specimen_force: f64) -> f64 {
         let Table {
@@ -172,6 +197,11 @@ mod tests {
             let got = system.evaluate(s).unwrap()[(0, 0)];
             assert!(
                 (got - g_ux).norm() < 1e-12 * g_ux.norm(),
+                "at {omega} rad/s"
+            );
+            let multiplied_out = rig.voltage_to_displacement().evaluate(s);
+            assert!(
+                (multiplied_out - g_ux).norm() < 1e-12 * g_ux.norm(),
                 "at {omega} rad/s"
             );
         }

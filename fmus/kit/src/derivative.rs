@@ -99,3 +99,45 @@ impl<C: Component> Instance<C> {
             .partial_derivative(name(unknown), name(known))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{
+        oscillator::{ACCELERATION, FORCE, MASS, POSITION, VELOCITY, refusal, running},
+        phase::Kind,
+    };
+
+    #[test]
+    fn directional_and_adjoint_derivatives_are_the_jacobian_times_the_seed() {
+        let mut instance = running(Kind::ModelExchange);
+        let (unknowns, knowns) = ([POSITION, ACCELERATION], [POSITION, VELOCITY, FORCE]);
+        // Rows: position, acceleration; m = 2, k = 50.
+        let jacobian = [[1.0, 0.0, 0.0], [-25.0, 0.0, 0.5]];
+        let (v, w) = ([3.0, 5.0, 7.0], [2.0, -1.0]);
+        let mut forward = [0.0; 2];
+        instance
+            .directional_derivative(&unknowns, &knowns, &v, &mut forward)
+            .unwrap();
+        let mut backward = [0.0; 3];
+        instance
+            .adjoint_derivative(&unknowns, &knowns, &w, &mut backward)
+            .unwrap();
+        for i in 0..2 {
+            assert_eq!(forward[i], (0..3).map(|j| jacobian[i][j] * v[j]).sum());
+        }
+        for j in 0..3 {
+            assert_eq!(backward[j], (0..2).map(|i| jacobian[i][j] * w[i]).sum());
+        }
+    }
+
+    #[test]
+    fn knowns_and_unknowns_are_checked() {
+        let mut instance = running(Kind::CoSimulation);
+        let mut one = |unknown, known| {
+            refusal(instance.directional_derivative(&[unknown], &[known], &[1.0], &mut [0.0]))
+        };
+        assert!(one(FORCE, FORCE).contains("`force` is no unknown"));
+        assert!(one(ACCELERATION, MASS).contains("`mass` is no known"));
+        assert!(one(ACCELERATION, 99).contains("value reference 99"));
+    }
+}

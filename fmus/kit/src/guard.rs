@@ -93,3 +93,41 @@ fn describe(payload: Box<dyn Any + Send>) -> String {
     let place = own.map(|at| panics.swap_remove(at).1).unwrap_or_default();
     format!("panic{place}: {text}")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        oscillator::{FORCE, Oscillator, running},
+        phase::Kind,
+    };
+
+    #[test]
+    fn panic_is_caught_and_poisons_only_its_instance() {
+        let mut hit = running(Kind::CoSimulation);
+        let mut beside = running(Kind::CoSimulation);
+        let handle = (&raw mut hit).cast::<c_void>();
+        let other = (&raw mut beside).cast::<c_void>();
+        hit.set_real(FORCE, 666.0).unwrap();
+        let step = |handle| {
+            // SAFETY: both instances live to the end of the test.
+            unsafe { entry::<Oscillator>(handle, "step", |i| i.do_step(i.now.time, 0.002)) }
+        };
+        assert_eq!(step(handle), Status::Error);
+        assert!(hit.poisoned);
+        assert_eq!(step(handle), Status::Error);
+        assert_eq!(step(other), Status::Ok);
+        assert_eq!(step(std::ptr::null_mut()), Status::Error);
+    }
+
+    #[test]
+    fn message_of_a_panic_is_kept() {
+        assert!(
+            catch(|| panic!("number {}", 7))
+                .unwrap_err()
+                .ends_with("number 7")
+        );
+        assert!(catch(|| panic!("plain")).unwrap_err().ends_with("plain"));
+        assert_eq!(catch(|| 5), Ok(5));
+    }
+}

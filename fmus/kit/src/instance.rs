@@ -87,7 +87,7 @@ impl<C: Component> Instance<C> {
             )));
         }
         if let Some(stop) = stop_time
-            && !(stop >= start_time)
+            && (stop.is_nan() || stop < start_time)
         {
             return Err(Fault::error(format!(
                 "stop time {stop} s is not after the start time {start_time} s"
@@ -158,7 +158,11 @@ impl<C: Component> Instance<C> {
         if !(in_place && in_range && in_time && fits) {
             return Err(self.refuse_step(time, step_size, in_place, in_range, in_time));
         }
-        if let Err(problem) = self.now.component.step(time, step_size) {
+        // A master that computes the step as a difference of times errs by rounding; components
+        // prepared for their own step size need not prepare again.
+        let nominal = (step_size - C::STEP_SIZE).abs() <= 1e-9 * C::STEP_SIZE;
+        let length = if nominal { C::STEP_SIZE } else { step_size };
+        if let Err(problem) = self.now.component.step(time, length) {
             self.now.phase = Phase::Failed;
             return Err(Fault::error(format!(
                 "the step from t = {time} s to {} s failed: {problem}",
@@ -221,5 +225,99 @@ impl<C: Component> Snapshot<C> {
             unprepared: true,
             stale: true,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::oscillator::{ACCELERATION, FORCE, MASS, Oscillator, instance, refusal, running};
+
+    /// The calls that move an instance on, by name.
+    type Call = (&'static str, fn(&mut Instance<Oscillator>) -> Outcome);
+
+    const CALLS: [Call; 7] = [
+        ("set up", |i| i.set_up(0.0, None)),
+        ("enter initialization", |i| i.enter_initialization()),
+        ("exit initialization", |i| i.exit_initialization()),
+        ("step", |i| i.do_step(i.now.time, 0.002)),
+        ("event mode", |i| i.enter_event_mode()),
+        ("continuous time", |i| i.enter_continuous_time_mode()),
+        ("terminate", |i| i.terminate()),
+    ];
+
+    fn accepted(kind: Kind, phase: Phase) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        for (name, call) in CALLS {
+            let mut instance = running(kind);
+            instance.now.phase = phase;
+            if call(&mut instance).is_ok() {
+                names.push(name);
+            }
+        }
+        names
+    }
+
+    #[test]
+    fn each_phase_accepts_its_calls_and_no_others() {
+        use Kind::{CoSimulation, ModelExchange};
+        use Phase::*;
+        let first = ["set up", "enter initialization"];
+        let running = ["event mode", "continuous time", "terminate"];
+        for kind in [CoSimulation, ModelExchange] {
+            assert_eq!(accepted(kind, Instantiated), first);
+            assert_eq!(accepted(kind, Initialization), ["exit initialization"]);
+            assert_eq!(accepted(kind, Failed), ["terminate"]);
+            assert!(accepted(kind, Terminated).is_empty());
+        }
+        assert_eq!(accepted(CoSimulation, Step), ["step", "terminate"]);
+        assert_eq!(accepted(ModelExchange, Event), running);
+        assert_eq!(
+            accepted(ModelExchange, ContinuousTime),
+            ["event mode", "terminate"]
+        );
+    }
+
+    #[test]
+    fn outputs_follow_inputs_and_parameters_during_initialization() {
+        let mut instance = instance(Kind::CoSimulation);
+        instance.set_up(0.0, None).unwrap();
+        instance.enter_initialization().unwrap();
+        instance.set_real(FORCE, 8.0).unwrap();
+        assert_eq!(instance.get_real(ACCELERATION), Ok(4.0));
+        instance.set_real(MASS, 4.0).unwrap();
+        assert_eq!(instance.get_real(ACCELERATION), Ok(2.0));
+        instance.set_real(MASS, 1e7).unwrap();
+        assert!(refusal(instance.get_real(ACCELERATION)).contains("`mass` is too large"));
+        assert!(refusal(instance.exit_initialization()).contains("`mass` is too large"));
+        instance.set_real(MASS, 1.0).unwrap();
+        assert_eq!(instance.exit_initialization(), Ok(()));
+    }
+
+    #[test]
+    fn rounding_of_the_time_is_accepted_and_anything_more_refused() {
+        let mut instance = running(Kind::CoSimulation);
+        let mut time = 0.0;
+        for _ in 0..50_000 {
+            instance.do_step(time, 0.002).unwrap();
+            time += 0.002;
+        }
+        assert_eq!(instance.do_step(50_000.0 * 0.002, 0.002), Ok(()));
+        assert!(refusal(instance.do_step(100.0, 0.002)).contains("stands at 100.002 s"));
+        assert!(refusal(instance.do_step(100.002 + 1e-6, 0.002)).contains("communication point"));
+        assert!(refusal(instance.do_step(100.002, -0.0)).contains("step size -0 s"));
+        assert!(refusal(instance.do_step(100.002, f64::NAN)).contains("step size NaN s"));
+    }
+
+    #[test]
+    fn failed_step_is_left_by_reset_only_or_an_earlier_state() {
+        let mut instance = running(Kind::CoSimulation);
+        instance.set_real(FORCE, 13.0).unwrap();
+        let message = refusal(instance.do_step(0.0, 0.002));
+        assert!(message.contains("from t = 0 s to 0.002 s failed: a force that the step refuses"));
+        assert!(refusal(instance.do_step(0.0, 0.002)).contains("after a failed step"));
+        instance.reset();
+        assert_eq!(instance.now.phase, Phase::Instantiated);
+        assert_eq!(instance.get_real(FORCE), Ok(0.0));
     }
 }

@@ -37,6 +37,7 @@
 //! }
 //! ```
 
+mod checksum;
 mod component;
 mod derivative;
 mod exchange;
@@ -45,6 +46,8 @@ mod fault;
 mod guard;
 mod instance;
 mod log;
+#[cfg(test)]
+mod oscillator;
 mod phase;
 mod pointers;
 mod shared;

@@ -32,9 +32,6 @@ pub enum Sink {
     Fmi2(Fmi2Logger, *mut c_void),
     /// An importer of FMI 3.0.
     Fmi3(Fmi3Logger, *mut c_void),
-    /// Collects nothing but counts; for tests in Rust.
-    #[cfg(test)]
-    Test(fn(Status, &str)),
 }
 
 /// The log categories, as both model descriptions list them.
@@ -128,8 +125,6 @@ impl Log {
                 // SAFETY: as above.
                 unsafe { logger(environment, status as i32, category.as_ptr(), text.as_ptr()) }
             }
-            #[cfg(test)]
-            Sink::Test(sink) => sink(status, message),
         }
     }
 }

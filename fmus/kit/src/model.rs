@@ -9,6 +9,7 @@ use std::{
 use thiserror::Error;
 
 use crate::{
+    checksum::{SEED, checksum},
     component::Component,
     description,
     fault::{Fault, Outcome},
@@ -267,18 +268,11 @@ fn check_kind<C>(variable: &Variable<C>, start: &mut C) -> Result<(), String> {
     Ok(())
 }
 
-/// A token in the form of a GUID: two FNV-1a sums of the text.
-fn fingerprint(text: &str) -> String {
-    let sum = |seed: u64| {
-        text.bytes().fold(seed, |sum, byte| {
-            (sum ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-        })
-    };
-    let digits = format!(
-        "{:016x}{:016x}",
-        sum(0xcbf2_9ce4_8422_2325),
-        sum(0x9ae1_6a3b_2f90_404f)
-    );
+/// A token in the form of a GUID: two sums of the text.
+pub(crate) fn fingerprint(text: &str) -> String {
+    let second = checksum(SEED, b"second");
+    let sum = |seed| checksum(seed, text.as_bytes());
+    let digits = format!("{:016x}{:016x}", sum(SEED), sum(second));
     let part = |from: usize, to: usize| &digits[from..to];
     format!(
         "{{{}-{}-{}-{}-{}}}",
@@ -288,4 +282,90 @@ fn fingerprint(text: &str) -> String {
         part(16, 20),
         part(20, 32)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::component::ComponentResult;
+    use serde::{Deserialize, Serialize};
+
+    /// Components that differ in the mistake in their table.
+    #[derive(Clone, Default, Serialize, Deserialize)]
+    struct Wrong<const MISTAKE: usize> {
+        input: f64,
+        output: f64,
+        flag: bool,
+    }
+
+    impl<const MISTAKE: usize> Component for Wrong<MISTAKE> {
+        const NAME: &'static str = "Wrong";
+        const DESCRIPTION: &'static str = "Has a mistake in its table";
+
+        fn variables() -> Vec<Variable<Self>> {
+            let input = Variable::<Self>::input("input", |s| &mut s.input).unit("m");
+            let output = Variable::<Self>::output("output", |s| &mut s.output);
+            let flag = Variable::<Self>::input("flag", |s| &mut s.flag);
+            let fixed = Dependency::Fixed;
+            match MISTAKE {
+                0 => vec![input, Variable::<Self>::output("input", |s| &mut s.output)],
+                1 => vec![input.shown_in("s"), output],
+                2 => vec![input.unit("cubit"), output],
+                3 => vec![input.min(1.0), output],
+                4 => vec![input, output.depends_on(&["inptu"], fixed)],
+                5 => vec![flag.unit("m"), output],
+                6 => vec![input.tunable(), output],
+                7 => vec![input.derivative_of("output"), output],
+                8 => vec![input, output.initially_depends_on(&["output"])],
+                _ => vec![input, output.depends_on(&["input"], fixed), flag],
+            }
+        }
+
+        fn initialize(&mut self) -> ComponentResult {
+            Ok(())
+        }
+
+        fn step(&mut self, _: f64, _: f64) -> ComponentResult {
+            Ok(())
+        }
+    }
+
+    fn problem<const MISTAKE: usize>() -> String {
+        Model::<Wrong<MISTAKE>>::new()
+            .err()
+            .map(|e| e.to_string())
+            .unwrap_or_default()
+    }
+
+    #[test]
+    fn mistakes_in_a_table_are_named() {
+        for (problem, expected) in [
+            (problem::<0>(), "`input`: the name is used twice"),
+            (problem::<1>(), "`input`: cannot be shown in `s`"),
+            (problem::<2>(), "unknown symbol `cubit`"),
+            (problem::<3>(), "`input`: start 0 is outside 1 to inf"),
+            (problem::<4>(), "`output`: `inptu` is no variable"),
+            (problem::<5>(), "`flag`: only a Float64 has a unit"),
+            (problem::<6>(), "`input`: cannot be Input and Tunable"),
+            (
+                problem::<7>(),
+                "`input`: states and derivatives are continuous outputs or locals",
+            ),
+            (
+                problem::<8>(),
+                "`output`: `output` is neither input nor parameter",
+            ),
+        ] {
+            assert!(problem.contains(expected), "`{problem}` lacks `{expected}`");
+        }
+        assert_eq!(problem::<9>(), "");
+    }
+
+    #[test]
+    fn token_changes_with_the_interface() {
+        let token = Model::<Wrong<9>>::new().unwrap().token;
+        assert_eq!(token, Model::<Wrong<9>>::new().unwrap().token);
+        assert_ne!(token, fingerprint(""));
+        assert_eq!(token.len(), 38);
+    }
 }

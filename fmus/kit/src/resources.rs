@@ -1,8 +1,9 @@
 //! The folder `resources` of an unpacked FMU, where a file may replace start values.
 //!
 //! `start_values.csv` has one line `name,value` for each parameter that starts differently from
-//! the component's own defaults. An FMU made from identified data is the same library with such a
-//! file and its own model description.
+//! the component's own defaults. A variant of an FMU, made from identified data for instance, is
+//! the same library with such a file and its own model description; its token tells it from the
+//! original and from other variants.
 
 use std::{
     fs, io,
@@ -13,7 +14,7 @@ use percent_encoding::percent_decode_str;
 
 use crate::{
     component::Component,
-    model::Model,
+    model::{Model, fingerprint},
     variable::{Access, Causality},
 };
 
@@ -52,28 +53,38 @@ impl Location<'_> {
     }
 }
 
-/// The component's defaults, changed as the file in its resources says.
+/// The file that replaces start values, with its text; `None` if there is none.
+///
+/// # Errors
+/// When the file is there but cannot be read.
+pub fn start_values(location: Location<'_>) -> Result<Option<(PathBuf, String)>, String> {
+    let Some(file) = location.folder().map(|folder| folder.join(START_VALUES)) else {
+        return Ok(None);
+    };
+    match fs::read_to_string(&file) {
+        Ok(text) => Ok(Some((file, text))),
+        Err(e)
+            if matches!(
+                e.kind(),
+                io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+            ) =>
+        {
+            Ok(None)
+        }
+        Err(e) => Err(format!("{}: {e}", file.display())),
+    }
+}
+
+/// The token of the variant that a file of start values makes of the FMU with `token`.
+pub fn variant_token(token: &str, start_values: &str) -> String {
+    fingerprint(&format!("{token}\n{start_values}"))
+}
+
+/// Changes a component as the text of its file of start values says.
 ///
 /// # Errors
 /// Names the file and line that cannot be used.
-pub fn start_values<C: Component>(model: &Model<C>, location: Location<'_>) -> Result<C, String> {
-    let mut component = C::default();
-    if let Some(folder) = location.folder() {
-        let file = folder.join(START_VALUES);
-        match fs::read_to_string(&file) {
-            Ok(text) => apply(model, &mut component, &text, &file)?,
-            Err(e)
-                if matches!(
-                    e.kind(),
-                    io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
-                ) => {}
-            Err(e) => return Err(format!("{}: {e}", file.display())),
-        }
-    }
-    Ok(component)
-}
-
-fn apply<C: Component>(
+pub fn apply<C: Component>(
     model: &Model<C>,
     component: &mut C,
     text: &str,
@@ -114,6 +125,7 @@ fn apply<C: Component>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::oscillator::Oscillator;
 
     fn folder(uri: &str) -> Option<PathBuf> {
         Location::Uri(uri).folder()
@@ -134,5 +146,34 @@ mod tests {
             Some(PathBuf::from("/tmp/a%20b"))
         );
         assert_eq!(Location::Path("").folder(), None);
+    }
+
+    #[test]
+    fn start_values_are_applied_or_refused_by_line() {
+        let model = Model::<Oscillator>::get().unwrap();
+        let file = Path::new("start_values.csv");
+        let mut component = Oscillator::default();
+        apply(model, &mut component, "mass, 3.5\n\nstiffness,7e2\n", file).unwrap();
+        assert_eq!(component.mass, 3.5);
+        for (line, expected) in [
+            ("mass", "start_values.csv:2: `mass`, expected `name,value`"),
+            (
+                "force,1",
+                "start_values.csv:2: `force` is no parameter of Oscillator",
+            ),
+            ("mass,two", "start_values.csv:2: `two` is no number"),
+            ("mass,NaN", "start_values.csv:2: `NaN` is no number"),
+            (
+                "mass,0.01",
+                "start_values.csv:2: `mass` = 0.01 is out of its range",
+            ),
+            ("note,1", "start_values.csv:2: `note` is no Float64"),
+        ] {
+            let text = format!("stiffness,1\n{line}\n");
+            assert_eq!(
+                apply(model, &mut component, &text, file),
+                Err(expected.to_string())
+            );
+        }
     }
 }

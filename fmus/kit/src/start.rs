@@ -58,17 +58,24 @@ fn prepare<C: Component>(
     if name.is_none_or(CStr::is_empty) {
         return Err("an instance needs a name".into());
     }
+    let start_values = resources::start_values(location)?;
+    let expected = match &start_values {
+        Some((_, text)) => resources::variant_token(&model.token, text),
+        None => model.token.clone(),
+    };
     let token = token.map(CStr::to_string_lossy).unwrap_or_default();
-    if token != model.token {
+    if token != expected {
         return Err(format!(
-            "token `{token}`, but this library has {}",
-            model.token
+            "token `{token}`, but the library with its resources has {expected}"
         ));
     }
     if kind == Kind::ModelExchange && !model.offers_model_exchange() {
         return Err("offers co-simulation only, no model exchange".into());
     }
-    let start = resources::start_values(model, location)?;
+    let mut start = C::default();
+    if let Some((file, text)) = start_values {
+        resources::apply(model, &mut start, &text, &file)?;
+    }
     Ok(Instance::new(model, start, kind, log))
 }
 

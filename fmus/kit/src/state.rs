@@ -9,6 +9,7 @@ use std::{
 };
 
 use crate::{
+    checksum::{SEED, checksum},
     component::Component,
     fault::{Fault, Outcome},
     instance::{Instance, Snapshot},
@@ -110,7 +111,7 @@ fn serialize<C: Component>(snapshot: &Snapshot<C>) -> Outcome<Vec<u8>> {
     bytes.extend(FORMAT.to_le_bytes());
     bytes.extend((body.len() as u64).to_le_bytes());
     bytes.extend(&body);
-    bytes.extend(checksum(&body).to_le_bytes());
+    bytes.extend(checksum(SEED, &body).to_le_bytes());
     Ok(bytes)
 }
 
@@ -141,7 +142,7 @@ fn deserialize<C: Component>(bytes: &[u8]) -> Outcome<Snapshot<C>> {
             bytes.len()
         )));
     }
-    if checksum(body) != u64::from_le_bytes(*sum) {
+    if checksum(SEED, body) != u64::from_le_bytes(*sum) {
         return Err(fail("damaged, the checksum differs".into()));
     }
     let unreadable = |e: postcard::Error| fail(format!("cannot be read: {e}"));
@@ -154,9 +155,107 @@ fn deserialize<C: Component>(bytes: &[u8]) -> Outcome<Snapshot<C>> {
     postcard::from_bytes(body).map_err(unreadable)
 }
 
-/// FNV-1a.
-fn checksum(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |sum, byte| {
-        (sum ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        oscillator::{FORCE, Oscillator, POSITION, VELOCITY, instance, refusal, running},
+        phase::Kind,
+    };
+
+    fn advance(instance: &mut Instance<Oscillator>, steps: usize) -> Vec<u64> {
+        let mut seen = Vec::new();
+        for k in 0..steps {
+            instance.set_real(FORCE, (k as f64 * 0.7).sin()).unwrap();
+            instance.do_step(instance.now.time, 0.002).unwrap();
+            for reference in [POSITION, VELOCITY] {
+                seen.push(instance.get_real(reference).unwrap().to_bits());
+            }
+        }
+        seen
+    }
+
+    #[test]
+    fn restored_state_goes_on_to_the_bit_even_in_another_instance() {
+        let mut first = running(Kind::CoSimulation);
+        advance(&mut first, 50);
+        let mut state = std::ptr::null_mut();
+        first.get_state(&mut state).unwrap();
+        let bytes = first.serialize_state(state).unwrap();
+        let expected = advance(&mut first, 50);
+
+        let mut second = instance(Kind::CoSimulation);
+        let mut restored = std::ptr::null_mut();
+        second.deserialize_state(&bytes, &mut restored).unwrap();
+        second.set_state(restored).unwrap();
+        assert_eq!(
+            second.now.time.to_bits(),
+            (0..50).fold(0.0f64, |t, _| t + 0.002).to_bits()
+        );
+        assert_eq!(advance(&mut second, 50), expected);
+
+        // A state that is given is overwritten, not leaked.
+        let before = restored;
+        second.get_state(&mut restored).unwrap();
+        assert_eq!(before, restored);
+        second.free_state(&mut restored).unwrap();
+        assert!(restored.is_null());
+        second.free_state(&mut restored).unwrap();
+        first.free_state(&mut state).unwrap();
+    }
+
+    #[test]
+    fn foreign_and_freed_states_are_refused() {
+        let mut instance = running(Kind::CoSimulation);
+        let mut number = 7u64;
+        let foreign = (&raw mut number).cast::<c_void>();
+        assert!(refusal(instance.set_state(foreign)).contains("not a saved state"));
+        let mut state = std::ptr::null_mut();
+        instance.get_state(&mut state).unwrap();
+        let mut again = state;
+        instance.free_state(&mut state).unwrap();
+        assert!(refusal(instance.free_state(&mut again)).contains("already freed"));
+    }
+
+    #[test]
+    fn state_of_the_other_kind_is_refused() {
+        let exchange = running(Kind::ModelExchange);
+        let mut state = std::ptr::null_mut();
+        exchange.get_state(&mut state).unwrap();
+        let mut cosim = running(Kind::CoSimulation);
+        assert!(refusal(cosim.set_state(state)).contains("a state of ModelExchange"));
+        exchange.free_state(&mut state).unwrap();
+    }
+
+    #[test]
+    fn any_changed_byte_is_found() {
+        let instance = running(Kind::CoSimulation);
+        let bytes = serialize(&instance.now).unwrap();
+        for at in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x10;
+            assert!(deserialize::<Oscillator>(&damaged).is_err(), "byte {at}");
+            assert!(
+                deserialize::<Oscillator>(&bytes[..at]).is_err(),
+                "cut at {at}"
+            );
+        }
+        assert!(deserialize::<Oscillator>(&bytes).is_ok());
+    }
+
+    #[test]
+    fn state_of_another_component_is_named() {
+        let body = postcard::to_allocvec(&("Pump", "9.9.9", 0u8)).unwrap();
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend(FORMAT.to_le_bytes());
+        bytes.extend((body.len() as u64).to_le_bytes());
+        bytes.extend(&body);
+        bytes.extend(checksum(SEED, &body).to_le_bytes());
+        let problem = deserialize::<Oscillator>(&bytes).err().unwrap().message;
+        let own = Oscillator::VERSION;
+        assert_eq!(
+            problem,
+            format!("serialized state: of Pump 9.9.9, expected Oscillator {own}")
+        );
+    }
 }

@@ -138,7 +138,7 @@ mod tests {
         let mass = parse("kg").factor_to(&parse("lbf.s2/in")).unwrap();
         assert!((1.0 / mass - 175.126_835_246_5).abs() < 1e-9);
         let psi = parse("psi").factor_to(&parse("Pa")).unwrap();
-        assert!((psi - 6894.757_293_168).abs() < 1e-8);
+        assert!((psi - 6_894.757_293_168).abs() < 1e-8);
         assert_eq!(parse("m").factor_to(&parse("s")), None);
     }
 

@@ -123,3 +123,70 @@ impl Component for ShakeTable {
 }
 
 fmu_kit::export!(ShakeTable);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmu_kit::conformance::number;
+    use plant::{actuator::IdentifiedActuator, table::Table};
+
+    #[test]
+    fn parameters_arrive_where_they_belong() {
+        let mut component = ShakeTable::default();
+        let names = [
+            "table_mass",
+            "table_damping",
+            "table_stiffness",
+            "actuator_a2",
+            "actuator_a1",
+            "actuator_a0",
+            "actuator_b2",
+            "actuator_b1",
+            "actuator_b0",
+            "actuator_e2",
+            "actuator_e1",
+            "actuator_e0",
+        ];
+        number(&mut component, &names);
+        let expected = Rig {
+            table: Table {
+                mass: 1.0,
+                damping: 2.0,
+                stiffness: 3.0,
+            },
+            actuator: IdentifiedActuator {
+                denominator: [4.0, 5.0, 6.0],
+                voltage_to_force: [7.0, 8.0, 9.0],
+                velocity_to_force: [10.0, 11.0, 12.0],
+            },
+        };
+        assert_eq!(component.rig, expected);
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_plant() {
+        let mut component = ShakeTable::default();
+        let names = [
+            "actuator_force",
+            "actuator_state[2]",
+            "actuator_state[3]",
+            "displacement",
+            "velocity",
+            "valve_command",
+            "specimen_force",
+        ];
+        number(&mut component, &names);
+        component.update_outputs(0.0);
+        let (a, b) = component.rig.dynamics();
+        let state = [1.0, 2.0, 3.0, 4.0, 5.0];
+        let expected = a * nalgebra::SVector::from(state) + b * nalgebra::vector![6.0, 7.0];
+        let [z1, z2, z3] = component.actuator_rates;
+        let got = [z1, z2, z3, component.state.velocity, component.acceleration];
+        for (got, expected) in got.iter().zip(expected.iter()) {
+            assert!(
+                (got - expected).abs() <= 1e-12 * expected.abs(),
+                "{got} against {expected}"
+            );
+        }
+    }
+}

@@ -82,3 +82,34 @@ impl Component for Specimen {
 }
 
 fmu_kit::export!(Specimen);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmu_kit::conformance::number;
+
+    #[test]
+    fn parameters_and_state_arrive_where_they_belong() {
+        let mut component = Specimen::default();
+        let names = [
+            "mass",
+            "damping",
+            "stiffness",
+            "drift",
+            "drift_velocity",
+            "table_acceleration",
+        ];
+        number(&mut component, &names);
+        let expected = LinearSpecimen {
+            mass: 1.0,
+            damping: 2.0,
+            stiffness: 3.0,
+        };
+        assert_eq!(component.specimen, expected);
+        component.update_outputs(0.0);
+        // force = k d + c d' = 12 + 10; acceleration = -force / m; d'' = acceleration - 6.
+        assert_eq!(component.force, 22.0);
+        assert_eq!(component.acceleration, -22.0);
+        assert_eq!(component.drift_acceleration, -28.0);
+    }
+}

@@ -70,3 +70,58 @@ impl Component for ThreeVariableControl {
 }
 
 fmu_kit::export!(ThreeVariableControl);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use controllers::three_variable::ThreeVariableGains;
+    use fmu_kit::conformance::number;
+
+    #[test]
+    fn parameters_and_inputs_arrive_where_they_belong() {
+        let mut component = ThreeVariableControl::default();
+        let parameters = [
+            "proportional_gain",
+            "integral_gain",
+            "velocity_feedback_gain",
+            "acceleration_feedback_gain",
+            "displacement_feedforward_gain",
+            "velocity_feedforward_gain",
+            "acceleration_feedforward_gain",
+            "valve_limit",
+        ];
+        number(&mut component, &parameters);
+        let gains = ThreeVariableGains {
+            proportional: 1.0,
+            integral: 2.0,
+            velocity_feedback: 3.0,
+            acceleration_feedback: 4.0,
+            displacement_feedforward: 5.0,
+            velocity_feedforward: 6.0,
+            acceleration_feedforward: 7.0,
+        };
+        assert_eq!(
+            component.law,
+            Law {
+                gains,
+                limit: 8.0,
+                integral: 0.0
+            }
+        );
+        number(&mut component, &INPUTS);
+        let reference = Motion {
+            displacement: 1.0,
+            velocity: 2.0,
+            acceleration: 3.0,
+        };
+        let measured = Motion {
+            displacement: 4.0,
+            velocity: 5.0,
+            acceleration: 6.0,
+        };
+        assert_eq!(
+            (component.reference, component.measured),
+            (reference, measured)
+        );
+    }
+}

@@ -185,16 +185,11 @@ fn words(system: &system::System, operation: &Operation) -> String {
 }
 
 fn motion(path: &Path) -> Result<String, Error> {
-    let record = motion::read_record(path);
-    let playable = match &record {
-        Ok(_) => motion::load(path, &motion::Options::default())?,
+    let options = motion::Options::default();
+    let playable = match motion::read_record(path) {
+        Ok(_) => motion::load(path, &options)?,
         // Not an acceleration alone: a reference, perhaps.
-        Err(_) => motion::load_reference(path, &motion::Options::default()).or_else(|error| {
-            Err::<_, Error>(match record {
-                Err(first) => first.into(),
-                Ok(_) => error.into(),
-            })
-        })?,
+        Err(error) => motion::load_reference(path, &options).map_err(|_| error)?,
     };
     let mut text = format!("{}\n", playable.name);
     for note in &playable.notes {

@@ -1,6 +1,11 @@
 //! One file a command.
 
 pub mod build;
+pub mod compare;
+mod compare_tables;
+pub mod design;
+mod design_report;
+pub mod identify;
 pub mod info;
 pub mod run;
 mod summary;

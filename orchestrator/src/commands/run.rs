@@ -14,7 +14,7 @@ use crate::master::{Algorithm, Ended, Pace};
 use crate::motion;
 use crate::results::Results;
 use crate::system::built_in;
-use crate::units::{Quantity, STANDARD_GRAVITY};
+use crate::units::{self, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
 #[derive(Debug, Default, Args)]
@@ -215,13 +215,7 @@ fn absolute(path: &Path) -> PathBuf {
 /// A positive quantity; a number alone is in `unit`.
 fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
     let fault = |reason: String| Error::Option { option, reason };
-    let quantity = Quantity::parse(text).map_err(|error| fault(error.to_string()))?;
-    let value = if quantity.unit.text.is_empty() {
-        Ok(quantity.value)
-    } else {
-        quantity.to(unit)
-    };
-    let value = value.map_err(|error| fault(error.to_string()))?;
+    let value = units::value_in(text, unit).map_err(|error| fault(error.to_string()))?;
     if value > 0.0 {
         return Ok(value);
     }

@@ -213,8 +213,12 @@ impl Instance {
                     }
                 }
             }
-            _ => (0..references.len())
-                .try_for_each(|at| Ok(values[at] = self.get_one(kind, references[at])?)),
+            _ => {
+                for (value, &reference) in values.iter_mut().zip(references) {
+                    *value = self.get_one(kind, reference)?;
+                }
+                Ok(())
+            }
         }
     }
 

@@ -6,7 +6,7 @@ use super::action::Action;
 use super::reference::Reference;
 use super::transfer::{Inputs, Outputs};
 use super::{Algorithm, MasterError, Part, Simulation, start};
-use crate::fmu::{Causality, Instance, Kind, State};
+use crate::fmu::{Causality, Instance, Kind, State, Variability};
 use crate::motion::Motion;
 use crate::system::{Operation, Quantity, Source, System};
 
@@ -191,6 +191,21 @@ impl<'a> Plan<'a> {
         }
     }
 
+    /// Whether the source changes between samples.
+    fn is_smooth(&self, source: Source) -> bool {
+        match source {
+            Source::Reference { .. } => false,
+            Source::Output {
+                component,
+                variable,
+            } => {
+                let component = &self.system.components[component];
+                let variable = &component.fmu.description.variables[variable];
+                component.period.is_none() && variable.variability == Variability::Continuous
+            }
+        }
+    }
+
     fn inputs(
         &self,
         reference: &mut Reference,
@@ -202,7 +217,11 @@ impl<'a> Plan<'a> {
         for connection in &self.system.connections {
             if connection.component == component && chosen(connection.input) {
                 let signal = self.signal(reference, connection.source);
-                inputs.add(&variables[connection.input], signal, connection.factor);
+                let input = &variables[connection.input];
+                let is_smooth = self.is_smooth(connection.source)
+                    && input.kind == Kind::Float64
+                    && input.variability == Variability::Continuous;
+                inputs.add(input, signal, connection.factor, is_smooth);
             }
         }
         inputs

@@ -22,16 +22,25 @@ pub(super) fn observe(simulation: &mut Simulation) -> Result<(), MasterError> {
     Ok(())
 }
 
-/// Continuous components over `[t_k, t_k + h]`, with their inputs held at their values at `t_k`.
+/// Continuous components over `[t_k, t_k + h]` with their inputs held: commands at their value of
+/// `t_k`, what another continuous component gives at its value extrapolated to the middle of the
+/// step, `(3 y_k - y_(k-1)) / 2` (Adams-Bashforth). That couples them with second order, where
+/// `y_k` would be half a step late and of first.
 pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
-    let (time, step) = (simulation.time(), simulation.step);
+    let (tick, time, step) = (simulation.tick, simulation.time(), simulation.step);
+    let (now, last) = (&mut simulation.signals, &mut simulation.last_signals);
+    if tick == 0 {
+        last.copy_from_slice(now);
+    }
     for part in simulation
         .parts
         .iter_mut()
         .filter(|part| part.every.is_none())
     {
-        part.inputs.transfer(&simulation.signals, &part.instance)?;
+        part.inputs
+            .transfer_between(now, last, -0.5, &part.instance)?;
         part.instance.do_step(time, step)?;
     }
+    last.copy_from_slice(now);
     Ok(())
 }

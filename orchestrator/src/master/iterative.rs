@@ -1,6 +1,6 @@
 //! The coupling over a step by fixed-point iteration: inputs from continuous components are held
-//! at the mean of their values at both ends of the step, which makes the coupling of second order
-//! where held inputs are of first.
+//! at the mean of their values at both ends of the step (the trapezoidal rule), so that nothing is
+//! extrapolated; of second order.
 
 use super::action::{Moment, settled};
 use super::{MasterError, Simulation};
@@ -31,7 +31,8 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     for pass in 1.. {
         last.copy_from_slice(next);
         for part in parts.iter_mut().filter(|part| part.every.is_none()) {
-            part.inputs.transfer_mean(signals, next, &part.instance)?;
+            part.inputs
+                .transfer_between(signals, next, 0.5, &part.instance)?;
             part.instance.do_step(time, step)?;
         }
         for action in actions.iter_mut().filter(|action| action.is_continuous()) {

@@ -80,9 +80,10 @@ pub struct Simulation {
     actions: Vec<Action>,
     /// The signal that ends the run when it is not 0, and how long the run goes on then, s.
     end_when: Option<(usize, f64)>,
+    /// The signals at the tick before; in [`Algorithm::Iterative`] those of the last repetition.
+    last_signals: Vec<f64>,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
     next_signals: Vec<f64>,
-    last_signals: Vec<f64>,
 }
 
 /// A component in a simulation.

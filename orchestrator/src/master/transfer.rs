@@ -12,9 +12,15 @@ pub(super) struct Inputs(Vec<InputGroup>);
 struct InputGroup {
     kind: Kind,
     references: Vec<u32>,
-    /// Signal and factor of each.
-    sources: Vec<(usize, f64)>,
+    sources: Vec<InputSource>,
     values: Vec<f64>,
+}
+
+struct InputSource {
+    signal: usize,
+    factor: f64,
+    /// It changes between samples.
+    is_smooth: bool,
 }
 
 /// Outputs of an instance, grouped by type; each group's signals stand side by side.
@@ -30,7 +36,7 @@ struct OutputGroup {
 
 impl Inputs {
     /// Adds an input that takes `factor` times the value of `signal`.
-    pub(super) fn add(&mut self, variable: &Variable, signal: usize, factor: f64) {
+    pub(super) fn add(&mut self, variable: &Variable, signal: usize, factor: f64, is_smooth: bool) {
         let known = self.0.iter().position(|group| group.kind == variable.kind);
         let place = known.unwrap_or_else(|| {
             self.0.push(InputGroup {
@@ -43,34 +49,40 @@ impl Inputs {
         });
         let group = &mut self.0[place];
         group.references.push(variable.reference);
-        group.sources.push((signal, factor));
+        group.sources.push(InputSource {
+            signal,
+            factor,
+            is_smooth,
+        });
         group.values.push(0.0);
     }
 
     /// Sets the inputs from the signals.
     pub(super) fn transfer(&mut self, signals: &[f64], instance: &Instance) -> Outcome {
         for group in &mut self.0 {
-            for (value, &(signal, factor)) in group.values.iter_mut().zip(&group.sources) {
-                *value = factor * signals[signal];
+            for (value, source) in group.values.iter_mut().zip(&group.sources) {
+                *value = source.factor * signals[source.signal];
             }
             instance.set(&group.kind, &group.references, &group.values)?;
         }
         Ok(())
     }
 
-    /// Sets the inputs from the mean of the signals now and at the end of the step.
-    pub(super) fn transfer_mean(
+    /// As [`Inputs::transfer`], but inputs that change between samples are set to
+    /// `now + share (other - now)`.
+    pub(super) fn transfer_between(
         &mut self,
         now: &[f64],
-        next: &[f64],
+        other: &[f64],
+        share: f64,
         instance: &Instance,
     ) -> Outcome {
         for group in &mut self.0 {
-            for (value, &(signal, factor)) in group.values.iter_mut().zip(&group.sources) {
-                *value = match group.kind {
-                    Kind::Float64 => factor * 0.5 * (now[signal] + next[signal]),
-                    _ => factor * now[signal],
-                };
+            for (value, source) in group.values.iter_mut().zip(&group.sources) {
+                let at = now[source.signal];
+                let change = other[source.signal] - at;
+                let share = if source.is_smooth { share } else { 0.0 };
+                *value = source.factor * (at + share * change);
             }
             instance.set(&group.kind, &group.references, &group.values)?;
         }

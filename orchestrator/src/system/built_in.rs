@@ -10,7 +10,13 @@ macro_rules! parts {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [(&str, &str); 2] = parts!["displacement-pid", "three-variable"];
+const CONTROLLERS: [(&str, &str); 5] = parts![
+    "displacement-pid",
+    "three-variable",
+    "loop-shaping",
+    "sliding-mode",
+    "mpc",
+];
 /// Tables with their actuators.
 const PLANTS: [(&str, &str); 1] = parts!["plant/identified"];
 /// What stands on the table.
@@ -45,7 +51,9 @@ pub fn specimens() -> impl Iterator<Item = &'static str> {
 pub fn system(name: &str, plant: &str, specimen: &str) -> Result<SystemFile, SystemError> {
     let mut file = part("system", &CONTROLLERS, name, names())?;
     file.extend(part("plant", &PLANTS, plant, plants())?);
-    if specimen != "none" {
+    if specimen == "none" {
+        file.disconnect("specimen");
+    } else {
         file.extend(part("specimen", &SPECIMENS, specimen, specimens())?);
     }
     file.name = name.to_string();

@@ -138,6 +138,21 @@ impl SystemFile {
         })
     }
 
+    /// Takes out the connections that come from the component `name`.
+    pub fn disconnect(&mut self, name: &str) {
+        let from_it = |text: &str| {
+            text.trim_start()
+                .strip_prefix(name)
+                .is_some_and(|rest| rest.starts_with('.'))
+        };
+        let kept = self
+            .connections
+            .iter()
+            .zip(&self.lines)
+            .filter(|(text, _)| !from_it(text.get_ref()));
+        (self.connections, self.lines) = kept.map(|(text, line)| (text.clone(), *line)).unzip();
+    }
+
     /// Adds the components, connections and experiment of `part`; what `part` says goes before.
     pub fn extend(&mut self, part: Self) {
         self.connections.extend(part.connections);

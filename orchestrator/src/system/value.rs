@@ -1,7 +1,7 @@
 //! Values as people write them, for variables with types and units.
 
 use crate::fmu::{Kind, Variable};
-use crate::units::Quantity;
+use crate::units;
 
 use super::hint;
 
@@ -32,7 +32,7 @@ pub(super) fn read(variable: &Variable, written: &toml::Value) -> Result<Value, 
     match (&variable.kind, written) {
         (Kind::Float64, Toml::Float(number)) if number.is_finite() => Ok(Value::Number(*number)),
         (Kind::Float64, Toml::Integer(number)) => Ok(Value::Number(*number as f64)),
-        (Kind::Float64, Toml::String(text)) => quantity(text, unit).map(Value::Number),
+        (Kind::Float64, Toml::String(text)) => number(text, unit).map(Value::Number),
         (Kind::Float64, _) => misfit("a finite number, or a text with a unit such as \"1.5 in\""),
         (Kind::Int32, Toml::Integer(number)) if i32::try_from(*number).is_ok() => {
             Ok(Value::Number(*number as f64))
@@ -65,22 +65,6 @@ pub(super) fn read(variable: &Variable, written: &toml::Value) -> Result<Value, 
     }
 }
 
-/// A number with or without a unit, in `unit`.
-///
-/// # Errors
-/// No number, or a unit that does not fit.
-pub(super) fn quantity(text: &str, unit: Option<&str>) -> Result<f64, String> {
-    let quantity = Quantity::parse(text).map_err(|error| error.to_string())?;
-    match unit {
-        // A number alone is in the variable's own unit.
-        _ if quantity.unit.text.is_empty() => Ok(quantity.value),
-        Some(unit) if quantity.unit.text == unit => Ok(quantity.value),
-        unit => quantity
-            .to(unit.unwrap_or(""))
-            .map_err(|error| error.to_string()),
-    }
-}
-
 /// A time in a system file: a number in s, or a text with a unit.
 ///
 /// # Errors
@@ -89,13 +73,18 @@ pub(super) fn time(written: &toml::Value) -> Result<f64, String> {
     let seconds = match written {
         toml::Value::Float(number) => *number,
         toml::Value::Integer(number) => *number as f64,
-        toml::Value::String(text) => quantity(text, Some("s"))?,
+        toml::Value::String(text) => number(text, Some("s"))?,
         other => return Err(format!("`{}` is no time, expected \"2 ms\"", shown(other))),
     };
     if seconds.is_finite() && seconds > 0.0 {
         return Ok(seconds);
     }
     Err(format!("{seconds} s is no time, expected more than 0 s"))
+}
+
+/// A number in `unit`, which may stand behind it.
+fn number(text: &str, unit: Option<&str>) -> Result<f64, String> {
+    units::value_in(text, unit.unwrap_or("")).map_err(|error| error.to_string())
 }
 
 fn shown(written: &toml::Value) -> String {

@@ -2,6 +2,7 @@
 //! equations.
 
 mod frequency_response;
+pub mod margins;
 mod riccati;
 mod state_space;
 mod transfer_function;

@@ -205,3 +205,96 @@ fn initial_unknown<C: Component>(
         on.map(|on| (*on, Dependency::Dependent)),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::oscillator::Oscillator;
+    use roxmltree::{Document, Node};
+
+    fn model() -> &'static Model<Oscillator> {
+        Model::get().unwrap()
+    }
+
+    fn named<'a>(document: &'a Document, name: &str) -> Node<'a, 'a> {
+        document
+            .descendants()
+            .find(|n| n.attribute("name") == Some(name))
+            .unwrap()
+    }
+
+    #[test]
+    fn both_descriptions_are_well_formed_and_carry_the_token() {
+        for (text, token) in [
+            (fmi2(model()), "guid"),
+            (fmi3(model()), "instantiationToken"),
+        ] {
+            let document = Document::parse(&text).unwrap();
+            assert_eq!(
+                document.root_element().attribute(token),
+                Some(model().token.as_str())
+            );
+            let note = named(&document, "note");
+            assert_eq!(note.attribute("description"), Some("Free text <&>"));
+            let start = note.first_element_child().unwrap();
+            let text = start.attribute("start").or(start.attribute("value"));
+            assert_eq!(text, Some("a < b & \"c\""));
+        }
+    }
+
+    #[test]
+    fn model_structure_names_what_the_table_says() {
+        let text = fmi3(model());
+        let document = Document::parse(&text).unwrap();
+        let entry = |element: &str, reference: &str| {
+            let found = document.descendants().find(|n| {
+                n.has_tag_name(element) && n.attribute("valueReference") == Some(reference)
+            });
+            let node = found.unwrap();
+            (
+                node.attribute("dependencies").unwrap(),
+                node.attribute("dependenciesKind").unwrap(),
+            )
+        };
+        assert_eq!(entry("Output", "2"), ("2", "constant"));
+        assert_eq!(entry("Output", "4"), ("1 2", "fixed fixed"));
+        assert_eq!(entry("Output", "7"), ("", ""));
+        assert_eq!(
+            entry("ContinuousStateDerivative", "4"),
+            ("1 2", "fixed fixed")
+        );
+        assert_eq!(entry("InitialUnknown", "4"), ("1 5", "dependent dependent"));
+        assert_eq!(
+            named(&document, "velocity").attribute("derivative"),
+            Some("2")
+        );
+    }
+
+    #[test]
+    fn units_are_reduced_to_base_units_with_factors_for_display() {
+        let text = fmi2(model());
+        let document = Document::parse(&text).unwrap();
+        let force = named(&document, "N");
+        let base = force.first_element_child().unwrap();
+        for (unit, exponent) in [("kg", "1"), ("m", "1"), ("s", "-2")] {
+            assert_eq!(base.attribute(unit), Some(exponent));
+        }
+        let shown = force.last_element_child().unwrap();
+        assert_eq!(shown.attribute("name"), Some("lbf"));
+        let factor: f64 = shown.attribute("factor").unwrap().parse().unwrap();
+        assert!((factor * 4.448_221_615_260_5 - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn documentation_page_lists_every_variable() {
+        let page = html(model());
+        for variable in &model().variables {
+            assert!(
+                page.contains(&format!("<td>{}</td>", variable.name)),
+                "{}",
+                variable.name
+            );
+        }
+        assert!(page.contains("Free text &lt;&amp;&gt;"));
+    }
+}

@@ -1,0 +1,349 @@
+//! The interlock between controller and valve.
+//!
+//! **It protects no people.** It is software in the control computer and fails with it. It keeps a
+//! model, a specimen or an actuator from needless damage; whoever works at a rig is protected by
+//! the emergency stop, the pressure-off valve and the fence, none of which may depend on it.
+
+use plant::units::{G, INCH, LBF, SAMPLING_PERIOD, STROKE};
+
+use crate::pid::VALVE_LIMIT;
+use crate::{Controller, ModelError, Motion};
+
+/// Limits and timings of the interlock, and its memory.
+///
+/// On a trip the valve command runs from its last value to zero along a straight line within
+/// [`ramp_time`](Self::ramp_time); cause and time are latched until a reset, after which the
+/// controller's command is faded in over the same time. A trip at sample k means a valve at null
+/// from sample k + ramp_time/h on.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Interlock {
+    /// Largest displacement, measured or predicted, m.
+    pub displacement_limit: f64,
+    /// Largest velocity, m/s.
+    pub velocity_limit: f64,
+    /// Largest acceleration, m/s².
+    pub acceleration_limit: f64,
+    /// Largest force of the actuator, N.
+    pub force_limit: f64,
+    /// Largest difference between reference and measured displacement, m.
+    pub tracking_limit: f64,
+    /// Commands from this magnitude on count as saturated, V.
+    pub saturation_level: f64,
+    /// Longest time in saturation, s.
+    pub saturation_time: f64,
+    /// Time from a trip to the valve at null, s.
+    pub ramp_time: f64,
+    /// Time from the measurement to the valve's answer that the stopping distance allows for, s.
+    pub reaction_time: f64,
+    /// A channel is stale when it repeats itself to the bit for this many samples and ...
+    pub stale_samples: u32,
+    /// ... while the reference travels this far, m.
+    pub stale_travel: f64,
+    /// Samples after which the heartbeat must have changed; 0 if there is none.
+    pub heartbeat_samples: u32,
+    /// What the interlock remembers.
+    pub memory: InterlockMemory,
+}
+
+/// Why the interlock tripped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(i32)]
+pub enum Trip {
+    /// It did not.
+    #[default]
+    None = 0,
+    /// An input is not a finite number.
+    NotFinite = 1,
+    /// A measurement repeats itself while the reference moves.
+    Stale = 2,
+    /// The heartbeat stood still.
+    Heartbeat = 3,
+    /// The displacement is beyond its limit.
+    Displacement = 4,
+    /// The table could not be stopped any more before the limit if it went on.
+    StoppingDistance = 5,
+    /// The velocity is beyond its limit.
+    Velocity = 6,
+    /// The acceleration is beyond its limit.
+    Acceleration = 7,
+    /// The force is beyond its limit.
+    Force = 8,
+    /// The displacement is too far from the reference.
+    TrackingError = 9,
+    /// The command was saturated for too long.
+    Saturation = 10,
+    /// The operator pressed stop.
+    Stop = 11,
+}
+
+impl Trip {
+    /// All causes, in the order of their numbers.
+    pub const ALL: [Self; 12] = [
+        Self::None,
+        Self::NotFinite,
+        Self::Stale,
+        Self::Heartbeat,
+        Self::Displacement,
+        Self::StoppingDistance,
+        Self::Velocity,
+        Self::Acceleration,
+        Self::Force,
+        Self::TrackingError,
+        Self::Saturation,
+        Self::Stop,
+    ];
+
+    /// The cause in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::None => "not tripped",
+            Self::NotFinite => "an input is not a finite number",
+            Self::Stale => "a measurement repeats itself while the reference moves",
+            Self::Heartbeat => "the heartbeat stood still",
+            Self::Displacement => "the displacement is beyond its limit",
+            Self::StoppingDistance => "the stopping distance reaches beyond the displacement limit",
+            Self::Velocity => "the velocity is beyond its limit",
+            Self::Acceleration => "the acceleration is beyond its limit",
+            Self::Force => "the force is beyond its limit",
+            Self::TrackingError => "the displacement is too far from the reference",
+            Self::Saturation => "the valve command was saturated for too long",
+            Self::Stop => "the operator pressed stop",
+        }
+    }
+}
+
+/// Memory of [`Interlock`].
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct InterlockMemory {
+    /// Time of the present sample since the start or the last forgetting, s.
+    pub time: f64,
+    /// The latched cause.
+    pub trip: Trip,
+    /// When it tripped, s.
+    pub trip_time: f64,
+    /// What goes to the valve, V.
+    pub command: f64,
+    /// Change of the command per second while ramping down, V/s.
+    ramp: f64,
+    /// Weight of the controller's command, 0 after a reset and 1 in service.
+    fade: f64,
+    /// Whether there was a sample.
+    started: bool,
+    saturated: f64,
+    last: [f64; 4],
+    last_reference: f64,
+    repeats: [u32; 4],
+    travel: [f64; 4],
+    heartbeat: i32,
+    beats_missed: u32,
+    reset_was_held: bool,
+}
+
+/// What the interlock is told.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct InterlockInput {
+    /// The controller's command, V.
+    pub valve_command: f64,
+    /// Wanted displacement, m.
+    pub reference_displacement: f64,
+    /// Measured motion.
+    pub measured: Motion,
+    /// Measured force of the actuator, N.
+    pub measured_force: f64,
+    /// A number that the controller changes at every sample.
+    pub heartbeat: i32,
+    /// The operator's stop.
+    pub stop: bool,
+    /// A rising edge ends a trip whose cause is gone.
+    pub reset: bool,
+}
+
+impl Interlock {
+    /// Limits for the laboratory's rig, assumed except for the stroke (±1.5 in), the valve's range
+    /// (10 V) and the capacity of the actuator (1.1 kip, Section 2.3.1).
+    pub fn laboratory() -> Self {
+        Self {
+            displacement_limit: STROKE - 0.1 * INCH,
+            velocity_limit: 40.0 * INCH,
+            acceleration_limit: 3.5 * G,
+            force_limit: 1000.0 * LBF,
+            tracking_limit: 1.0 * INCH,
+            saturation_level: 0.99 * VALVE_LIMIT,
+            saturation_time: 0.1,
+            ramp_time: 0.02,
+            reaction_time: 0.008,
+            stale_samples: 10,
+            stale_travel: 0.02 * INCH,
+            heartbeat_samples: 0,
+            memory: InterlockMemory {
+                fade: 1.0,
+                ..InterlockMemory::default()
+            },
+        }
+    }
+
+    /// Where the table would come to rest if the interlock tripped now (m): through the reaction
+    /// time at full velocity, then with the flow going to zero along the ramp.
+    pub fn stopping_position(&self, motion: &Motion) -> f64 {
+        motion.displacement + motion.velocity * (self.reaction_time + 0.5 * self.ramp_time)
+    }
+
+    fn counts_stale(&mut self, input: &InterlockInput) -> bool {
+        let y = &input.measured;
+        let now = [
+            y.displacement,
+            y.velocity,
+            y.acceleration,
+            input.measured_force,
+        ];
+        let m = &mut self.memory;
+        let travelled = (input.reference_displacement - m.last_reference).abs();
+        m.last_reference = input.reference_displacement;
+        let mut stale = false;
+        for i in 0..4 {
+            // A channel that was never anything but zero is not connected.
+            if m.started && now[i] == m.last[i] && now[i] != 0.0 {
+                m.repeats[i] = m.repeats[i].saturating_add(1);
+                m.travel[i] += travelled;
+                stale |= m.repeats[i] >= self.stale_samples && m.travel[i] >= self.stale_travel;
+            } else {
+                (m.repeats[i], m.travel[i]) = (0, 0.0);
+            }
+            m.last[i] = now[i];
+        }
+        stale
+    }
+
+    fn misses_beats(&mut self, heartbeat: i32) -> bool {
+        let m = &mut self.memory;
+        if self.heartbeat_samples == 0 {
+            return false;
+        }
+        if !m.started || heartbeat != m.heartbeat {
+            m.beats_missed = 0;
+        } else {
+            m.beats_missed = m.beats_missed.saturating_add(1);
+        }
+        m.heartbeat = heartbeat;
+        m.beats_missed >= self.heartbeat_samples
+    }
+
+    fn cause(&mut self, input: &InterlockInput, period: f64) -> Trip {
+        let y = &input.measured;
+        let numbers = [
+            input.valve_command,
+            input.reference_displacement,
+            y.displacement,
+            y.velocity,
+            y.acceleration,
+            input.measured_force,
+        ];
+        // Each check keeps a count, so all run at every sample.
+        let stale = self.counts_stale(input);
+        let silent = self.misses_beats(input.heartbeat);
+        let m = &mut self.memory;
+        if input.valve_command.abs() >= self.saturation_level {
+            m.saturated += period;
+        } else {
+            m.saturated = 0.0;
+        }
+        let saturated = m.saturated > self.saturation_time + 1e-9;
+        m.started = true;
+        let error = y.displacement - input.reference_displacement;
+        let checks = [
+            (numbers.iter().any(|n| !n.is_finite()), Trip::NotFinite),
+            (input.stop, Trip::Stop),
+            (stale, Trip::Stale),
+            (silent, Trip::Heartbeat),
+            (
+                y.displacement.abs() > self.displacement_limit,
+                Trip::Displacement,
+            ),
+            (
+                self.stopping_position(y).abs() > self.displacement_limit,
+                Trip::StoppingDistance,
+            ),
+            (y.velocity.abs() > self.velocity_limit, Trip::Velocity),
+            (
+                y.acceleration.abs() > self.acceleration_limit,
+                Trip::Acceleration,
+            ),
+            (input.measured_force.abs() > self.force_limit, Trip::Force),
+            (error.abs() > self.tracking_limit, Trip::TrackingError),
+            (saturated, Trip::Saturation),
+        ];
+        checks
+            .into_iter()
+            .find_map(|(holds, trip)| holds.then_some(trip))
+            .unwrap_or_default()
+    }
+}
+
+impl Default for Interlock {
+    fn default() -> Self {
+        Self::laboratory()
+    }
+}
+
+impl Controller for Interlock {
+    type Input = InterlockInput;
+    type Output = f64;
+
+    fn validate(&self) -> Result<(), ModelError> {
+        for (name, value) in [
+            ("displacement_limit", self.displacement_limit),
+            ("velocity_limit", self.velocity_limit),
+            ("acceleration_limit", self.acceleration_limit),
+            ("force_limit", self.force_limit),
+            ("tracking_limit", self.tracking_limit),
+            ("saturation_level", self.saturation_level),
+            ("saturation_time", self.saturation_time),
+            ("ramp_time", self.ramp_time),
+            ("stale_travel", self.stale_travel),
+        ] {
+            ModelError::require_positive(name, value)?;
+        }
+        ModelError::require_non_negative("reaction_time", self.reaction_time)?;
+        ModelError::require_positive("stale_samples", f64::from(self.stale_samples))
+    }
+
+    fn step(&mut self, input: &InterlockInput, period: f64) -> f64 {
+        let cause = self.cause(input, period);
+        let pressed = input.reset && !self.memory.reset_was_held;
+        let ramp_time = self.ramp_time.max(period);
+        let m = &mut self.memory;
+        m.reset_was_held = input.reset;
+        if m.trip != Trip::None && pressed && cause == Trip::None && m.command == 0.0 {
+            (m.trip, m.trip_time, m.fade) = (Trip::None, 0.0, 0.0);
+        }
+        if m.trip == Trip::None && cause != Trip::None {
+            (m.trip, m.trip_time) = (cause, m.time);
+            m.ramp = m.command.abs() / ramp_time;
+        }
+        if m.trip == Trip::None {
+            m.command = m.fade * input.valve_command;
+            m.fade = (m.fade + period / ramp_time).min(1.0);
+        } else {
+            // One part in 1e9 less would leave a crumb of rounding after the last step.
+            let step = m.ramp * period * (1.0 + 1e-9);
+            m.command -= m.command.clamp(-step, step);
+        }
+        m.time += period;
+        m.command
+    }
+
+    fn reset(&mut self) {
+        self.memory = InterlockMemory {
+            fade: 1.0,
+            ..InterlockMemory::default()
+        };
+    }
+}
+
+/// Longest time from a trip to the valve at null with the default settings, s.
+pub const TIME_TO_NULL: f64 = 0.02 + SAMPLING_PERIOD;
+
+#[cfg(test)]
+#[path = "interlock_tests.rs"]
+mod tests;

@@ -1,0 +1,407 @@
+//! Every loop of the thesis as a linear system around the rig, broken at the valve: continuous as
+//! printed, and as sampled.
+//!
+//! The sampled loops hold the same difference equations as the laws that the FMUs run, with the
+//! plant behind a zero-order hold, so that a margin given here is a margin of what runs.
+
+use nalgebra::{Complex, DMatrix, DVector, RowSVector, dmatrix};
+use plant::linear::margins::{self, Margins};
+use plant::linear::{DiscreteStateSpace, StateSpace, TransferFunction};
+use plant::rig::Rig;
+
+use crate::ModelError;
+use crate::allocation::ControlAllocation;
+use crate::loop_shaping::LoopShapingCoefficients;
+use crate::pid::Pid;
+use crate::sliding_mode::SlidingMode;
+use crate::three_variable::ThreeVariableGains;
+
+/// What a law may listen to, in this order: measured displacement, velocity, acceleration, actuator
+/// force and specimen acceleration; reference displacement, velocity and acceleration, the first of
+/// which is the reference force in the force loop.
+type Signals = RowSVector<f64, 8>;
+
+const MEASURED: usize = 5;
+const SPECIMEN_ACCELERATION: usize = 4;
+
+/// Which signal of the rig a loop makes follow its reference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Controlled {
+    /// The table's displacement in m; references come with their derivatives.
+    Displacement = 0,
+    /// The actuator's force in N.
+    Force = 3,
+}
+
+/// A dynamic part of a law: one combination of signals through a transfer function.
+#[derive(Debug, Clone)]
+struct Channel {
+    signals: Signals,
+    continuous: StateSpace,
+    sampled: DiscreteStateSpace,
+}
+
+/// A linear law in continuous time and as sampled.
+#[derive(Debug, Clone)]
+pub struct LinearLaw {
+    controlled: Controlled,
+    direct: Signals,
+    channels: Vec<Channel>,
+    period: f64,
+}
+
+/// Rig and law with the loop broken at the valve.
+#[derive(Debug, Clone)]
+pub struct Loop {
+    plant: StateSpace,
+    sampled_plant: DiscreteStateSpace,
+    law: LinearLaw,
+}
+
+/// Continuous time, or sampled with the plant's input held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Time {
+    /// The law runs continuously.
+    Continuous,
+    /// The law runs once a period.
+    Sampled,
+}
+
+impl LinearLaw {
+    /// Displacement or force PID without its derivative part (Eq 3-6, 3-7).
+    ///
+    /// Refuses a derivative gain.
+    pub fn pid(pid: &Pid, controlled: Controlled, period: f64) -> Result<Self, ModelError> {
+        let mut error = Signals::zeros();
+        error[MEASURED] = 1.0;
+        error[controlled as usize] = -1.0;
+        Ok(Self {
+            controlled,
+            direct: Signals::zeros(),
+            channels: vec![proportional_integral(pid, error, 1.0, period)?],
+            period,
+        })
+    }
+
+    /// A controller of the form of Eq 3-10.
+    pub fn loop_shaping(
+        coefficients: &LoopShapingCoefficients,
+        period: f64,
+    ) -> Result<Self, ModelError> {
+        coefficients.validate()?;
+        let LoopShapingCoefficients {
+            gain,
+            numerator_rate: n1,
+            numerator_constant: n0,
+            pole: p,
+        } = *coefficients;
+        let continuous = TransferFunction::new(&[gain, gain * n1, gain * n0], &[1.0, p, 0.0])?
+            .to_state_space()?;
+        // Memory (error, lag, integral) of the law as it runs.
+        let (half, damping) = (0.5 * period, 1.0 / (1.0 + 0.5 * period * p));
+        let lag = [half * damping, (1.0 - half * p) * damping, half * damping];
+        let integral = gain * n0 * half;
+        let a = dmatrix![
+            0.0, 0.0, 0.0;
+            lag[0], lag[1], 0.0;
+            integral * lag[0], integral * (lag[1] + 1.0), 1.0
+        ];
+        let b = dmatrix![1.0; lag[2]; integral * lag[2]];
+        let to_command = dmatrix![0.0, gain * (n1 - p), 1.0];
+        let sampled = DiscreteStateSpace::new(
+            a.clone(),
+            b.clone(),
+            &to_command * a,
+            &to_command * b + dmatrix![gain],
+            period,
+        )?;
+        let mut error = Signals::zeros();
+        error[MEASURED] = 1.0;
+        error[0] = -1.0;
+        Ok(Self {
+            controlled: Controlled::Displacement,
+            direct: Signals::zeros(),
+            channels: vec![Channel {
+                signals: error,
+                continuous,
+                sampled,
+            }],
+            period,
+        })
+    }
+
+    /// Three-variable control (Fig 3-5).
+    pub fn three_variable(gains: &ThreeVariableGains, period: f64) -> Result<Self, ModelError> {
+        let (reference, feedback) = gains.reference_and_feedback();
+        let mut direct = Signals::zeros();
+        for i in 0..3 {
+            direct[MEASURED + i] = reference[i];
+            direct[i] = -feedback[i];
+        }
+        let mut error = Signals::zeros();
+        error[MEASURED] = 1.0;
+        error[0] = -1.0;
+        let integral = Pid {
+            proportional: 0.0,
+            integral: gains.integral,
+            ..Pid::equation_3_6()
+        };
+        Ok(Self {
+            controlled: Controlled::Displacement,
+            direct,
+            channels: vec![proportional_integral(&integral, error, 1.0, period)?],
+            period,
+        })
+    }
+
+    /// The hierarchy of Fig 4-3: sliding mode over a displacement and a force loop.
+    pub fn hierarchy(
+        sliding: &SlidingMode,
+        displacement: &Pid,
+        force: &Pid,
+        allocation: &ControlAllocation,
+        period: f64,
+    ) -> Result<Self, ModelError> {
+        let stiffness = sliding.table.stiffness;
+        let [restoring, velocity, acceleration] = sliding.error_gains();
+        let printed = sliding.table.mass * sliding.surface_rate * sliding.reaching_rate;
+        let mut displacement_error = Signals::zeros();
+        displacement_error[MEASURED] = printed / stiffness;
+        displacement_error[0] = -printed / stiffness;
+
+        let mut force_error = Signals::zeros();
+        force_error[MEASURED] = restoring;
+        force_error[0] = stiffness - restoring;
+        force_error[MEASURED + 1] = velocity;
+        force_error[1] = sliding.table.damping - velocity;
+        force_error[MEASURED + 2] = acceleration;
+        force_error[SPECIMEN_ACCELERATION] = sliding.specimen_mass;
+        force_error[Controlled::Force as usize] = -1.0;
+        let (alpha, beta) = (allocation.displacement_share, allocation.force_share);
+        Ok(Self {
+            controlled: Controlled::Displacement,
+            direct: Signals::zeros(),
+            channels: vec![
+                proportional_integral(displacement, displacement_error, alpha, period)?,
+                proportional_integral(force, force_error, beta, period)?,
+            ],
+            period,
+        })
+    }
+}
+
+/// `share (P + I / (s + leak))` on the error `signals`.
+fn proportional_integral(
+    pid: &Pid,
+    signals: Signals,
+    share: f64,
+    period: f64,
+) -> Result<Channel, ModelError> {
+    if pid.derivative != 0.0 {
+        return Err(ModelError::Parameter {
+            name: "derivative_gain",
+            value: pid.derivative,
+            expected: "zero in a loop that is analysed",
+        });
+    }
+    ModelError::require_positive("period", period)?;
+    let kept = (-pid.integral_leak * period).exp();
+    let (p, i) = (share * pid.proportional, share * pid.integral);
+    Ok(Channel {
+        signals,
+        continuous: StateSpace::new(
+            dmatrix![-pid.integral_leak],
+            dmatrix![i],
+            dmatrix![1.0],
+            dmatrix![p],
+        )?,
+        sampled: DiscreteStateSpace::new(
+            dmatrix![kept],
+            dmatrix![i * period],
+            dmatrix![kept],
+            dmatrix![p + i * period],
+            period,
+        )?,
+    })
+}
+
+impl Loop {
+    /// Joins a rig and a law.
+    pub fn new(rig: &Rig, law: LinearLaw) -> Self {
+        // Without a specimen the rig's last two states and its specimen signals are idle.
+        let full = rig.state_space();
+        let order = if rig.specimen.is_some() { 7 } else { 5 };
+        let mut c = DMatrix::zeros(MEASURED, order);
+        for (row, output) in [0, 1, 2, 3, 6].into_iter().enumerate() {
+            c.row_mut(row)
+                .copy_from(&full.c.view((output, 0), (1, order)));
+        }
+        let plant = StateSpace {
+            a: full.a.view((0, 0), (order, order)).into_owned(),
+            b: full.b.rows(0, order).into_owned(),
+            c,
+            d: DMatrix::zeros(MEASURED, 1),
+        };
+        Self {
+            sampled_plant: plant.sample(law.period),
+            plant,
+            law,
+        }
+    }
+
+    /// The open loop's response at `omega` (rad/s): minus the command that comes back for a valve
+    /// command of one. Infinite where `omega` meets a pole.
+    pub fn open(&self, time: Time, omega: f64) -> Complex<f64> {
+        let Some((plant, law)) = self.responses(time, omega) else {
+            return Complex::new(f64::INFINITY, 0.0);
+        };
+        let mut returned = Complex::new(0.0, 0.0);
+        for i in 0..MEASURED {
+            returned -= law[i] * plant[i];
+        }
+        returned
+    }
+
+    /// Response at `omega` (rad/s) of the controlled signal to its reference, with the reference's
+    /// derivatives given to the laws that use them.
+    pub fn closed(&self, time: Time, omega: f64) -> Complex<f64> {
+        let Some((plant, law)) = self.responses(time, omega) else {
+            return Complex::new(f64::NAN, f64::NAN);
+        };
+        let rate = Complex::new(0.0, omega);
+        let command = match self.law.controlled {
+            Controlled::Displacement => {
+                law[MEASURED] + rate * (law[MEASURED + 1] + rate * law[MEASURED + 2])
+            }
+            Controlled::Force => law[MEASURED],
+        };
+        plant[self.law.controlled as usize] * command / (1.0 + self.open(time, omega))
+    }
+
+    /// Responses at `omega` from valve command to the measured signals, and from all signals to the
+    /// valve command.
+    fn responses(&self, time: Time, omega: f64) -> Option<Responses> {
+        let s = Complex::new(0.0, omega);
+        let z = (s * self.law.period).exp();
+        let plant = match time {
+            Time::Continuous => self.plant.evaluate(s)?,
+            Time::Sampled => self.sampled_plant.evaluate(z)?,
+        };
+        let mut law = [Complex::new(0.0, 0.0); 8];
+        for (value, &direct) in law.iter_mut().zip(self.law.direct.iter()) {
+            *value += direct;
+        }
+        for channel in &self.law.channels {
+            let response = match time {
+                Time::Continuous => channel.continuous.evaluate(s)?,
+                Time::Sampled => channel.sampled.evaluate(z)?,
+            }[(0, 0)];
+            for (value, &weight) in law.iter_mut().zip(channel.signals.iter()) {
+                *value += response * weight;
+            }
+        }
+        Some((plant, law))
+    }
+
+    /// Poles of the closed loop: 1/s in continuous time, in the z plane as sampled.
+    pub fn closed_loop_poles(&self, time: Time) -> DVector<Complex<f64>> {
+        let (a, b, c) = match time {
+            Time::Continuous => (&self.plant.a, &self.plant.b, &self.plant.c),
+            Time::Sampled => (
+                &self.sampled_plant.a,
+                &self.sampled_plant.b,
+                &self.sampled_plant.c,
+            ),
+        };
+        let n = a.nrows();
+        let measured = |signals: &Signals| {
+            DMatrix::from_row_slice(1, MEASURED, &signals.as_slice()[..MEASURED])
+        };
+        let memory: usize = self
+            .law
+            .channels
+            .iter()
+            .map(|channel| channel.continuous_or_sampled(time).0.nrows())
+            .sum();
+        let mut closed = DMatrix::zeros(n + memory, n + memory);
+        let mut command = DMatrix::zeros(1, n + memory);
+        command
+            .view_mut((0, 0), (1, n))
+            .copy_from(&(measured(&self.law.direct) * c));
+        let mut at = n;
+        for channel in &self.law.channels {
+            let (ac, bc, cc, dc) = channel.continuous_or_sampled(time);
+            let heard = measured(&channel.signals) * c;
+            let order = ac.nrows();
+            closed.view_mut((at, at), (order, order)).copy_from(ac);
+            closed
+                .view_mut((at, 0), (order, n))
+                .copy_from(&(bc * &heard));
+            command.view_mut((0, at), (1, order)).copy_from(cc);
+            let mut direct = command.view_mut((0, 0), (1, n));
+            direct += heard * dc[(0, 0)];
+            at += order;
+        }
+        let mut plant_rows = closed.view_mut((0, 0), (n, n));
+        plant_rows += a;
+        let mut plant_rows = closed.rows_mut(0, n);
+        plant_rows += b * command;
+        closed.complex_eigenvalues()
+    }
+
+    /// True when every closed-loop pole decays.
+    pub fn is_stable(&self, time: Time) -> bool {
+        self.closed_loop_poles(time).iter().all(|pole| match time {
+            Time::Continuous => pole.re < 0.0,
+            Time::Sampled => pole.norm() < 1.0,
+        })
+    }
+
+    /// Margins between `first` (rad/s) and the Nyquist frequency, in continuous time a hundred
+    /// times beyond it.
+    pub fn margins(&self, time: Time, first: f64) -> Margins {
+        margins::margins(|omega| self.open(time, omega), first, self.last(time))
+    }
+
+    /// Every crossover from `first` (rad/s) upwards, ascending.
+    pub fn crossovers(&self, time: Time, first: f64) -> Vec<f64> {
+        margins::crossovers(|omega| self.open(time, omega), first, self.last(time))
+    }
+
+    /// Bandwidth of the closed loop in rad/s: see [`margins::bandwidth`].
+    pub fn bandwidth(&self, time: Time, lowest: f64, first: f64) -> Option<f64> {
+        let closed = |omega| self.closed(time, omega);
+        margins::bandwidth(closed, lowest, first, self.last(time))
+    }
+
+    fn last(&self, time: Time) -> f64 {
+        let nyquist = margins::nyquist(self.law.period);
+        match time {
+            Time::Continuous => 1e2 * nyquist,
+            Time::Sampled => nyquist,
+        }
+    }
+}
+
+type Responses = (DMatrix<Complex<f64>>, [Complex<f64>; 8]);
+type Matrices<'a> = (
+    &'a DMatrix<f64>,
+    &'a DMatrix<f64>,
+    &'a DMatrix<f64>,
+    &'a DMatrix<f64>,
+);
+
+impl Channel {
+    fn continuous_or_sampled(&self, time: Time) -> Matrices<'_> {
+        match time {
+            Time::Continuous => {
+                let s = &self.continuous;
+                (&s.a, &s.b, &s.c, &s.d)
+            }
+            Time::Sampled => {
+                let s = &self.sampled;
+                (&s.a, &s.b, &s.c, &s.d)
+            }
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! Sliding mode over a displacement and a force loop (Sections 4.2 and 4.3, Fig 4-3).
+//!
+//! # The law
+//! With the tracking error `e = x - x_d` and the surface `S = de/dt + lambda e` (Eq 4-7 as meant),
+//! `dS/dt = -K S - K_s sat(S / phi)` gives (Eq 4-17, 4-18, with the table's damping)
+//!
+//! ```text
+//! F      = F_disp + F_v/a
+//! F_disp = m lambda K (x_d - x) + k x
+//! F_v/a  = m (K + lambda) (v_d - v) + m a_d + m_s a_s + c v - m K_s sat(S / phi)
+//! ```
+//!
+//! `a_s` is the specimen's absolute acceleration: `m_s a_s` is the force that it takes from the
+//! table (Eq 4-15). The displacement loop gets `F_disp / k`, the force loop `F`. The switching term
+//! is the option of a boundary layer; Eq 4-17 has none (`K_s = 0`).
+//!
+//! # Choice of lambda and K
+//! `lambda = K`: the surface is reached as fast as it is slid along (a double pole, no overshoot).
+//! Both lie a decade below the highest crossover of the sampled force loop with its share of the
+//! valve, so that the loop that has to make `F` adds less than 6 degrees of lag at the rate at which
+//! the law relies on it: [`rate_by_rule`].
+//!
+//! # Two integrators, one valve
+//! Displacement and force loop both integrate (Eq 3-6, 3-7) and act through one valve, so that their
+//! difference is seen by nothing: a pole at z = 1, and a bias of any sensor makes the two integrals
+//! drift apart without end. Here the displacement loop's integral leaks at the lower edge of the
+//! band of the motions ([`DISPLACEMENT_INTEGRAL_LEAK`]); the force loop's, which is eight times
+//! as strong, stays whole and takes the valve's null shift. In steady state the force error is then
+//! zero: a bias `b` of the force cell offsets the table by `b / (m lambda K)`, and nothing drifts.
+//!
+//! # Limits
+//! A low-level loop that stops at the valve's 10 V reaches, through its share of one half, 5 V of the
+//! valve: too little for a strong motion under a specimen. The loops' limits are therefore the
+//! valve's over their shares, and the allocation limits the sum.
+
+use std::f64::consts::TAU;
+
+use plant::linear::margins::{crossovers, nyquist};
+use plant::rig::Rig;
+use plant::specimen::LinearSpecimen;
+use plant::table::Table;
+
+use crate::allocation::ControlAllocation;
+use crate::loops::{Controlled, LinearLaw, Loop, Time};
+use crate::pid::Pid;
+use crate::prediction_over_delay::PredictionOverDelay;
+use crate::{Controller, ModelError, Motion};
+
+/// Leak of the displacement loop's integral under sliding mode, 1/s: the lower edge of the band
+/// of the motions, 0.25 Hz.
+pub const DISPLACEMENT_INTEGRAL_LEAK: f64 = TAU * 0.25;
+
+/// Crossover of the force loop over the rates of the sliding mode.
+const SEPARATION: f64 = 10.0;
+
+/// `lambda = K` of [`rate_by_rule`] on the identified table at 500 Hz with `beta = 0.5`, 1/s.
+pub const IDENTIFIED_RATE: f64 = 69.6;
+
+/// The sliding-mode law.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct SlidingMode {
+    /// The table: `m`, `c`, `k`.
+    pub table: Table,
+    /// Mass of the specimen whose acceleration is measured, `m_s`, kg.
+    pub specimen_mass: f64,
+    /// `lambda`, 1/s.
+    pub surface_rate: f64,
+    /// `K`, 1/s.
+    pub reaching_rate: f64,
+    /// `K_s`, m/s²; zero for the law as printed.
+    pub switching_gain: f64,
+    /// `phi`, m/s.
+    pub boundary_layer: f64,
+    /// Prediction over transport delay; absent where the loop has none.
+    pub prediction: Option<PredictionOverDelay>,
+}
+
+/// What sliding mode is told.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct SlidingModeInput {
+    /// Wanted motion.
+    pub reference: Motion,
+    /// Measured motion; the law needs no measured acceleration.
+    pub measured: Motion,
+    /// Measured force of the actuator, N; used by the prediction alone.
+    pub measured_force: f64,
+    /// Absolute acceleration of the specimen, m/s².
+    pub specimen_acceleration: f64,
+}
+
+/// What sliding mode asks of the low-level loops.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct LowLevelReferences {
+    /// Reference of the displacement loop, m.
+    pub displacement: f64,
+    /// Reference of the force loop, N.
+    pub force: f64,
+}
+
+impl SlidingMode {
+    /// Without switching and without delay.
+    pub fn new(table: Table, specimen_mass: f64, surface_rate: f64, reaching_rate: f64) -> Self {
+        Self {
+            table,
+            specimen_mass,
+            surface_rate,
+            reaching_rate,
+            switching_gain: 0.0,
+            boundary_layer: 0.01,
+            prediction: None,
+        }
+    }
+
+    /// Gains of the force command on displacement, velocity and acceleration error,
+    /// `[m lambda K, m (lambda + K), m]`; inside the boundary layer `K_s / phi` adds to `K`.
+    pub fn error_gains(&self) -> [f64; 3] {
+        let mass = self.table.mass;
+        let reaching = self.reaching_rate + self.switching_gain / self.boundary_layer;
+        [
+            mass * self.surface_rate * reaching,
+            mass * (self.surface_rate + reaching),
+            mass,
+        ]
+    }
+
+    /// The surface `S` in m/s (Eq 4-7).
+    pub fn surface(&self, reference: &Motion, measured: &Motion) -> f64 {
+        measured.velocity - reference.velocity
+            + self.surface_rate * (measured.displacement - reference.displacement)
+    }
+
+    /// `(F_disp, F_v/a)` of Eq 4-18 in N.
+    pub fn forces(
+        &self,
+        reference: &Motion,
+        measured: &Motion,
+        specimen_acceleration: f64,
+    ) -> (f64, f64) {
+        let Table {
+            mass,
+            damping,
+            stiffness,
+        } = self.table;
+        let (lambda, k) = (self.surface_rate, self.reaching_rate);
+        let switching = self.switching_gain
+            * (self.surface(reference, measured) / self.boundary_layer).clamp(-1.0, 1.0);
+        let displacement_force =
+            mass * lambda * k * (reference.displacement - measured.displacement)
+                + stiffness * measured.displacement;
+        let motion_force = mass * (k + lambda) * (reference.velocity - measured.velocity)
+            + mass * reference.acceleration
+            + self.specimen_mass * specimen_acceleration
+            + damping * measured.velocity
+            - mass * switching;
+        (displacement_force, motion_force)
+    }
+}
+
+impl Default for SlidingMode {
+    /// On the identified table, for the specimen of Appendix A, with lambda and K by the rule.
+    fn default() -> Self {
+        Self::new(
+            Table::default(),
+            LinearSpecimen::appendix_a().mass,
+            IDENTIFIED_RATE,
+            IDENTIFIED_RATE,
+        )
+    }
+}
+
+impl Controller for SlidingMode {
+    type Input = SlidingModeInput;
+    type Output = LowLevelReferences;
+
+    fn validate(&self) -> Result<(), ModelError> {
+        self.table.validate()?;
+        ModelError::require_non_negative("specimen_mass", self.specimen_mass)?;
+        ModelError::require_positive("surface_rate", self.surface_rate)?;
+        ModelError::require_positive("reaching_rate", self.reaching_rate)?;
+        ModelError::require_non_negative("switching_gain", self.switching_gain)?;
+        ModelError::require_positive("boundary_layer", self.boundary_layer)?;
+        self.prediction
+            .as_ref()
+            .map_or(Ok(()), PredictionOverDelay::validate)
+    }
+
+    fn step(&mut self, input: &SlidingModeInput, period: f64) -> LowLevelReferences {
+        let Some(mut prediction) = self.prediction else {
+            let (displacement, motion) = self.forces(
+                &input.reference,
+                &input.measured,
+                input.specimen_acceleration,
+            );
+            return LowLevelReferences {
+                displacement: displacement / self.table.stiffness,
+                force: displacement + motion,
+            };
+        };
+        let foreseen = prediction.foresee(input, self.specimen_mass, period);
+        let at = foreseen.action;
+        let (displacement, motion) =
+            self.forces(&foreseen.reference, &at.motion, at.specimen_acceleration);
+        // The low-level loops subtract what they measure when the references reach them: what is
+        // predicted to be different when the valve moves is added here.
+        let references = LowLevelReferences {
+            displacement: displacement / self.table.stiffness - at.motion.displacement
+                + foreseen.low_level.motion.displacement,
+            force: displacement + motion - at.force + foreseen.low_level.force,
+        };
+        prediction.remember(&references, input, period);
+        self.prediction = Some(prediction);
+        references
+    }
+
+    fn reset(&mut self) {
+        if let Some(prediction) = &mut self.prediction {
+            prediction.reset();
+        }
+    }
+}
+
+/// Displacement control of Eq 3-6 as it runs under sliding mode: its integral leaks, and its limit
+/// leaves the limiting of the valve to the allocation.
+pub fn displacement_loop(allocation: &ControlAllocation) -> Pid {
+    Pid {
+        integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
+        limit: allocation.limit / allocation.displacement_share,
+        ..Pid::equation_3_6()
+    }
+}
+
+/// Force control of Eq 3-7 as it runs under sliding mode: its limit leaves the limiting of the
+/// valve to the allocation.
+pub fn force_loop(allocation: &ControlAllocation) -> Pid {
+    Pid {
+        limit: allocation.limit / allocation.force_share,
+        ..Pid::equation_3_7()
+    }
+}
+
+/// `lambda = K` in 1/s: a tenth of the highest crossover of the force loop that runs with
+/// `force_share` of the valve, sampled with `period`.
+///
+/// Fails where that loop never has a gain of one.
+pub fn rate_by_rule(
+    rig: &Rig,
+    force: &Pid,
+    force_share: f64,
+    period: f64,
+) -> Result<f64, ModelError> {
+    let shared = Pid {
+        proportional: force.proportional * force_share,
+        integral: force.integral * force_share,
+        ..*force
+    };
+    let law = LinearLaw::pid(&shared, Controlled::Force, period)?;
+    let force_loop = Loop::new(rig, law);
+    crossovers(
+        |omega| force_loop.open(Time::Sampled, omega),
+        1.0,
+        nyquist(period),
+    )
+    .last()
+    .map(|crossover| crossover / SEPARATION)
+    .ok_or(ModelError::NoSolution {
+        equation: "the rule for surface_rate and reaching_rate",
+        reason: "the force loop has no crossover".into(),
+    })
+}

@@ -1,0 +1,56 @@
+#![allow(non_snake_case, reason = "an FMU is named in camel case")]
+//! Loop-shaping control as an FMU.
+
+use controllers::{Controller, loop_shaping::LoopShaping as Law, pid::PidInput};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use serde::{Deserialize, Serialize};
+
+/// The second-order controller of Eq 3-10 from displacement to valve command.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct LoopShaping {
+    law: Law,
+    reference_displacement: f64,
+    measured_displacement: f64,
+    valve_command: f64,
+}
+
+impl Component for LoopShaping {
+    const NAME: &'static str = "LoopShaping";
+    const DESCRIPTION: &'static str = "Loop-shaping control of the displacement of a shake table";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+
+    fn variables() -> Vec<Variable<Self>> {
+        fmu_kit::table! { Self, s:
+            input("reference_displacement", s.reference_displacement, "Wanted displacement", "m" => "in")
+                .nominal(0.0381);
+            input("measured_displacement", s.measured_displacement, "Displacement of the table", "m" => "in")
+                .nominal(0.0381);
+            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0)
+                .depends_on(&["reference_displacement", "measured_displacement"], Dependent);
+            parameter("gain", s.law.coefficients.gain, "g of Eq 3-10", "V/m" => "V/in");
+            parameter("numerator_rate", s.law.coefficients.numerator_rate, "Coefficient of s in the numerator", "1/s");
+            parameter("numerator_constant", s.law.coefficients.numerator_constant, "Constant of the numerator", "1/s2");
+            parameter("pole", s.law.coefficients.pole, "Rate p of the slow pole", "1/s");
+            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
+        }
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        self.law.validate()?;
+        self.law.reset();
+        self.valve_command = 0.0;
+        Ok(())
+    }
+
+    fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        let input = PidInput {
+            reference: self.reference_displacement,
+            measured: self.measured_displacement,
+        };
+        self.valve_command = self.law.step(&input, step_size);
+        Ok(())
+    }
+}
+
+fmu_kit::export!(LoopShaping);

@@ -1,0 +1,266 @@
+#![allow(non_snake_case, reason = "an FMU is named in camel case")]
+//! Model predictive control over three-variable control as an FMU.
+
+mod settings;
+
+use controllers::mpc::{MAXIMUM_HORIZON, Memory, ModelPredictiveControl, ModelPredictiveInput};
+use controllers::{Controller, Motion};
+use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Variable};
+use serde::{Deserialize, Serialize};
+
+use settings::{SOLVERS, Settings};
+
+/// Model predictive control from reference and measured motion to the commands of three-variable
+/// control.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct ModelPredictive {
+    settings: Settings,
+    reference: Motion,
+    displacement_ahead: [f64; MAXIMUM_HORIZON],
+    velocity_ahead: [f64; MAXIMUM_HORIZON],
+    acceleration_ahead: [f64; MAXIMUM_HORIZON],
+    measured: Motion,
+    memory: Memory,
+    command: Motion,
+    counts: Counts,
+    #[serde(skip)]
+    built: Built,
+}
+
+/// Outputs about the solver.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+struct Counts {
+    shortcuts: i32,
+    solved: i32,
+    iterations: i32,
+    fallbacks: i32,
+    low_level_alone: i32,
+}
+
+/// What follows from the settings alone. A copy builds its own at its next step.
+#[derive(Default)]
+struct Built(Option<Box<(Settings, ModelPredictiveControl)>>);
+
+impl Clone for Built {
+    fn clone(&self) -> Self {
+        Self(None)
+    }
+
+    fn clone_from(&mut self, _source: &Self) {}
+}
+
+impl std::fmt::Debug for Built {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Built").field(&self.0.is_some()).finish()
+    }
+}
+
+impl Built {
+    /// The controller for these settings, built if it isn't yet.
+    fn controller(
+        &mut self,
+        settings: &Settings,
+    ) -> Result<&mut ModelPredictiveControl, plant::ModelError> {
+        if self.0.as_ref().is_some_and(|built| built.0 != *settings) {
+            self.0 = None;
+        }
+        let built = match self.0.take() {
+            Some(built) => built,
+            None => Box::new((
+                *settings,
+                ModelPredictiveControl::new(settings.parameters(ModelPredictive::STEP_SIZE)?)?,
+            )),
+        };
+        Ok(&mut self.0.insert(built).1)
+    }
+}
+
+const NOW: [&str; 6] = [
+    "reference_displacement",
+    "reference_velocity",
+    "reference_acceleration",
+    "measured_displacement",
+    "measured_velocity",
+    "measured_acceleration",
+];
+
+fn ahead() -> Vec<Variable<ModelPredictive>> {
+    let array = |name, about: &str, unit, shown, nominal, field| {
+        let elements =
+            Variable::<ModelPredictive>::array(name, Causality::Input, MAXIMUM_HORIZON, field);
+        elements
+            .into_iter()
+            .enumerate()
+            .map(|(i, element)| {
+                element
+                    .about(&format!("{about} {} samples ahead, for `preview`", i + 1))
+                    .unit(unit)
+                    .shown_in(shown)
+                    .nominal(nominal)
+            })
+            .collect::<Vec<_>>()
+    };
+    let mut all = array(
+        "reference_displacement",
+        "Wanted displacement",
+        "m",
+        "in",
+        0.0381,
+        |s| &mut s.displacement_ahead,
+    );
+    all.extend(array(
+        "reference_velocity",
+        "Wanted velocity",
+        "m/s",
+        "in/s",
+        0.5,
+        |s| &mut s.velocity_ahead,
+    ));
+    all.extend(array(
+        "reference_acceleration",
+        "Wanted acceleration",
+        "m/s2",
+        "g",
+        10.0,
+        |s| &mut s.acceleration_ahead,
+    ));
+    all
+}
+
+impl Component for ModelPredictive {
+    const NAME: &'static str = "ModelPredictive";
+    const DESCRIPTION: &'static str =
+        "Model predictive control of a shake table over three-variable control";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const ANY_STEP_SIZE: bool = false;
+
+    fn variables() -> Vec<Variable<Self>> {
+        let mut variables = fmu_kit::table! { Self, s:
+            input("reference_displacement", s.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input("reference_velocity", s.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
+            input("reference_acceleration", s.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
+            input("measured_displacement", s.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+            input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
+        };
+        let ahead = ahead();
+        let inputs: Vec<String> = NOW
+            .iter()
+            .map(|name| name.to_string())
+            .chain(ahead.iter().map(|variable| variable.name.clone()))
+            .collect();
+        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+        variables.extend(ahead);
+        let outputs = fmu_kit::table! { Self, s:
+            output("command_displacement", s.command.displacement, "Displacement for three-variable control", "m" => "in").nominal(0.0381);
+            output("command_velocity", s.command.velocity, "Velocity for three-variable control", "m/s" => "in/s").nominal(0.5);
+            output("command_acceleration", s.command.acceleration, "Acceleration for three-variable control", "m/s2" => "g").nominal(10.0);
+        };
+        let outputs = outputs.into_iter().map(Variable::discrete);
+        let counts = fmu_kit::table! { Self, s:
+            output("solver_shortcut_count", s.counts.shortcuts, "Steps in which no limit was active");
+            output("solver_solved_count", s.counts.solved, "Steps that the solver solved");
+            output("solver_iterations", s.counts.iterations, "Iterations of the solver in this step");
+            output("fallback_count", s.counts.fallbacks, "Steps along the previous plan because the solver gave up");
+            output("low_level_alone_count", s.counts.low_level_alone, "Steps left to three-variable control alone");
+        };
+        variables.extend(
+            outputs
+                .chain(counts)
+                .map(|output| output.depends_on(&inputs, Dependent)),
+        );
+        variables.extend(settings::variables());
+        variables.push(
+            Variable::choice("solver", SOLVERS, |s: &mut Self| &mut s.settings.solver)
+                .about("Solver of the steps in which a limit is active"),
+        );
+        variables
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        self.built.controller(&self.settings)?;
+        self.memory = Memory::default();
+        self.command = Motion::default();
+        self.counts = Counts::default();
+        Ok(())
+    }
+
+    fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        let control = self.built.controller(&self.settings)?;
+        control.memory = self.memory;
+        let input = ModelPredictiveInput {
+            reference: std::array::from_fn(|i| match i.checked_sub(1) {
+                None => self.reference,
+                Some(i) => Motion {
+                    displacement: self.displacement_ahead[i],
+                    velocity: self.velocity_ahead[i],
+                    acceleration: self.acceleration_ahead[i],
+                },
+            }),
+            measured: self.measured,
+        };
+        self.command = control.step(&input, step_size);
+        self.memory = control.memory;
+        let counters = &self.memory.counters;
+        let whole = |count: u32| i32::try_from(count).unwrap_or(i32::MAX);
+        self.counts = Counts {
+            shortcuts: whole(counters.shortcuts),
+            solved: whole(counters.solved),
+            iterations: whole(counters.iterations),
+            fallbacks: whole(counters.shifted_plans),
+            low_level_alone: whole(counters.low_level_alone),
+        };
+        Ok(())
+    }
+}
+
+fmu_kit::export!(ModelPredictive);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmu_kit::conformance::allocations;
+
+    #[test]
+    fn steps_at_a_limit_do_not_allocate_either() {
+        let mut component = ModelPredictive::default();
+        component.initialize().unwrap();
+        let counted = allocations(|| {
+            for k in 0..1000 {
+                let time = 0.002 * f64::from(k);
+                component.reference.displacement = 0.05 * (3.0 * time).sin();
+                component.measured = component.reference;
+                component.step(time, 0.002).unwrap();
+            }
+        });
+        assert_eq!(counted, 0);
+        assert!(component.counts.solved > 50, "{:?}", component.counts);
+        assert_eq!(component.counts.fallbacks, 0);
+    }
+
+    #[test]
+    fn what_no_controller_is_built_from_is_refused_by_name() {
+        let set = |component: &mut ModelPredictive, name: &str, value: f64| {
+            let variables = ModelPredictive::variables();
+            let variable = variables.iter().find(|v| v.name == name).unwrap();
+            match &variable.access {
+                fmu_kit::variable::Access::Real(field) => *field(component) = value,
+                fmu_kit::variable::Access::Integer(field) => *field(component) = value as i32,
+                _ => panic!("{name} is no number"),
+            }
+        };
+        for (name, value) in [
+            ("prediction_horizon", 0.0),
+            ("displacement_weight", -1.0),
+            ("minimum_displacement", 0.1),
+            ("violation_weight", 0.0),
+            ("valve_limit", 0.0),
+            ("table_mass", 0.0),
+        ] {
+            let mut component = ModelPredictive::default();
+            set(&mut component, name, value);
+            let error = component.initialize().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{name}`")), "{name}: {error}");
+        }
+    }
+}

@@ -1,0 +1,212 @@
+#![allow(non_snake_case, reason = "an FMU is named in camel case")]
+//! Servo-hydraulic shake table from first principles as an FMU.
+
+use fmu_kit::{
+    Component, ComponentResult,
+    Dependency::{Dependent, Fixed},
+    Event, Variable,
+};
+use plant::servo_hydraulic::{
+    INNER_STEP, ServoHydraulicInput, ServoHydraulicState, ServoHydraulicTable as Rig,
+};
+use serde::{Deserialize, Serialize};
+
+/// The physical table between valve command, specimen force and motion.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ServoHydraulicTable {
+    rig: Rig,
+    state: ServoHydraulicState,
+    rates: ServoHydraulicState,
+    valve_command: f64,
+    specimen_force: f64,
+    actuator_force: f64,
+    supply_loss_time: f64,
+    estimate_error: bool,
+    displacement_error: f64,
+    stop_hit: bool,
+}
+
+/// A supply that is never lost.
+const NEVER: f64 = 1e9;
+
+impl Default for ServoHydraulicTable {
+    fn default() -> Self {
+        let rig = Rig::default();
+        Self {
+            rig,
+            state: rig.rest(),
+            rates: ServoHydraulicState::default(),
+            valve_command: 0.0,
+            specimen_force: 0.0,
+            actuator_force: 0.0,
+            supply_loss_time: NEVER,
+            estimate_error: false,
+            displacement_error: 0.0,
+            stop_hit: false,
+        }
+    }
+}
+
+impl ServoHydraulicTable {
+    fn input(&self, time: f64) -> ServoHydraulicInput {
+        ServoHydraulicInput {
+            valve_command: self.valve_command,
+            specimen_force: self.specimen_force,
+            supply_lost: time >= self.supply_loss_time - 1e-9,
+        }
+    }
+}
+
+impl Component for ServoHydraulicTable {
+    const NAME: &'static str = "ServoHydraulicTable";
+    const DESCRIPTION: &'static str = "Uniaxial servo-hydraulic shake table from first principles";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+
+    fn variables() -> Vec<Variable<Self>> {
+        const MOTION: [&str; 2] = ["displacement", "velocity"];
+        const OIL: [&str; 3] = ["pressure_a", "pressure_b", "seal_deflection"];
+        const CHAMBERS: [&str; 6] = [
+            "pressure_a",
+            "pressure_b",
+            "supply_pressure",
+            "spool",
+            "displacement",
+            "velocity",
+        ];
+        const VALVE: [&str; 7] = [
+            "null_leakage",
+            "pump_pressure",
+            "pump_gain",
+            "pump_limit",
+            "bulk_modulus",
+            "oil_volume",
+            "piston_leakage",
+        ];
+        fmu_kit::table! { Self, s:
+            input("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0);
+            input("specimen_force", s.specimen_force, "Force of the specimen on the table", "N" => "lbf")
+                .nominal(400.0);
+            output("displacement", s.state.displacement, "Displacement of the table", "m" => "in")
+                .nominal(0.0381);
+            output("velocity", s.state.velocity, "Velocity of the table", "m/s" => "in/s")
+                .nominal(0.5).derivative_of("displacement");
+            output("acceleration", s.rates.velocity, "Absolute acceleration of the table", "m/s2" => "g")
+                .nominal(10.0).derivative_of("velocity")
+                .depends_on(&["specimen_force"], Fixed).depends_on(&MOTION, Dependent).depends_on(&OIL, Dependent)
+                .initially_depends_on(&["specimen_force", "table_mass", "added_payload"]);
+            output("actuator_force", s.actuator_force, "Force of the actuator on the table", "N" => "lbf")
+                .nominal(400.0).depends_on(&MOTION, Dependent).depends_on(&OIL, Dependent);
+            output("supply_pressure", s.state.supply_pressure, "Pressure of the supply", "Pa" => "psi")
+                .nominal(2e7).initially_depends_on(&VALVE);
+            parameter("estimate_error", s.estimate_error, "Estimate the error of every step");
+            parameter("pump_pressure", s.rig.supply.pressure, "Pressure at which the pump stops delivering", "Pa" => "psi");
+            parameter("pump_gain", s.rig.supply.pump_gain, "Pump flow per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
+            parameter("pump_limit", s.rig.supply.pump_limit, "Largest flow of the pump", "m3/s" => "in3/s");
+            parameter("accumulator_gas_volume", s.rig.supply.gas_volume, "Gas volume of the accumulator at the pump's pressure", "m3" => "in3");
+            parameter("polytropic_exponent", s.rig.supply.polytropic_exponent, "Polytropic exponent of the gas");
+            parameter("supply_loss_time", s.supply_loss_time, "Fault: the supply is lost from this time on", "s");
+            parameter("supply_drain_time", s.rig.supply.drain_time, "Time constant at which a lost supply drains", "s");
+            parameter("valve_frequency", s.rig.valve.frequency, "Natural frequency of the spool", "Hz");
+            parameter("valve_damping_ratio", s.rig.valve.damping_ratio, "Damping ratio of the spool");
+            parameter("spool_travel_limit", s.rig.valve.travel_limit, "Travel limit of the spool", "V");
+            parameter("valve_overlap", s.rig.valve.overlap, "Overlap of the edges (dead band, half width)", "V");
+            parameter("valve_null_bias", s.rig.valve.null_bias, "Position of the spool at zero command", "V");
+            parameter("flow_coefficient", s.rig.valve.flow_coefficient, "Flow through an edge per volt and root of pressure, m3/(s V sqrt(Pa))");
+            parameter("valve_asymmetry", s.rig.valve.asymmetry, "q of the flow gains 1 + q and 1 - q");
+            parameter("null_leakage", s.rig.valve.null_leakage, "Laminar flow past a closed edge", "m3/(s.Pa)" => "in3/(s.psi)");
+            parameter("piston_area", s.rig.cylinder.area, "Area of the piston", "m2" => "in2");
+            parameter("oil_volume", s.rig.cylinder.volume, "Volume of both chambers with hoses", "m3" => "in3");
+            parameter("bulk_modulus", s.rig.cylinder.bulk_modulus, "Effective bulk modulus", "Pa" => "psi");
+            parameter("piston_leakage", s.rig.cylinder.leakage, "Leakage past the piston", "m3/(s.Pa)" => "in3/(s.psi)");
+            parameter("make_up_flow", s.rig.cylinder.make_up, "Flow of the anti-cavitation valves per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
+            parameter("coulomb_friction", s.rig.friction.coulomb, "Coulomb friction of the seals", "N" => "lbf");
+            parameter("static_friction", s.rig.friction.static_force, "Static friction of the seals", "N" => "lbf");
+            parameter("stribeck_velocity", s.rig.friction.stribeck_velocity, "Stribeck velocity", "m/s" => "in/s");
+            parameter("seal_viscous_friction", s.rig.friction.viscous, "Viscous friction of the seals", "N.s/m" => "lbf.s/in");
+            parameter("seal_stiffness", s.rig.friction.stiffness, "Stiffness of the seals before they slide", "N/m" => "lbf/in");
+            parameter("presliding_damping", s.rig.friction.presliding_damping, "Damping of the seals at rest", "N.s/m" => "lbf.s/in");
+            parameter("stroke", s.rig.stops.stroke, "Distance of the hard stops from the middle", "m" => "in");
+            parameter("cushion_length", s.rig.stops.cushion_length, "Length of the cushions", "m" => "in");
+            parameter("cushion_damping", s.rig.stops.cushion_damping, "Damping of a cushion at its end", "N.s/m" => "lbf.s/in");
+            parameter("stop_stiffness", s.rig.stops.stiffness, "Stiffness of the hard stops", "N/m" => "lbf/in");
+            parameter("stop_loss", s.rig.stops.loss, "Loss of the hard stops", "s/m" => "s/in");
+            parameter("table_mass", s.rig.table.mass, "Mass of the table", "kg" => "lbf.s2/in");
+            parameter("table_damping", s.rig.table.damping, "Viscous damping of the table", "N.s/m" => "lbf.s/in");
+            parameter("table_stiffness", s.rig.table.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
+            parameter("added_payload", s.rig.added_payload, "Mass on the table that a model does not know of", "kg" => "lbf.s2/in");
+            parameter("cubic_stiffness", s.rig.cubic_stiffness, "Factor of an additional force with the cube of the displacement", "N/m3" => "lbf/in3");
+            local("stop_hit", s.stop_hit, "Whether a hard stop is touched");
+            local("displacement_error", s.displacement_error, "Estimated error of the displacement made in the last step, if asked for", "m" => "in")
+                .discrete().nominal(1e-6);
+            local("spool", s.state.spool, "Position of the spool", "V").nominal(10.0);
+            local("spool_velocity", s.state.spool_velocity, "Velocity of the spool", "V/s")
+                .nominal(1e3).derivative_of("spool");
+            local("pressure_a", s.state.pressures[0], "Pressure of chamber A, which extends the rod", "Pa" => "psi")
+                .nominal(1e7).initially_depends_on(&VALVE);
+            local("pressure_b", s.state.pressures[1], "Pressure of chamber B", "Pa" => "psi")
+                .nominal(1e7).initially_depends_on(&VALVE);
+            local("seal_deflection", s.state.seal_deflection, "Deflection of the seals", "m" => "in")
+                .nominal(2e-5);
+            local("der(spool_velocity)", s.rates.spool_velocity, "Acceleration of the spool", "V/s2")
+                .derivative_of("spool_velocity")
+                .depends_on(&["valve_command"], Dependent).depends_on(&["spool", "spool_velocity"], Fixed)
+                .initially_depends_on(&["valve_command", "valve_null_bias", "spool_travel_limit", "valve_frequency"]);
+            local("der(pressure_a)", s.rates.pressures[0], "Rate of the pressure of chamber A", "Pa/s")
+                .derivative_of("pressure_a").depends_on(&CHAMBERS, Dependent).initially_depends_on(&VALVE);
+            local("der(pressure_b)", s.rates.pressures[1], "Rate of the pressure of chamber B", "Pa/s")
+                .derivative_of("pressure_b").depends_on(&CHAMBERS, Dependent).initially_depends_on(&VALVE);
+            local("der(seal_deflection)", s.rates.seal_deflection, "Rate of the seals' deflection", "m/s")
+                .derivative_of("seal_deflection").depends_on(&["velocity", "seal_deflection"], Dependent);
+            local("der(supply_pressure)", s.rates.supply_pressure, "Rate of the supply pressure", "Pa/s")
+                .derivative_of("supply_pressure")
+                .depends_on(&["pressure_a", "pressure_b", "supply_pressure", "spool"], Dependent)
+                .initially_depends_on(&VALVE)
+                .initially_depends_on(&["accumulator_gas_volume", "polytropic_exponent", "supply_loss_time"]);
+        }
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        self.rig.validate()?;
+        self.state = self.rig.rest();
+        self.displacement_error = 0.0;
+        self.stop_hit = false;
+        Ok(())
+    }
+
+    fn update_outputs(&mut self, time: f64) {
+        self.actuator_force = self.rig.actuator_force(&self.state);
+        self.rates = self.rig.derivatives(&self.state, &self.input(time));
+        self.stop_hit = self.rig.stops.is_hit(self.state.displacement);
+    }
+
+    fn step(&mut self, time: f64, step_size: f64) -> ComponentResult {
+        let input = self.input(time);
+        if self.estimate_error {
+            let (next, error) =
+                self.rig
+                    .advance_with_error(&self.state, &input, step_size, INNER_STEP);
+            (self.state, self.displacement_error) = (next, error.displacement);
+        } else {
+            self.state = self.rig.advance(&self.state, &input, step_size);
+        }
+        if self.state.displacement.is_finite() && self.state.supply_pressure.is_finite() {
+            return Ok(());
+        }
+        Err(format!(
+            "the state is no longer finite after t = {} s",
+            time + step_size
+        )
+        .into())
+    }
+
+    fn handle_event(&mut self, time: f64) -> Result<Event, Box<dyn std::error::Error>> {
+        let ahead = self.supply_loss_time < NEVER && time < self.supply_loss_time - 1e-9;
+        Ok(Event {
+            next_event_time: ahead.then_some(self.supply_loss_time),
+            ..Event::default()
+        })
+    }
+}
+
+fmu_kit::export!(ServoHydraulicTable);

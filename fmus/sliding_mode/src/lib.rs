@@ -1,0 +1,167 @@
+#![allow(non_snake_case, reason = "an FMU is named in camel case")]
+//! Sliding-mode control as an FMU.
+
+use controllers::{
+    Controller,
+    allocation::ControlAllocation,
+    pid::Pid,
+    prediction_over_delay::PredictionOverDelay,
+    sliding_mode::{self, LowLevelReferences, SlidingMode as Law, SlidingModeInput},
+};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use plant::{ModelError, shake_table::ShakeTable, units::SAMPLING_PERIOD};
+use serde::{Deserialize, Serialize};
+
+/// The sliding-mode law over the loops of Fig 4-3.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SlidingMode {
+    law: Law,
+    input: SlidingModeInput,
+    references: LowLevelReferences,
+    surface: f64,
+    loop_delay_samples: i32,
+    command_delay_samples: i32,
+    reference_ahead: bool,
+    sampling_period: f64,
+    displacement_loop: Pid,
+    force_loop: Pid,
+    allocation: ControlAllocation,
+}
+
+impl Default for SlidingMode {
+    fn default() -> Self {
+        let allocation = ControlAllocation::default();
+        Self {
+            law: Law::default(),
+            input: SlidingModeInput::default(),
+            references: LowLevelReferences::default(),
+            surface: 0.0,
+            loop_delay_samples: 0,
+            command_delay_samples: 0,
+            reference_ahead: false,
+            sampling_period: SAMPLING_PERIOD,
+            displacement_loop: sliding_mode::displacement_loop(&allocation),
+            force_loop: sliding_mode::force_loop(&allocation),
+            allocation,
+        }
+    }
+}
+
+const MOTION: [&str; 5] = [
+    "reference_displacement",
+    "reference_velocity",
+    "reference_acceleration",
+    "measured_displacement",
+    "measured_velocity",
+];
+const ALL: [&str; 7] = [
+    "reference_displacement",
+    "reference_velocity",
+    "reference_acceleration",
+    "measured_displacement",
+    "measured_velocity",
+    "measured_force",
+    "specimen_acceleration",
+];
+
+impl Component for SlidingMode {
+    const NAME: &'static str = "SlidingMode";
+    const DESCRIPTION: &'static str = "Sliding mode over a displacement and a force loop";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+
+    fn variables() -> Vec<Variable<Self>> {
+        fmu_kit::table! { Self, s:
+            input("reference_displacement", s.input.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input("reference_velocity", s.input.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
+            input("reference_acceleration", s.input.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
+            input("measured_displacement", s.input.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input("measured_velocity", s.input.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+            input("measured_force", s.input.measured_force, "Force of the actuator, for the prediction over a delay", "N" => "lbf").nominal(200.0);
+            input("specimen_acceleration", s.input.specimen_acceleration, "Absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
+            output("displacement_command", s.references.displacement, "Reference of the displacement loop", "m" => "in")
+                .discrete().nominal(0.0381).depends_on(&ALL, Dependent);
+            output("force_command", s.references.force, "Reference of the force loop", "N" => "lbf")
+                .discrete().nominal(200.0).depends_on(&ALL, Dependent);
+            output("sliding_surface", s.surface, "S of Eq 4-7 as measured", "m/s" => "in/s")
+                .discrete().nominal(0.5).depends_on(&MOTION, Dependent);
+            parameter("table_mass", s.law.table.mass, "Mass of the table", "kg");
+            parameter("table_damping", s.law.table.damping, "Damping of the table", "N.s/m" => "lbf.s/in");
+            parameter("table_stiffness", s.law.table.stiffness, "Stiffness of the table's springs", "N/m" => "lbf/in");
+            parameter("specimen_mass", s.law.specimen_mass, "Mass of the specimen whose acceleration is measured", "kg");
+            parameter("surface_rate", s.law.surface_rate, "lambda of Eq 4-7", "1/s");
+            parameter("reaching_rate", s.law.reaching_rate, "K of Eq 4-12", "1/s");
+            parameter("switching_gain", s.law.switching_gain, "K_s of the switching term, 0 for none", "m/s2" => "g");
+            parameter("boundary_layer", s.law.boundary_layer, "phi of the switching term", "m/s" => "in/s");
+            parameter("loop_delay_samples", s.loop_delay_samples, "Samples from measurement to valve");
+            parameter("command_delay_samples", s.command_delay_samples, "Samples from this law to the low-level loops");
+            parameter("reference_ahead", s.reference_ahead, "The references are those of loop_delay_samples later");
+            parameter("sampling_period", s.sampling_period, "Period of the prediction", "s" => "ms");
+            parameter("displacement_loop_proportional_gain", s.displacement_loop.proportional, "Of the displacement loop", "V/m" => "V/in");
+            parameter("displacement_loop_integral_gain", s.displacement_loop.integral, "Of the displacement loop", "V/(m.s)" => "V/(in.s)");
+            parameter("displacement_loop_integral_leak", s.displacement_loop.integral_leak, "Of the displacement loop", "1/s");
+            parameter("displacement_loop_limit", s.displacement_loop.limit, "Of the displacement loop", "V");
+            parameter("force_loop_proportional_gain", s.force_loop.proportional, "Of the force loop", "V/N" => "V/lbf");
+            parameter("force_loop_integral_gain", s.force_loop.integral, "Of the force loop", "V/(N.s)" => "V/(lbf.s)");
+            parameter("force_loop_integral_leak", s.force_loop.integral_leak, "Of the force loop", "1/s");
+            parameter("force_loop_limit", s.force_loop.limit, "Of the force loop", "V");
+            parameter("displacement_share", s.allocation.displacement_share, "alpha of the allocation", "1");
+            parameter("force_share", s.allocation.force_share, "beta of the allocation", "1");
+            parameter("valve_limit", s.allocation.limit, "Largest magnitude of the valve command", "V");
+        }
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        self.law.prediction = None;
+        let [loop_delay, command_delay] = [
+            ("loop_delay_samples", self.loop_delay_samples),
+            ("command_delay_samples", self.command_delay_samples),
+        ]
+        .map(|(name, samples)| {
+            usize::try_from(samples).map_err(|_| ModelError::Parameter {
+                name,
+                value: f64::from(samples),
+                expected: "zero or a positive whole number",
+            })
+        });
+        let (loop_delay, command_delay) = (loop_delay?, command_delay?);
+        self.law.validate()?;
+        if loop_delay > 0 || command_delay > 0 {
+            let table = ShakeTable {
+                table: self.law.table,
+                ..ShakeTable::default()
+            };
+            let mut prediction =
+                PredictionOverDelay::new(&table, self.sampling_period, loop_delay, command_delay)?;
+            prediction.reference_ahead = self.reference_ahead;
+            prediction.displacement_loop = self.displacement_loop;
+            prediction.force_loop = self.force_loop;
+            prediction.allocation = self.allocation;
+            self.law.prediction = Some(prediction);
+        }
+        self.law.validate()?;
+        self.law.reset();
+        self.references = LowLevelReferences::default();
+        self.surface = 0.0;
+        Ok(())
+    }
+
+    fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        if self.law.prediction.is_some()
+            && (step_size - self.sampling_period).abs() > 1e-9 * self.sampling_period
+        {
+            return Err(format!(
+                "parameter `sampling_period` is {} s, the step {step_size} s: a prediction over a \
+                 delay needs them equal",
+                self.sampling_period
+            )
+            .into());
+        }
+        self.references = self.law.step(&self.input, step_size);
+        self.surface = self
+            .law
+            .surface(&self.input.reference, &self.input.measured);
+        Ok(())
+    }
+}
+
+fmu_kit::export!(SlidingMode);

@@ -1,0 +1,543 @@
+//! Recordings and their faults: gaps, drop-outs, clipped and constant channels, uneven time
+//! stamps.
+
+use std::fmt;
+
+use crate::IdentificationError;
+
+/// Channels of one test on an even time base, SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// What the recording is called in messages.
+    pub name: String,
+    /// Sampling period, s.
+    pub period: f64,
+    /// Time of the first sample, s.
+    pub start: f64,
+    /// The file or test it comes from; pieces of one recording share it.
+    pub source: String,
+    channels: Vec<(String, Vec<f64>)>,
+}
+
+/// Something about a recording that its reader should know.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// The recording.
+    pub recording: String,
+    /// What was found, with its place.
+    pub what: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.recording, self.what)
+    }
+}
+
+/// Missing samples up to this many in a row are bridged by a straight line.
+const LONGEST_BRIDGE: usize = 5;
+/// Time stamps may stray from the even grid by this part of the period.
+const JITTER: f64 = 0.02;
+/// A stretch at the same extreme value this long is a clipped channel.
+const CLIPPED_RUN: usize = 4;
+/// A stretch of one repeated value this long, in a channel that otherwise moves, is a drop-out.
+const STUCK_RUN: usize = 25;
+
+impl Recording {
+    /// Joins channels that are sampled evenly.
+    ///
+    /// # Errors
+    /// Channels of different length, a period that is not positive, samples that are not finite.
+    pub fn new(
+        name: &str,
+        period: f64,
+        channels: Vec<(String, Vec<f64>)>,
+    ) -> Result<Self, IdentificationError> {
+        let unreadable = |what: String, expected| IdentificationError::Unreadable {
+            recording: name.to_string(),
+            what,
+            expected,
+        };
+        if !(period.is_finite() && period > 0.0) {
+            return Err(unreadable(
+                format!("the period is {period} s"),
+                "a positive sampling period",
+            ));
+        }
+        let length = channels.first().map_or(0, |channel| channel.1.len());
+        for (channel, values) in &channels {
+            if values.len() != length {
+                return Err(unreadable(
+                    format!("`{channel}` has {} samples, not {length}", values.len()),
+                    "channels of one length",
+                ));
+            }
+            if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+                return Err(unreadable(
+                    format!("`{channel}` has no number at sample {}", at + 1),
+                    "finite numbers",
+                ));
+            }
+        }
+        Ok(Self {
+            name: name.to_string(),
+            period,
+            start: 0.0,
+            source: name.to_string(),
+            channels,
+        })
+    }
+
+    /// Puts raw columns on an even time base: short drop-outs (NaN) are bridged, uneven stamps
+    /// interpolated, and the recording is cut where samples are missing for longer. Each piece is
+    /// a recording of its own; everything done is told.
+    ///
+    /// # Errors
+    /// Time that does not increase, fewer than two samples.
+    pub fn from_columns(
+        name: &str,
+        time: &[f64],
+        channels: Vec<(String, Vec<f64>)>,
+    ) -> Result<(Vec<Self>, Vec<Finding>), IdentificationError> {
+        let unreadable = |what: String, expected| IdentificationError::Unreadable {
+            recording: name.to_string(),
+            what,
+            expected,
+        };
+        if time.len() < 2 {
+            return Err(unreadable(
+                format!("{} samples", time.len()),
+                "at least two rows of numbers",
+            ));
+        }
+        if let Some(at) = time
+            .windows(2)
+            .position(|pair| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater))
+        {
+            return Err(unreadable(
+                format!(
+                    "time does not increase at row {} ({} s)",
+                    at + 2,
+                    time[at + 1]
+                ),
+                "time stamps that increase",
+            ));
+        }
+        let mut findings = Vec::new();
+        let mut tell = |what: String| {
+            findings.push(Finding {
+                recording: name.to_string(),
+                what,
+            });
+        };
+        let period = even_period(time);
+        let uneven = time
+            .windows(2)
+            .filter(|pair| {
+                let steps = (pair[1] - pair[0]) / period;
+                (steps - steps.round().max(1.0)).abs() > JITTER
+            })
+            .count();
+        if uneven > 0 {
+            tell(format!(
+                "uneven time stamps: {uneven} of {} steps stray from {:.6} s by more than {:.0} %; \
+                 interpolated on an even base",
+                time.len() - 1,
+                period,
+                100.0 * JITTER
+            ));
+        }
+
+        let mut missing = vec![false; time.len()];
+        let mut channels = channels;
+        for (channel, values) in &mut channels {
+            if values.len() != time.len() {
+                return Err(unreadable(
+                    format!(
+                        "`{channel}` has {} samples, not {}",
+                        values.len(),
+                        time.len()
+                    ),
+                    "columns of one length",
+                ));
+            }
+            let runs = runs(values, |value| !value.is_finite());
+            for &(first, end) in &runs {
+                let inside = first > 0 && end < values.len();
+                if inside && end - first <= LONGEST_BRIDGE {
+                    bridge(values, first, end);
+                } else {
+                    missing[first..end].fill(true);
+                }
+            }
+            if let Some(&(first, end)) = runs.first() {
+                let count: usize = runs.iter().map(|run| run.1 - run.0).sum();
+                tell(format!(
+                    "drop-outs in `{channel}`: {count} samples in {} places, the first at \
+                     {:.3} s ({} samples)",
+                    runs.len(),
+                    time[first],
+                    end - first
+                ));
+            }
+        }
+
+        let mut pieces = Vec::new();
+        let mut first = 0;
+        for at in 0..time.len() {
+            let gap = at > first && time[at] - time[at - 1] > 1.5 * period;
+            if gap {
+                tell(format!(
+                    "gap of {:.3} s at {:.3} s; the recording is cut there",
+                    time[at] - time[at - 1],
+                    time[at - 1]
+                ));
+            }
+            if gap || missing[at] {
+                pieces.push((first, at));
+                first = if missing[at] { at + 1 } else { at };
+            }
+        }
+        pieces.push((first, time.len()));
+        pieces.retain(|piece| piece.1 > piece.0 + 1);
+        let several = pieces.len() > 1;
+        let recordings = pieces
+            .iter()
+            .enumerate()
+            .map(|(index, &(first, end))| Self {
+                name: if several {
+                    format!("{name} (part {})", index + 1)
+                } else {
+                    name.to_string()
+                },
+                period,
+                start: time[first],
+                source: name.to_string(),
+                channels: channels
+                    .iter()
+                    .map(|(channel, values)| {
+                        let values = if uneven > 0 {
+                            interpolate(&time[first..end], &values[first..end], period)
+                        } else {
+                            values[first..end].to_vec()
+                        };
+                        (channel.clone(), values)
+                    })
+                    .collect(),
+            })
+            .collect::<Vec<_>>();
+        for recording in &recordings {
+            findings.extend(recording.faults());
+        }
+        Ok((recordings, findings))
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.channels.first().map_or(0, |channel| channel.1.len())
+    }
+
+    /// True without samples.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Length in seconds.
+    pub fn duration(&self) -> f64 {
+        self.len() as f64 * self.period
+    }
+
+    /// Names of the channels.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.channels.iter().map(|channel| channel.0.as_str())
+    }
+
+    /// The samples of a channel, if it was recorded.
+    pub fn channel(&self, name: &str) -> Option<&[f64]> {
+        let found = self.channels.iter().find(|channel| channel.0 == name)?;
+        Some(&found.1)
+    }
+
+    /// The samples of a channel that must be there and must move.
+    ///
+    /// # Errors
+    /// It is missing or constant.
+    pub fn require(
+        &self,
+        name: &str,
+        expected: &'static str,
+    ) -> Result<&[f64], IdentificationError> {
+        let values = self
+            .channel(name)
+            .ok_or_else(|| IdentificationError::MissingChannel {
+                recording: self.name.clone(),
+                channel: name.to_string(),
+                found: self.names().collect::<Vec<_>>().join(", "),
+                expected,
+            })?;
+        match values.first() {
+            Some(&value) if is_constant(values) => Err(IdentificationError::ConstantChannel {
+                recording: self.name.clone(),
+                channel: name.to_string(),
+                value,
+            }),
+            _ => Ok(values),
+        }
+    }
+
+    /// The samples `first..end` as a recording.
+    pub fn cut(&self, first: usize, end: usize) -> Self {
+        let (first, end) = (first.min(self.len()), end.min(self.len()));
+        Self {
+            name: self.name.clone(),
+            period: self.period,
+            start: self.start + first as f64 * self.period,
+            source: self.source.clone(),
+            channels: self
+                .channels
+                .iter()
+                .map(|(name, values)| (name.clone(), values[first..end.max(first)].to_vec()))
+                .collect(),
+        }
+    }
+
+    /// Constant, clipped and stuck channels.
+    pub fn faults(&self) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        let mut tell = |what: String| {
+            findings.push(Finding {
+                recording: self.name.clone(),
+                what,
+            });
+        };
+        for (name, values) in &self.channels {
+            if is_constant(values) {
+                tell(format!("`{name}` is constant"));
+                continue;
+            }
+            let (low, high) = values
+                .iter()
+                .fold((f64::MAX, f64::MIN), |(low, high), &value| {
+                    (low.min(value), high.max(value))
+                });
+            let mut clipped = 0;
+            for extreme in [low, high] {
+                clipped += runs(values, |value| value == extreme)
+                    .iter()
+                    .map(|run| run.1 - run.0)
+                    .filter(|&length| length >= CLIPPED_RUN)
+                    .sum::<usize>();
+            }
+            if clipped > 0 {
+                tell(format!(
+                    "`{name}` is clipped: {clipped} samples stand at {low:.4e} or {high:.4e} (SI)"
+                ));
+            }
+            let stuck: Vec<(usize, usize)> = stuck_runs(values)
+                .into_iter()
+                .filter(|run| ![low, high, 0.0].contains(&values[run.0]))
+                .collect();
+            if let Some(&(first, end)) = stuck.first() {
+                tell(format!(
+                    "drop-out in `{name}`: the value repeats for {:.3} s from {:.3} s ({} such \
+                     places)",
+                    (end - first) as f64 * self.period,
+                    self.start + first as f64 * self.period,
+                    stuck.len()
+                ));
+            }
+        }
+        findings
+    }
+}
+
+/// Mean, and root mean square about it.
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let square = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / count;
+    (mean, square.sqrt())
+}
+
+/// `100 (1 - ||y - m|| / ||y - mean(y)||)`, per cent.
+pub fn fit_percent(measured: &[f64], model: &[f64]) -> f64 {
+    let (mean, _) = mean_and_deviation(measured);
+    let error: f64 = measured
+        .iter()
+        .zip(model)
+        .map(|(y, m)| (y - m) * (y - m))
+        .sum();
+    let size: f64 = measured.iter().map(|y| (y - mean) * (y - mean)).sum();
+    100.0 * (1.0 - (error / size).sqrt())
+}
+
+fn is_constant(values: &[f64]) -> bool {
+    let (mean, deviation) = mean_and_deviation(values);
+    deviation <= 1e-12 * mean.abs() || deviation == 0.0
+}
+
+/// The step of the even base: the median step, refined over the whole recording where no gap
+/// forbids it.
+fn even_period(time: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let median = steps[steps.len() / 2];
+    let whole = (time[time.len() - 1] - time[0]) / steps.len() as f64;
+    let even = if (whole / median - 1.0).abs() < 0.01 {
+        whole
+    } else {
+        median
+    };
+    // Stamps are decimal: 0.002 s must not become 0.0019999999.
+    let rounded = (even * 1e9).round() / 1e9;
+    if rounded > 0.0 { rounded } else { even }
+}
+
+fn runs(values: &[f64], is: impl Fn(f64) -> bool) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut first = None;
+    for (at, &value) in values.iter().enumerate() {
+        match (is(value), first) {
+            (true, None) => first = Some(at),
+            (false, Some(start)) => {
+                found.push((start, at));
+                first = None;
+            }
+            _ => {}
+        }
+    }
+    if let Some(start) = first {
+        found.push((start, values.len()));
+    }
+    found
+}
+
+fn stuck_runs(values: &[f64]) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut first = 0;
+    for at in 1..=values.len() {
+        if at == values.len() || values[at] != values[first] {
+            if at - first >= STUCK_RUN {
+                found.push((first, at));
+            }
+            first = at;
+        }
+    }
+    found
+}
+
+fn bridge(values: &mut [f64], first: usize, end: usize) {
+    let (from, to) = (values[first - 1], values[end]);
+    let span = (end - first + 1) as f64;
+    for at in first..end {
+        values[at] = from + (to - from) * (at - first + 1) as f64 / span;
+    }
+}
+
+fn interpolate(time: &[f64], values: &[f64], period: f64) -> Vec<f64> {
+    let last = time.len() - 1;
+    let count = ((time[last] - time[0]) / period + 1e-6).floor() as usize + 1;
+    let mut at = 0;
+    (0..count)
+        .map(|k| {
+            let t = time[0] + k as f64 * period;
+            while at + 1 < last && time[at + 1] <= t {
+                at += 1;
+            }
+            let part = ((t - time[at]) / (time[at + 1] - time[at])).clamp(0.0, 1.0);
+            values[at] + part * (values[at + 1] - values[at])
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(count: usize) -> Vec<f64> {
+        (0..count).map(|k| (0.7 * k as f64).sin()).collect()
+    }
+
+    fn even(count: usize) -> Vec<f64> {
+        (0..count).map(|k| k as f64 * 0.002).collect()
+    }
+
+    fn read(time: &[f64], values: Vec<f64>) -> (Vec<Recording>, String) {
+        let columns = vec![("force".to_string(), values)];
+        let (recordings, findings) = Recording::from_columns("a.csv", time, columns).unwrap();
+        let text = findings.iter().map(ToString::to_string).collect::<Vec<_>>();
+        (recordings, text.join("\n"))
+    }
+
+    #[test]
+    fn a_clean_recording_has_no_findings() {
+        let (recordings, findings) = read(&even(500), wave(500));
+        assert_eq!(findings, "");
+        assert_eq!(recordings[0].period, 0.002);
+        assert_eq!(recordings[0].channel("force").unwrap(), wave(500));
+    }
+
+    #[test]
+    fn faults_are_named_with_their_place() {
+        let mut values = wave(500);
+        values[100..102].fill(f64::NAN);
+        let (recordings, findings) = read(&even(500), values);
+        assert!(
+            findings.contains("drop-outs in `force`: 2 samples in 1 places, the first at 0.200 s")
+        );
+        assert_eq!(recordings.len(), 1);
+
+        let mut values = wave(500);
+        values[100..150].fill(f64::NAN);
+        let (recordings, _) = read(&even(500), values);
+        assert_eq!((recordings.len(), recordings[1].len()), (2, 350));
+
+        let mut time = even(500);
+        time[200..].iter_mut().for_each(|t| *t += 0.5);
+        let (recordings, findings) = read(&time, wave(500));
+        assert!(findings.contains("gap of 0.502 s at 0.398 s"), "{findings}");
+        assert_eq!((recordings[0].len(), recordings[1].len()), (200, 300));
+        assert!((recordings[1].start - 0.9).abs() < 1e-12);
+
+        let clipped = wave(500).iter().map(|v| v.clamp(-0.2, 0.2)).collect();
+        assert!(read(&even(500), clipped).1.contains("`force` is clipped"));
+
+        let mut stuck = wave(500);
+        stuck[50..100].fill(0.25);
+        assert!(
+            read(&even(500), stuck)
+                .1
+                .contains("repeats for 0.100 s from 0.100 s")
+        );
+        assert!(
+            read(&even(500), vec![3.0; 500])
+                .1
+                .contains("`force` is constant")
+        );
+    }
+
+    #[test]
+    fn uneven_stamps_are_put_on_an_even_base() {
+        let time: Vec<f64> = (0..500)
+            .map(|k| (k as f64 + 0.3 * (k as f64).sin()) * 0.002)
+            .collect();
+        let values = time.iter().map(|t| 3.0 * t).collect();
+        let (recordings, findings) = read(&time, values);
+        assert!(findings.contains("uneven time stamps"), "{findings}");
+        let values = recordings[0].channel("force").unwrap();
+        let period = recordings[0].period;
+        for (k, value) in values.iter().enumerate() {
+            let line = 3.0 * (time[0] + k as f64 * period);
+            assert!((value - line).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn time_that_turns_back_is_refused_by_row() {
+        let error = Recording::from_columns("a.csv", &[0.0, 0.1, 0.05], vec![]).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "a.csv: time does not increase at row 3 (0.05 s); expected time stamps that increase"
+        );
+    }
+}

@@ -1,0 +1,255 @@
+//! The frequency responses of `shakebench design`: the content of Fig 3-3, 3-4, 3-7, 3-9 and 3-10, and
+//! every loop in continuous time beside the one that is sampled.
+
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use controllers::loop_shaping::LoopShapingCoefficients;
+use controllers::loops::Time;
+use controllers::synthesis::{self, LoopShapingDesign};
+use nalgebra::Complex;
+use plant::linear::{FrequencyResponse, log_space};
+use plant::shake_table::ShakeTable;
+use plant::units::SAMPLING_PERIOD;
+
+use super::design::{NAMES, NamedLoop};
+use crate::error::Error;
+use crate::report::{
+    self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units,
+};
+
+const POINTS: usize = 600;
+/// Drawn from 0.01 Hz to the Nyquist frequency.
+const FIRST_HZ: f64 = 0.01;
+
+/// Writes `report.html` into `folder`; says where.
+pub(super) fn write(
+    folder: &Path,
+    loops: &[NamedLoop],
+    design: &LoopShapingDesign,
+    table: &[Vec<String>],
+) -> Result<PathBuf, Error> {
+    let path = folder.join("report.html");
+    let fault = |reason: String| Error::File {
+        path: path.clone(),
+        reason,
+    };
+    let page = report::html(&report(loops, design, table));
+    let page = page.map_err(|error| fault(error.to_string()))?;
+    std::fs::create_dir_all(folder).map_err(|error| fault(error.to_string()))?;
+    std::fs::write(&path, page).map_err(|error| fault(error.to_string()))?;
+    Ok(path)
+}
+
+fn report(loops: &[NamedLoop], design: &LoopShapingDesign, table: &[Vec<String>]) -> Report {
+    let mut heads = table.iter().take(2);
+    let (names, units) = (heads.next(), heads.next());
+    let columns = names.into_iter().flatten().zip(units.into_iter().flatten());
+    let columns = columns.map(|(name, unit)| match unit.as_str() {
+        "" => name.clone(),
+        unit => format!("{name} ({unit})"),
+    });
+    let figures = Table {
+        caption: "Margins".into(),
+        columns: columns.collect(),
+        rows: table
+            .iter()
+            .skip(2)
+            .map(|row| row.iter().cloned().map(Cell::Text).collect())
+            .collect(),
+    };
+    let mut sections = vec![Section {
+        heading: "Loops".into(),
+        text: vec![
+            "The loops are broken at the valve. Margins are the smallest in magnitude; the crossover is \
+             that of the phase margin; the bandwidth ends where the closed loop has fallen by 3 dB. \
+             Sampled loops hold the difference equations of the components, with the plant behind a \
+             zero-order hold."
+                .into(),
+        ],
+        tables: vec![figures],
+        ..Section::default()
+    }];
+    sections.extend(loops.iter().map(loop_section));
+    if loops.len() == NAMES.len() {
+        sections.push(comparison(loops));
+        sections.push(shaping(design));
+    }
+    Report {
+        title: "Loops of the shake table".into(),
+        summary: "Margins and frequency responses on the identified plant.".into(),
+        sections,
+        footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
+        ..Report::default()
+    }
+}
+
+fn loop_section(one: &NamedLoop) -> Section {
+    let open = |time| response(|omega| one.rig_loop.open(time, omega));
+    let closed = |time| response(|omega| one.rig_loop.closed(time, omega));
+    let (continuous, sampled) = (open(Time::Continuous), open(Time::Sampled));
+    let pair = |values: fn(&FrequencyResponse) -> Vec<f64>,
+                a: &FrequencyResponse,
+                b: &FrequencyResponse| {
+        vec![
+            line("continuous", a, values(a)),
+            line("500 Hz", b, values(b)).styled(Style::Dashed),
+        ]
+    };
+    let (closed_continuous, closed_sampled) = (closed(Time::Continuous), closed(Time::Sampled));
+    let figure = match one.name {
+        "displacement-pid" => " (Fig 3-3)",
+        "force-pid" => " (Fig 3-4)",
+        "loop-shaping" => " (Fig 3-9)",
+        _ => "",
+    };
+    Section {
+        heading: one.name.into(),
+        text: vec![format!("{}{figure}.", one.about)],
+        panels: vec![
+            gain_panel(
+                "Open loop, gain",
+                pair(FrequencyResponse::gain_db, &continuous, &sampled),
+            ),
+            phase_panel(
+                "Open loop, phase",
+                pair(FrequencyResponse::phase_deg, &continuous, &sampled),
+            ),
+            gain_panel(
+                "Closed loop, gain",
+                pair(
+                    FrequencyResponse::gain_db,
+                    &closed_continuous,
+                    &closed_sampled,
+                ),
+            ),
+        ],
+        ..Section::default()
+    }
+}
+
+/// Fig 3-7 and 3-10: what the loops make of their reference.
+fn comparison(all: &[NamedLoop]) -> Section {
+    let series = |names: &[&str], values: fn(&FrequencyResponse) -> Vec<f64>| {
+        all.iter()
+            .filter(|one| names.contains(&one.name))
+            .map(|one| {
+                let closed = response(|omega| one.rig_loop.closed(Time::Sampled, omega));
+                line(one.name, &closed, values(&closed))
+            })
+            .collect()
+    };
+    let tracking = [
+        "displacement-pid",
+        "loop-shaping",
+        "three-variable",
+        "sliding-mode",
+    ];
+    Section {
+        heading: "Comparison of the closed loops".into(),
+        text: vec!["Displacement over its reference, sampled at 500 Hz.".into()],
+        panels: vec![
+            gain_panel(
+                "Three-variable control and PID (Fig 3-7)",
+                series(
+                    &["displacement-pid", "three-variable"],
+                    FrequencyResponse::gain_db,
+                ),
+            ),
+            gain_panel(
+                "Loop shaping and PID (Fig 3-10)",
+                series(
+                    &["displacement-pid", "loop-shaping"],
+                    FrequencyResponse::gain_db,
+                ),
+            ),
+            gain_panel("All, gain", series(&tracking, FrequencyResponse::gain_db)),
+            phase_panel(
+                "All, phase",
+                series(&tracking, FrequencyResponse::phase_deg),
+            ),
+        ],
+        ..Section::default()
+    }
+}
+
+/// Fig 3-9: plant, controller, loop and target.
+fn shaping(design: &LoopShapingDesign) -> Section {
+    let plant = ShakeTable::default().voltage_to_displacement();
+    let printed = synthesis::transfer_function(&LoopShapingCoefficients::equation_3_10());
+    let reduced = design.reduced();
+    let at = |omega: f64| Complex::new(0.0, omega);
+    let gain = |name: &str, value: &dyn Fn(f64) -> Complex<f64>| {
+        let response = response(value);
+        let gain = response.gain_db();
+        line(name, &response, gain)
+    };
+    let full = |omega: f64| {
+        design
+            .full(at(omega))
+            .unwrap_or(Complex::new(f64::NAN, 0.0))
+    };
+    Section {
+        heading: "Synthesis of the loop-shaping controller".into(),
+        text: vec![format!(
+            "Target {:.3} rad/s over s (Eq 3-8); gamma_min {:.4}.",
+            design.crossover, design.robust.gamma_min
+        )],
+        panels: vec![
+            gain_panel(
+                "Loop and target (Fig 3-9)",
+                vec![
+                    gain("target", &|omega| design.crossover / at(omega)).coloured(0),
+                    gain("plant, V to m", &|omega| plant.evaluate(at(omega))),
+                    gain("full order", &|omega| {
+                        full(omega) * plant.evaluate(at(omega))
+                    }),
+                    gain("second order", &|omega| {
+                        reduced.evaluate(at(omega)) * plant.evaluate(at(omega))
+                    })
+                    .styled(Style::Dashed),
+                ],
+            ),
+            gain_panel(
+                "Controller, V/m",
+                vec![
+                    gain("Eq 3-10", &|omega| printed.evaluate(at(omega))).coloured(0),
+                    gain("full order", &full),
+                    gain("second order", &|omega| reduced.evaluate(at(omega)))
+                        .styled(Style::Dashed),
+                ],
+            ),
+        ],
+        ..Section::default()
+    }
+}
+
+fn response(value: impl Fn(f64) -> Complex<f64>) -> FrequencyResponse {
+    let last = 0.499 / SAMPLING_PERIOD;
+    FrequencyResponse::continuous(&log_space(TAU * FIRST_HZ, TAU * last, POINTS), |s| {
+        value(s.im)
+    })
+}
+
+fn line(name: &str, response: &FrequencyResponse, values: Vec<f64>) -> Series {
+    let places: Arc<[f64]> = response.omega.iter().map(|omega| omega / TAU).collect();
+    Series::line(name, Abscissa::At(places), values)
+}
+
+fn gain_panel(title: &str, series: Vec<Series>) -> Panel {
+    panel(title, Axis::linear("gain", Units::DECIBEL), series)
+}
+
+fn phase_panel(title: &str, series: Vec<Series>) -> Panel {
+    panel(title, Axis::linear("phase", Units::DEGREE), series)
+}
+
+fn panel(title: &str, y: Axis, series: Vec<Series>) -> Panel {
+    Panel {
+        title: title.into(),
+        x: Axis::logarithmic("frequency", Units::FREQUENCY),
+        y,
+        series,
+    }
+}

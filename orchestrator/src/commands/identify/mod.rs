@@ -1,0 +1,162 @@
+//! `shakebench identify`
+
+pub mod measured;
+mod printed;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+use identification::data::Recording;
+use identification::model_file::ModelFile;
+use identification::rig::{self, Options, RigIdentification};
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::report;
+
+/// Options of `shakebench identify`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    shakebench identify bare.csv payload.csv --out MODEL.toml\n\n\
+    Columns: time, valve_command, displacement, acceleration, actuator_force and, with a specimen\n\
+    on the table, specimen_acceleration; each header cell is `name [unit]`. A bare table alone\n\
+    does not determine the actuator: measure with a specimen or two payloads.")]
+pub struct Arguments {
+    /// Recordings of one rig
+    #[arg(value_name = "DATA.csv", required = true)]
+    data: Vec<PathBuf>,
+    /// Where the model goes; a report with plots goes beside it
+    #[arg(long, value_name = "MODEL.toml")]
+    out: PathBuf,
+    /// Part of each recording that is fitted before the rest validates it
+    #[arg(long, value_name = "PART", default_value_t = 0.75)]
+    fit_part: f64,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    /// The model file.
+    pub model: PathBuf,
+    /// Poles of G1 and G2, `[re, im]` in 1/s; empty where the data do not determine them.
+    pub actuator_poles_rad_s: Vec<[f64; 2]>,
+    /// Poles of the table.
+    pub table_poles_rad_s: Vec<[f64; 2]>,
+    /// Fit of each channel on the validation part; the worst of several recordings.
+    pub fit_percent: BTreeMap<String, Option<f64>>,
+    /// Whether the data determine the actuator.
+    pub identifiable: bool,
+    /// Everything the reader should know.
+    pub warnings: Vec<String>,
+    /// Time taken, s.
+    pub wall_s: f64,
+}
+
+/// Identifies a rig and writes its model.
+///
+/// # Errors
+/// Data at fault, or a file that cannot be written.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let started = Instant::now();
+    if !(0.3..=0.95).contains(&arguments.fit_part) {
+        return Err(Error::Option {
+            option: "--fit-part",
+            reason: format!("{}; expected 0.3 to 0.95", arguments.fit_part),
+        });
+    }
+    let mut recordings = Vec::new();
+    let mut warnings = Vec::new();
+    for path in &arguments.data {
+        let (pieces, findings) = measured::read(path)?;
+        warnings.extend(findings.iter().map(ToString::to_string));
+        recordings.extend(long_enough(pieces, &mut warnings));
+    }
+    let options = Options {
+        fit_part: arguments.fit_part,
+        ..Options::default()
+    };
+    let found = rig::identify(&recordings, options)?;
+    warnings.extend(found.warnings.iter().cloned());
+    let model = ModelFile::from_identification(&found);
+    let summary = summary(arguments, &found, warnings, started);
+    write(
+        arguments,
+        &model.to_toml()?,
+        &printed::report(&found, &summary),
+    )?;
+    if arguments.json {
+        println!(
+            "{}",
+            serde_json::to_string_pretty(&summary).unwrap_or_default()
+        );
+    } else {
+        print!("{}", printed::text(&found, &summary));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Leaves out pieces between gaps that are too short to fit, where longer ones remain.
+fn long_enough(pieces: Vec<Recording>, warnings: &mut Vec<String>) -> Vec<Recording> {
+    const SHORTEST: f64 = 5.0;
+    let longest = pieces.iter().map(Recording::duration).fold(0.0, f64::max);
+    let (kept, dropped): (Vec<_>, Vec<_>) = pieces
+        .into_iter()
+        .partition(|piece| piece.duration() >= SHORTEST.min(longest));
+    for piece in dropped {
+        warnings.push(format!(
+            "{}: left out, {:.2} s are too short",
+            piece.name,
+            piece.duration()
+        ));
+    }
+    kept
+}
+
+fn summary(
+    arguments: &Arguments,
+    found: &RigIdentification,
+    warnings: Vec<String>,
+    started: Instant,
+) -> Summary {
+    let pairs = |poles: Vec<nalgebra::Complex<f64>>| poles.iter().map(|p| [p.re, p.im]).collect();
+    let mut fit_percent = BTreeMap::new();
+    for fit in &found.fits {
+        let own = fit.simulated.is_finite().then_some(fit.simulated);
+        let slot = fit_percent.entry(fit.channel.to_string()).or_insert(own);
+        if let (Some(before), Some(own)) = (*slot, own) {
+            *slot = Some(before.min(own));
+        }
+    }
+    Summary {
+        model: arguments.out.clone(),
+        actuator_poles_rad_s: if found.identifiable {
+            pairs(found.actuator_poles())
+        } else {
+            Vec::new()
+        },
+        table_poles_rad_s: pairs(found.table_poles()),
+        fit_percent,
+        identifiable: found.identifiable,
+        warnings,
+        wall_s: started.elapsed().as_secs_f64(),
+    }
+}
+
+fn write(arguments: &Arguments, model: &str, page: &report::Report) -> Result<(), Error> {
+    let fault = |path: &PathBuf, reason: String| Error::File {
+        path: path.clone(),
+        reason,
+    };
+    let beside = arguments.out.with_extension("html");
+    let html = report::html(page).map_err(|error| fault(&beside, error.to_string()))?;
+    for (path, text) in [(&arguments.out, model), (&beside, html.as_str())] {
+        std::fs::write(path, text).map_err(|error| fault(path, error.to_string()))?;
+    }
+    Ok(())
+}

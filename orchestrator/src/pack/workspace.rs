@@ -1,0 +1,185 @@
+//! Finding the project's workspace and letting cargo build its components.
+
+use std::{
+    fs::{self, File},
+    io::{self, IsTerminal},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    sync::{Mutex, PoisonError},
+};
+
+use super::{
+    FmiVersion, PackError, PackedFmu,
+    archive::{entries, write_archive},
+    file_error,
+};
+use crate::component_library::ComponentLibrary;
+
+/// The project's folder.
+pub(super) struct Workspace {
+    pub(super) root: PathBuf,
+}
+
+impl Workspace {
+    /// Looks upwards from the package that cargo runs, the present folder and the program.
+    pub(super) fn find() -> Result<Self, PackError> {
+        let here = std::env::current_dir().unwrap_or_default();
+        let package = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
+        let program = std::env::current_exe().ok();
+        let places = [package, Some(here.clone()), program];
+        places
+            .iter()
+            .flatten()
+            .flat_map(|place| place.ancestors())
+            .find(|folder| folder.join("fmus/kit/Cargo.toml").is_file())
+            .map(|root| Self { root: root.into() })
+            .ok_or(PackError::NoWorkspace(here))
+    }
+
+    fn cargo(&self, arguments: &[&str]) -> Result<String, PackError> {
+        let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+        // On a terminal people see cargo's progress; elsewhere it goes into the error, if any.
+        let watched = io::stderr().is_terminal();
+        let output = Command::new(&cargo)
+            .args(arguments)
+            .current_dir(&self.root)
+            .stderr(if watched {
+                Stdio::inherit()
+            } else {
+                Stdio::piped()
+            })
+            .output()
+            .map_err(|error| PackError::NoCargo {
+                cargo: cargo.clone(),
+                error,
+            })?;
+        if !output.status.success() {
+            return Err(PackError::Cargo {
+                command: format!("cargo {}", arguments.join(" ")),
+                output: String::from_utf8_lossy(&output.stderr).trim().into(),
+            });
+        }
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    }
+
+    /// Names of the packages under a folder that have a `cdylib`.
+    pub(super) fn packages_under(&self, folder: &str) -> Result<Vec<String>, PackError> {
+        let answer = self.cargo(&["metadata", "--no-deps", "--format-version", "1"])?;
+        let fail = |problem: String| PackError::Answer {
+            command: "metadata",
+            problem,
+        };
+        let metadata: serde_json::Value =
+            serde_json::from_str(&answer).map_err(|e| fail(e.to_string()))?;
+        let packages = metadata["packages"]
+            .as_array()
+            .ok_or_else(|| fail("no `packages`".into()))?;
+        let within = |package: &&serde_json::Value| {
+            let manifest = package["manifest_path"].as_str().map(Path::new);
+            let above = manifest.and_then(|m| m.parent()?.parent()?.file_name());
+            above.is_some_and(|above| above == folder)
+        };
+        Ok(packages
+            .iter()
+            .filter(within)
+            .filter(|package| targets(&package["targets"]).any(|t| kinds(t, "cdylib")))
+            .filter_map(|package| package["name"].as_str().map(String::from))
+            .collect())
+    }
+
+    /// Builds packages and returns their dynamic libraries.
+    pub(super) fn build(&self, packages: &[String]) -> Result<Vec<PathBuf>, PackError> {
+        let mut arguments = vec![
+            "build",
+            "--release",
+            "--message-format",
+            "json-render-diagnostics",
+        ];
+        for package in packages {
+            arguments.extend(["-p", package]);
+        }
+        let answer = self.cargo(&arguments)?;
+        let fail = |problem: String| PackError::Answer {
+            command: "build",
+            problem,
+        };
+        let mut libraries = Vec::new();
+        for line in answer.lines() {
+            let message: serde_json::Value =
+                serde_json::from_str(line).map_err(|e| fail(e.to_string()))?;
+            let manifest = message["manifest_path"].as_str().map(Path::new);
+            let ours = manifest.is_some_and(|manifest| manifest.starts_with(&self.root));
+            if !ours || !kinds(&message["target"], "cdylib") {
+                continue;
+            }
+            let files = message["filenames"].as_array().into_iter().flatten();
+            let extension = std::env::consts::DLL_EXTENSION;
+            libraries.extend(
+                files
+                    .filter_map(|file| file.as_str().map(PathBuf::from))
+                    .filter(|file| file.extension().is_some_and(|e| e == extension)),
+            );
+        }
+        if libraries.len() != packages.len() {
+            let (found, wanted) = (libraries.len(), packages.join(", "));
+            return Err(fail(format!("{found} dynamic libraries for {wanted}")));
+        }
+        Ok(libraries)
+    }
+
+    pub(super) fn pack(
+        &self,
+        packages: &[String],
+        out: &Path,
+        versions: &[FmiVersion],
+    ) -> Result<Vec<PackedFmu>, PackError> {
+        // One process at a time builds and packs: the first does the work, the others find it
+        // done. Threads of one process share the lock of the file, so they need one of their own.
+        static THREADS: Mutex<()> = Mutex::new(());
+        let _turn = THREADS.lock().unwrap_or_else(PoisonError::into_inner);
+        fs::create_dir_all(out).map_err(file_error(out))?;
+        let lock_path = out.join(".lock");
+        let lock = File::create(&lock_path).map_err(file_error(&lock_path))?;
+        lock.lock().map_err(file_error(&lock_path))?;
+        let licences = self.licences()?;
+        let mut packed = Vec::new();
+        for library in self.build(packages)? {
+            let binary = fs::read(&library).map_err(file_error(&library))?;
+            let descriptions = ComponentLibrary::open(&library)?.describe()?;
+            for version in versions {
+                let folder = out.join(version.folder());
+                fs::create_dir_all(&folder).map_err(file_error(&folder))?;
+                let path = folder.join(format!("{}.fmu", descriptions.name));
+                let entries = entries(*version, &descriptions, &binary, &licences);
+                write_archive(&path, &entries)?;
+                packed.push(PackedFmu {
+                    name: descriptions.name.clone(),
+                    version: *version,
+                    path,
+                });
+            }
+        }
+        packed.sort_by(|a, b| (&a.name, a.version).cmp(&(&b.name, b.version)));
+        Ok(packed)
+    }
+
+    fn licences(&self) -> Result<Vec<(String, Vec<u8>)>, PackError> {
+        let mut licences = Vec::new();
+        for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
+            let path = self.root.join(name);
+            let text = fs::read(&path).map_err(file_error(&path))?;
+            licences.push((format!("documentation/licenses/{name}.txt"), text));
+        }
+        Ok(licences)
+    }
+}
+
+fn targets(targets: &serde_json::Value) -> impl Iterator<Item = &serde_json::Value> {
+    targets.as_array().into_iter().flatten()
+}
+
+fn kinds(target: &serde_json::Value, kind: &str) -> bool {
+    target["kind"]
+        .as_array()
+        .is_some_and(|kinds| kinds.iter().any(|k| k == kind))
+}

@@ -1,0 +1,52 @@
+//! The rig as one model under the sampled controller: what a co-simulation is compared with.
+
+use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
+use controllers::{Controller, Motion as Sample};
+use nalgebra::{DVector, dvector};
+use plant::rig::Rig;
+use plant::specimen::LinearSpecimen;
+use shakebench::motion::Motion;
+
+/// Acceleration of the table (m/s²) at the samples of `motion` under three-variable control, from
+/// the exact solution of table and specimen as one system with the valve command held.
+pub fn table_acceleration(motion: &Motion, with_specimen: bool) -> Vec<f64> {
+    let rig = Rig {
+        specimen: with_specimen.then(LinearSpecimen::appendix_a),
+        ..Rig::default()
+    };
+    let system = rig.state_space().sample(motion.dt);
+    let mut law = ThreeVariableControl::table_3_2();
+    let mut state = DVector::zeros(7);
+    (0..motion.len())
+        .map(|k| {
+            let output = &system.c * &state;
+            let command = law.step(
+                &ThreeVariableInput {
+                    reference: Sample {
+                        displacement: motion.displacement[k],
+                        velocity: motion.velocity[k],
+                        acceleration: motion.acceleration[k],
+                    },
+                    measured: Sample {
+                        displacement: output[0],
+                        velocity: output[1],
+                        acceleration: output[2],
+                    },
+                },
+                motion.dt,
+            );
+            state = system.advance(&state, &dvector![command]);
+            output[2]
+        })
+        .collect()
+}
+
+/// Largest difference of two histories over the largest magnitude of the first.
+pub fn worst_error(truth: &[f64], other: &[f64]) -> f64 {
+    assert_eq!(truth.len(), other.len());
+    let peak = truth
+        .iter()
+        .fold(0.0f64, |peak, value| peak.max(value.abs()));
+    let pairs = truth.iter().zip(other);
+    pairs.fold(0.0f64, |worst, (a, b)| worst.max((a - b).abs())) / peak
+}

@@ -1,0 +1,137 @@
+//! Real measurements: a servo-hydraulic press and a positioning drive, where they are present.
+
+use std::path::PathBuf;
+
+use identification::data::fit_percent;
+use identification::state_variable_filter::{Between, equal_lags, filter};
+use identification::transfer_function::{Structure, identify};
+
+/// Columns of a file under `measured`, or nothing and a word about it.
+fn measured(file: &str) -> Option<Vec<Vec<f64>>> {
+    let shared = std::env::var_os("SHAKEBENCH_SHARED").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
+        PathBuf::from,
+    );
+    let path = shared.join("measured").join(file);
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        println!("skipped: {} is not there", path.display());
+        return None;
+    };
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    for line in text.lines().skip(1) {
+        for (i, cell) in line.split(',').enumerate() {
+            if columns.len() <= i {
+                columns.push(Vec::new());
+            }
+            columns[i].push(cell.trim().parse().unwrap());
+        }
+    }
+    Some(columns)
+}
+
+#[test]
+fn the_press_is_one_pole_and_a_delay_of_four_milliseconds() {
+    let Some(columns) = measured("servohydraulic_press/chirp_0A.csv") else {
+        return;
+    };
+    let (command, position) = (&columns[1], &columns[2]);
+    let structure = Structure {
+        order: 1,
+        zeros: 0,
+        longest_delay: Some(0.02),
+        corner: 60.0,
+        between: Between::Straight,
+    };
+    let found = identify(command, position, 0.001, structure).unwrap();
+    println!(
+        "pole {:.2} 1/s, gain {:.4}, delay {:.2} ms: error {:.2} %",
+        -found.denominator[1],
+        found.numerator[0] / found.denominator[1],
+        1e3 * found.delay,
+        100.0 * found.normalised_error
+    );
+    assert!(found.normalised_error < 0.0445);
+    assert!((found.delay - 0.0045).abs() < 0.001);
+
+    // Fitted to the first two thirds of the sweep, judged on the last.
+    let part = 2 * command.len() / 3;
+    let half = identify(&command[..part], &position[..part], 0.001, structure).unwrap();
+    println!(
+        "first two thirds: delay {:.2} ms, error {:.2} %",
+        1e3 * half.delay,
+        100.0 * half.normalised_error
+    );
+
+    let two = Structure {
+        order: 2,
+        longest_delay: None,
+        ..structure
+    };
+    let found = identify(command, position, 0.001, two).unwrap();
+    println!(
+        "two poles {:?}: error {:.2} %",
+        found.denominator,
+        100.0 * found.normalised_error
+    );
+    assert!(found.normalised_error < 0.052);
+}
+
+#[test]
+fn the_drive_s_force_follows_from_its_motion() {
+    let Some(columns) = measured("positioning_drive/DATA_EMPS.csv") else {
+        return;
+    };
+    const NEWTON_PER_VOLT: f64 = 35.15065;
+    let lag = equal_lags(200.0, 4);
+    let position = filter(&columns[2], 0.001, &lag, Between::Straight);
+    let force: Vec<f64> = columns[3].iter().map(|u| u * NEWTON_PER_VOLT).collect();
+    let force = &filter(&force, 0.001, &lag, Between::Held)[0];
+    // The sign is taken of the measured velocity and then filtered like the force.
+    let count = force.len();
+    let velocity: Vec<f64> = (0..count)
+        .map(|k| {
+            let (before, after) = (k.saturating_sub(4), (k + 4).min(count - 1));
+            columns[2][after] - columns[2][before]
+        })
+        .collect();
+    let sign = |wanted: f64| -> Vec<f64> {
+        let of = |v: &f64| if v * wanted > 2e-6 { wanted } else { 0.0 };
+        let raw: Vec<f64> = velocity.iter().map(of).collect();
+        filter(&raw, 0.001, &lag, Between::Held)[0].clone()
+    };
+    let (forward, backward) = (sign(1.0), sign(-1.0));
+    let both: Vec<f64> = forward.iter().zip(&backward).map(|(a, b)| a + b).collect();
+    let one = vec![1.0; count];
+    let fit = |columns: &[&Vec<f64>]| -> (Vec<f64>, f64) {
+        let n = columns.len();
+        let normal = nalgebra::DMatrix::from_fn(n, n, |i, j| {
+            (200..count)
+                .map(|k| columns[i][k] * columns[j][k])
+                .sum::<f64>()
+        });
+        let right = nalgebra::DVector::from_fn(n, |i, _| {
+            (200..count).map(|k| columns[i][k] * force[k]).sum::<f64>()
+        });
+        let theta = normal.lu().solve(&right).unwrap();
+        let model: Vec<f64> = (0..count)
+            .map(|k| (0..n).map(|i| theta[i] * columns[i][k]).sum())
+            .collect();
+        let error = (200..count)
+            .map(|k| (force[k] - model[k]).powi(2))
+            .sum::<f64>();
+        let size = (200..count).map(|k| force[k].powi(2)).sum::<f64>();
+        assert!(fit_percent(&force[200..], &model[200..]) > 90.0);
+        (theta.as_slice().to_vec(), 100.0 * (error / size).sqrt())
+    };
+    let (symmetric, error) = fit(&[&position[2], &position[1], &both, &one]);
+    println!(
+        "symmetric: mass {:.2} kg, viscous {:.1} N s/m, Coulomb {:.2} N, offset {:.2} N: error {error:.2} %",
+        symmetric[0], symmetric[1], symmetric[2], symmetric[3]
+    );
+    assert!(error < 4.08, "{error}");
+    assert!((symmetric[0] - 95.0).abs() < 3.0);
+    let turning: Vec<f64> = position[1].iter().map(|v| v.max(0.0)).collect();
+    let (_, error) = fit(&[&position[2], &position[1], &turning, &forward, &backward]);
+    println!("asymmetric: error {error:.2} %");
+    assert!(error < 3.11, "{error}");
+}
