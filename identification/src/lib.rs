@@ -1,1 +1,3 @@
 //! From measured data to a model, and what a model gets wrong
+
+pub mod case;

@@ -4,8 +4,10 @@
 //! pound-force, second, volt) beside their conversion. No control and no FMI.
 
 pub mod actuator;
+pub mod effects;
 pub mod error;
 pub mod hysteresis;
+pub mod identified_rig;
 pub mod instrumentation;
 pub mod integration;
 pub mod linear;

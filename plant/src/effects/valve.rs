@@ -1,0 +1,128 @@
+//! Effects between the valve command and the flow.
+
+use std::f64::consts::TAU;
+
+use crate::ModelError;
+
+/// The valve: `command -> delay -> play -> spool lag -> offset -> travel limit -> overlap -> gain`.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ValveEffects {
+    /// Constant offset at the spool, V.
+    pub null_bias: f64,
+    /// Half width of the spool's overlap, V: `sign(u) max(|u| - w, 0)`.
+    pub dead_band: f64,
+    /// Relative change of the flow gain: `(1 + g) u`.
+    pub flow_gain: f64,
+    /// `(1 + q) u` for positive and `(1 - q) u` for negative commands.
+    pub asymmetry: f64,
+    /// Natural frequency of the second-order spool, Hz; 0 is an ideal spool.
+    pub spool_frequency: f64,
+    /// Damping ratio of the spool.
+    pub spool_damping: f64,
+    /// Pure delay of the command, s; at most [`MAX_DELAY_SAMPLES`] steps.
+    pub command_delay: f64,
+    /// Travel limit of the spool, V; 0 is none.
+    pub spool_limit: f64,
+    /// Half width of the play between command and spool, V.
+    pub hysteresis: f64,
+}
+
+/// Steps that a delayed command or channel can be late.
+pub const MAX_DELAY_SAMPLES: usize = 30;
+
+impl Default for ValveEffects {
+    fn default() -> Self {
+        Self {
+            null_bias: 0.0,
+            dead_band: 0.0,
+            flow_gain: 0.0,
+            asymmetry: 0.0,
+            spool_frequency: 0.0,
+            spool_damping: 0.7,
+            command_delay: 0.0,
+            spool_limit: 0.0,
+            hysteresis: 0.0,
+        }
+    }
+}
+
+impl ValveEffects {
+    /// Refuses negative widths, delays, limits and frequencies.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        ModelError::require_finite("null_bias", self.null_bias)?;
+        ModelError::require_finite("flow_gain", self.flow_gain)?;
+        ModelError::require_finite("asymmetry", self.asymmetry)?;
+        ModelError::require_non_negative("dead_band", self.dead_band)?;
+        ModelError::require_non_negative("spool_frequency", self.spool_frequency)?;
+        ModelError::require_positive("spool_damping", self.spool_damping)?;
+        ModelError::require_non_negative("command_delay", self.command_delay)?;
+        ModelError::require_non_negative("spool_limit", self.spool_limit)?;
+        ModelError::require_non_negative("hysteresis", self.hysteresis)
+    }
+
+    /// The spool behind its play (V), from its position before and the command now.
+    #[inline]
+    pub fn play(&self, spool: f64, command: f64) -> f64 {
+        spool.clamp(command - self.hysteresis, command + self.hysteresis)
+    }
+
+    /// Acceleration of the spool (V/s²) towards `command`.
+    #[inline]
+    pub fn spool_acceleration(&self, spool: f64, velocity: f64, command: f64) -> f64 {
+        let omega = TAU * self.spool_frequency;
+        omega * (omega * (command - spool) - 2.0 * self.spool_damping * velocity)
+    }
+
+    /// Flow (in V of an ideal valve) through the openings at `spool` (V).
+    #[inline]
+    pub fn flow(&self, spool: f64) -> f64 {
+        let mut u = spool + self.null_bias;
+        if self.spool_limit > 0.0 {
+            u = u.clamp(-self.spool_limit, self.spool_limit);
+        }
+        if self.dead_band > 0.0 {
+            u = u.signum() * (u.abs() - self.dead_band).max(0.0);
+        }
+        u * (1.0 + self.flow_gain) * (1.0 + self.asymmetry * u.signum())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overlap_and_offset_shift_the_flow() {
+        let valve = ValveEffects {
+            dead_band: 0.1,
+            null_bias: 0.05,
+            ..Default::default()
+        };
+        assert_eq!(valve.flow(0.04), 0.0);
+        assert!((valve.flow(0.25) - 0.2).abs() < 1e-15);
+        assert!((valve.flow(-0.25) + 0.1).abs() < 1e-15);
+    }
+
+    #[test]
+    fn play_encloses_the_area_of_its_width() {
+        let valve = ValveEffects {
+            hysteresis: 0.1,
+            ..Default::default()
+        };
+        let (mut spool, mut area) = (0.0, 0.0);
+        let n = 20_000;
+        for cycle in 0..2 {
+            for i in 0..n {
+                let command = (TAU * f64::from(i) / f64::from(n)).sin();
+                let next = valve.play(spool, command);
+                if cycle == 1 {
+                    area += command * (next - spool);
+                }
+                spool = next;
+            }
+        }
+        // A parallelogram of width 2 w and height 2 (1 - w).
+        assert!((area.abs() - 2.0 * 0.1 * 2.0 * 0.9).abs() < 1e-3, "{area}");
+    }
+}
