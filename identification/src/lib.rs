@@ -1,3 +1,4 @@
 //! From measured data to a model, and what a model gets wrong
 
 pub mod case;
+pub mod predictor;

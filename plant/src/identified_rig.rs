@@ -47,6 +47,7 @@ pub struct IdentifiedRigState {
     /// Past accelerations, m/s², a ring.
     accelerations: [f64; MAX_DELAY_SAMPLES + 2],
     at: usize,
+    disturbance: f64,
 }
 
 impl Default for IdentifiedRigState {
@@ -58,6 +59,7 @@ impl Default for IdentifiedRigState {
             commands: [0.0; MAX_DELAY_SAMPLES + 2],
             accelerations: [0.0; MAX_DELAY_SAMPLES + 2],
             at: 0,
+            disturbance: 0.0,
         }
     }
 }
@@ -84,6 +86,62 @@ impl IdentifiedRig {
         }
         self.effects.validate()?;
         self.sensors.validate()
+    }
+
+    /// The rig without what is not linear about rest: offsets, thresholds, friction, yielding.
+    pub fn linear_part(&self) -> Self {
+        let mut rig = *self;
+        let Effects {
+            valve,
+            hydraulics,
+            friction,
+            table,
+            specimen,
+            ..
+        } = &mut rig.effects;
+        valve.null_bias = 0.0;
+        valve.dead_band = 0.0;
+        valve.asymmetry = 0.0;
+        valve.spool_limit = 0.0;
+        valve.hysteresis = 0.0;
+        hydraulics.stall_force = 0.0;
+        hydraulics.droop_loss = 0.0;
+        friction.coulomb_force = 0.0;
+        friction.stribeck_force = 0.0;
+        table.cubic_stiffness = 0.0;
+        specimen.yield_displacement = 0.0;
+        specimen.degradation_loss = 0.0;
+        specimen.uplift_displacement = 0.0;
+        rig.sensors.accelerometer_bias = 0.0;
+        rig.sensors.load_cell_bias = 0.0;
+        rig.sensors.hum_amplitude = 0.0;
+        rig
+    }
+
+    /// Indices into [`IdentifiedRigState::continuous`] of the states that move in the linear part.
+    pub fn active_states(&self) -> Vec<usize> {
+        let mut active = vec![0, 1, 2, 3, 4];
+        if self.specimen.is_some() {
+            active.extend([5, 6]);
+        }
+        if self.effects.valve.spool_frequency > 0.0 {
+            active.extend([SPOOL, SPOOL + 1]);
+        }
+        if self.effects.foundation.frequency > 0.0 {
+            active.extend([FOUNDATION, FOUNDATION + 1]);
+        }
+        if self.specimen.is_some() && self.effects.specimen.second_mode_frequency > 0.0 {
+            active.extend([SECOND_MODE, SECOND_MODE + 1]);
+        }
+        if self.sensors.displacement_lag > 0.0 {
+            active.push(LAGGED);
+        }
+        active
+    }
+
+    /// Index of the state that follows the drift as long as nothing yields.
+    pub fn follower(&self) -> Option<usize> {
+        self.specimen.map(|_| HYSTERETIC)
     }
 
     /// The rig ready to step with `period` s between samples, each in `substeps` Runge-Kutta
@@ -313,6 +371,7 @@ impl SampledRig {
         let behind = |n: usize| (state.at + ring - n) % ring;
         state.commands[state.at] = command;
         let h = self.period / self.substeps as f64;
+        let w = state.disturbance;
         if valve.command_delay > 0.0 {
             let samples = valve.command_delay / self.period;
             let whole = (samples as usize).min(MAX_DELAY_SAMPLES);
@@ -322,20 +381,40 @@ impl SampledRig {
             state.play = valve.play(state.play, earlier);
             if split > 0.0 {
                 for _ in 0..self.substeps {
-                    self.runge_kutta(state, state.play, split / self.substeps as f64);
+                    self.runge_kutta(state, state.play + w, split / self.substeps as f64);
                 }
             }
             state.play = valve.play(state.play, later);
             let rest = (self.period - split) / self.substeps as f64;
             for _ in 0..self.substeps {
-                self.runge_kutta(state, state.play, rest);
+                self.runge_kutta(state, state.play + w, rest);
             }
         } else {
             state.play = valve.play(state.play, command);
             for _ in 0..self.substeps {
-                self.runge_kutta(state, state.play, h);
+                self.runge_kutta(state, state.play + w, h);
             }
         }
+    }
+
+    /// [`Self::step`] with `disturbance` (V) added behind delay and play.
+    #[inline]
+    pub fn step_disturbed(
+        &self,
+        state: &mut IdentifiedRigState,
+        command: f64,
+        disturbance: f64,
+    ) {
+        state.disturbance = disturbance;
+        self.step(state, command);
+        state.disturbance = 0.0;
+    }
+
+    /// Adds `correction` (m/s²) to the acceleration kept from `age` samples ago.
+    #[inline]
+    pub fn correct_past(&self, state: &mut IdentifiedRigState, age: usize, correction: f64) {
+        let ring = MAX_DELAY_SAMPLES + 2;
+        state.accelerations[(state.at + ring - age % ring) % ring] += correction;
     }
 
     /// What the rig does in `state`.
