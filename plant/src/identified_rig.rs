@@ -121,7 +121,7 @@ impl IdentifiedRig {
     /// Indices into [`IdentifiedRigState::continuous`] of the states that move in the linear part.
     pub fn active_states(&self) -> Vec<usize> {
         let mut active = vec![0, 1, 2, 3, 4];
-        if self.specimen.is_some() {
+        if self.has_specimen() {
             active.extend([5, 6]);
         }
         if self.effects.valve.spool_frequency > 0.0 {
@@ -130,7 +130,7 @@ impl IdentifiedRig {
         if self.effects.foundation.frequency > 0.0 {
             active.extend([FOUNDATION, FOUNDATION + 1]);
         }
-        if self.specimen.is_some() && self.effects.specimen.second_mode_frequency > 0.0 {
+        if self.has_specimen() && self.effects.specimen.second_mode_frequency > 0.0 {
             active.extend([SECOND_MODE, SECOND_MODE + 1]);
         }
         if self.sensors.displacement_lag > 0.0 {
@@ -141,7 +141,12 @@ impl IdentifiedRig {
 
     /// Index of the state that follows the drift as long as nothing yields.
     pub fn follower(&self) -> Option<usize> {
-        self.specimen.map(|_| HYSTERETIC)
+        self.has_specimen().then_some(HYSTERETIC)
+    }
+
+    /// True when a specimen stands on the table.
+    pub fn has_specimen(&self) -> bool {
+        self.specimen.is_some() && !self.effects.specimen.absent
     }
 
     /// The rig ready to step with `period` s between samples, each in `substeps` Runge-Kutta
@@ -203,7 +208,7 @@ impl SampledRig {
         let [d, b, e] = [a.denominator, a.voltage_to_force, a.velocity_to_force];
         let mass = shake_table.table.mass + effects.table.added_mass;
         let wall = TAU * effects.foundation.frequency;
-        let has_specimen = specimen.is_some();
+        let has_specimen = specimen.is_some() && !effects.specimen.absent;
         let mut specimen = specimen.unwrap_or_default();
         specimen.damping *= 1.0 + effects.specimen.damping_change;
         let upper = specimen.mass * effects.specimen.second_mode_mass_share;
@@ -268,6 +273,9 @@ impl SampledRig {
     fn accelerations(&self, s: &[f64; STATES], peak: f64) -> (f64, f64) {
         let specimen_force = self.specimen_force(s, peak);
         let table = (self.wall_force(s) + specimen_force) / self.mass;
+        if !self.has_specimen {
+            return (table, self.rig.effects.specimen.absent_sensor_share * table);
+        }
         let mut on_mass = -specimen_force;
         if self.has_second_mode {
             on_mass += self.second_mode[2] * s[SECOND_MODE] + self.second_mode[1] * s[SECOND_MODE + 1];

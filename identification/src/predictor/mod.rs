@@ -21,6 +21,17 @@ pub struct Disturbance {
     pub phi: f64,
 }
 
+impl Disturbance {
+    /// What a servo valve adds to a command recorded with `command_noise` (V): eight times that
+    /// noise, with a corner at 30 Hz.
+    pub fn beside_command(command_noise: f64, period: f64) -> Self {
+        Self {
+            sigma: 8.0 * command_noise.max(1e-5),
+            phi: (-std::f64::consts::TAU * 30.0 * period).exp(),
+        }
+    }
+}
+
 /// Kalman gain and whitening for one rig and one sampling period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Predictor {
@@ -69,7 +80,7 @@ impl Predictor {
         disturbance: Disturbance,
     ) -> Result<Self, ModelError> {
         let rig = rig.linear_part();
-        let sampled = rig.sample(period, 1)?;
+        let sampled = rig.sample(period, 2)?;
         let continuous = rig.active_states();
         let late = (rig.sensors.accelerometer_delay / period).floor();
         let past = if rig.sensors.accelerometer_delay > 0.0 {
@@ -146,9 +157,9 @@ impl Predictor {
             }
             response = &a * &response;
         }
-        let has_specimen = rig.specimen.is_some();
+        let shows_specimen = rig.specimen.is_some();
         let measured: Vec<usize> = (0..4)
-            .filter(|&i| noise[i].is_finite() && (has_specimen || i < 3))
+            .filter(|&i| noise[i].is_finite() && (shows_specimen || i < 3))
             .collect();
         let a = DMatrix::from_fn(order, order, |i, j| a[(i, j)] * scale[j] / scale[i]);
         let c = DMatrix::from_fn(measured.len(), order, |i, j| {
@@ -157,6 +168,12 @@ impl Predictor {
         let r = DMatrix::identity(measured.len(), measured.len());
         let mut q = DMatrix::identity(order, order) * (1e-3 * drive).powi(2);
         q[(n, n)] = (drive / scale[n]).powi(2);
+        if !a.iter().chain(c.iter()).all(|value| value.is_finite() && value.abs() < 1e12) {
+            return Err(ModelError::NoSolution {
+                equation: "the predictor's Riccati equation",
+                reason: "the sampled rig is not finite".into(),
+            });
+        }
         let p = discrete_riccati(&a.transpose(), &c.transpose(), &q, &r)?;
         let s = &c * &p * c.transpose() + &r;
         let no_solution = || ModelError::NoSolution {

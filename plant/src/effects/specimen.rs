@@ -6,6 +6,10 @@ use crate::ModelError;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SpecimenEffects {
+    /// Nothing stands on the table although the model says so.
+    pub absent: bool,
+    /// Share of the table's acceleration that the specimen's accelerometer then shows.
+    pub absent_sensor_share: f64,
     /// Yield displacement of a Bouc-Wen spring, m; 0 is elastic. The spring's force is
     /// `k (r d + (1 - r) z)`, `z' = d' (1 - |z/d_y|^n (1 + sign(z d')) / 2)`.
     pub yield_displacement: f64,
@@ -36,6 +40,8 @@ pub struct SpecimenEffects {
 impl Default for SpecimenEffects {
     fn default() -> Self {
         Self {
+            absent: false,
+            absent_sensor_share: 0.0,
             yield_displacement: 0.0,
             yield_post_ratio: 0.1,
             yield_exponent: 2.0,
@@ -55,6 +61,7 @@ impl Default for SpecimenEffects {
 impl SpecimenEffects {
     /// Refuses values without meaning.
     pub fn validate(&self) -> Result<(), ModelError> {
+        ModelError::require_finite("absent_sensor_share", self.absent_sensor_share)?;
         ModelError::require_non_negative("yield_displacement", self.yield_displacement)?;
         ModelError::require_finite("yield_post_ratio", self.yield_post_ratio)?;
         ModelError::require_positive("yield_exponent", self.yield_exponent)?;

@@ -1,0 +1,183 @@
+//! The identified shake table as the engine sees it: fifteen uncertain nominal parameters, the
+//! catalogue, and the innovations of every record.
+
+mod effects;
+
+pub use effects::{Apply, catalogue};
+
+use plant::identified_rig::IdentifiedRig;
+
+use crate::case::Nominal;
+use crate::diagnosis::{Candidate, Point, RigModel};
+use crate::predictor::{Disturbance, Predictor, Signals};
+
+/// One record and whether the effects were there when it was taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelRecord {
+    /// The signals, SI.
+    pub signals: Signals,
+    /// False for a baseline: the same rig before the effect.
+    pub with_effects: bool,
+}
+
+/// The shake table of a case.
+#[derive(Debug, Clone)]
+pub struct ShakeTableModel {
+    /// The nominal rig.
+    pub nominal: IdentifiedRig,
+    /// Relative standard deviation of its parameters.
+    pub uncertainty: f64,
+    /// Sampling period, s.
+    pub period: f64,
+    /// Sensor noise, SI, infinite where a channel is missing.
+    pub noise: [f64; 4],
+    /// What drives the rig unseen.
+    pub disturbance: Disturbance,
+    /// The records.
+    pub records: Vec<ModelRecord>,
+    candidates: Vec<Candidate>,
+    apply: Vec<Apply>,
+}
+
+/// Names of the uncertain nominal parameters, in the order of [`Point::nuisance`].
+pub const NUISANCE: [&str; 15] = [
+    "actuator.denominator[1]",
+    "actuator.denominator[2]",
+    "actuator.denominator[3]",
+    "actuator.voltage_to_force[1]",
+    "actuator.voltage_to_force[2]",
+    "actuator.voltage_to_force[3]",
+    "actuator.velocity_to_force[1]",
+    "actuator.velocity_to_force[2]",
+    "actuator.velocity_to_force[3]",
+    "table.mass",
+    "table.damping",
+    "table.stiffness",
+    "specimen.mass",
+    "specimen.damping",
+    "specimen.stiffness",
+];
+
+impl ShakeTableModel {
+    /// The model for `nominal` and `records`; `noise` as in [`Nominal::noise`], infinite where a
+    /// channel is missing.
+    pub fn new(nominal: &Nominal, noise: [f64; 4], records: Vec<ModelRecord>) -> Self {
+        let period = 1.0 / nominal.sample_rate;
+        let commands = records.iter().flat_map(|record| &record.signals.command);
+        let peak = commands.fold(1e-3f64, |peak, u| peak.max(u.abs()));
+        let (candidates, apply) = catalogue(peak, period).into_iter().unzip();
+        Self {
+            nominal: IdentifiedRig {
+                shake_table: nominal.shake_table,
+                specimen: nominal.specimen,
+                ..Default::default()
+            },
+            uncertainty: nominal.uncertainty,
+            period,
+            noise,
+            disturbance: Disturbance::beside_command(nominal.command_noise, period),
+            records,
+            candidates,
+            apply,
+        }
+    }
+
+    /// The nominal rig with `nuisance` (in standard deviations) and no effects.
+    pub fn rig_without_effects(&self, nuisance: &[f64]) -> IdentifiedRig {
+        let mut rig = self.nominal;
+        let mut factors = nuisance.iter().map(|p| 1.0 + self.uncertainty * p);
+        let mut scale = |value: &mut f64| *value *= factors.next().unwrap_or(1.0);
+        let actuator = &mut rig.shake_table.actuator;
+        actuator.denominator.iter_mut().for_each(&mut scale);
+        actuator.voltage_to_force.iter_mut().for_each(&mut scale);
+        actuator.velocity_to_force.iter_mut().for_each(&mut scale);
+        let table = &mut rig.shake_table.table;
+        scale(&mut table.mass);
+        scale(&mut table.damping);
+        scale(&mut table.stiffness);
+        if let Some(specimen) = &mut rig.specimen {
+            scale(&mut specimen.mass);
+            scale(&mut specimen.damping);
+            scale(&mut specimen.stiffness);
+        }
+        rig
+    }
+
+    /// The rig at `point`.
+    pub fn rig(&self, point: &Point) -> IdentifiedRig {
+        let mut rig = self.rig_without_effects(&point.nuisance);
+        for (candidate, internal) in &point.effects {
+            self.apply[*candidate](&mut rig, &self.candidates[*candidate].values(internal));
+        }
+        rig
+    }
+}
+
+/// Predictors of the rig with and without its effects.
+pub struct ShakeTablePredictor {
+    with_effects: Predictor,
+    without_effects: Option<Predictor>,
+}
+
+impl RigModel for ShakeTableModel {
+    type Predictor = ShakeTablePredictor;
+
+    fn nuisance(&self) -> usize {
+        if self.nominal.specimen.is_some() { 15 } else { 12 }
+    }
+
+    fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
+    fn records(&self) -> usize {
+        self.records.len()
+    }
+
+    fn residual_count(&self, record: usize) -> usize {
+        4 * self.records[record].signals.len()
+    }
+
+    fn sample_count(&self, record: usize) -> usize {
+        self.records[record].signals.len()
+    }
+
+    fn predictor(&self, point: &Point) -> Option<ShakeTablePredictor> {
+        let design = |rig: &IdentifiedRig| {
+            Predictor::design(rig, self.period, self.noise, self.disturbance).ok()
+        };
+        let without_effects = if self.records.iter().all(|record| record.with_effects) {
+            None
+        } else {
+            Some(design(&self.rig_without_effects(&point.nuisance))?)
+        };
+        Some(ShakeTablePredictor {
+            with_effects: design(&self.rig(point))?,
+            without_effects,
+        })
+    }
+
+    fn log_determinant(&self, predictor: &ShakeTablePredictor) -> f64 {
+        predictor.with_effects.log_determinant
+    }
+
+    fn residuals(
+        &self,
+        predictor: &ShakeTablePredictor,
+        point: &Point,
+        record: usize,
+        out: &mut [f64],
+    ) -> bool {
+        let ModelRecord {
+            signals,
+            with_effects,
+        } = &self.records[record];
+        let (rig, predictor) = match (&predictor.without_effects, with_effects) {
+            (Some(without), false) => (self.rig_without_effects(&point.nuisance), without),
+            _ => (self.rig(point), &predictor.with_effects),
+        };
+        predictor
+            .sample(&rig)
+            .is_ok_and(|sampled| predictor.innovations(&sampled, signals, out))
+    }
+}

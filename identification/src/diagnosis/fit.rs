@@ -1,0 +1,277 @@
+//! Maximum-likelihood fits by Levenberg-Marquardt, with the nuisance estimated along.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::model::{Point, RigModel};
+
+/// Internal coordinates move by this for a difference quotient.
+const DIFFERENCE: f64 = 1e-3;
+/// No nuisance moves farther than this many standard deviations in one step.
+const LONGEST_STEP: f64 = 4.0;
+
+/// A model at a point with its residuals on the records it was fitted to.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Where.
+    pub point: Point,
+    /// `-2 log` likelihood up to a constant, priors included.
+    pub cost: f64,
+    /// Whitened residuals, the fitted records after one another.
+    pub residuals: Vec<f64>,
+}
+
+/// Derivatives of the residuals by coordinates of a point.
+pub struct Jacobian {
+    columns: Vec<Vec<f64>>,
+    gram: DMatrix<f64>,
+}
+
+/// Whitened residuals and cost at `point` on `records`; nothing where it cannot be simulated.
+pub fn evaluate<M: RigModel>(model: &M, point: &Point, records: &[usize]) -> Option<Fit> {
+    let predictor = model.predictor(point)?;
+    let residuals = residuals(model, &predictor, point, records)?;
+    let samples: usize = records.iter().map(|&r| model.sample_count(r)).sum();
+    let cost = squares(&residuals)
+        + samples as f64 * model.log_determinant(&predictor)
+        + point.prior_cost(model.candidates());
+    cost.is_finite().then(|| Fit {
+        point: point.clone(),
+        cost,
+        residuals,
+    })
+}
+
+fn residuals<M: RigModel>(
+    model: &M,
+    predictor: &M::Predictor,
+    point: &Point,
+    records: &[usize],
+) -> Option<Vec<f64>> {
+    let count: usize = records.iter().map(|&r| model.residual_count(r)).sum();
+    let mut all = vec![0.0; count];
+    let mut rest = all.as_mut_slice();
+    for &record in records {
+        let (mine, others) = rest.split_at_mut(model.residual_count(record));
+        if !model.residuals(predictor, point, record, mine) {
+            return None;
+        }
+        rest = others;
+    }
+    Some(all)
+}
+
+fn squares(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Four sums at once keep the adders busy.
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let tail: f64 = a4
+        .remainder()
+        .iter()
+        .zip(b4.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in a4.zip(b4) {
+        for i in 0..4 {
+            sums[i] += x[i] * y[i];
+        }
+    }
+    sums.iter().sum::<f64>() + tail
+}
+
+/// Derivatives of the residuals at `fit` by the coordinates in `which` (nuisance first, then the
+/// effects').
+fn columns<M: RigModel>(
+    model: &M,
+    fit: &Fit,
+    records: &[usize],
+    which: impl Iterator<Item = usize>,
+) -> Option<Vec<Vec<f64>>> {
+    let predictor = model.predictor(&fit.point)?;
+    let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
+    let difference = |coordinate: usize, size: f64| {
+        let mut step = vec![0.0; count];
+        step[coordinate] = size;
+        let moved = fit.point.moved(&step, model.candidates());
+        if moved == fit.point {
+            return None;
+        }
+        let mut column = residuals(model, &predictor, &moved, records)?;
+        for (c, r) in column.iter_mut().zip(&fit.residuals) {
+            *c = (*c - r) / size;
+        }
+        Some(column)
+    };
+    which
+        .map(|coordinate| {
+            let size = if coordinate < fit.point.nuisance.len() {
+                0.02
+            } else {
+                DIFFERENCE
+            };
+            // At an upper bound the other side is taken.
+            difference(coordinate, size).or_else(|| difference(coordinate, -size))
+        })
+        .collect()
+}
+
+impl Jacobian {
+    /// All coordinates of `fit`.
+    pub fn at<M: RigModel>(model: &M, fit: &Fit, records: &[usize]) -> Option<Self> {
+        let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
+        let columns = columns(model, fit, records, 0..count)?;
+        let mut gram = DMatrix::zeros(count, count);
+        for i in 0..count {
+            for j in 0..=i {
+                let value = dot(&columns[i], &columns[j]);
+                gram[(i, j)] = value;
+                gram[(j, i)] = value;
+            }
+        }
+        Some(Self { columns, gram })
+    }
+
+    /// How much `column` (in the residuals' space) would lower the cost of `fit` if it entered
+    /// linearly with the best amplitude, everything in `self` estimated along; and that amplitude.
+    pub fn score<M: RigModel>(&self, model: &M, fit: &Fit, column: &[f64]) -> (f64, f64) {
+        let n = self.columns.len();
+        let (hessian, gradient) = self.normal_equations(model, fit);
+        let cross = DVector::from_fn(n, |i, _| dot(&self.columns[i], column));
+        let Some(factor) = hessian.cholesky() else {
+            return (0.0, 0.0);
+        };
+        let own = dot(column, column) - cross.dot(&factor.solve(&cross));
+        let slope = -dot(column, &fit.residuals) - cross.dot(&factor.solve(&gradient));
+        if own <= 1e-9 * dot(column, column) {
+            return (0.0, 0.0);
+        }
+        (slope * slope / own, slope / own)
+    }
+
+    fn normal_equations<M: RigModel>(
+        &self,
+        model: &M,
+        fit: &Fit,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let mut hessian = self.gram.clone();
+        let n = self.columns.len();
+        let mut gradient = DVector::from_fn(n, |i, _| -dot(&self.columns[i], &fit.residuals));
+        add_priors(model, &fit.point, &mut hessian, &mut gradient);
+        (hessian, gradient)
+    }
+
+    /// Covariance of all coordinates at `fit`.
+    pub fn covariance<M: RigModel>(&self, model: &M, fit: &Fit) -> Option<DMatrix<f64>> {
+        self.normal_equations(model, fit).0.try_inverse()
+    }
+}
+
+fn add_priors<M: RigModel>(
+    model: &M,
+    point: &Point,
+    hessian: &mut DMatrix<f64>,
+    gradient: &mut DVector<f64>,
+) {
+    let nuisance = point.nuisance.len();
+    for (i, p) in point.nuisance.iter().enumerate() {
+        hessian[(i, i)] += 1.0;
+        gradient[i] -= p;
+    }
+    for (place, off, spread) in point.prior_rows(model.candidates()) {
+        let i = nuisance + place;
+        if i < gradient.len() {
+            hessian[(i, i)] += 1.0 / (spread * spread);
+            gradient[i] -= off / (spread * spread);
+        }
+    }
+}
+
+/// Fits all coordinates of `start`. The first ones that `frozen` holds keep its derivatives; those
+/// of the others are taken anew in every iteration.
+pub fn fit<M: RigModel>(
+    model: &M,
+    start: &Point,
+    records: &[usize],
+    frozen: &Jacobian,
+    iterations: usize,
+) -> Option<Fit> {
+    let mut best = evaluate(model, start, records)?;
+    let held = frozen.columns.len();
+    let count = start.nuisance.len() + start.effect_coordinates();
+    let mut damping = 1e-4;
+    for _ in 0..iterations {
+        let fresh = columns(model, &best, records, held..count)?;
+        let mut hessian = DMatrix::zeros(count, count);
+        hessian.view_mut((0, 0), (held, held)).copy_from(&frozen.gram);
+        let mut gradient = DVector::zeros(count);
+        for (i, column) in frozen.columns.iter().chain(&fresh).enumerate() {
+            gradient[i] = -dot(column, &best.residuals);
+            for (j, other) in fresh.iter().enumerate() {
+                let j = held + j;
+                if i <= j {
+                    let value = dot(column, other);
+                    hessian[(i, j)] = value;
+                    hessian[(j, i)] = value;
+                }
+            }
+        }
+        add_priors(model, &best.point, &mut hessian, &mut gradient);
+        let before = best.cost;
+        let mut expected = 0.0;
+        for _ in 0..5 {
+            let mut damped = hessian.clone();
+            for i in 0..count {
+                damped[(i, i)] *= 1.0 + damping;
+            }
+            let Some(mut step) = damped.cholesky().map(|factor| factor.solve(&gradient)) else {
+                damping *= 10.0;
+                continue;
+            };
+            expected = gradient.dot(&step);
+            let longest = step.rows(0, start.nuisance.len()).amax();
+            if longest > LONGEST_STEP {
+                step *= LONGEST_STEP / longest;
+            }
+            let moved = best.point.moved(step.as_slice(), model.candidates());
+            match evaluate(model, &moved, records) {
+                Some(next) if next.cost < best.cost => {
+                    best = next;
+                    damping = (damping * 0.1).max(1e-6);
+                    break;
+                }
+                _ => damping = (damping * 20.0).max(1e-2),
+            }
+            if expected < 0.05 {
+                break;
+            }
+        }
+        if before - best.cost < 0.02 + 1e-6 * (best.cost - before).abs() || expected < 0.02 {
+            break;
+        }
+    }
+    Some(best)
+}
+
+/// Fits with derivatives taken anew at every round until the cost settles.
+pub fn polish<M: RigModel>(
+    model: &M,
+    start: &Fit,
+    records: &[usize],
+    rounds: usize,
+) -> Option<(Fit, Jacobian)> {
+    let mut best = start.clone();
+    let mut jacobian = Jacobian::at(model, &best, records)?;
+    for _ in 0..rounds {
+        let next = fit(model, &best.point, records, &jacobian, 3)?;
+        let gain = best.cost - next.cost;
+        best = next;
+        jacobian = Jacobian::at(model, &best, records)?;
+        if gain < 0.1 {
+            break;
+        }
+    }
+    Some((best, jacobian))
+}

@@ -1,0 +1,210 @@
+//! What the engine knows of a rig: parameters, candidates, whitened residuals.
+
+/// A rig with records, as the engine sees it. A new rig is one implementation of this.
+pub trait RigModel: Sync {
+    /// What stays fixed while derivatives are taken (a predictor's gain).
+    type Predictor: Send + Sync;
+
+    /// Number of uncertain nominal parameters; each is counted in its own standard deviations.
+    fn nuisance(&self) -> usize;
+
+    /// The catalogue.
+    fn candidates(&self) -> &[Candidate];
+
+    /// Number of records.
+    fn records(&self) -> usize;
+
+    /// Length of a record's residual vector.
+    fn residual_count(&self, record: usize) -> usize;
+
+    /// Samples over which [`Self::log_determinant`] counts.
+    fn sample_count(&self, record: usize) -> usize;
+
+    /// The predictor for `point`, or nothing where the model cannot be simulated there.
+    fn predictor(&self, point: &Point) -> Option<Self::Predictor>;
+
+    /// Logarithm of the determinant of the innovations' covariance, per sample.
+    fn log_determinant(&self, predictor: &Self::Predictor) -> f64;
+
+    /// Whitened residuals of `record` at `point` into `out`; false where they are not finite.
+    fn residuals(
+        &self,
+        predictor: &Self::Predictor,
+        point: &Point,
+        record: usize,
+        out: &mut [f64],
+    ) -> bool;
+}
+
+/// Values of everything that can be estimated.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Point {
+    /// Deviations of the nominal parameters, in their standard deviations.
+    pub nuisance: Vec<f64>,
+    /// Accepted effects: index of the candidate and its internal coordinates.
+    pub effects: Vec<(usize, Vec<f64>)>,
+}
+
+/// How a parameter is counted inside the engine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// The value itself over a unit.
+    Linear(f64),
+    /// The value's logarithm.
+    Logarithmic,
+    /// One over the value, in units of one over this; zero is off.
+    Inverse(f64),
+}
+
+impl Scale {
+    /// Internal coordinate of `value`.
+    pub fn to_internal(self, value: f64) -> f64 {
+        match self {
+            Self::Linear(unit) => value / unit,
+            Self::Logarithmic => value.ln(),
+            Self::Inverse(unit) => unit / value,
+        }
+    }
+
+    /// Value of an internal coordinate.
+    pub fn to_value(self, internal: f64) -> f64 {
+        match self {
+            Self::Linear(unit) => internal * unit,
+            Self::Logarithmic => internal.exp(),
+            Self::Inverse(unit) => unit / internal,
+        }
+    }
+
+    /// Derivative of the value by the internal coordinate.
+    pub fn slope(self, internal: f64) -> f64 {
+        match self {
+            Self::Linear(unit) => unit,
+            Self::Logarithmic => internal.exp(),
+            Self::Inverse(unit) => unit / (internal * internal),
+        }
+    }
+}
+
+/// What a parameter tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Role {
+    /// How strong the effect is; counts against the engineering floor `weak` (SI).
+    Size {
+        /// The weakest value of the catalogue.
+        weak: f64,
+    },
+    /// A detail of its form, known to `spread` (internal units) about `typical` (SI).
+    Shape {
+        /// The usual value.
+        typical: f64,
+        /// One standard deviation of the internal coordinate.
+        spread: f64,
+    },
+}
+
+/// One parameter of a candidate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectParameter {
+    /// Its name in the catalogue.
+    pub name: &'static str,
+    /// SI unit.
+    pub unit: &'static str,
+    /// How it is counted.
+    pub scale: Scale,
+    /// What it tells.
+    pub role: Role,
+    /// Smallest and largest value that is tried (SI).
+    pub bounds: (f64, f64),
+}
+
+/// One effect of the catalogue.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Its name in the catalogue.
+    pub effect: &'static str,
+    /// Its parameters.
+    pub parameters: Vec<EffectParameter>,
+    /// Values (SI) from which fits begin.
+    pub starts: Vec<Vec<f64>>,
+    /// Effects that one record often cannot tell from this one.
+    pub look_alikes: &'static [&'static str],
+    /// Effect that this one holds as a special case.
+    pub contains: Option<&'static str>,
+}
+
+impl Candidate {
+    /// Values (SI) of internal coordinates.
+    pub fn values(&self, internal: &[f64]) -> Vec<f64> {
+        let pairs = self.parameters.iter().zip(internal);
+        pairs.map(|(p, &q)| p.scale.to_value(q)).collect()
+    }
+
+    /// Internal coordinates of values (SI).
+    pub fn internal(&self, values: &[f64]) -> Vec<f64> {
+        let pairs = self.parameters.iter().zip(values);
+        pairs.map(|(p, &v)| p.scale.to_internal(v)).collect()
+    }
+
+    /// Brings internal coordinates into the parameters' bounds.
+    pub fn clamp(&self, internal: &mut [f64]) {
+        for (parameter, q) in self.parameters.iter().zip(internal) {
+            let (low, high) = parameter.bounds;
+            let (a, b) = (
+                parameter.scale.to_internal(low),
+                parameter.scale.to_internal(high),
+            );
+            *q = q.clamp(a.min(b), a.max(b));
+        }
+    }
+}
+
+impl Point {
+    /// Cost of the priors: squares of nuisance and of shapes in their standard deviations.
+    pub fn prior_cost(&self, candidates: &[Candidate]) -> f64 {
+        let nuisance: f64 = self.nuisance.iter().map(|p| p * p).sum();
+        nuisance
+            + self
+                .prior_rows(candidates)
+                .iter()
+                .map(|(_, off, spread)| (off / spread).powi(2))
+                .sum::<f64>()
+    }
+
+    /// Priors of the effects' shapes: place among all effect coordinates, deviation, spread.
+    pub fn prior_rows(&self, candidates: &[Candidate]) -> Vec<(usize, f64, f64)> {
+        let mut rows = Vec::new();
+        let mut place = 0;
+        for (candidate, internal) in &self.effects {
+            for (parameter, &q) in candidates[*candidate].parameters.iter().zip(internal) {
+                if let Role::Shape { typical, spread } = parameter.role {
+                    rows.push((place, q - parameter.scale.to_internal(typical), spread));
+                }
+                place += 1;
+            }
+        }
+        rows
+    }
+
+    /// Number of effect coordinates.
+    pub fn effect_coordinates(&self) -> usize {
+        self.effects.iter().map(|(_, q)| q.len()).sum()
+    }
+
+    /// Adds `step` to coordinates: nuisance first, then the effects'; kept in bounds.
+    pub fn moved(&self, step: &[f64], candidates: &[Candidate]) -> Self {
+        let mut point = self.clone();
+        let (nuisance, mut rest) = step.split_at(self.nuisance.len());
+        for (p, s) in point.nuisance.iter_mut().zip(nuisance) {
+            *p += s;
+        }
+        for (candidate, internal) in &mut point.effects {
+            let (mine, others) = rest.split_at(internal.len());
+            for (q, s) in internal.iter_mut().zip(mine) {
+                *q += s;
+            }
+            candidates[*candidate].clamp(internal);
+            rest = others;
+        }
+        point
+    }
+}
