@@ -103,6 +103,45 @@ impl ShakeTableModel {
         rig
     }
 
+    /// Functions of command and state that a wrong model leaves traces of, each with its name,
+    /// from the measured signals of `record` one sample before (the noise of the sample itself is
+    /// in its innovation).
+    pub fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)> {
+        let signals = &self.records[record].signals;
+        let n = signals.len();
+        let before = |k: usize| k.saturating_sub(1);
+        let channel = |i: usize| -> Vec<f64> {
+            (0..n).map(|k| signals.channels[before(k)][i]).collect()
+        };
+        let x = channel(0);
+        // Velocity over eight samples, smooth enough for its sign.
+        let v: Vec<f64> = (0..n)
+            .map(|k| (x[k] - x[k.saturating_sub(8)]) / (8.0 * self.period))
+            .collect();
+        let command: Vec<f64> = (0..n).map(|k| signals.command[before(k)]).collect();
+        let mut all = Vec::new();
+        for (name, signal) in [
+            ("valve command", command),
+            ("displacement", x.clone()),
+            ("velocity", v),
+            ("actuator force", channel(2)),
+            ("specimen acceleration", channel(3)),
+        ] {
+            let peak = signal.iter().fold(0.0f64, |peak, s| peak.max(s.abs()));
+            if peak == 0.0 {
+                continue;
+            }
+            let even = signal.iter().map(|s| s * s / peak).collect();
+            let odd = signal.iter().map(|s| s * s * s / (peak * peak)).collect();
+            let sign = signal.iter().map(|s| (40.0 * s / peak).tanh()).collect();
+            all.push((format!("{name} squared"), even));
+            all.push((format!("{name} cubed"), odd));
+            all.push((format!("sign of {name}"), sign));
+            all.push((name.to_string(), signal));
+        }
+        all
+    }
+
     /// The rig at `point`.
     pub fn rig(&self, point: &Point) -> IdentifiedRig {
         let mut rig = self.rig_without_effects(&point.nuisance);

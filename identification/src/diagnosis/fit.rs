@@ -41,7 +41,8 @@ pub fn evaluate<M: RigModel>(model: &M, point: &Point, records: &[usize]) -> Opt
     })
 }
 
-fn residuals<M: RigModel>(
+/// Whitened residuals at `point` with the gain of `predictor`.
+pub fn residuals<M: RigModel>(
     model: &M,
     predictor: &M::Predictor,
     point: &Point,
@@ -145,7 +146,7 @@ impl Jacobian {
         };
         let own = dot(column, column) - cross.dot(&factor.solve(&cross));
         let slope = -dot(column, &fit.residuals) - cross.dot(&factor.solve(&gradient));
-        if own <= 1e-9 * dot(column, column) {
+        if own <= 1e-13 * dot(column, column) {
             return (0.0, 0.0);
         }
         (slope * slope / own, slope / own)
@@ -201,7 +202,9 @@ pub fn fit<M: RigModel>(
     let mut best = evaluate(model, start, records)?;
     let held = frozen.columns.len();
     let count = start.nuisance.len() + start.effect_coordinates();
-    let mut damping = 1e-4;
+    // Directions that only the priors hold are a million times flatter than others: any damping
+    // to begin with would stop them.
+    let mut damping = 0.0f64;
     for _ in 0..iterations {
         let fresh = columns(model, &best, records, held..count)?;
         let mut hessian = DMatrix::zeros(count, count);
@@ -227,7 +230,7 @@ pub fn fit<M: RigModel>(
                 damped[(i, i)] *= 1.0 + damping;
             }
             let Some(mut step) = damped.cholesky().map(|factor| factor.solve(&gradient)) else {
-                damping *= 10.0;
+                damping = (damping * 20.0).max(1e-6);
                 continue;
             };
             expected = gradient.dot(&step);
@@ -239,10 +242,10 @@ pub fn fit<M: RigModel>(
             match evaluate(model, &moved, records) {
                 Some(next) if next.cost < best.cost => {
                     best = next;
-                    damping = (damping * 0.1).max(1e-6);
+                    damping = if damping < 1e-5 { 0.0 } else { damping * 0.03 };
                     break;
                 }
-                _ => damping = (damping * 20.0).max(1e-2),
+                _ => damping = (damping * 30.0).max(1e-5),
             }
             if expected < 0.05 {
                 break;

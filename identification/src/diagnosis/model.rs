@@ -145,6 +145,27 @@ impl Candidate {
         pairs.map(|(p, &v)| p.scale.to_internal(v)).collect()
     }
 
+    /// Internal coordinates of a weak effect of the form of `start`: functions of the share of the
+    /// catalogue's weakest value.
+    pub fn nearly_off(&self, start: &[f64]) -> Vec<impl Fn(f64) -> f64> {
+        let pairs = self.parameters.iter().zip(start);
+        pairs
+            .map(|(p, &value)| {
+                let (full, shrinks) = match (p.role, p.scale) {
+                    (Role::Size { weak }, Scale::Linear(_)) => (p.scale.to_internal(weak), true),
+                    (Role::Size { weak }, Scale::Inverse(_)) => {
+                        // Not past the bound where the effect is off.
+                        (p.scale.to_internal(weak.max(0.9 * p.bounds.1)), false)
+                    }
+                    (Role::Size { .. }, Scale::Logarithmic) | (Role::Shape { .. }, _) => {
+                        (p.scale.to_internal(value), false)
+                    }
+                };
+                move |share| if shrinks { share * full } else { full }
+            })
+            .collect()
+    }
+
     /// Brings internal coordinates into the parameters' bounds.
     pub fn clamp(&self, internal: &mut [f64]) {
         for (parameter, q) in self.parameters.iter().zip(internal) {

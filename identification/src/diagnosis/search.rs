@@ -1,0 +1,327 @@
+//! The search for the set of effects: forward with a beam, then backward.
+
+use super::fit::{Fit, Jacobian, evaluate, fit, polish, residuals};
+use super::model::{Candidate, Point, RigModel, Role, Scale};
+
+/// What an effect must earn, in units of `2 log` likelihood, before it is named.
+pub const PRICE_OF_AN_EFFECT: f64 = 18.0;
+/// And for each further parameter that it brings.
+const PRICE_OF_A_PARAMETER: f64 = 6.0;
+/// Share of the catalogue's weakest value below which an effect is not worth a name.
+const FLOOR: f64 = 0.6;
+/// A model within this of the best is a rival that the data do not rule out.
+pub const RIVAL_WITHIN: f64 = 12.0;
+/// Mean square of whitened residuals up to which a model may be right.
+const NEAR_NOISE: f64 = 1.03;
+/// Effects in one model.
+const MOST_EFFECTS: usize = 3;
+
+/// A fitted model with its derivatives.
+pub struct Hypothesis {
+    /// The fit.
+    pub fit: Fit,
+    /// Its derivatives by all coordinates.
+    pub jacobian: Jacobian,
+    /// Its cost and the price of its effects.
+    pub score: f64,
+}
+
+impl Hypothesis {
+    /// Indices of its effects, ascending.
+    pub fn effects(&self) -> Vec<usize> {
+        let mut effects: Vec<_> = self.fit.point.effects.iter().map(|(i, _)| *i).collect();
+        effects.sort_unstable();
+        effects
+    }
+
+    /// Mean square of its residuals.
+    pub fn mean_square(&self) -> f64 {
+        let sum: f64 = self.fit.residuals.iter().map(|r| r * r).sum();
+        sum / self.fit.residuals.len().max(1) as f64
+    }
+}
+
+/// What the search found.
+pub struct Found {
+    /// The nominal model with its nuisance.
+    pub nominal: Hypothesis,
+    /// The best model, which may be the nominal one.
+    pub best: Option<Hypothesis>,
+    /// Other models of as many effects, best first.
+    pub others: Vec<Hypothesis>,
+}
+
+/// Price of the effects of `point`.
+fn price(candidates: &[Candidate], point: &Point) -> f64 {
+    let extra = |candidate: &Candidate| candidate.parameters.len().saturating_sub(1) as f64;
+    point
+        .effects
+        .iter()
+        .map(|(i, _)| PRICE_OF_AN_EFFECT + PRICE_OF_A_PARAMETER * extra(&candidates[*i]))
+        .sum()
+}
+
+/// True when every effect of `point` is strong enough to matter.
+pub fn matters(candidates: &[Candidate], point: &Point) -> bool {
+    point.effects.iter().all(|(i, internal)| {
+        let candidate = &candidates[*i];
+        let mut sizes = candidate.parameters.iter().zip(internal).filter_map(|(p, &q)| {
+            let Role::Size { weak } = p.role else {
+                return None;
+            };
+            let value = p.scale.to_value(q);
+            Some(match p.scale {
+                Scale::Linear(_) => value.abs() / weak,
+                Scale::Logarithmic | Scale::Inverse(_) => weak / value,
+            })
+        });
+        let mut none = true;
+        let strong = sizes.any(|size| {
+            none = false;
+            size >= FLOOR
+        });
+        strong || none
+    })
+}
+
+/// One start of a race.
+struct Runner {
+    fit: Fit,
+    effect: usize,
+    parent: usize,
+}
+
+/// Search on `records` (indices of the model's records).
+pub struct Search<'a, M: RigModel> {
+    /// The rig.
+    pub model: &'a M,
+    /// The records that are fitted.
+    pub records: Vec<usize>,
+    /// Prints what it finds to standard error.
+    pub verbose: bool,
+}
+
+impl<M: RigModel> Search<'_, M> {
+    fn hypothesis(&self, start: &Fit, rounds: usize) -> Option<Hypothesis> {
+        let (fit, jacobian) = polish(self.model, start, &self.records, rounds)?;
+        let score = fit.cost + price(self.model.candidates(), &fit.point);
+        Some(Hypothesis {
+            fit,
+            jacobian,
+            score,
+        })
+    }
+
+    fn tell(&self, what: &str, hypothesis: &Hypothesis) {
+        if !self.verbose {
+            return;
+        }
+        let candidates = self.model.candidates();
+        let effects: Vec<String> = hypothesis
+            .fit
+            .point
+            .effects
+            .iter()
+            .map(|(i, q)| format!("{} {:.4?}", candidates[*i].effect, candidates[*i].values(q)))
+            .collect();
+        eprintln!(
+            "  {what}: score {:.1} cost {:.1} mean square {:.4} {}",
+            hypothesis.score,
+            hypothesis.fit.cost,
+            hypothesis.mean_square(),
+            effects.join(" + ")
+        );
+    }
+
+    /// The nominal model, nuisance estimated.
+    pub fn nominal(&self) -> Option<Hypothesis> {
+        let origin = Point {
+            nuisance: vec![0.0; self.model.nuisance()],
+            effects: Vec::new(),
+        };
+        let start = evaluate(self.model, &origin, &self.records)?;
+        self.hypothesis(&start, 6)
+    }
+
+    /// Best extensions of `parents` by one more effect: short fits from every start, of which
+    /// the better part runs on, then the `keep` best effects polished.
+    fn extend(&self, parents: &[(&Fit, &Jacobian)], keep: usize) -> Vec<Hypothesis> {
+        let candidates = self.model.candidates();
+        let mut runners = Vec::new();
+        for (parent, (base, jacobian)) in parents.iter().enumerate() {
+            for (effect, candidate) in candidates.iter().enumerate() {
+                let held = |(i, _): &(usize, Vec<f64>)| {
+                    *i == effect
+                        || candidate.contains == Some(candidates[*i].effect)
+                        || candidates[*i].contains == Some(candidate.effect)
+                };
+                if base.point.effects.iter().any(held) {
+                    continue;
+                }
+                for start in &candidate.starts {
+                    let mut point = base.point.clone();
+                    point.effects.push((effect, candidate.internal(start)));
+                    if let Some(fit) = fit(self.model, &point, &self.records, jacobian, 2) {
+                        runners.push(Runner {
+                            fit,
+                            effect,
+                            parent,
+                        });
+                    }
+                }
+            }
+        }
+        runners.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        runners.truncate(14 + 4 * parents.len());
+        for runner in &mut runners {
+            let jacobian = parents[runner.parent].1;
+            if let Some(further) = fit(self.model, &runner.fit.point, &self.records, jacobian, 4) {
+                runner.fit = further;
+            }
+        }
+        runners.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        let mut seen: Vec<Vec<usize>> = Vec::new();
+        let mut best = Vec::new();
+        for runner in runners {
+            let mut set: Vec<usize> = runner.fit.point.effects.iter().map(|(i, _)| *i).collect();
+            set.sort_unstable();
+            if seen.contains(&set) {
+                continue;
+            }
+            seen.push(set);
+            let _ = runner.effect;
+            best.extend(self.hypothesis(&runner.fit, 4));
+            if best.len() == keep {
+                break;
+            }
+        }
+        best.sort_by(|a, b| a.score.total_cmp(&b.score));
+        best
+    }
+
+    /// Extensions of an already good `parent`: only effects whose linear score promises to pay.
+    fn refine(&self, parent: &Hypothesis) -> Vec<Hypothesis> {
+        let candidates = self.model.candidates();
+        let Some(predictor) = self.model.predictor(&parent.fit.point) else {
+            return Vec::new();
+        };
+        let mut promising = Vec::new();
+        for (effect, candidate) in candidates.iter().enumerate() {
+            if parent.fit.point.effects.iter().any(|(i, _)| *i == effect) {
+                continue;
+            }
+            for start in &candidate.starts {
+                let off = candidate.nearly_off(start);
+                // A derivative at nothing, and a difference to a weak effect for thresholds.
+                for share in [1e-3, 0.5] {
+                    let internal: Vec<f64> = off.iter().map(|at| at(share)).collect();
+                    let mut point = parent.fit.point.clone();
+                    point.effects.push((effect, internal));
+                    let with = residuals(self.model, &predictor, &point, &self.records);
+                    let Some(with) = with else { continue };
+                    let pairs = with.iter().zip(&parent.fit.residuals);
+                    let column: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+                    let (gain, amplitude) = parent.jacobian.score(self.model, &parent.fit, &column);
+                    if self.verbose && gain > 9.0 {
+                        eprintln!("    {} share {share}: gain {gain:.1} amplitude {amplitude:.3e}", candidate.effect);
+                    }
+                    let either = candidate.parameters.iter().any(|p| p.bounds.0 < 0.0);
+                    if gain > 0.5 * PRICE_OF_AN_EFFECT && (amplitude > 0.0 || either) {
+                        promising.push((gain, effect, point));
+                    }
+                }
+            }
+        }
+        promising.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut best: Vec<Hypothesis> = Vec::new();
+        let mut seen = Vec::new();
+        for (_, effect, point) in promising {
+            if seen.contains(&effect) || seen.len() == 5 {
+                continue;
+            }
+            seen.push(effect);
+            let short = fit(self.model, &point, &self.records, &parent.jacobian, 6);
+            best.extend(short.and_then(|short| self.hypothesis(&short, 3)));
+        }
+        best.sort_by(|a, b| a.score.total_cmp(&b.score));
+        best
+    }
+
+    /// The whole search.
+    pub fn run(&self) -> Option<Found> {
+        let candidates = self.model.candidates();
+        let nominal = self.nominal()?;
+        self.tell("nominal", &nominal);
+        let origin = Point {
+            nuisance: vec![0.0; self.model.nuisance()],
+            effects: Vec::new(),
+        };
+        let worth = |hypothesis: &Hypothesis| matters(candidates, &hypothesis.fit.point);
+
+        let mut level = if nominal.mean_square() < NEAR_NOISE {
+            self.refine(&nominal)
+        } else {
+            // A strong effect bends the nominal fit: begin at the nominal values themselves.
+            let start = evaluate(self.model, &origin, &self.records)?;
+            let jacobian = Jacobian::at(self.model, &start, &self.records)?;
+            self.extend(&[(&start, &jacobian)], 6)
+        };
+        level.retain(worth);
+        for hypothesis in &level {
+            self.tell("one", hypothesis);
+        }
+        let mut best: Option<Hypothesis> = None;
+        let mut others = Vec::new();
+        for _ in 1..=MOST_EFFECTS {
+            let score_before = best.as_ref().map_or(nominal.score, |best| best.score);
+            if level.first().is_none_or(|first| first.score >= score_before) {
+                break;
+            }
+            others = level.split_off(1);
+            best = level.pop();
+            let Some(current) = &best else { break };
+            if current.fit.point.effects.len() == MOST_EFFECTS {
+                break;
+            }
+            level = if current.mean_square() < NEAR_NOISE {
+                self.refine(current)
+            } else {
+                let mut parents = vec![(&current.fit, &current.jacobian)];
+                parents.extend(others.iter().take(2).map(|other| (&other.fit, &other.jacobian)));
+                self.extend(&parents, 5)
+            };
+            level.retain(worth);
+            for hypothesis in &level {
+                self.tell("more", hypothesis);
+            }
+        }
+        if let Some(current) = best.take() {
+            best = Some(self.eliminate(current));
+        }
+        Some(Found {
+            nominal,
+            best,
+            others,
+        })
+    }
+
+    /// Drops effects that no longer earn their price.
+    fn eliminate(&self, mut current: Hypothesis) -> Hypothesis {
+        while current.fit.point.effects.len() > 1 {
+            let without = (0..current.fit.point.effects.len()).filter_map(|i| {
+                let mut point = current.fit.point.clone();
+                point.effects.remove(i);
+                let start = evaluate(self.model, &point, &self.records)?;
+                self.hypothesis(&start, 4)
+            });
+            match without.min_by(|a, b| a.score.total_cmp(&b.score)) {
+                Some(smaller) if smaller.score <= current.score => {
+                    self.tell("dropped to", &smaller);
+                    current = smaller;
+                }
+                _ => break,
+            }
+        }
+        current
+    }
+}
