@@ -7,13 +7,15 @@ pub use effects::{Apply, catalogue};
 
 use plant::identified_rig::IdentifiedRig;
 
-use crate::case::Nominal;
+use crate::case::{CHANNELS, Nominal};
 use crate::diagnosis::{Candidate, Point, RigModel};
 use crate::predictor::{Disturbance, Predictor, Signals};
 
 /// One record and whether the effects were there when it was taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelRecord {
+    /// Its name.
+    pub name: String,
     /// The signals, SI.
     pub signals: Signals,
     /// False for a baseline: the same rig before the effect.
@@ -103,10 +105,54 @@ impl ShakeTableModel {
         rig
     }
 
-    /// Functions of command and state that a wrong model leaves traces of, each with its name,
-    /// from the measured signals of `record` one sample before (the noise of the sample itself is
-    /// in its innovation).
-    pub fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)> {
+    /// The rig at `point`.
+    pub fn rig(&self, point: &Point) -> IdentifiedRig {
+        let mut rig = self.rig_without_effects(&point.nuisance);
+        for (candidate, internal) in &point.effects {
+            self.apply[*candidate](&mut rig, &self.candidates[*candidate].values(internal));
+        }
+        rig
+    }
+}
+
+/// Predictors of the rig with and without its effects.
+pub struct ShakeTablePredictor {
+    with_effects: Predictor,
+    without_effects: Option<Predictor>,
+}
+
+impl RigModel for ShakeTableModel {
+    type Predictor = ShakeTablePredictor;
+
+    fn nuisance(&self) -> usize {
+        if self.nominal.specimen.is_some() { 15 } else { 12 }
+    }
+
+    fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
+    fn records(&self) -> usize {
+        self.records.len()
+    }
+
+    fn record_name(&self, record: usize) -> &str {
+        &self.records[record].name
+    }
+
+    fn channels(&self) -> &[&'static str] {
+        &CHANNELS
+    }
+
+    fn disturbed(&self, factor: f64) -> Self {
+        let mut model = self.clone();
+        model.disturbance.sigma *= factor;
+        model
+    }
+
+    // From the measured signals one sample before: the noise of the sample itself is in its
+    // innovation.
+    fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)> {
         let signals = &self.records[record].signals;
         let n = signals.len();
         let before = |k: usize| k.saturating_sub(1);
@@ -140,37 +186,6 @@ impl ShakeTableModel {
             all.push((name.to_string(), signal));
         }
         all
-    }
-
-    /// The rig at `point`.
-    pub fn rig(&self, point: &Point) -> IdentifiedRig {
-        let mut rig = self.rig_without_effects(&point.nuisance);
-        for (candidate, internal) in &point.effects {
-            self.apply[*candidate](&mut rig, &self.candidates[*candidate].values(internal));
-        }
-        rig
-    }
-}
-
-/// Predictors of the rig with and without its effects.
-pub struct ShakeTablePredictor {
-    with_effects: Predictor,
-    without_effects: Option<Predictor>,
-}
-
-impl RigModel for ShakeTableModel {
-    type Predictor = ShakeTablePredictor;
-
-    fn nuisance(&self) -> usize {
-        if self.nominal.specimen.is_some() { 15 } else { 12 }
-    }
-
-    fn candidates(&self) -> &[Candidate] {
-        &self.candidates
-    }
-
-    fn records(&self) -> usize {
-        self.records.len()
     }
 
     fn residual_count(&self, record: usize) -> usize {
@@ -210,6 +225,7 @@ impl RigModel for ShakeTableModel {
         let ModelRecord {
             signals,
             with_effects,
+            ..
         } = &self.records[record];
         let (rig, predictor) = match (&predictor.without_effects, with_effects) {
             (Some(without), false) => (self.rig_without_effects(&point.nuisance), without),

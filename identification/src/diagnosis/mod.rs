@@ -4,7 +4,9 @@ pub mod adequacy;
 mod fit;
 mod model;
 mod search;
+mod verdict;
 
 pub use fit::{Fit, Jacobian, evaluate, fit, polish};
 pub use model::{Candidate, EffectParameter, Point, RigModel, Role, Scale};
 pub use search::{Found, Hypothesis, Search};
+pub use verdict::{Estimate, Judgement, NamedEffect, Verdict, judge};

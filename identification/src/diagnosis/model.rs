@@ -14,6 +14,22 @@ pub trait RigModel: Sync {
     /// Number of records.
     fn records(&self) -> usize;
 
+    /// Name of a record.
+    fn record_name(&self, record: usize) -> &str;
+
+    /// Names of the channels, in the order in which their residuals stand within a sample.
+    fn channels(&self) -> &[&'static str];
+
+    /// Functions of command and state that a wrong model leaves traces of, each with its name,
+    /// one value a sample.
+    fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)>;
+
+    /// The same rig with what its predictor assumes about unseen disturbances multiplied by
+    /// `factor`.
+    fn disturbed(&self, factor: f64) -> Self
+    where
+        Self: Sized;
+
     /// Length of a record's residual vector.
     fn residual_count(&self, record: usize) -> usize;
 

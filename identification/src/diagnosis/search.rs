@@ -13,6 +13,8 @@ const FLOOR: f64 = 0.6;
 pub const RIVAL_WITHIN: f64 = 12.0;
 /// Mean square of whitened residuals up to which a model may be right.
 const NEAR_NOISE: f64 = 1.03;
+/// Mean square beyond which a third effect is no longer looked for: the catalogue lacks something.
+const HOPEFUL: f64 = 2.0;
 /// Effects in one model.
 const MOST_EFFECTS: usize = 3;
 
@@ -286,8 +288,18 @@ impl<M: RigModel> Search<'_, M> {
             level = if current.mean_square() < NEAR_NOISE {
                 self.refine(current)
             } else {
+                if current.fit.point.effects.len() > 1 && current.mean_square() > HOPEFUL {
+                    break;
+                }
+                let excess = |hypothesis: &Hypothesis| hypothesis.mean_square() - 1.0;
                 let mut parents = vec![(&current.fit, &current.jacobian)];
-                parents.extend(others.iter().take(2).map(|other| (&other.fit, &other.jacobian)));
+                parents.extend(
+                    others
+                        .iter()
+                        .filter(|other| excess(other) < 5.0 * excess(current))
+                        .take(2)
+                        .map(|other| (&other.fit, &other.jacobian)),
+                );
                 self.extend(&parents, 5)
             };
             level.retain(worth);

@@ -1,0 +1,271 @@
+//! From a search to a verdict: is the best model adequate, and does anything rival it?
+
+use super::adequacy::{self, Test};
+use super::fit::{Fit, Jacobian, evaluate, polish};
+use super::model::{Point, RigModel, Role, Scale};
+use super::search::{Found, Hypothesis, RIVAL_WITHIN, Search};
+
+/// Largest deviate that noise alone may show among the few hundred tests.
+pub const LARGEST_DEVIATE: f64 = 5.6;
+
+/// What came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The nominal model explains the records within its uncertainty.
+    Adequate,
+    /// The effects are these.
+    Named,
+    /// The effects are these, or one of the alternatives.
+    Ambiguous,
+    /// Something is there that the catalogue does not hold.
+    Unexplained,
+}
+
+impl Verdict {
+    /// The word in reports.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Adequate => "adequate",
+            Self::Named => "named",
+            Self::Ambiguous => "ambiguous",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
+/// An estimated parameter, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Its name in the catalogue.
+    pub name: String,
+    /// The estimate.
+    pub value: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// One standard deviation.
+    pub standard_error: f64,
+    /// True for a detail of the effect's form rather than its size.
+    pub is_shape: bool,
+}
+
+/// An effect with its parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedEffect {
+    /// Its name in the catalogue.
+    pub effect: &'static str,
+    /// Its parameters.
+    pub parameters: Vec<Estimate>,
+    /// Posterior share against the models tried in its place, 0 to 1.
+    pub confidence: f64,
+}
+
+/// The judged search.
+pub struct Judgement {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Effects of the best model (also under `Unexplained`, where they only help).
+    pub effects: Vec<NamedEffect>,
+    /// Rival sets of effects.
+    pub alternatives: Vec<Vec<&'static str>>,
+    /// Points of the rivals, in the order of `alternatives`.
+    pub rival_points: Vec<Point>,
+    /// The best model, fitted to the fitting records.
+    pub best: Fit,
+    /// Tests of what is left over, strongest first.
+    pub tests: Vec<Test>,
+    /// Share of the nominal model's excess error that the best model explains.
+    pub share_explained: f64,
+}
+
+/// Estimates and standard errors of the effects of `fit`.
+pub fn estimates<M: RigModel>(model: &M, fit: &Fit, jacobian: &Jacobian) -> Vec<NamedEffect> {
+    let covariance = jacobian.covariance(model, fit);
+    let mut place = fit.point.nuisance.len();
+    let mut effects = Vec::new();
+    for (i, internal) in &fit.point.effects {
+        let candidate = &model.candidates()[*i];
+        let mut parameters = Vec::new();
+        for (parameter, &q) in candidate.parameters.iter().zip(internal) {
+            let deviation = covariance
+                .as_ref()
+                .map_or(f64::NAN, |c| c[(place, place)].max(0.0).sqrt());
+            place += 1;
+            parameters.push(Estimate {
+                name: parameter.name.into(),
+                value: parameter.scale.to_value(q),
+                unit: parameter.unit,
+                standard_error: deviation * parameter.scale.slope(q).abs(),
+                is_shape: matches!(parameter.role, Role::Shape { .. }),
+            });
+        }
+        effects.push(NamedEffect {
+            effect: candidate.effect,
+            parameters,
+            confidence: 1.0,
+        });
+    }
+    effects
+}
+
+fn names<M: RigModel>(model: &M, hypothesis: &Hypothesis) -> Vec<&'static str> {
+    let effects = hypothesis.effects();
+    effects
+        .iter()
+        .map(|&i| model.candidates()[i].effect)
+        .collect()
+}
+
+/// Searches on the records `fitted`, judges on all of them and `held_out`.
+pub fn judge<M: RigModel>(
+    model: &M,
+    fitted: &[usize],
+    held_out: &[usize],
+    verbose: bool,
+) -> Option<Judgement> {
+    let search = |model: &M| {
+        Search {
+            model,
+            records: fitted.to_vec(),
+            verbose,
+        }
+        .run()
+    };
+    let mut found = search(model)?;
+    let mut retuned = None;
+    // The size of the unseen disturbance is known to a factor at best.
+    let best = found.best.as_ref().unwrap_or(&found.nominal);
+    if best.mean_square() < 1.5 {
+        let cost = |factor: f64| {
+            let tuned = model.disturbed(factor);
+            evaluate(&tuned, &best.fit.point, fitted).map_or(f64::INFINITY, |fit| fit.cost)
+        };
+        let costs = [(1.0 / 3.0), 1.0, 3.0].map(|factor| (factor, cost(factor)));
+        let (factor, lowest) = costs
+            .into_iter()
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap_or((1.0, f64::INFINITY));
+        if factor != 1.0 && lowest.is_finite() {
+            let tuned = model.disturbed(factor);
+            found = search(&tuned)?;
+            retuned = Some(tuned);
+        }
+    }
+    Some(weigh(retuned.as_ref().unwrap_or(model), found, fitted, held_out))
+}
+
+fn weigh<M: RigModel>(
+    model: &M,
+    found: Found,
+    fitted: &[usize],
+    held_out: &[usize],
+) -> Judgement {
+    let Found {
+        nominal,
+        best,
+        others,
+    } = found;
+    let nominal_square = nominal.mean_square();
+    let named = best.is_some();
+    let best = best.unwrap_or(nominal);
+    let everything: Vec<usize> = fitted.iter().chain(held_out).copied().collect();
+    // The held-out record is predicted with the fitted parameters for the gain; whether noise is
+    // all that is left is asked of a fit to everything, free of the parameters' own errors.
+    let joint = evaluate(model, &best.fit.point, &everything)
+        .and_then(|start| polish(model, &start, &everything, 4));
+    let (joint_fit, joint_jacobian) = match joint {
+        Some((fit, jacobian)) => (fit, Some(jacobian)),
+        None => (best.fit.clone(), None),
+    };
+    let mut tests = Vec::new();
+    let mut rest = joint_fit.residuals.as_slice();
+    for &record in &everything {
+        let count = model.residual_count(record).min(rest.len());
+        let (mine, others) = rest.split_at(count);
+        rest = others;
+        tests.extend(adequacy::tests(
+            model.record_name(record),
+            mine,
+            model.channels(),
+            &model.regressors(record),
+        ));
+    }
+    let nuisance = &joint_fit.point.nuisance;
+    tests.push(Test {
+        what: "nominal parameters against their stated uncertainty".into(),
+        deviate: adequacy::chi_square_deviate(
+            nuisance.iter().map(|p| p * p).sum(),
+            nuisance.len() as f64,
+        ),
+    });
+    let priors = joint_fit.point.prior_rows(model.candidates());
+    for (_, off, spread) in priors {
+        tests.push(Test {
+            what: "form of an effect against what is usual".into(),
+            deviate: (off / spread).abs(),
+        });
+    }
+    tests.sort_by(|a, b| b.deviate.total_cmp(&a.deviate));
+    let adequate = tests.first().is_none_or(|worst| worst.deviate < LARGEST_DEVIATE);
+
+    let best_names = names(model, &best);
+    let nested = |set: &[&'static str]| {
+        let without = |a: &[&'static str], b: &[&'static str]| -> Vec<&'static str> {
+            a.iter().filter(|name| !b.contains(name)).copied().collect()
+        };
+        let (mine, theirs) = (without(&best_names, set), without(set, &best_names));
+        let [mine, theirs] = [mine.as_slice(), theirs.as_slice()];
+        let contains = |outer: &str, inner: &str| {
+            let mut all = model.candidates().iter();
+            all.any(|c| c.effect == outer && c.contains == Some(inner))
+        };
+        matches!((mine, theirs), ([a], [b]) if contains(a, b) || contains(b, a))
+    };
+    let mut alternatives = Vec::new();
+    let mut rival_points = Vec::new();
+    let mut weight = 1.0;
+    for other in &others {
+        let behind = other.score - best.score;
+        let set = names(model, other);
+        if named && !nested(&set) {
+            weight += (-0.5 * behind).exp();
+            if behind < RIVAL_WITHIN && set.len() == best_names.len() {
+                alternatives.push(set);
+                rival_points.push(other.fit.point.clone());
+            }
+        }
+    }
+    let verdict = match (adequate, named, alternatives.is_empty()) {
+        (false, _, _) => Verdict::Unexplained,
+        (true, false, _) => Verdict::Adequate,
+        (true, true, true) => Verdict::Named,
+        (true, true, false) => Verdict::Ambiguous,
+    };
+    let mut effects = estimates(model, &best.fit, &best.jacobian);
+    if let Some(jacobian) = joint_jacobian {
+        // Standard errors of the fit itself; the joint one only confirms.
+        let _ = jacobian;
+    }
+    for effect in &mut effects {
+        effect.confidence = 1.0 / weight;
+    }
+    let excess = |square: f64| (square - 1.0).max(0.0);
+    let share_explained = if excess(nominal_square) > 0.0 {
+        1.0 - excess(best.mean_square()) / excess(nominal_square)
+    } else {
+        1.0
+    };
+    Judgement {
+        verdict,
+        effects,
+        alternatives,
+        rival_points,
+        best: best.fit,
+        tests,
+        share_explained,
+    }
+}
+
+/// True when a parameter counted like this is stronger the smaller it is.
+pub fn weaker_when_larger(scale: Scale) -> bool {
+    !matches!(scale, Scale::Linear(_))
+}
