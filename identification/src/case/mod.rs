@@ -1,9 +1,11 @@
 //! What a laboratory hands in: a nominal model and records.
 
+mod checks;
 mod nominal;
 mod record;
 mod units;
 
+pub use checks::{blind_spot, deviation, problems};
 pub use nominal::{ControlLaw, Nominal};
 pub use record::{CHANNELS, Record};
 
@@ -36,9 +38,23 @@ pub enum CaseError {
         /// What is wrong with it.
         reason: String,
     },
+    /// Records that would mislead a diagnosis.
+    #[error("the records cannot be diagnosed: {}", .problems.join("; "))]
+    Unfit {
+        /// One sentence for each problem.
+        problems: Vec<String>,
+    },
 }
 
 impl Case {
+    /// The records that there are.
+    pub fn records(&self) -> impl Iterator<Item = &Record> {
+        let optional = [self.small.as_ref(), self.baseline.as_ref()];
+        [&self.identification, &self.validation]
+            .into_iter()
+            .chain(optional.into_iter().flatten())
+    }
+
     /// Reads a case folder.
     pub fn read(folder: &Path) -> Result<Self, CaseError> {
         let text = |name: &str| {

@@ -179,8 +179,19 @@ impl Nominal {
 }
 
 impl ControlLaw {
+    /// The law at rest, sampled every `period` s.
+    pub fn start(&self, period: f64) -> ControlLawState {
+        ControlLawState {
+            law: *self,
+            period,
+            before: None,
+            velocity: 0.0,
+            integral: 0.0,
+        }
+    }
+
     /// The commands that the law makes of what was measured (V), sampled every `period` s; from
-    /// rest. Needs equal lengths.
+    /// rest. As many as the shortest column has samples.
     pub fn commands(
         &self,
         reference: &[f64],
@@ -188,28 +199,50 @@ impl ControlLaw {
         acceleration: &[f64],
         period: f64,
     ) -> Vec<f64> {
+        let mut state = self.start(period);
         let n = reference.len().min(displacement.len()).min(acceleration.len());
-        let (mut velocity, mut integral) = (0.0, 0.0);
-        let at = |k: isize| reference[k.clamp(0, n as isize - 1) as usize];
         (0..n)
-            .map(|k| {
-                let x = displacement[k];
-                let before = if k == 0 { x } else { displacement[k - 1] };
-                velocity += self.velocity_filter * ((x - before) / period - velocity);
-                let error = reference[k] - x;
-                integral += self.integral * error * period;
-                let i = k as isize;
-                let (ahead, behind) = (at(i + 1), at(i - 1));
-                let reference_velocity = (ahead - behind) / (2.0 * period);
-                let reference_acceleration = (ahead - 2.0 * reference[k] + behind) / (period * period);
-                let u = self.proportional * error
-                    + integral
-                    + self.velocity_feedforward * reference_velocity
-                    + self.acceleration_feedforward * reference_acceleration
-                    - self.velocity_feedback * velocity
-                    - self.acceleration_feedback * acceleration[k];
-                u.clamp(-self.limit, self.limit)
-            })
+            .map(|k| state.command(&reference[..n], k, displacement[k], acceleration[k]))
             .collect()
+    }
+}
+
+/// Memory of a [`ControlLaw`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlLawState {
+    law: ControlLaw,
+    period: f64,
+    before: Option<f64>,
+    velocity: f64,
+    integral: f64,
+}
+
+impl ControlLawState {
+    /// The command (V) at sample `k` of `reference` (m), from the measured displacement (m) and
+    /// acceleration (m/s²).
+    pub fn command(
+        &mut self,
+        reference: &[f64],
+        k: usize,
+        displacement: f64,
+        acceleration: f64,
+    ) -> f64 {
+        let (law, period) = (&self.law, self.period);
+        let difference = displacement - self.before.unwrap_or(displacement);
+        self.before = Some(displacement);
+        self.velocity += law.velocity_filter * (difference / period - self.velocity);
+        let error = reference[k] - displacement;
+        self.integral += law.integral * error * period;
+        let ahead = reference[(k + 1).min(reference.len() - 1)];
+        let behind = reference[k.saturating_sub(1)];
+        let reference_velocity = (ahead - behind) / (2.0 * period);
+        let reference_acceleration = (ahead - 2.0 * reference[k] + behind) / (period * period);
+        let u = law.proportional * error
+            + self.integral
+            + law.velocity_feedforward * reference_velocity
+            + law.acceleration_feedforward * reference_acceleration
+            - law.velocity_feedback * self.velocity
+            - law.acceleration_feedback * acceleration;
+        u.clamp(-law.limit, law.limit)
     }
 }

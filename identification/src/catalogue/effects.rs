@@ -163,14 +163,11 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                     "V",
                     Scale::Logarithmic,
                     0.9 * peak_command,
-                    (0.1 * peak_command, peak_command),
+                    (0.05 * peak_command, peak_command),
                 )],
-                &[
-                    &[0.72 * peak_command],
-                    &[0.55 * peak_command],
-                    &[0.4 * peak_command],
-                    &[0.28 * peak_command],
-                ],
+                &[0.85, 0.72, 0.6, 0.5, 0.42, 0.35, 0.28, 0.2].map(|share| share * peak_command)
+                    .each_ref()
+                    .map(std::slice::from_ref),
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.effects.valve.spool_limit = p[0],
         ),

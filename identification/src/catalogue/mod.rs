@@ -65,8 +65,11 @@ impl ShakeTableModel {
     /// channel is missing.
     pub fn new(nominal: &Nominal, noise: [f64; 4], records: Vec<ModelRecord>) -> Self {
         let period = 1.0 / nominal.sample_rate;
-        let commands = records.iter().flat_map(|record| &record.signals.command);
-        let peak = commands.fold(1e-3f64, |peak, u| peak.max(u.abs()));
+        let commands = records.first().map(|record| record.signals.command.as_slice());
+        let peak = commands
+            .unwrap_or_default()
+            .iter()
+            .fold(1e-3f64, |peak, u| peak.max(u.abs()));
         let (candidates, apply) = catalogue(peak, period).into_iter().unzip();
         Self {
             nominal: IdentifiedRig {

@@ -174,7 +174,14 @@ impl<M: RigModel> Search<'_, M> {
             }
         }
         runners.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-        runners.truncate(14 + 4 * parents.len());
+        // Two starts of each set of effects run on.
+        let mut starts: Vec<(usize, usize)> = Vec::new();
+        runners.retain(|runner| {
+            let key = (runner.parent, runner.effect);
+            starts.push(key);
+            starts.iter().filter(|seen| **seen == key).count() <= 2
+        });
+        runners.truncate(16 + 4 * parents.len());
         for runner in &mut runners {
             let jacobian = parents[runner.parent].1;
             if let Some(further) = fit(self.model, &runner.fit.point, &self.records, jacobian, 4) {
@@ -191,7 +198,6 @@ impl<M: RigModel> Search<'_, M> {
                 continue;
             }
             seen.push(set);
-            let _ = runner.effect;
             best.extend(self.hypothesis(&runner.fit, 4));
             if best.len() == keep {
                 break;

@@ -45,6 +45,8 @@ pub struct Predictor {
     past_gain: Vec<[f64; 4]>,
     /// Inverse of the lower Cholesky factor of the innovations' covariance.
     whitening: [[f64; 4]; 4],
+    /// Its inverse: from whitened innovations to SI.
+    spread: [[f64; 4]; 4],
     /// Logarithm of the determinant of the innovations' covariance, in units of the noise.
     pub log_determinant: f64,
 }
@@ -104,11 +106,8 @@ impl Predictor {
         let mut c = DMatrix::<f64>::zeros(4, order);
         for j in 0..=n {
             let mut state = IdentifiedRigState::default();
-            let mut command = 0.0;
             if j < n {
                 state.continuous[continuous[j]] = 1.0;
-            } else {
-                command = 1.0;
             }
             let now = undelayed.measure(&mut state, 0.0);
             let acceleration = undelayed.motion(&state).acceleration;
@@ -119,7 +118,7 @@ impl Predictor {
                 c[(1, j)] -= (1.0 + rig.sensors.accelerometer_scale) * acceleration;
                 a[(n + 1, j)] = acceleration;
             }
-            sampled.step(&mut state, command);
+            sampled.step_disturbed(&mut state, 0.0, if j < n { 0.0 } else { 1.0 });
             for (i, &index) in continuous.iter().enumerate() {
                 a[(i, j)] = state.continuous[index];
             }
@@ -184,7 +183,7 @@ impl Predictor {
         let k = &p * c.transpose() * inverse;
         let log_determinant = s.determinant().ln();
         let factor = s.cholesky().ok_or_else(no_solution)?.l();
-        let whiten = factor.try_inverse().ok_or_else(no_solution)?;
+        let whiten = factor.clone().try_inverse().ok_or_else(no_solution)?;
         let row = |i: usize| {
             let mut row = [0.0; 4];
             for (j, &channel) in measured.iter().enumerate() {
@@ -193,9 +192,11 @@ impl Predictor {
             row
         };
         let mut whitening = [[0.0; 4]; 4];
+        let mut spread = [[0.0; 4]; 4];
         for (j, &channel) in measured.iter().enumerate() {
             for i in 0..measured.len() {
                 whitening[measured[i]][channel] = whiten[(i, j)] / noise[channel];
+                spread[measured[i]][channel] = factor[(i, j)] * noise[measured[i]];
             }
         }
         let mut gain: Vec<_> = (0..n).map(|i| (continuous[i], row(i))).collect();
@@ -209,6 +210,7 @@ impl Predictor {
             disturbance_gain: row(n),
             past_gain: (1..=past).map(|age| row(n + age)).collect(),
             whitening,
+            spread,
             log_determinant,
         })
     }
@@ -239,6 +241,16 @@ impl Predictor {
             disturbance *= self.phi;
         }
         out.iter().all(|value| value.is_finite())
+    }
+
+    /// An innovation in SI from a whitened one.
+    pub fn physical(&self, whitened: &[f64; 4]) -> [f64; 4] {
+        [0, 1, 2, 3].map(|i| dot(&self.spread[i], whitened))
+    }
+
+    /// Standard deviations of the innovations of a perfect model, SI.
+    pub fn floor(&self) -> [f64; 4] {
+        self.spread.map(|row| dot(&row, &row).sqrt())
     }
 
     /// Sampled form of `rig` for this predictor; friction and a fast spool get finer steps.

@@ -1,0 +1,158 @@
+//! What makes a record unfit for a diagnosis, said by name.
+
+use super::nominal::Nominal;
+use super::record::{CHANNELS, Record};
+
+/// Shortest record that is looked at, samples.
+const SHORTEST: usize = 500;
+/// Standard deviations of the sensor's noise that the displacement must exceed.
+const LEAST_EXCITATION: f64 = 8.0;
+/// Equal readings in a row, at the channel's extreme, that betray a clipped sensor.
+const CLIPPED_RUN: usize = 4;
+/// Equal readings in a row that betray a frozen one.
+const FROZEN_RUN: usize = 50;
+
+/// Everything wrong with `record`, a sentence each; empty when it can be used.
+pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
+    let name = &record.name;
+    let mut found = Vec::new();
+    let n = record.len();
+    for (what, column) in [("time", &record.time), ("valve_command", &record.valve_command)] {
+        if column.is_empty() {
+            found.push(format!("{name}: column `{what}` is missing, nothing can be told without it"));
+        }
+    }
+    if record.channels.iter().filter(|channel| !channel.is_empty()).count() < 2 {
+        found.push(format!(
+            "{name}: at least two of {} are needed",
+            CHANNELS.join(", ")
+        ));
+    }
+    if !found.is_empty() {
+        return found;
+    }
+    if n < SHORTEST {
+        found.push(format!("{name}: {n} samples are too few, at least {SHORTEST} are needed"));
+        return found;
+    }
+    found.extend(timing(record, nominal));
+    for (channel, values) in CHANNELS.iter().zip(&record.channels) {
+        found.extend(readings(name, channel, values));
+    }
+    found.extend(readings(name, "valve_command", &record.valve_command));
+    if let Some(limit) = nominal.controller.map(|law| law.limit) {
+        let at_limit = record.valve_command.iter().filter(|u| u.abs() > 0.999 * limit).count();
+        if at_limit > n / 4 {
+            found.push(format!(
+                "{name}: the valve command stands at its limit in {at_limit} of {n} samples, the \
+                 rig was not under control"
+            ));
+        }
+    }
+    let excitation = deviation(&record.channels[0]) / nominal.noise[0];
+    if found.is_empty() && !record.channels[0].is_empty() && excitation < LEAST_EXCITATION {
+        found.push(format!(
+            "{name}: too little excitation, the displacement varies by {excitation:.1} standard \
+             deviations of its noise, at least {LEAST_EXCITATION} are needed"
+        ));
+    }
+    found
+}
+
+fn timing(record: &Record, nominal: &Nominal) -> Option<String> {
+    let name = &record.name;
+    let period = 1.0 / nominal.sample_rate;
+    let mut steps: Vec<f64> = record.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let irregular = steps
+        .iter()
+        .position(|step| !step.is_finite() || (step - period).abs() > 0.1 * period);
+    steps.retain(|step| step.is_finite());
+    steps.sort_by(f64::total_cmp);
+    let median = steps.get(steps.len() / 2).copied().unwrap_or(f64::NAN);
+    if median.is_nan() || (median - period).abs() > 0.01 * period {
+        return Some(format!(
+            "{name}: sampled at {:.4} Hz, the nominal model says {} Hz",
+            1.0 / median,
+            nominal.sample_rate
+        ));
+    }
+    let at = irregular?;
+    let gap = record.time[at + 1] - record.time[at];
+    Some(if gap > period {
+        format!(
+            "{name}: a gap after {:.4} s, about {:.0} samples were dropped",
+            record.time[at],
+            gap / period - 1.0
+        )
+    } else {
+        format!(
+            "{name}: time is no steady clock after {:.4} s (step {gap:.3e} s)",
+            record.time[at]
+        )
+    })
+}
+
+fn readings(name: &str, channel: &str, values: &[f64]) -> Vec<String> {
+    let mut found = Vec::new();
+    if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+        let count = values.iter().filter(|value| !value.is_finite()).count();
+        found.push(format!(
+            "{name}: `{channel}` has {count} empty or non-finite readings, the first in sample {row}"
+        ));
+        return found;
+    }
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (mut run, mut start) = (1, 0);
+    let mut clipped = 0;
+    for k in 1..=values.len() {
+        if k < values.len() && values[k] == values[k - 1] {
+            run += 1;
+            continue;
+        }
+        let value = values[k - 1];
+        if run >= FROZEN_RUN {
+            found.push(format!(
+                "{name}: `{channel}` is frozen at {value:.4e} for {run} samples from sample {start}"
+            ));
+            return found;
+        }
+        if run >= CLIPPED_RUN && (value == low || value == high) {
+            clipped += run;
+        }
+        (run, start) = (1, k);
+    }
+    if clipped > 2 * CLIPPED_RUN && high > low {
+        found.push(format!(
+            "{name}: `{channel}` is clipped, {clipped} readings stand at its extremes {low:.4e} \
+             and {high:.4e}"
+        ));
+    }
+    found
+}
+
+/// Standard deviation.
+pub fn deviation(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+/// What a missing channel takes away.
+pub fn blind_spot(channel: usize) -> &'static str {
+    match channel {
+        0 => {
+            "without displacement its sensor cannot be judged, slow drifts stay unseen and the \
+             controller's law cannot be checked"
+        }
+        1 => {
+            "without acceleration its sensor cannot be judged, and payload and friction are told \
+             from the force alone"
+        }
+        2 => {
+            "without actuator force the load cell cannot be judged, and what the valve does is \
+             hard to tell from what the table does"
+        }
+        _ => "without specimen acceleration the specimen is seen through its force on the table only",
+    }
+}

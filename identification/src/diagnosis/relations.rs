@@ -1,0 +1,130 @@
+//! The five relations of a healthy rig, each checked from the records alone in the frequency
+//! domain, against the noise of the sensors that it uses.
+
+use nalgebra::Complex;
+use plant::specimen::LinearSpecimen;
+use realfft::RealFftPlanner;
+
+use crate::case::{Nominal, Record};
+
+/// Band in which the relations are checked, Hz.
+const BAND: (f64, f64) = (0.5, 15.0);
+
+/// A relation and its error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Relation {
+    /// R1 to R5 and what it joins.
+    pub name: &'static str,
+    /// Root mean square error in units of what the sensors' noise makes of it.
+    pub ratio: f64,
+}
+
+/// The relations that the columns of `record` allow, on the nominal model.
+pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
+    let n = record.len();
+    let period = 1.0 / nominal.sample_rate;
+    let mut planner = RealFftPlanner::<f64>::new();
+    let transform = planner.plan_fft_forward(n);
+    let spectrum = |values: &[f64]| -> Option<Vec<Complex<f64>>> {
+        if values.len() != n {
+            return None;
+        }
+        // Hann window: records do not end where they began.
+        let mut windowed: Vec<f64> = values
+            .iter()
+            .enumerate()
+            .map(|(k, value)| {
+                let turn = std::f64::consts::TAU * k as f64 / n as f64;
+                value * (1.0 - turn.cos()) * (2.0f64 / 3.0).sqrt()
+            })
+            .collect();
+        let mut out = transform.make_output_vec();
+        transform.process(&mut windowed, &mut out).ok()?;
+        Some(out.iter().map(|z| Complex::new(z.re, z.im)).collect())
+    };
+    let [x, a, f, specimen_acceleration] = record.channels.each_ref().map(|c| spectrum(c));
+    let u = spectrum(&record.valve_command);
+    let bin = nominal.sample_rate / n as f64;
+    let bins = ((BAND.0 / bin) as usize).max(1)..((BAND.1 / bin) as usize).min(n / 2);
+    let [sx, sa, sf, ss] = nominal.noise;
+    let table = nominal.shake_table.table;
+    let mass = nominal.specimen.map_or(0.0, |specimen| specimen.mass);
+    let omega = |k: usize| std::f64::consts::TAU * bin * k as f64;
+
+    // Mean over the band of |error|² over its variance.
+    let ratio = |error: &dyn Fn(usize, Complex<f64>) -> (Complex<f64>, f64)| {
+        let sum: f64 = bins
+            .clone()
+            .map(|k| {
+                let (value, variance) = error(k, Complex::new(0.0, omega(k)));
+                value.norm_sqr() / (n as f64 * variance)
+            })
+            .sum();
+        (sum / bins.len().max(1) as f64).sqrt()
+    };
+    let mut all = Vec::new();
+    if let (Some(u), Some(x), Some(f)) = (&u, &x, &f) {
+        let (g1, g2) = (
+            nominal.shake_table.actuator.g1(),
+            nominal.shake_table.actuator.g2(),
+        );
+        all.push(Relation {
+            name: "R1 valve and actuator",
+            ratio: ratio(&|k, s| {
+                // The command is held over a sample.
+                let held = (1.0 - (-s * period).exp()) / (s * period);
+                let of_x = g2.evaluate(s) * s;
+                let error = f[k] - g1.evaluate(s) * held * u[k] - of_x * x[k];
+                let of_u = (g1.evaluate(s) * nominal.command_noise).norm_sqr();
+                (error, sf * sf + of_x.norm_sqr() * sx * sx + of_u)
+            }),
+        });
+    }
+    if let (Some(x), Some(a), Some(f), Some(specimen)) = (&x, &a, &f, &specimen_acceleration) {
+        all.push(Relation {
+            name: "R2 equilibrium of the table",
+            ratio: ratio(&|k, s| {
+                let of_x = s * table.damping + table.stiffness;
+                let error = f[k] - specimen[k] * mass - a[k] * table.mass - of_x * x[k];
+                let inertia = (table.mass * sa).powi(2) + (mass * ss).powi(2);
+                (error, sf * sf + inertia + of_x.norm_sqr() * sx * sx)
+            }),
+        });
+    }
+    if let (Some(LinearSpecimen { mass, damping, stiffness }), Some(a), Some(specimen)) =
+        (nominal.specimen, &a, &specimen_acceleration)
+    {
+        all.push(Relation {
+            name: "R3 specimen",
+            ratio: ratio(&|k, s| {
+                let spring = s * damping + stiffness;
+                let passed = spring / (s * s * mass + spring);
+                let error = specimen[k] - passed * a[k];
+                (error, ss * ss + passed.norm_sqr() * sa * sa)
+            }),
+        });
+    }
+    if let (Some(x), Some(a)) = (&x, &a) {
+        all.push(Relation {
+            name: "R4 kinematics",
+            ratio: ratio(&|k, s| (a[k] - s * s * x[k], sa * sa + (s * s).norm_sqr() * sx * sx)),
+        });
+    }
+    if let Some(law) = nominal.controller {
+        let [x, a, ..] = &record.channels;
+        let commands = law.commands(&record.reference, x, a, period);
+        if commands.len() == n && n > 2 && nominal.command_noise > 0.0 {
+            // The ends are left out: differences of the reference want neighbours.
+            let inner = 1..n - 1;
+            let count = inner.len() as f64;
+            let sum: f64 = inner
+                .map(|k| (record.valve_command[k] - commands[k]).powi(2))
+                .sum();
+            all.push(Relation {
+                name: "R5 the controller's law",
+                ratio: (sum / count).sqrt() / nominal.command_noise,
+            });
+        }
+    }
+    all
+}

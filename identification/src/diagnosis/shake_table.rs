@@ -1,0 +1,389 @@
+//! Diagnosis of a case of the shake table: from folder to verdict, extended model and gain.
+
+use std::collections::BTreeMap;
+
+use plant::effects::{Effects, SensorEffects};
+use plant::shake_table::ShakeTable;
+use plant::specimen::LinearSpecimen;
+use plant::units::INCH;
+
+use super::experiment;
+use super::gain::{Gain, gain};
+use super::relations::{Relation, relations};
+use super::verdict::{NamedEffect, Verdict, judge};
+use super::{Point, Test};
+use crate::case::{CHANNELS, Case, CaseError, Nominal, Record, blind_spot, problems};
+use crate::catalogue::{ModelRecord, ShakeTableModel};
+use crate::predictor::{Predictor, Signals};
+
+/// R5 fires, and the recorded command is used, where it misses the law by more than this many
+/// standard deviations of its noise.
+const LAW_HOLDS_WITHIN: f64 = 4.0;
+/// A nominal model whose one-step prediction misses a channel's variation by more than this
+/// factor does not belong to the columns.
+const DOES_NOT_FIT: f64 = 1.0;
+
+/// The parameter set that the FMUs of table, specimen and instrumentation take, SI.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ExtendedModel {
+    /// Actuator and table, nominal values corrected within their uncertainty.
+    pub shake_table: ShakeTable,
+    /// The specimen, if one stands on the table.
+    pub specimen: Option<LinearSpecimen>,
+    /// The effects found.
+    pub effects: Effects,
+    /// The sensors' effects found.
+    pub sensors: SensorEffects,
+    /// Standard errors of the effects' parameters, `effect.parameter`, SI.
+    pub standard_errors: BTreeMap<String, f64>,
+}
+
+/// What came out of a case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnosis {
+    /// One sentence for a laboratory engineer.
+    pub sentence: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The effects, with estimates in SI.
+    pub effects: Vec<NamedEffect>,
+    /// Rival sets of effects.
+    pub alternatives: Vec<Vec<&'static str>>,
+    /// The experiment that would tell the first rival apart.
+    pub separating_experiment: Option<String>,
+    /// What the extended model brings on the validation record.
+    pub gain: Gain,
+    /// The extended model.
+    pub extended_model: ExtendedModel,
+    /// The five relations on the identification record, nominal model.
+    pub relations: Vec<Relation>,
+    /// Traces left over, strongest first.
+    pub remaining: Vec<Test>,
+    /// Share of the nominal model's excess error that the effects explain.
+    pub share_explained: f64,
+    /// What the reader should know: missing channels, a law that does not hold.
+    pub notes: Vec<String>,
+}
+
+/// The command that acted: by the law where it explains the record, as recorded elsewhere.
+fn acting_command(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -> Vec<f64> {
+    let recorded = &record.valve_command;
+    let [x, a, ..] = &record.channels;
+    let Some(law) = nominal.controller else {
+        return recorded.clone();
+    };
+    let mut commands = law.commands(&record.reference, x, a, 1.0 / nominal.sample_rate);
+    if commands.len() != recorded.len() || commands.len() < 3 {
+        return recorded.clone();
+    }
+    let last = commands.len() - 1;
+    // The record's ends lack a neighbour of the reference.
+    commands[0] = recorded[0];
+    commands[last] = recorded[last];
+    let square: f64 = commands
+        .iter()
+        .zip(recorded)
+        .map(|(a, b)| (a - b).powi(2))
+        .sum();
+    let miss = (square / recorded.len() as f64).sqrt();
+    if miss > LAW_HOLDS_WITHIN * nominal.command_noise {
+        notes.push(format!(
+            "{}: the stated controller's law does not make the recorded command (R5, {:.1} times \
+             its noise); the recorded one is used",
+            record.name,
+            miss / nominal.command_noise
+        ));
+        return recorded.clone();
+    }
+    commands
+}
+
+/// Model and records of a case, after its checks; sentences on what is missing go to `notes`.
+fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, CaseError> {
+    let nominal = &case.nominal;
+    let mut found: Vec<String> = case
+        .records()
+        .flat_map(|record| problems(record, nominal))
+        .collect();
+    let has = |record: &Record| record.channels.each_ref().map(|channel| !channel.is_empty());
+    let present = has(&case.identification);
+    for record in case.records() {
+        if found.is_empty() && has(record) != present {
+            found.push(format!(
+                "{}: its channels are not those of {}, are the records of one rig?",
+                record.name, case.identification.name
+            ));
+        }
+    }
+    if !found.is_empty() {
+        return Err(CaseError::Unfit { problems: found });
+    }
+    let mut noise = nominal.noise;
+    for (i, there) in present.into_iter().enumerate() {
+        if !there {
+            noise[i] = f64::INFINITY;
+            notes.push(format!("column `{}` is missing: {}", CHANNELS[i], blind_spot(i)));
+        }
+    }
+    let mut records = Vec::new();
+    let ordered = [
+        Some((&case.identification, true)),
+        case.small.as_ref().map(|record| (record, true)),
+        case.baseline.as_ref().map(|record| (record, false)),
+        Some((&case.validation, true)),
+    ];
+    for (record, with_effects) in ordered.into_iter().flatten() {
+        let value = |i: usize, k: usize| record.channels[i].get(k).copied().unwrap_or(0.0);
+        records.push(ModelRecord {
+            name: record.name.clone(),
+            with_effects,
+            signals: Signals {
+                command: acting_command(record, nominal, notes),
+                channels: (0..record.len())
+                    .map(|k| [value(0, k), value(1, k), value(2, k), value(3, k)])
+                    .collect(),
+            },
+        });
+    }
+    Ok(ShakeTableModel::new(nominal, noise, records))
+}
+
+fn prediction(model: &ShakeTableModel, point: &Point, record: usize) -> Option<(Predictor, Vec<f64>)> {
+    let rig = model.rig(point);
+    let predictor = Predictor::design(&rig, model.period, model.noise, model.disturbance).ok()?;
+    let signals = &model.records[record].signals;
+    let mut out = vec![0.0; 4 * signals.len()];
+    let sampled = predictor.sample(&rig).ok()?;
+    predictor
+        .innovations(&sampled, signals, &mut out)
+        .then_some((predictor, out))
+}
+
+/// Diagnoses a case. `verbose` tells the search's steps on standard error.
+///
+/// Refuses records that would mislead, naming record, column and place.
+pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
+    let unfit = |problem: &str| CaseError::Unfit {
+        problems: vec![problem.into()],
+    };
+    let mut notes = Vec::new();
+    let model = prepare(case, &mut notes)?;
+    let held_out = model.records.len() - 1;
+    let fitted: Vec<usize> = (0..held_out).collect();
+    let origin = Point {
+        nuisance: vec![0.0; super::RigModel::nuisance(&model)],
+        effects: Vec::new(),
+    };
+    let lost = || {
+        unfit(
+            "the nominal model leaves the finite on these records: do its units and the columns' \
+             belong together?",
+        )
+    };
+    let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
+    let signals = &model.records[held_out].signals;
+    let crude = gain(
+        signals,
+        &CHANNELS,
+        (&before.0, &before.1),
+        (&before.0, &before.1),
+    );
+    if let Some(channel) = crude.channels.iter().find(|c| c.before > DOES_NOT_FIT.max(3.0 * c.floor)) {
+        return Err(unfit(&format!(
+            "the nominal model does not fit the columns: its one-step prediction misses `{}` by \
+             {:.1} times that channel's variation; check units, signs and which rig this is",
+            channel.channel, channel.before
+        )));
+    }
+    let judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
+    let after = prediction(&model, &judgement.best.point, held_out).ok_or_else(lost)?;
+    let gain = gain(
+        signals,
+        &CHANNELS,
+        (&before.0, &before.1),
+        (&after.0, &after.1),
+    );
+    let rig = model.rig(&judgement.best.point);
+    let effects = readable(judgement.effects);
+    let separating_experiment = judgement.rival_points.first().and_then(|rival| {
+        let law = case.nominal.controller?;
+        let found = experiment::separate(
+            &rig,
+            &model.rig(rival),
+            &law,
+            &case.nominal.noise,
+            model.period,
+        )?;
+        Some(format!(
+            "{} with a peak of {:.2} in ({:.1} mm): the rivals differ there by {:.1} standard \
+             deviations of the noise",
+            found.kind,
+            found.peak / INCH,
+            1e3 * found.peak,
+            found.separation
+        ))
+    });
+    let fits_fitted = {
+        let squares: f64 = judgement.best.residuals.iter().map(|r| r * r).sum();
+        squares / (judgement.best.residuals.len().max(1) as f64)
+    };
+    if judgement.verdict == Verdict::Unexplained && fits_fitted < 1.03 && gain.after_ratio > 1.2 {
+        notes.push(
+            "what was fitted is explained and the validation record is not: are the records of \
+             one rig?"
+                .into(),
+        );
+    }
+    let standard_errors = effects
+        .iter()
+        .flat_map(|e| {
+            e.parameters
+                .iter()
+                .map(|p| (format!("{}.{}", e.effect, p.name), p.standard_error))
+        })
+        .filter(|(_, error)| error.is_finite())
+        .collect();
+    let relations = relations(&case.identification, &case.nominal);
+    let sentence = sentence(
+        judgement.verdict,
+        &effects,
+        &judgement.alternatives,
+        &gain,
+        &judgement.tests,
+        judgement.share_explained,
+    );
+    Ok(Diagnosis {
+        sentence,
+        verdict: judgement.verdict,
+        effects: if judgement.verdict == Verdict::Unexplained {
+            Vec::new()
+        } else {
+            effects
+        },
+        alternatives: judgement.alternatives,
+        separating_experiment,
+        gain,
+        extended_model: ExtendedModel {
+            shake_table: rig.shake_table,
+            specimen: rig.specimen,
+            effects: rig.effects,
+            sensors: rig.sensors,
+            standard_errors,
+        },
+        relations,
+        remaining: judgement
+            .tests
+            .into_iter()
+            .filter(|test| test.deviate > 3.5)
+            .take(12)
+            .collect(),
+        share_explained: judgement.share_explained,
+        notes,
+    })
+}
+
+/// The mains as amplitude and phase instead of two components.
+fn readable(mut effects: Vec<NamedEffect>) -> Vec<NamedEffect> {
+    for effect in &mut effects {
+        if let ("mains_hum", [a, b]) = (effect.effect, effect.parameters.as_mut_slice()) {
+            let (p, q) = (a.value, b.value);
+            let amplitude = p.hypot(q);
+            a.name = "amplitude".into();
+            a.value = amplitude;
+            b.name = "phase".into();
+            b.value = q.atan2(p);
+            b.unit = "rad";
+            b.standard_error /= amplitude.max(f64::MIN_POSITIVE);
+            b.is_shape = true;
+        }
+    }
+    effects
+}
+
+/// How an effect is said.
+fn phrase(effect: &str) -> String {
+    effect.replace('_', " ")
+}
+
+fn sentence(
+    verdict: Verdict,
+    effects: &[NamedEffect],
+    alternatives: &[Vec<&'static str>],
+    gain: &Gain,
+    tests: &[Test],
+    share: f64,
+) -> String {
+    let described: Vec<String> = effects
+        .iter()
+        .map(|e| {
+            let sizes: Vec<String> = e
+                .parameters
+                .iter()
+                .filter(|p| !p.is_shape)
+                .map(|p| {
+                    let unit = if p.unit == "1" { "" } else { p.unit };
+                    format!(
+                        "{} {:.4} +- {:.4} {unit}",
+                        phrase(&p.name),
+                        Significant(p.value),
+                        Significant(p.standard_error)
+                    )
+                    .trim_end()
+                    .to_string()
+                })
+                .collect();
+            if sizes.is_empty() {
+                phrase(e.effect)
+            } else {
+                format!("{} ({})", phrase(e.effect), sizes.join(", "))
+            }
+        })
+        .collect();
+    let falls = format!(
+        "the error on the unseen record falls from {:.1} to {:.2} times the noise floor",
+        gain.before_ratio, gain.after_ratio
+    );
+    match verdict {
+        Verdict::Adequate => format!(
+            "The nominal model is adequate: within its stated uncertainty the error on the unseen \
+             record is {:.2} times the noise floor.",
+            gain.after_ratio
+        ),
+        Verdict::Named => format!("The rig has {}; with it {falls}.", described.join(" and ")),
+        Verdict::Ambiguous => {
+            let sets: Vec<String> = alternatives
+                .iter()
+                .map(|set| set.iter().map(|e| phrase(e)).collect::<Vec<_>>().join(" and "))
+                .collect();
+            format!(
+                "The rig has {}, or as likely {}; with it {falls}.",
+                described.join(" and "),
+                sets.join(", or ")
+            )
+        }
+        Verdict::Unexplained => format!(
+            "Something is there that no effect of the catalogue explains: the best of them takes \
+             {:.0} % of the excess error; what is left shows most in \"{}\".",
+            100.0 * share.clamp(0.0, 1.0),
+            tests.first().map_or("nothing", |test| test.what.as_str())
+        ),
+    }
+}
+
+/// A number with as many digits as its precision asks.
+struct Significant(f64);
+
+impl std::fmt::Display for Significant {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let digits = f.precision().unwrap_or(4) as i32;
+        if self.0 == 0.0 || !self.0.is_finite() {
+            return write!(f, "{}", self.0);
+        }
+        let order = self.0.abs().log10().floor() as i32;
+        if (-4..5).contains(&order) {
+            write!(f, "{:.*}", (digits - 1 - order).max(0) as usize, self.0)
+        } else {
+            write!(f, "{:.*e}", (digits - 1).max(0) as usize, self.0)
+        }
+    }
+}
