@@ -81,7 +81,11 @@ fn candidate(
             _ => &[],
         },
         // Where the table sticks the constant gain is not the best one and leaves traces.
-        tolerance: if effect.ends_with("friction") { 1.6 } else { 1.0 },
+        tolerance: if effect.ends_with("friction") {
+            1.6
+        } else {
+            1.0
+        },
         contains: (effect == "stribeck_friction").then_some("coulomb_friction"),
     }
 }
@@ -104,7 +108,11 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
     let per_in3 = LBF / INCH.powi(3);
     let all: Vec<(Candidate, Apply)> = vec![
         (
-            candidate("valve_null_bias", vec![signed("offset", "V", 0.03, 0.3)], &[&[0.0]]),
+            candidate(
+                "valve_null_bias",
+                vec![signed("offset", "V", 0.03, 0.3)],
+                &[&[0.0]],
+            ),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.effects.valve.null_bias = p[0],
         ),
         (
@@ -136,7 +144,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                 "valve_spool_lag",
                 vec![
                     size("frequency", "Hz", Scale::Inverse(60.0), 60.0, (4.0, 110.0)),
-                    shape("damping_ratio", "1", Scale::Logarithmic, 0.7, 0.1, (0.3, 1.5)),
+                    shape(
+                        "damping_ratio",
+                        "1",
+                        Scale::Logarithmic,
+                        0.7,
+                        0.1,
+                        (0.3, 1.5),
+                    ),
                 ],
                 &[&[40.0, 0.7], &[18.0, 0.7]],
             ),
@@ -167,7 +182,8 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                     0.9 * peak_command,
                     (0.05 * peak_command, peak_command),
                 )],
-                &[0.85, 0.72, 0.6, 0.5, 0.42, 0.35, 0.28, 0.2].map(|share| share * peak_command)
+                &[0.85, 0.72, 0.6, 0.5, 0.42, 0.35, 0.28, 0.2]
+                    .map(|share| share * peak_command)
                     .each_ref()
                     .map(std::slice::from_ref),
             ),
@@ -186,7 +202,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                 "supply_pressure_droop",
                 vec![
                     positive("loss_per_volt", "1/V", 0.15, 0.6),
-                    shape("accumulator_time", "s", Scale::Logarithmic, 0.5, 0.2, (0.1, 2.0)),
+                    shape(
+                        "accumulator_time",
+                        "s",
+                        Scale::Logarithmic,
+                        0.5,
+                        0.2,
+                        (0.1, 2.0),
+                    ),
                     shape("form", "1", Scale::Linear(1.0), -1.0, 1.0, (-3.0, 3.0)),
                 ],
                 &[&[0.15, 0.5, -1.0], &[0.4, 0.5, -1.0]],
@@ -258,7 +281,12 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
         (
             candidate(
                 "added_payload",
-                vec![positive("mass", "kg", 0.006 * LBF_S2_PER_INCH, 0.06 * LBF_S2_PER_INCH)],
+                vec![positive(
+                    "mass",
+                    "kg",
+                    0.006 * LBF_S2_PER_INCH,
+                    0.06 * LBF_S2_PER_INCH,
+                )],
                 &[&[0.01 * LBF_S2_PER_INCH], &[0.035 * LBF_S2_PER_INCH]],
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.effects.table.added_mass = p[0],
@@ -279,7 +307,12 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
         (
             candidate(
                 "cubic_stiffness",
-                vec![positive("stiffness", "N/m^3", 2.0 * per_in3, 30.0 * per_in3)],
+                vec![positive(
+                    "stiffness",
+                    "N/m^3",
+                    2.0 * per_in3,
+                    30.0 * per_in3,
+                )],
                 &[&[4.0 * per_in3], &[15.0 * per_in3]],
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.effects.table.cubic_stiffness = p[0],
@@ -289,7 +322,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                 "foundation_compliance",
                 vec![
                     size("frequency", "Hz", Scale::Logarithmic, 18.0, (3.0, 30.0)),
-                    shape("damping_ratio", "1", Scale::Logarithmic, 0.05, 0.1, (0.01, 0.3)),
+                    shape(
+                        "damping_ratio",
+                        "1",
+                        Scale::Logarithmic,
+                        0.05,
+                        0.1,
+                        (0.01, 0.3),
+                    ),
                 ],
                 &[&[7.0, 0.05], &[9.5, 0.05], &[13.0, 0.05], &[17.0, 0.05]],
             ),
@@ -323,7 +363,11 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.accelerometer_tilt = p[0],
         ),
         (
-            candidate("accelerometer_delay", vec![delay("delay")], &[&[0.005], &[0.013]]),
+            candidate(
+                "accelerometer_delay",
+                vec![delay("delay")],
+                &[&[0.005], &[0.013]],
+            ),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.accelerometer_delay = p[0],
         ),
         (
@@ -383,7 +427,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                         1.2 * INCH,
                         (0.1 * INCH, 4.0 * INCH),
                     ),
-                    shape("post_yield_ratio", "1", Scale::Linear(0.01), 0.05, 1.0, (-0.1, 0.5)),
+                    shape(
+                        "post_yield_ratio",
+                        "1",
+                        Scale::Linear(0.01),
+                        0.05,
+                        1.0,
+                        (-0.1, 0.5),
+                    ),
                     shape("exponent", "1", Scale::Logarithmic, 3.0, 0.07, (0.8, 8.0)),
                 ],
                 &[
@@ -425,7 +476,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                 "specimen_second_mode",
                 vec![
                     size("frequency", "Hz", Scale::Logarithmic, 12.0, (2.0, 25.0)),
-                    shape("damping_ratio", "1", Scale::Logarithmic, 0.03, 0.1, (0.005, 0.2)),
+                    shape(
+                        "damping_ratio",
+                        "1",
+                        Scale::Logarithmic,
+                        0.03,
+                        0.1,
+                        (0.005, 0.2),
+                    ),
                 ],
                 &[&[4.5, 0.03], &[6.0, 0.03], &[8.0, 0.03], &[11.0, 0.03]],
             ),
@@ -466,7 +524,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                         1.0 * INCH,
                         (0.08 * INCH, 3.0 * INCH),
                     ),
-                    shape("post_uplift_ratio", "1", Scale::Linear(1.0), 0.3, 0.3, (-0.1, 0.95)),
+                    shape(
+                        "post_uplift_ratio",
+                        "1",
+                        Scale::Linear(1.0),
+                        0.3,
+                        0.3,
+                        (-0.1, 0.95),
+                    ),
                 ],
                 &[&[0.3 * INCH, 0.3], &[0.55 * INCH, 0.3], &[0.9 * INCH, 0.3]],
             ),

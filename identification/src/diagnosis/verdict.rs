@@ -150,15 +150,15 @@ pub fn judge<M: RigModel>(
             retuned = Some(tuned);
         }
     }
-    Some(weigh(retuned.as_ref().unwrap_or(model), found, fitted, held_out))
+    Some(weigh(
+        retuned.as_ref().unwrap_or(model),
+        found,
+        fitted,
+        held_out,
+    ))
 }
 
-fn weigh<M: RigModel>(
-    model: &M,
-    found: Found,
-    fitted: &[usize],
-    held_out: &[usize],
-) -> Judgement {
+fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usize]) -> Judgement {
     let Found {
         nominal,
         best,
@@ -203,7 +203,9 @@ fn weigh<M: RigModel>(
     }
     tests.sort_by(|a, b| b.deviate.total_cmp(&a.deviate));
     let effects = best.fit.point.effects.iter();
-    let tolerance = effects.fold(1.0f64, |most, (i, _)| most.max(model.candidates()[*i].tolerance));
+    let tolerance = effects.fold(1.0f64, |most, (i, _)| {
+        most.max(model.candidates()[*i].tolerance)
+    });
     let adequate = tests
         .first()
         .is_none_or(|worst| worst.deviate < tolerance * LARGEST_DEVIATE);

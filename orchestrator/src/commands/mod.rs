@@ -3,6 +3,7 @@
 pub mod build;
 pub mod design;
 mod design_report;
+pub mod diagnose;
 pub mod info;
 pub mod run;
 mod summary;
