@@ -3,11 +3,11 @@
 //! One law, one file; every law meets [`Controller`]. Laws are sampled: they are called once a
 //! period with what the sensors gave, and the command they return is held until the next call.
 
-pub mod mpc;
 pub mod allocation;
+pub mod interlock;
 pub mod loop_shaping;
 pub mod loops;
-pub mod interlock;
+pub mod mpc;
 pub mod pid;
 pub mod prediction_over_delay;
 pub mod sliding_mode;

@@ -48,7 +48,10 @@ fn allocations(action: impl FnOnce()) -> usize {
 
 #[test]
 fn the_counter_counts() {
-    assert_eq!(allocations(|| drop(std::hint::black_box(vec![1.0; 100]))), 1);
+    assert_eq!(
+        allocations(|| drop(std::hint::black_box(vec![1.0; 100]))),
+        1
+    );
 }
 
 #[test]

@@ -278,7 +278,8 @@ impl SampledRig {
         }
         let mut on_mass = -specimen_force;
         if self.has_second_mode {
-            on_mass += self.second_mode[2] * s[SECOND_MODE] + self.second_mode[1] * s[SECOND_MODE + 1];
+            on_mass +=
+                self.second_mode[2] * s[SECOND_MODE] + self.second_mode[1] * s[SECOND_MODE + 1];
         }
         (table, on_mass / self.specimen.mass)
     }
@@ -292,18 +293,15 @@ impl SampledRig {
         if self.has_spool {
             spool = s[SPOOL];
             rate[SPOOL] = s[SPOOL + 1];
-            rate[SPOOL + 1] =
-                effects
-                    .valve
-                    .spool_acceleration(s[SPOOL], s[SPOOL + 1], command);
+            rate[SPOOL + 1] = effects
+                .valve
+                .spool_acceleration(s[SPOOL], s[SPOOL + 1], command);
         }
         let opening = effects.valve.flow(spool);
         if self.has_droop {
             rate[DEMAND] = (opening.abs() - s[DEMAND]) / effects.hydraulics.droop_time;
         }
-        let mut flow = effects
-            .hydraulics
-            .available_flow(opening, s[0], s[DEMAND]);
+        let mut flow = effects.hydraulics.available_flow(opening, s[0], s[DEMAND]);
         let v = s[4];
         let mut force_rate = s[1] - a2 * s[0] + b2 * flow + e2 * v;
         if effects.hydraulics.compliance != 0.0 {
@@ -323,9 +321,8 @@ impl SampledRig {
         if self.has_foundation {
             let [per_mass, damping, stiffness] = self.foundation;
             rate[FOUNDATION] = s[FOUNDATION + 1];
-            rate[FOUNDATION + 1] = -wall_force * per_mass
-                - damping * s[FOUNDATION + 1]
-                - stiffness * s[FOUNDATION];
+            rate[FOUNDATION + 1] =
+                -wall_force * per_mass - damping * s[FOUNDATION + 1] - stiffness * s[FOUNDATION];
             rate[4] -= rate[FOUNDATION + 1];
         }
         if self.has_specimen {
@@ -375,7 +372,11 @@ impl SampledRig {
     pub fn step(&self, state: &mut IdentifiedRigState, command: f64) {
         let valve = &self.rig.effects.valve;
         let ring = MAX_DELAY_SAMPLES + 2;
-        state.at = if state.at + 1 == ring { 0 } else { state.at + 1 };
+        state.at = if state.at + 1 == ring {
+            0
+        } else {
+            state.at + 1
+        };
         let behind = |n: usize| (state.at + ring - n) % ring;
         state.commands[state.at] = command;
         let h = self.period / self.substeps as f64;
@@ -407,12 +408,7 @@ impl SampledRig {
 
     /// [`Self::step`] with `disturbance` (V) added behind delay and play.
     #[inline]
-    pub fn step_disturbed(
-        &self,
-        state: &mut IdentifiedRigState,
-        command: f64,
-        disturbance: f64,
-    ) {
+    pub fn step_disturbed(&self, state: &mut IdentifiedRigState, command: f64, disturbance: f64) {
         state.disturbance = disturbance;
         self.step(state, command);
         state.disturbance = 0.0;

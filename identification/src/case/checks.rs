@@ -17,12 +17,23 @@ pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
     let name = &record.name;
     let mut found = Vec::new();
     let n = record.len();
-    for (what, column) in [("time", &record.time), ("valve_command", &record.valve_command)] {
+    for (what, column) in [
+        ("time", &record.time),
+        ("valve_command", &record.valve_command),
+    ] {
         if column.is_empty() {
-            found.push(format!("{name}: column `{what}` is missing, nothing can be told without it"));
+            found.push(format!(
+                "{name}: column `{what}` is missing, nothing can be told without it"
+            ));
         }
     }
-    if record.channels.iter().filter(|channel| !channel.is_empty()).count() < 2 {
+    if record
+        .channels
+        .iter()
+        .filter(|channel| !channel.is_empty())
+        .count()
+        < 2
+    {
         found.push(format!(
             "{name}: at least two of {} are needed",
             CHANNELS.join(", ")
@@ -32,7 +43,9 @@ pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
         return found;
     }
     if n < SHORTEST {
-        found.push(format!("{name}: {n} samples are too few, at least {SHORTEST} are needed"));
+        found.push(format!(
+            "{name}: {n} samples are too few, at least {SHORTEST} are needed"
+        ));
         return found;
     }
     found.extend(timing(record, nominal));
@@ -41,7 +54,11 @@ pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
     }
     found.extend(readings(name, "valve_command", &record.valve_command));
     if let Some(limit) = nominal.controller.map(|law| law.limit) {
-        let at_limit = record.valve_command.iter().filter(|u| u.abs() > 0.999 * limit).count();
+        let at_limit = record
+            .valve_command
+            .iter()
+            .filter(|u| u.abs() > 0.999 * limit)
+            .count();
         if at_limit > n / 4 {
             found.push(format!(
                 "{name}: the valve command stands at its limit in {at_limit} of {n} samples, the \
@@ -62,7 +79,11 @@ pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
 fn timing(record: &Record, nominal: &Nominal) -> Option<String> {
     let name = &record.name;
     let period = 1.0 / nominal.sample_rate;
-    let mut steps: Vec<f64> = record.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut steps: Vec<f64> = record
+        .time
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .collect();
     let irregular = steps
         .iter()
         .position(|step| !step.is_finite() || (step - period).abs() > 0.1 * period);
@@ -153,6 +174,8 @@ pub fn blind_spot(channel: usize) -> &'static str {
             "without actuator force the load cell cannot be judged, and what the valve does is \
              hard to tell from what the table does"
         }
-        _ => "without specimen acceleration the specimen is seen through its force on the table only",
+        _ => {
+            "without specimen acceleration the specimen is seen through its force on the table only"
+        }
     }
 }

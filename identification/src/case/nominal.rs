@@ -200,7 +200,10 @@ impl ControlLaw {
         period: f64,
     ) -> Vec<f64> {
         let mut state = self.start(period);
-        let n = reference.len().min(displacement.len()).min(acceleration.len());
+        let n = reference
+            .len()
+            .min(displacement.len())
+            .min(acceleration.len());
         (0..n)
             .map(|k| state.command(&reference[..n], k, displacement[k], acceleration[k]))
             .collect()

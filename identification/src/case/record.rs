@@ -77,7 +77,10 @@ impl Record {
                 let value = match cell {
                     "" => f64::NAN,
                     _ => cell.parse::<f64>().map_err(|_| {
-                        format!("line {line}, column `{}`: `{cell}` is no number", COLUMNS[column].0)
+                        format!(
+                            "line {line}, column `{}`: `{cell}` is no number",
+                            COLUMNS[column].0
+                        )
                     })?,
                 };
                 columns[column].push(value * factor[column]);

@@ -105,7 +105,15 @@ mod tests {
 
     #[test]
     fn misfits_are_named() {
-        assert!(factor_to("lbf", "m").unwrap_err().contains("does not measure"));
-        assert!(factor_to("furlong", "m").unwrap_err().contains("unknown unit `furlong`"));
+        assert!(
+            factor_to("lbf", "m")
+                .unwrap_err()
+                .contains("does not measure")
+        );
+        assert!(
+            factor_to("furlong", "m")
+                .unwrap_err()
+                .contains("unknown unit `furlong`")
+        );
     }
 }

@@ -102,7 +102,11 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
     let per_v2 = LBF / INCH.powi(3);
     let all: Vec<(Candidate, Apply)> = vec![
         (
-            candidate("valve_null_bias", vec![signed("offset", "V", 0.03, 0.3)], &[&[0.0]]),
+            candidate(
+                "valve_null_bias",
+                vec![signed("offset", "V", 0.03, 0.3)],
+                &[&[0.0]],
+            ),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.effects.valve.null_bias = p[0],
         ),
         (
@@ -134,7 +138,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                 "valve_spool_lag",
                 vec![
                     size("frequency", "Hz", Scale::Inverse(60.0), 60.0, (4.0, 110.0)),
-                    shape("damping_ratio", "1", Scale::Logarithmic, 0.7, 0.1, (0.3, 1.5)),
+                    shape(
+                        "damping_ratio",
+                        "1",
+                        Scale::Logarithmic,
+                        0.7,
+                        0.1,
+                        (0.3, 1.5),
+                    ),
                 ],
                 &[&[40.0, 0.7], &[18.0, 0.7]],
             ),
@@ -165,7 +176,8 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                     0.9 * peak_command,
                     (0.05 * peak_command, peak_command),
                 )],
-                &[0.85, 0.72, 0.6, 0.5, 0.42, 0.35, 0.28, 0.2].map(|share| share * peak_command)
+                &[0.85, 0.72, 0.6, 0.5, 0.42, 0.35, 0.28, 0.2]
+                    .map(|share| share * peak_command)
                     .each_ref()
                     .map(std::slice::from_ref),
             ),
@@ -184,7 +196,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                 "supply_pressure_droop",
                 vec![
                     positive("loss_per_volt", "1/V", 0.15, 0.6),
-                    shape("accumulator_time", "s", Scale::Logarithmic, 0.5, 0.2, (0.1, 2.0)),
+                    shape(
+                        "accumulator_time",
+                        "s",
+                        Scale::Logarithmic,
+                        0.5,
+                        0.2,
+                        (0.1, 2.0),
+                    ),
                     shape("form", "1", Scale::Linear(1.0), -1.0, 1.0, (-3.0, 3.0)),
                 ],
                 &[&[0.15, 0.5, -1.0], &[0.4, 0.5, -1.0]],
@@ -256,7 +275,12 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
         (
             candidate(
                 "added_payload",
-                vec![positive("mass", "kg", 0.006 * LBF_S2_PER_INCH, 0.06 * LBF_S2_PER_INCH)],
+                vec![positive(
+                    "mass",
+                    "kg",
+                    0.006 * LBF_S2_PER_INCH,
+                    0.06 * LBF_S2_PER_INCH,
+                )],
                 &[&[0.01 * LBF_S2_PER_INCH]],
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.effects.table.added_mass = p[0],
@@ -287,7 +311,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                 "foundation_compliance",
                 vec![
                     size("frequency", "Hz", Scale::Logarithmic, 18.0, (3.0, 30.0)),
-                    shape("damping_ratio", "1", Scale::Logarithmic, 0.05, 0.1, (0.01, 0.3)),
+                    shape(
+                        "damping_ratio",
+                        "1",
+                        Scale::Logarithmic,
+                        0.05,
+                        0.1,
+                        (0.01, 0.3),
+                    ),
                 ],
                 &[&[7.0, 0.05], &[9.5, 0.05], &[13.0, 0.05], &[17.0, 0.05]],
             ),
@@ -321,7 +352,11 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.accelerometer_tilt = p[0],
         ),
         (
-            candidate("accelerometer_delay", vec![delay("delay")], &[&[0.005], &[0.013]]),
+            candidate(
+                "accelerometer_delay",
+                vec![delay("delay")],
+                &[&[0.005], &[0.013]],
+            ),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.accelerometer_delay = p[0],
         ),
         (
@@ -381,7 +416,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                         1.2 * INCH,
                         (0.1 * INCH, 4.0 * INCH),
                     ),
-                    shape("post_yield_ratio", "1", Scale::Linear(0.02), 0.05, 1.0, (-0.1, 0.5)),
+                    shape(
+                        "post_yield_ratio",
+                        "1",
+                        Scale::Linear(0.02),
+                        0.05,
+                        1.0,
+                        (-0.1, 0.5),
+                    ),
                     shape("exponent", "1", Scale::Logarithmic, 3.0, 0.2, (0.8, 8.0)),
                 ],
                 &[
@@ -423,7 +465,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                 "specimen_second_mode",
                 vec![
                     size("frequency", "Hz", Scale::Logarithmic, 12.0, (2.0, 25.0)),
-                    shape("damping_ratio", "1", Scale::Logarithmic, 0.03, 0.2, (0.005, 0.2)),
+                    shape(
+                        "damping_ratio",
+                        "1",
+                        Scale::Logarithmic,
+                        0.03,
+                        0.2,
+                        (0.005, 0.2),
+                    ),
                 ],
                 &[&[4.5, 0.03], &[6.0, 0.03], &[8.0, 0.03], &[11.0, 0.03]],
             ),
@@ -464,7 +513,14 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                         1.0 * INCH,
                         (0.08 * INCH, 3.0 * INCH),
                     ),
-                    shape("post_uplift_ratio", "1", Scale::Linear(1.0), 0.3, 0.3, (-0.1, 0.95)),
+                    shape(
+                        "post_uplift_ratio",
+                        "1",
+                        Scale::Linear(1.0),
+                        0.3,
+                        0.3,
+                        (-0.1, 0.95),
+                    ),
                 ],
                 &[&[0.3 * INCH, 0.3], &[0.55 * INCH, 0.3], &[0.9 * INCH, 0.3]],
             ),

@@ -65,7 +65,9 @@ impl ShakeTableModel {
     /// channel is missing.
     pub fn new(nominal: &Nominal, noise: [f64; 4], records: Vec<ModelRecord>) -> Self {
         let period = 1.0 / nominal.sample_rate;
-        let commands = records.first().map(|record| record.signals.command.as_slice());
+        let commands = records
+            .first()
+            .map(|record| record.signals.command.as_slice());
         let peak = commands
             .unwrap_or_default()
             .iter()
@@ -128,7 +130,11 @@ impl RigModel for ShakeTableModel {
     type Predictor = ShakeTablePredictor;
 
     fn nuisance(&self) -> usize {
-        if self.nominal.specimen.is_some() { 15 } else { 12 }
+        if self.nominal.specimen.is_some() {
+            15
+        } else {
+            12
+        }
     }
 
     fn candidates(&self) -> &[Candidate] {
@@ -159,9 +165,8 @@ impl RigModel for ShakeTableModel {
         let signals = &self.records[record].signals;
         let n = signals.len();
         let before = |k: usize| k.saturating_sub(1);
-        let channel = |i: usize| -> Vec<f64> {
-            (0..n).map(|k| signals.channels[before(k)][i]).collect()
-        };
+        let channel =
+            |i: usize| -> Vec<f64> { (0..n).map(|k| signals.channels[before(k)][i]).collect() };
         let x = channel(0);
         // Velocity over eight samples, smooth enough for its sign.
         let v: Vec<f64> = (0..n)

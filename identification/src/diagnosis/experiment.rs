@@ -84,10 +84,9 @@ pub fn separate(
     for (index, kind) in KINDS.into_iter().enumerate() {
         for peak in PEAKS {
             let motion = reference(index, peak, samples, period);
-            let (Ok(one), Ok(other)) = (
-                play(a, law, &motion, period),
-                play(b, law, &motion, period),
-            ) else {
+            let (Ok(one), Ok(other)) =
+                (play(a, law, &motion, period), play(b, law, &motion, period))
+            else {
                 continue;
             };
             let sum: f64 = one
@@ -98,7 +97,9 @@ pub fn separate(
                 .sum();
             let separation = (sum / (4 * samples) as f64).sqrt();
             if separation.is_finite()
-                && best.as_ref().is_none_or(|best| separation > best.separation)
+                && best
+                    .as_ref()
+                    .is_none_or(|best| separation > best.separation)
             {
                 best = Some(Experiment {
                     kind,

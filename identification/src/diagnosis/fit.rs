@@ -152,11 +152,7 @@ impl Jacobian {
         (slope * slope / own, slope / own)
     }
 
-    fn normal_equations<M: RigModel>(
-        &self,
-        model: &M,
-        fit: &Fit,
-    ) -> (DMatrix<f64>, DVector<f64>) {
+    fn normal_equations<M: RigModel>(&self, model: &M, fit: &Fit) -> (DMatrix<f64>, DVector<f64>) {
         let mut hessian = self.gram.clone();
         let n = self.columns.len();
         let mut gradient = DVector::from_fn(n, |i, _| -dot(&self.columns[i], &fit.residuals));
@@ -208,7 +204,9 @@ pub fn fit<M: RigModel>(
     for _ in 0..iterations {
         let fresh = columns(model, &best, records, held..count)?;
         let mut hessian = DMatrix::zeros(count, count);
-        hessian.view_mut((0, 0), (held, held)).copy_from(&frozen.gram);
+        hessian
+            .view_mut((0, 0), (held, held))
+            .copy_from(&frozen.gram);
         let mut gradient = DVector::zeros(count);
         for (i, column) in frozen.columns.iter().chain(&fresh).enumerate() {
             gradient[i] = -dot(column, &best.residuals);

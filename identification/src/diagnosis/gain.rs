@@ -127,7 +127,10 @@ fn bootstrap(before: &[f64], after: &[f64]) -> [f64; 2] {
         })
         .collect();
     shares.sort_by(f64::total_cmp);
-    [shares[RESAMPLES / 40], shares[RESAMPLES - 1 - RESAMPLES / 40]]
+    [
+        shares[RESAMPLES / 40],
+        shares[RESAMPLES - 1 - RESAMPLES / 40],
+    ]
 }
 
 #[cfg(test)]
@@ -147,6 +150,9 @@ mod tests {
                 .collect()
         };
         let [low, high] = bootstrap(&sums(4.0), &sums(1.0));
-        assert!(low <= 0.5 && 0.5 <= high && high - low < 0.05, "{low} {high}");
+        assert!(
+            low <= 0.5 && 0.5 <= high && high - low < 0.05,
+            "{low} {high}"
+        );
     }
 }

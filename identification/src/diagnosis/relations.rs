@@ -91,8 +91,15 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
             }),
         });
     }
-    if let (Some(LinearSpecimen { mass, damping, stiffness }), Some(a), Some(specimen)) =
-        (nominal.specimen, &a, &specimen_acceleration)
+    if let (
+        Some(LinearSpecimen {
+            mass,
+            damping,
+            stiffness,
+        }),
+        Some(a),
+        Some(specimen),
+    ) = (nominal.specimen, &a, &specimen_acceleration)
     {
         all.push(Relation {
             name: "R3 specimen",

@@ -67,16 +67,20 @@ fn price(candidates: &[Candidate], point: &Point) -> f64 {
 pub fn matters(candidates: &[Candidate], point: &Point) -> bool {
     point.effects.iter().all(|(i, internal)| {
         let candidate = &candidates[*i];
-        let mut sizes = candidate.parameters.iter().zip(internal).filter_map(|(p, &q)| {
-            let Role::Size { weak } = p.role else {
-                return None;
-            };
-            let value = p.scale.to_value(q);
-            Some(match p.scale {
-                Scale::Linear(_) => value.abs() / weak,
-                Scale::Logarithmic | Scale::Inverse(_) => weak / value,
-            })
-        });
+        let mut sizes = candidate
+            .parameters
+            .iter()
+            .zip(internal)
+            .filter_map(|(p, &q)| {
+                let Role::Size { weak } = p.role else {
+                    return None;
+                };
+                let value = p.scale.to_value(q);
+                Some(match p.scale {
+                    Scale::Linear(_) => value.abs() / weak,
+                    Scale::Logarithmic | Scale::Inverse(_) => weak / value,
+                })
+            });
         let mut none = true;
         let strong = sizes.any(|size| {
             none = false;
@@ -231,7 +235,10 @@ impl<M: RigModel> Search<'_, M> {
                     let column: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
                     let (gain, amplitude) = parent.jacobian.score(self.model, &parent.fit, &column);
                     if self.verbose && gain > 9.0 {
-                        eprintln!("    {} share {share}: gain {gain:.1} amplitude {amplitude:.3e}", candidate.effect);
+                        eprintln!(
+                            "    {} share {share}: gain {gain:.1} amplitude {amplitude:.3e}",
+                            candidate.effect
+                        );
                     }
                     let either = candidate.parameters.iter().any(|p| p.bounds.0 < 0.0);
                     if gain > 0.5 * PRICE_OF_AN_EFFECT && (amplitude > 0.0 || either) {
@@ -282,7 +289,10 @@ impl<M: RigModel> Search<'_, M> {
         let mut others = Vec::new();
         for _ in 1..=MOST_EFFECTS {
             let score_before = best.as_ref().map_or(nominal.score, |best| best.score);
-            if level.first().is_none_or(|first| first.score >= score_before) {
+            if level
+                .first()
+                .is_none_or(|first| first.score >= score_before)
+            {
                 break;
             }
             others = level.split_off(1);

@@ -105,7 +105,12 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
         .records()
         .flat_map(|record| problems(record, nominal))
         .collect();
-    let has = |record: &Record| record.channels.each_ref().map(|channel| !channel.is_empty());
+    let has = |record: &Record| {
+        record
+            .channels
+            .each_ref()
+            .map(|channel| !channel.is_empty())
+    };
     let present = has(&case.identification);
     for record in case.records() {
         if found.is_empty() && has(record) != present {
@@ -122,7 +127,11 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
     for (i, there) in present.into_iter().enumerate() {
         if !there {
             noise[i] = f64::INFINITY;
-            notes.push(format!("column `{}` is missing: {}", CHANNELS[i], blind_spot(i)));
+            notes.push(format!(
+                "column `{}` is missing: {}",
+                CHANNELS[i],
+                blind_spot(i)
+            ));
         }
     }
     let mut records = Vec::new();
@@ -148,7 +157,11 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
     Ok(ShakeTableModel::new(nominal, noise, records))
 }
 
-fn prediction(model: &ShakeTableModel, point: &Point, record: usize) -> Option<(Predictor, Vec<f64>)> {
+fn prediction(
+    model: &ShakeTableModel,
+    point: &Point,
+    record: usize,
+) -> Option<(Predictor, Vec<f64>)> {
     let rig = model.rig(point);
     let predictor = Predictor::design(&rig, model.period, model.noise, model.disturbance).ok()?;
     let signals = &model.records[record].signals;
@@ -188,7 +201,11 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
         (&before.0, &before.1),
         (&before.0, &before.1),
     );
-    if let Some(channel) = crude.channels.iter().find(|c| c.before > DOES_NOT_FIT.max(3.0 * c.floor)) {
+    if let Some(channel) = crude
+        .channels
+        .iter()
+        .find(|c| c.before > DOES_NOT_FIT.max(3.0 * c.floor))
+    {
         return Err(unfit(&format!(
             "the nominal model does not fit the columns: its one-step prediction misses `{}` by \
              {:.1} times that channel's variation; check units, signs and which rig this is",
@@ -353,7 +370,12 @@ fn sentence(
         Verdict::Ambiguous => {
             let sets: Vec<String> = alternatives
                 .iter()
-                .map(|set| set.iter().map(|e| phrase(e)).collect::<Vec<_>>().join(" and "))
+                .map(|set| {
+                    set.iter()
+                        .map(|e| phrase(e))
+                        .collect::<Vec<_>>()
+                        .join(" and ")
+                })
                 .collect();
             format!(
                 "The rig has {}, or as likely {}; with it {falls}.",

@@ -150,15 +150,15 @@ pub fn judge<M: RigModel>(
             retuned = Some(tuned);
         }
     }
-    Some(weigh(retuned.as_ref().unwrap_or(model), found, fitted, held_out))
+    Some(weigh(
+        retuned.as_ref().unwrap_or(model),
+        found,
+        fitted,
+        held_out,
+    ))
 }
 
-fn weigh<M: RigModel>(
-    model: &M,
-    found: Found,
-    fitted: &[usize],
-    held_out: &[usize],
-) -> Judgement {
+fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usize]) -> Judgement {
     let Found {
         nominal,
         best,
@@ -205,7 +205,9 @@ fn weigh<M: RigModel>(
         });
     }
     tests.sort_by(|a, b| b.deviate.total_cmp(&a.deviate));
-    let adequate = tests.first().is_none_or(|worst| worst.deviate < LARGEST_DEVIATE);
+    let adequate = tests
+        .first()
+        .is_none_or(|worst| worst.deviate < LARGEST_DEVIATE);
 
     let best_names = names(model, &best);
     let nested = |set: &[&'static str]| {

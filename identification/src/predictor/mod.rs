@@ -167,7 +167,11 @@ impl Predictor {
         let r = DMatrix::identity(measured.len(), measured.len());
         let mut q = DMatrix::identity(order, order) * (1e-3 * drive).powi(2);
         q[(n, n)] = (drive / scale[n]).powi(2);
-        if !a.iter().chain(c.iter()).all(|value| value.is_finite() && value.abs() < 1e12) {
+        if !a
+            .iter()
+            .chain(c.iter())
+            .all(|value| value.is_finite() && value.abs() < 1e12)
+        {
             return Err(ModelError::NoSolution {
                 equation: "the predictor's Riccati equation",
                 reason: "the sampled rig is not finite".into(),

@@ -49,7 +49,9 @@ impl HydraulicEffects {
     #[inline]
     pub fn available_flow(&self, mut u: f64, force: f64, demand: f64) -> f64 {
         if self.stall_force > 0.0 {
-            u *= (1.0 - u.signum() * force / self.stall_force).max(0.0).sqrt();
+            u *= (1.0 - u.signum() * force / self.stall_force)
+                .max(0.0)
+                .sqrt();
         }
         if self.droop_loss != 0.0 {
             let loss = self.droop_loss * demand;
