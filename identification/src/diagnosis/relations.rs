@@ -9,6 +9,9 @@ use crate::case::{Nominal, Record};
 
 /// Band in which the relations are checked, Hz.
 const BAND: (f64, f64) = (0.5, 15.0);
+/// Upper end of the band in which signs and units are checked, Hz: lags and delays of the
+/// catalogue are small there.
+const SLOW: f64 = 3.0;
 
 /// A relation and its error.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +20,29 @@ pub struct Relation {
     pub name: &'static str,
     /// Root mean square error in units of what the sensors' noise makes of it.
     pub ratio: f64,
+    /// Error below 3 Hz over the size of what it is an error of, where that is a channel.
+    pub relative: Option<f64>,
+}
+
+const EQUILIBRIUM: &str = "R2 equilibrium of the table";
+const KINEMATICS: &str = "R4 kinematics";
+
+/// What shows that columns and nominal model do not belong together: signs, units, another rig.
+/// The limits lie beyond anything that an effect of the catalogue does.
+pub fn misfit(relations: &[Relation]) -> Option<String> {
+    relations.iter().find_map(|relation| {
+        let (limit, what) = match relation.name {
+            KINEMATICS => (0.8, "acceleration and displacement are not of one motion"),
+            EQUILIBRIUM => (1.2, "forces do not balance what moves"),
+            _ => return None,
+        };
+        let relative = relation.relative.filter(|relative| *relative > limit)?;
+        Some(format!(
+            "the nominal model does not fit the columns: {what} ({}, error {relative:.2} times \
+             the signal below {SLOW} Hz); check units, signs and which rig this is",
+            relation.name
+        ))
+    })
 }
 
 /// The relations that the columns of `record` allow, on the nominal model.
@@ -62,6 +88,16 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
             .sum();
         (sum / bins.len().max(1) as f64).sqrt()
     };
+    let relative = |error: &dyn Fn(usize, Complex<f64>) -> (Complex<f64>, f64),
+                    size: &[Complex<f64>]| {
+        let slow = bins.start..((SLOW / bin) as usize).clamp(bins.start, bins.end);
+        let (mut wrong, mut whole) = (0.0, 0.0);
+        for k in slow {
+            wrong += error(k, Complex::new(0.0, omega(k))).0.norm_sqr();
+            whole += size[k].norm_sqr();
+        }
+        (whole > 0.0).then(|| (wrong / whole).sqrt())
+    };
     let mut all = Vec::new();
     if let (Some(u), Some(x), Some(f)) = (&u, &x, &f) {
         let (g1, g2) = (
@@ -78,17 +114,20 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
                 let of_u = (g1.evaluate(s) * nominal.command_noise).norm_sqr();
                 (error, sf * sf + of_x.norm_sqr() * sx * sx + of_u)
             }),
+            relative: None,
         });
     }
     if let (Some(x), Some(a), Some(f), Some(specimen)) = (&x, &a, &f, &specimen_acceleration) {
+        let error = |k: usize, s: Complex<f64>| {
+            let of_x = s * table.damping + table.stiffness;
+            let error = f[k] - specimen[k] * mass - a[k] * table.mass - of_x * x[k];
+            let inertia = (table.mass * sa).powi(2) + (mass * ss).powi(2);
+            (error, sf * sf + inertia + of_x.norm_sqr() * sx * sx)
+        };
         all.push(Relation {
-            name: "R2 equilibrium of the table",
-            ratio: ratio(&|k, s| {
-                let of_x = s * table.damping + table.stiffness;
-                let error = f[k] - specimen[k] * mass - a[k] * table.mass - of_x * x[k];
-                let inertia = (table.mass * sa).powi(2) + (mass * ss).powi(2);
-                (error, sf * sf + inertia + of_x.norm_sqr() * sx * sx)
-            }),
+            name: EQUILIBRIUM,
+            ratio: ratio(&error),
+            relative: relative(&error, f),
         });
     }
     if let (
@@ -109,12 +148,18 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
                 let error = specimen[k] - passed * a[k];
                 (error, ss * ss + passed.norm_sqr() * sa * sa)
             }),
+            relative: None,
         });
     }
     if let (Some(x), Some(a)) = (&x, &a) {
+        let error = |k: usize, s: Complex<f64>| {
+            let variance = sa * sa + (s * s).norm_sqr() * sx * sx;
+            (a[k] - s * s * x[k], variance)
+        };
         all.push(Relation {
-            name: "R4 kinematics",
-            ratio: ratio(&|k, s| (a[k] - s * s * x[k], sa * sa + (s * s).norm_sqr() * sx * sx)),
+            name: KINEMATICS,
+            ratio: ratio(&error),
+            relative: relative(&error, a),
         });
     }
     if let Some(law) = nominal.controller {
@@ -130,6 +175,7 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
             all.push(Relation {
                 name: "R5 the controller's law",
                 ratio: (sum / count).sqrt() / nominal.command_noise,
+                relative: None,
             });
         }
     }
