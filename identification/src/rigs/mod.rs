@@ -112,6 +112,7 @@ fn effect(
             parameters,
             starts: starts.iter().map(|start| start.to_vec()).collect(),
             look_alikes: &[],
+            tolerance: 1.0,
             contains: None,
         },
         off: off.to_vec(),
