@@ -20,42 +20,102 @@ impl Rig for ClosedLoopActuator {
     }
 
     fn parameters(&self) -> &'static [Named] {
-        &[("loop_gain", "1/s"), ("command_lag", "s"), ("scale", "1"), ("offset", "m")]
+        &[
+            ("loop_gain", "1/s"),
+            ("command_lag", "s"),
+            ("scale", "1"),
+            ("offset", "m"),
+        ]
     }
 
     fn effects(&self) -> Vec<Effect> {
         vec![
             // r(t - T): conversion, computation and valve electronics.
-            effect("delay", vec![size("delay", "s", 1e-3, (0.0, 0.05))], &[0.0], &[&[2e-3], &[6e-3]]).like(&["valve_lag"]),
+            effect(
+                "delay",
+                vec![size("delay", "s", 1e-3, (0.0, 0.05))],
+                &[0.0],
+                &[&[2e-3], &[6e-3]],
+            )
+            .like(&["valve_lag"]),
             // Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
-            effect("dead_band", vec![size("half_width", "m", 5e-6, (0.0, 1e-3))], &[0.0], &[&[3e-5], &[2e-4]]),
+            effect(
+                "dead_band",
+                vec![size("half_width", "m", 5e-6, (0.0, 1e-3))],
+                &[0.0],
+                &[&[3e-5], &[2e-4]],
+            ),
             // Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
             // of Hydraulic Servosystems, 1980).
-            effect("asymmetric_gain", vec![size("asymmetry", "1", 0.01, (-0.8, 0.8))], &[0.0], &[&[0.03], &[-0.03]]),
+            effect(
+                "asymmetric_gain",
+                vec![size("asymmetry", "1", 0.01, (-0.8, 0.8))],
+                &[0.0],
+                &[&[0.03], &[-0.03]],
+            ),
             // Spool: T w' = K e - w, x' = w.
-            effect("valve_lag", vec![size("time_constant", "s", 1e-3, (0.0, 0.02))], &[0.0], &[&[2e-3]]).like(&["delay"]),
+            effect(
+                "valve_lag",
+                vec![size("time_constant", "s", 1e-3, (0.0, 0.02))],
+                &[0.0],
+                &[&[2e-3]],
+            )
+            .like(&["delay"]),
             // Flow falls with speed as the load pressure rises: x' = w / (1 + |w| / s).
-            effect("flow_saturation", vec![size("compression", "s/m", 0.2, (0.0, 50.0))], &[0.0], &[&[1.0]]),
+            effect(
+                "flow_saturation",
+                vec![size("compression", "s/m", 0.2, (0.0, 50.0))],
+                &[0.0],
+                &[&[1.0]],
+            ),
             // Transducer: y = x (1 + c x).
-            effect("sensor_curvature", vec![size("curvature", "1/m", 2.0, (-200.0, 200.0))], &[0.0], &[&[3.0], &[-3.0]]),
+            effect(
+                "sensor_curvature",
+                vec![size("curvature", "1/m", 2.0, (-200.0, 200.0))],
+                &[0.0],
+                &[&[3.0], &[-3.0]],
+            ),
             // Transducer linkage: y follows x only beyond a gap.
-            effect("free_play", vec![size("gap", "m", 1e-5, (0.0, 1e-3))], &[0.0], &[&[4e-5]]),
+            effect(
+                "free_play",
+                vec![size("gap", "m", 1e-5, (0.0, 1e-3))],
+                &[0.0],
+                &[&[4e-5]],
+            ),
             // Disturbance n that command and output share in the recorder: the loop gets r - n, the
             // record y = x + c n; n is what a median of five samples takes out of the command.
-            effect("shared_disturbance", vec![size("coupling", "1", 0.1, (-5.0, 5.0))], &[0.0], &[&[1.0]]),
+            effect(
+                "shared_disturbance",
+                vec![size("coupling", "1", 0.1, (-5.0, 5.0))],
+                &[0.0],
+                &[&[1.0]],
+            ),
         ]
     }
 
     fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
-        let &[gain, lag, scale, offset] = nominal else { return };
-        let &[delay, dead_band, asymmetry, valve, compression, curvature, gap, coupling] = effects
+        let &[gain, lag, scale, offset] = nominal else {
+            return;
+        };
+        let &[
+            delay,
+            dead_band,
+            asymmetry,
+            valve,
+            compression,
+            curvature,
+            gap,
+            coupling,
+        ] = effects
         else {
             return;
         };
         let command = &series.inputs[0];
         let clean = &series.cleaned;
         let loop_input = if coupling == 0.0 { command } else { clean };
-        let Some(&first) = loop_input.first() else { return };
+        let Some(&first) = loop_input.first() else {
+            return;
+        };
         let h = series.step / STEPS as f64;
         let keep = |time: f64| if time > 1e-5 { (-h / time).exp() } else { 0.0 };
         let (keep_command, keep_valve) = (keep(lag), keep(valve));

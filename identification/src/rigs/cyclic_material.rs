@@ -21,14 +21,22 @@ impl Rig for CyclicMaterial {
     }
 
     fn parameters(&self) -> &'static [Named] {
-        &[("modulus", "Pa"), ("yield_stress", "Pa"), ("hardening", "Pa"), ("recovery", "1")]
+        &[
+            ("modulus", "Pa"),
+            ("yield_stress", "Pa"),
+            ("hardening", "Pa"),
+            ("recovery", "1"),
+        ]
     }
 
     fn effects(&self) -> Vec<Effect> {
         let backstress = |name, recovery: f64| {
             effect(
                 name,
-                vec![size("hardening", "Pa", 1e8, (0.0, 1e12)), shape("recovery", "1", recovery, 0.8)],
+                vec![
+                    size("hardening", "Pa", 1e8, (0.0, 1e12)),
+                    shape("recovery", "1", recovery, 0.8),
+                ],
                 &[0.0, recovery],
                 &[&[1e9, recovery], &[1e10, recovery]],
             )
@@ -40,14 +48,20 @@ impl Rig for CyclicMaterial {
             // R = Q (1 - e^{-b p}), p the plastic path (Voce 1948).
             effect(
                 "isotropic_hardening",
-                vec![size("saturation", "Pa", 5e6, (-3e8, 1e9)), shape("rate", "1", 10.0, 1.0)],
+                vec![
+                    size("saturation", "Pa", 5e6, (-3e8, 1e9)),
+                    shape("rate", "1", 10.0, 1.0),
+                ],
                 &[0.0, 10.0],
                 &[&[5e7, 10.0], &[-3e7, 10.0]],
             ),
             // Yield plateau: a further R that falls within the first strain (Q < 0).
             effect(
                 "initial_softening",
-                vec![size("drop", "Pa", 5e6, (0.0, 4e8)), shape("rate", "1", 200.0, 0.7)],
+                vec![
+                    size("drop", "Pa", 5e6, (0.0, 4e8)),
+                    shape("rate", "1", 200.0, 0.7),
+                ],
                 &[0.0, 200.0],
                 &[&[5e7, 200.0], &[1e8, 300.0]],
             ),
@@ -55,38 +69,59 @@ impl Rig for CyclicMaterial {
             // 2002).
             effect(
                 "modulus_degradation",
-                vec![size("share", "1", 0.02, (-1.0, 0.9)), shape("rate", "1", 20.0, 1.0)],
+                vec![
+                    size("share", "1", 0.02, (-1.0, 0.9)),
+                    shape("rate", "1", 20.0, 1.0),
+                ],
                 &[0.0, 20.0],
                 &[&[0.1, 20.0], &[-0.1, 20.0]],
             ),
             // Compression yields at (1 + a) of tension.
-            effect("strength_differential", vec![size("asymmetry", "1", 0.01, (-0.5, 0.5))], &[0.0], &[&[0.02], &[-0.02]]),
+            effect(
+                "strength_differential",
+                vec![size("asymmetry", "1", 0.01, (-0.5, 0.5))],
+                &[0.0],
+                &[&[0.02], &[-0.02]],
+            ),
             // Sampling of the strain misses the turns: between two samples it ran on to the
             // amplitude of the test.
-            effect("missed_turns", vec![size("amplitude", "1", 2e-4, (0.0, 0.2))], &[0.0], &[&[0.005], &[0.01], &[0.02], &[0.0201], &[0.04]]),
+            effect(
+                "missed_turns",
+                vec![size("amplitude", "1", 2e-4, (0.0, 0.2))],
+                &[0.0],
+                &[&[0.005], &[0.01], &[0.02], &[0.0201], &[0.04]],
+            ),
             // Strain recorded late by a part of a sample, or stress.
-            effect("strain_late", vec![size("samples", "1", 0.05, (-2.0, 2.0))], &[0.0], &[&[0.3], &[-0.3]]),
+            effect(
+                "strain_late",
+                vec![size("samples", "1", 0.05, (-2.0, 2.0))],
+                &[0.0],
+                &[&[0.3], &[-0.3]],
+            ),
         ]
     }
 
     fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
-        let (&[modulus, yield_stress, hardening, recovery], &[
-            slow,
-            slow_recovery,
-            middle,
-            middle_recovery,
-            fast,
-            fast_recovery,
-            saturation,
-            rate,
-            drop,
-            drop_rate,
-            degradation,
-            degradation_rate,
-            differential,
-            amplitude,
-            late,
-        ]) = (nominal, effects)
+        let (
+            &[modulus, yield_stress, hardening, recovery],
+            &[
+                slow,
+                slow_recovery,
+                middle,
+                middle_recovery,
+                fast,
+                fast_recovery,
+                saturation,
+                rate,
+                drop,
+                drop_rate,
+                degradation,
+                degradation_rate,
+                differential,
+                amplitude,
+                late,
+            ],
+        ) = (nominal, effects)
         else {
             return;
         };

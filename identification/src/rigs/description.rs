@@ -154,24 +154,41 @@ fn median_of_five(values: &[f64]) -> Vec<f64> {
 impl Description {
     /// Reads a description.
     pub fn read(path: &Path) -> Result<Self, DescriptionError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| DescriptionError::Read { path: path.to_owned(), source })?;
-        let wrong = |what: String| DescriptionError::Description { path: path.to_owned(), what };
-        let mut description: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let text = std::fs::read_to_string(path).map_err(|source| DescriptionError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        let wrong = |what: String| DescriptionError::Description {
+            path: path.to_owned(),
+            what,
+        };
+        let mut description: Self =
+            toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         description.path = path.to_owned();
         description.rig()?;
         Ok(description)
     }
 
     fn wrong(&self, what: String) -> DescriptionError {
-        DescriptionError::Description { path: self.path.clone(), what }
+        DescriptionError::Description {
+            path: self.path.clone(),
+            what,
+        }
     }
 
-    fn si(&self, what: &str, quantity: &Quantity, si: &str) -> Result<(f64, f64), DescriptionError> {
+    fn si(
+        &self,
+        what: &str,
+        quantity: &Quantity,
+        si: &str,
+    ) -> Result<(f64, f64), DescriptionError> {
         let factor =
             factor_to(&quantity.unit, si).map_err(|why| self.wrong(format!("`{what}`: {why}")))?;
-        if !quantity.value.is_finite() || quantity.plus_minus.is_nan() || quantity.plus_minus < 0.0 {
-            return Err(self.wrong(format!("`{what}` is no number with an uncertainty from 0 up")));
+        if !quantity.value.is_finite() || quantity.plus_minus.is_nan() || quantity.plus_minus < 0.0
+        {
+            return Err(self.wrong(format!(
+                "`{what}` is no number with an uncertainty from 0 up"
+            )));
         }
         Ok((quantity.value * factor, quantity.plus_minus * factor))
     }
@@ -179,16 +196,27 @@ impl Description {
     /// The rig's equations.
     pub fn rig(&self) -> Result<Box<dyn Rig>, DescriptionError> {
         of_kind(&self.kind).ok_or_else(|| {
-            self.wrong(format!("kind `{}` is unknown: expected one of {}", self.kind, KINDS.join(", ")))
+            self.wrong(format!(
+                "kind `{}` is unknown: expected one of {}",
+                self.kind,
+                KINDS.join(", ")
+            ))
         })
     }
 
     /// Nominal values and standard deviations in the rig's order, SI.
     pub fn nominal(&self, rig: &dyn Rig) -> Result<Vec<(f64, f64)>, DescriptionError> {
         let known = rig.parameters();
-        if let Some(extra) = self.nominal.keys().find(|name| !known.iter().any(|(k, _)| k == name)) {
+        if let Some(extra) = self
+            .nominal
+            .keys()
+            .find(|name| !known.iter().any(|(k, _)| k == name))
+        {
             let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
-            return Err(self.wrong(format!("`nominal.{extra}` is unknown: expected {}", names.join(", "))));
+            return Err(self.wrong(format!(
+                "`nominal.{extra}` is unknown: expected {}",
+                names.join(", ")
+            )));
         }
         known
             .iter()
@@ -235,9 +263,14 @@ impl Description {
             }
             LeftOut::Files(names) => {
                 for name in names {
-                    let place = files.iter().position(|file| file.file_name() == name.file_name());
+                    let place = files
+                        .iter()
+                        .position(|file| file.file_name() == name.file_name());
                     let Some(place) = place else {
-                        let what = format!("`left_out.files` names {}, which is no data file", name.display());
+                        let what = format!(
+                            "`left_out.files` names {}, which is no data file",
+                            name.display()
+                        );
                         return Err(self.wrong(what));
                     };
                     series[place].left_out.fill(true);
@@ -245,23 +278,37 @@ impl Description {
             }
         }
         let count = |out: bool| -> usize {
-            series.iter().map(|s| s.left_out.iter().filter(|o| **o == out).count()).sum()
+            series
+                .iter()
+                .map(|s| s.left_out.iter().filter(|o| **o == out).count())
+                .sum()
         };
         if count(true) < 64 || count(false) < 64 {
-            return Err(self.wrong("`left_out` leaves fewer than 64 samples on one side".to_owned()));
+            return Err(
+                self.wrong("`left_out` leaves fewer than 64 samples on one side".to_owned())
+            );
         }
         Ok(())
     }
 
     fn series(&self, path: &Path, rig: &dyn Rig) -> Result<Series, DescriptionError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| DescriptionError::Read { path: path.to_owned(), source })?;
-        let data = |line: u64, what: String| DescriptionError::Data { path: path.to_owned(), line, what };
+        let text = std::fs::read_to_string(path).map_err(|source| DescriptionError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        let data = |line: u64, what: String| DescriptionError::Data {
+            path: path.to_owned(),
+            line,
+            what,
+        };
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|error| data(1, error.to_string()))?.clone();
+        let header = reader
+            .headers()
+            .map_err(|error| data(1, error.to_string()))?
+            .clone();
         let mut wanted: Vec<Named> = rig.inputs().to_vec();
         wanted.push(rig.output());
         let timed = self.columns.contains_key("time");
@@ -270,22 +317,30 @@ impl Description {
         }
         let mut places = Vec::new();
         for (name, si) in &wanted {
-            let column = self
-                .columns
-                .get(*name)
-                .ok_or_else(|| self.wrong(format!("`columns.{name}` is missing: a column in {si}")))?;
+            let column = self.columns.get(*name).ok_or_else(|| {
+                self.wrong(format!("`columns.{name}` is missing: a column in {si}"))
+            })?;
             let factor = factor_to(&column.unit, si)
                 .map_err(|why| self.wrong(format!("`columns.{name}`: {why}")))?;
-            let place = header.iter().position(|cell| cell == column.column).ok_or_else(|| {
-                let cells: Vec<&str> = header.iter().collect();
-                data(1, format!("no column `{}` among {}", column.column, cells.join(", ")))
-            })?;
+            let place = header
+                .iter()
+                .position(|cell| cell == column.column)
+                .ok_or_else(|| {
+                    let cells: Vec<&str> = header.iter().collect();
+                    data(
+                        1,
+                        format!("no column `{}` among {}", column.column, cells.join(", ")),
+                    )
+                })?;
             places.push((place, factor));
         }
         let mut columns = vec![Vec::new(); places.len()];
         for row in reader.records() {
             let row = row.map_err(|error| {
-                data(error.position().map_or(0, csv::Position::line), error.to_string())
+                data(
+                    error.position().map_or(0, csv::Position::line),
+                    error.to_string(),
+                )
             })?;
             let line = row.position().map_or(0, csv::Position::line);
             for ((place, factor), column) in places.iter().zip(&mut columns) {
@@ -301,23 +356,35 @@ impl Description {
         let time = if timed { columns.pop() } else { None };
         let output = columns.pop().unwrap_or_default();
         if output.len() < 128 {
-            return Err(data(1, format!("{} samples: expected at least 128", output.len())));
+            return Err(data(
+                1,
+                format!("{} samples: expected at least 128", output.len()),
+            ));
         }
         let step = match (time, &self.time_step) {
             (Some(time), _) => {
                 let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
-                let uneven = time.windows(2).position(|t| ((t[1] - t[0]) / step - 1.0).abs() > 0.5);
+                let uneven = time
+                    .windows(2)
+                    .position(|t| ((t[1] - t[0]) / step - 1.0).abs() > 0.5);
                 if let Some(k) = uneven.or((step <= 0.0).then_some(0)) {
-                    return Err(data(k as u64 + 3, "the times are not evenly spaced".to_owned()));
+                    return Err(data(
+                        k as u64 + 3,
+                        "the times are not evenly spaced".to_owned(),
+                    ));
                 }
                 step
             }
             (None, Some(step)) => self.si("time_step", step, "s")?.0,
             (None, None) => {
-                return Err(self.wrong("neither `columns.time` nor `time_step` is given".to_owned()));
+                return Err(
+                    self.wrong("neither `columns.time` nor `time_step` is given".to_owned())
+                );
             }
         };
-        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let name = path
+            .file_stem()
+            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         Ok(Series::new(&name, step, columns, output))
     }
 }

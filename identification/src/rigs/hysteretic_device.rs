@@ -24,50 +24,101 @@ impl Rig for HystereticDevice {
     fn effects(&self) -> Vec<Effect> {
         vec![
             // F± = F (1 ± a).
-            effect("asymmetric_coulomb_friction", vec![size("asymmetry", "1", 0.03, (-0.9, 0.9))], &[0.0], &[&[0.1], &[-0.1]]),
+            effect(
+                "asymmetric_coulomb_friction",
+                vec![size("asymmetry", "1", 0.03, (-0.9, 0.9))],
+                &[0.0],
+                &[&[0.1], &[-0.1]],
+            ),
             // After the force has gone to zero, the device moves through a gap before it takes
             // hold on the other side.
-            effect("free_play", vec![size("gap", "m", 2e-4, (0.0, 0.05))], &[0.0], &[&[2e-3], &[6e-3]]),
+            effect(
+                "free_play",
+                vec![size("gap", "m", 2e-4, (0.0, 0.05))],
+                &[0.0],
+                &[&[2e-3], &[6e-3]],
+            ),
             // Stiffness while the force falls is (1 + s) k: a band that wraps on gives way more
             // softly than it lets go.
-            effect("stiffer_unloading", vec![size("excess", "1", 0.05, (-0.9, 20.0))], &[0.0], &[&[0.5], &[-0.3]]),
+            effect(
+                "stiffer_unloading",
+                vec![size("excess", "1", 0.05, (-0.9, 20.0))],
+                &[0.0],
+                &[&[0.5], &[-0.3]],
+            ),
             // k± = k (1 ± a).
-            effect("asymmetric_stiffness", vec![size("asymmetry", "1", 0.03, (-0.9, 0.9))], &[0.0], &[&[0.1], &[-0.1]]),
+            effect(
+                "asymmetric_stiffness",
+                vec![size("asymmetry", "1", 0.03, (-0.9, 0.9))],
+                &[0.0],
+                &[&[0.1], &[-0.1]],
+            ),
             // Rounded transition: k (1 - r |f / F|^n) with exponent n.
             effect(
                 "rounded_transition",
-                vec![size("rounding", "1", 0.05, (0.0, 1.0)), shape("exponent", "1", 2.0, 0.7)],
+                vec![
+                    size("rounding", "1", 0.05, (0.0, 1.0)),
+                    shape("exponent", "1", 2.0, 0.7),
+                ],
                 &[0.0, 2.0],
                 &[&[0.5, 2.0], &[0.9, 1.0]],
             ),
             // Soft begin of contact: k (1 - p e^{-|f| / (c F)}); p near one would be free play.
             effect(
                 "progressive_contact",
-                vec![size("softness", "1", 0.05, (0.0, 0.8)), shape("share", "1", 0.1, 0.7)],
+                vec![
+                    size("softness", "1", 0.05, (0.0, 0.8)),
+                    shape("share", "1", 0.1, 0.7),
+                ],
                 &[0.0, 0.1],
                 &[&[0.6, 0.1], &[0.6, 0.3]],
             ),
             // F (1 + s e^{-|v| / v_s}) (Stribeck).
             effect(
                 "stribeck",
-                vec![size("excess", "1", 0.03, (-0.9, 2.0)), shape("speed", "m/s", 0.03, 1.0)],
+                vec![
+                    size("excess", "1", 0.03, (-0.9, 2.0)),
+                    shape("speed", "m/s", 0.03, 1.0),
+                ],
                 &[0.0, 0.03],
                 &[&[0.2, 0.03], &[-0.2, 0.03]],
             ),
             // F (1 + s |v| / (1 m/s)).
-            effect("rate_dependence", vec![size("slope", "s/m", 0.2, (-5.0, 20.0))], &[0.0], &[&[0.5], &[-0.5]]),
+            effect(
+                "rate_dependence",
+                vec![size("slope", "s/m", 0.2, (-5.0, 20.0))],
+                &[0.0],
+                &[&[0.5], &[-0.5]],
+            ),
             // c v beside the friction.
-            effect("viscous", vec![size("damping", "N s/m", 300.0, (-1e6, 1e6))], &[0.0], &[&[3e3], &[-3e3]]),
+            effect(
+                "viscous",
+                vec![size("damping", "N s/m", 300.0, (-1e6, 1e6))],
+                &[0.0],
+                &[&[3e3], &[-3e3]],
+            ),
             // y follows the force through (2π f)² / (s² + 2 ζ (2π f) s + (2π f)²), ζ = 0.1: mass and
             // spring between device and load cell.
-            effect("load_path_resonance", vec![shape("frequency", "rad/s", 150.0, 0.7)], &[0.0], &[&[80.0], &[110.0], &[200.0]]),
+            effect(
+                "load_path_resonance",
+                vec![shape("frequency", "rad/s", 150.0, 0.7)],
+                &[0.0],
+                &[&[80.0], &[110.0], &[200.0]],
+            ),
             // Displacement or force late.
-            effect("delay", vec![size("delay", "s", 1e-3, (0.0, 0.2))], &[0.0], &[&[5e-3], &[2e-2]]),
+            effect(
+                "delay",
+                vec![size("delay", "s", 1e-3, (0.0, 0.2))],
+                &[0.0],
+                &[&[5e-3], &[2e-2]],
+            ),
         ]
     }
 
     fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
-        let &[coulomb, stiffness] = nominal else { return };
+        let &[coulomb, stiffness] = nominal else {
+            return;
+        };
         let &[
             asymmetry,
             gap,
@@ -89,7 +140,10 @@ impl Rig for HystereticDevice {
         };
         let (x, v) = (&series.inputs[0], &series.inputs[1]);
         // The device begins as it was left: where in the gap, the first measured force tells.
-        let mut force = series.output.first().map_or(0.0, |f| f.clamp(-coulomb, coulomb));
+        let mut force = series
+            .output
+            .first()
+            .map_or(0.0, |f| f.clamp(-coulomb, coulomb));
         // Travelled part of the gap, 0 at its negative end.
         let mut travelled = if force > 0.0 { gap } else { 0.0 };
         let (mut shown, mut shown_rate) = (0.0, 0.0);
@@ -119,7 +173,11 @@ impl Rig for HystereticDevice {
                 let direction = move_left.signum();
                 let loose = force == 0.0;
                 if loose {
-                    let room = if direction > 0.0 { gap - travelled } else { travelled };
+                    let room = if direction > 0.0 {
+                        gap - travelled
+                    } else {
+                        travelled
+                    };
                     if move_left.abs() < room {
                         travelled += move_left;
                         break;

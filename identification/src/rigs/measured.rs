@@ -52,8 +52,14 @@ pub struct Measured<'a> {
     pub scale: f64,
 }
 
-const NAMES: [&str; 6] =
-    ["fitted", "left out", "fitted, fold 1", "fitted, fold 2", "left out, fold 1", "left out, fold 2"];
+const NAMES: [&str; 6] = [
+    "fitted",
+    "left out",
+    "fitted, fold 1",
+    "fitted, fold 2",
+    "left out, fold 1",
+    "left out, fold 2",
+];
 
 impl<'a> Measured<'a> {
     /// The rig with nominal values and standard deviations in its order.
@@ -61,11 +67,20 @@ impl<'a> Measured<'a> {
         let mut places = vec![vec![Vec::new(); measurement.series.len()]; NAMES.len()];
         for part in 0..2 {
             let in_part = |out: &bool| usize::from(*out) == part;
-            let count: usize =
-                measurement.series.iter().flat_map(|s| &s.left_out).filter(|o| in_part(o)).count();
+            let count: usize = measurement
+                .series
+                .iter()
+                .flat_map(|s| &s.left_out)
+                .filter(|o| in_part(o))
+                .count();
             let mut seen = 0;
             for (s, series) in measurement.series.iter().enumerate() {
-                for (k, _) in series.left_out.iter().enumerate().filter(|(_, o)| in_part(o)) {
+                for (k, _) in series
+                    .left_out
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, o)| in_part(o))
+                {
                     places[part][s].push(k);
                     places[2 + 2 * part + (seen * RUNS / count) % 2][s].push(k);
                     seen += 1;
@@ -75,7 +90,10 @@ impl<'a> Measured<'a> {
         let effects = rig.effects();
         Self {
             uncertain: (0..nominal.len()).filter(|&i| nominal[i].1 > 0.0).collect(),
-            candidates: effects.iter().map(|effect| effect.candidate.clone()).collect(),
+            candidates: effects
+                .iter()
+                .map(|effect| effect.candidate.clone())
+                .collect(),
             effects,
             channel: [rig.output().0],
             rig,
@@ -118,7 +136,10 @@ impl<'a> Measured<'a> {
 
     /// Names of the uncertain nominal parameters, in the order of the nuisance.
     pub fn uncertain_names(&self) -> Vec<&'static str> {
-        self.uncertain.iter().map(|&i| self.rig.parameters()[i].0).collect()
+        self.uncertain
+            .iter()
+            .map(|&i| self.rig.parameters()[i].0)
+            .collect()
     }
 
     fn effect_values(&self, point: &Point) -> Vec<f64> {
@@ -160,8 +181,12 @@ impl<'a> Measured<'a> {
         let mut size = 0.0;
         for (s, places) in self.places[record].iter().enumerate() {
             let measured = &self.measurement.series[s].output;
-            let mean = places.iter().map(|&k| measured[k]).sum::<f64>() / places.len().max(1) as f64;
-            size += places.iter().map(|&k| (measured[k] - mean).powi(2)).sum::<f64>();
+            let mean =
+                places.iter().map(|&k| measured[k]).sum::<f64>() / places.len().max(1) as f64;
+            size += places
+                .iter()
+                .map(|&k| (measured[k] - mean).powi(2))
+                .sum::<f64>();
         }
         (errors.iter().map(|e| e * e).sum::<f64>() / size).sqrt()
     }

@@ -96,7 +96,10 @@ fn shape(name: &'static str, si: &'static str, typical: f64, spread: f64) -> Eff
         unit: si,
         scale: Scale::Logarithmic,
         role: Role::Shape { typical, spread },
-        bounds: (typical * (-6.0 * spread).exp(), typical * (6.0 * spread).exp()),
+        bounds: (
+            typical * (-6.0 * spread).exp(),
+            typical * (6.0 * spread).exp(),
+        ),
     }
 }
 

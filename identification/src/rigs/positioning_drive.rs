@@ -10,8 +10,9 @@ pub struct PositioningDrive;
 
 const STEPS: usize = 2;
 /// Nominal leads of ball screws, m (ISO 3408-2).
-const LEADS: [f64; 12] =
-    [1e-3, 1.25e-3, 2e-3, 2.5e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3, 12e-3, 20e-3];
+const LEADS: [f64; 12] = [
+    1e-3, 1.25e-3, 2e-3, 2.5e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3, 12e-3, 20e-3,
+];
 
 impl Rig for PositioningDrive {
     fn inputs(&self) -> &'static [Named] {
@@ -60,25 +61,52 @@ impl Rig for PositioningDrive {
             // with speed (Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994).
             effect(
                 "speed_dependent_coulomb",
-                vec![size("excess", "1", 0.03, (-0.99, 3.0)), shape("speed", "m/s", 0.01, 1.0)],
+                vec![
+                    size("excess", "1", 0.03, (-0.99, 3.0)),
+                    shape("speed", "m/s", 0.01, 1.0),
+                ],
                 &[0.0, 0.01],
                 &[&[0.2, 0.01], &[-0.3, 0.01]],
             ),
             // A cos(2π q / p) + B sin(2π q / p): screw and motor poles.
             ripple,
             // Current loop: T F' = G u - F.
-            effect("actuation_lag", vec![size("time_constant", "s", 1e-4, (0.0, 0.02))], &[0.0], &[&[5e-4]])
-                .like(&["delay"]),
+            effect(
+                "actuation_lag",
+                vec![size("time_constant", "s", 1e-4, (0.0, 0.02))],
+                &[0.0],
+                &[&[5e-4]],
+            )
+            .like(&["delay"]),
             // u acts late.
-            effect("delay", vec![size("delay", "s", 1e-4, (0.0, 2e-3))], &[0.0], &[&[5e-4]]).like(&["actuation_lag"]),
+            effect(
+                "delay",
+                vec![size("delay", "s", 1e-4, (0.0, 2e-3))],
+                &[0.0],
+                &[&[5e-4]],
+            )
+            .like(&["actuation_lag"]),
             // F_c (1 + c (q - q_0)), q_0 in the middle of the travel: misalignment.
-            effect("position_dependent_friction", vec![size("slope", "1/m", 0.1, (-5.0, 5.0))], &[0.0], &[&[0.3], &[-0.3]]),
+            effect(
+                "position_dependent_friction",
+                vec![size("slope", "1/m", 0.1, (-5.0, 5.0))],
+                &[0.0],
+                &[&[0.3], &[-0.3]],
+            ),
             // -D |v| v.
-            effect("quadratic_drag", vec![size("drag", "N s2/m2", 20.0, (-2000.0, 2000.0))], &[0.0], &[&[100.0], &[-100.0]]),
+            effect(
+                "quadratic_drag",
+                vec![size("drag", "N s2/m2", 20.0, (-2000.0, 2000.0))],
+                &[0.0],
+                &[&[100.0], &[-100.0]],
+            ),
             // Load on a spring: a share m of the mass hangs on k and d = 2 ζ (k m)^{1/2}, ζ = 0.05.
             effect(
                 "flexibility",
-                vec![size("share", "1", 0.02, (0.0, 0.9)), shape("frequency", "rad/s", 300.0, 0.7)],
+                vec![
+                    size("share", "1", 0.02, (0.0, 0.9)),
+                    shape("frequency", "rad/s", 300.0, 0.7),
+                ],
                 &[0.0, 300.0],
                 &[&[0.1, 150.0], &[0.1, 400.0]],
             ),
@@ -86,7 +114,9 @@ impl Rig for PositioningDrive {
     }
 
     fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
-        let &[mass, viscous, coulomb, offset, force_gain, kp, kv, limit] = nominal else { return };
+        let &[mass, viscous, coulomb, offset, force_gain, kp, kv, limit] = nominal else {
+            return;
+        };
         let &[
             viscous_asymmetry,
             excess,
@@ -123,7 +153,8 @@ impl Rig for PositioningDrive {
         let mut force = f64::NAN;
         let mut last = 0.0;
         for (k, y) in out.iter_mut().enumerate() {
-            let u = (kp * kv * (reference[k] - q) - kv * (q - before) / sample).clamp(-limit, limit);
+            let u =
+                (kp * kv * (reference[k] - q) - kv * (q - before) / sample).clamp(-limit, limit);
             *y = u;
             before = q;
             if k == 0 {

@@ -101,16 +101,20 @@ pub fn diagnose(
         if verbose {
             eprintln!("fitting {}", measured.record_name(fitted as usize));
         }
-        let selected = select(&measured, fitted, verbose).ok_or_else(|| DescriptionError::Description {
-            path: description.path.clone(),
-            what: "the nominal model gives no finite output on these data".to_owned(),
-        })?;
+        let selected =
+            select(&measured, fitted, verbose).ok_or_else(|| DescriptionError::Description {
+                path: description.path.clone(),
+                what: "the nominal model gives no finite output on these data".to_owned(),
+            })?;
         Ok(part_report(&measured, fitted, &selected))
     };
     let as_described = part(Selection::Fitted)?;
     let swapped = part(Selection::LeftOut)?;
     let list = |part: &PartReport| -> Vec<String> {
-        part.effects.iter().map(|effect| effect.effect.clone()).collect()
+        part.effects
+            .iter()
+            .map(|effect| effect.effect.clone())
+            .collect()
     };
     let (here, there) = (list(&as_described), list(&swapped));
     // Effects that records of a rig cannot tell apart confirm each other.
@@ -131,14 +135,20 @@ pub fn diagnose(
         })
         .collect();
     let only = here.iter().filter(|name| !in_both(name, &there));
-    let not_confirmed: Vec<String> =
-        only.chain(there.iter().filter(|name| !in_both(name, &here))).cloned().collect();
+    let not_confirmed: Vec<String> = only
+        .chain(there.iter().filter(|name| !in_both(name, &here)))
+        .cloned()
+        .collect();
     let pays = as_described.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
     let rivalled = as_described
         .rivals
         .iter()
         .any(|(rival, against)| named.contains(against) && !alike(against, rival));
-    let verdict = match (here.is_empty() && there.is_empty(), named.is_empty() || !pays, rivalled) {
+    let verdict = match (
+        here.is_empty() && there.is_empty(),
+        named.is_empty() || !pays,
+        rivalled,
+    ) {
         (true, ..) => Verdict::Adequate,
         (_, true, _) => Verdict::Unexplained,
         (_, _, true) => Verdict::Ambiguous,
@@ -160,7 +170,10 @@ pub fn diagnose(
 fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) -> PartReport {
     let tested = fitted.other() as usize;
     let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
-    let origin = Point { nuisance: vec![0.0; measured.nuisance()], effects: Vec::new() };
+    let origin = Point {
+        nuisance: vec![0.0; measured.nuisance()],
+        effects: Vec::new(),
+    };
     let before = squares(&measured.errors(&origin, tested));
     let refitted = measured.errors(&selected.nominal.point, tested);
     let extended = measured.errors(&selected.extended.point, tested);
@@ -203,7 +216,11 @@ fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) 
         parameters: parameters(measured, point, &selected.deviations),
         effects,
         explained: 1.0 - after / before,
-        rivals: selected.rivals.iter().map(|r| (name(r.effect), name(r.against))).collect(),
+        rivals: selected
+            .rivals
+            .iter()
+            .map(|r| (name(r.effect), name(r.against)))
+            .collect(),
         point: point.clone(),
     }
 }
@@ -213,7 +230,13 @@ fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) 
 fn normal(deviate: f64) -> f64 {
     let x = deviate.abs();
     let t = 1.0 / (1.0 + 0.231_641_9 * x);
-    let series = [0.319_381_530, -0.356_563_782, 1.781_477_937, -1.821_255_978, 1.330_274_429];
+    let series = [
+        0.319_381_530,
+        -0.356_563_782,
+        1.781_477_937,
+        -1.821_255_978,
+        1.330_274_429,
+    ];
     let sum = series.iter().rev().fold(0.0, |sum, c| (sum + c) * t);
     let above = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt() * sum;
     if deviate < 0.0 { above } else { 1.0 - above }
@@ -253,10 +276,17 @@ impl Report {
         let rig = description.rig()?;
         let nominal = description.nominal(rig.as_ref())?;
         let measured = Measured::new(rig.as_ref(), measurement, nominal);
-        let origin = Point { nuisance: vec![0.0; measured.nuisance()], effects: Vec::new() };
+        let origin = Point {
+            nuisance: vec![0.0; measured.nuisance()],
+            effects: Vec::new(),
+        };
         let curves = (0..measurement.series.len()).map(|s| {
             let measured_output = measurement.series[s].output.clone();
-            [measured_output, measured.simulate(&origin, s), measured.simulate(&self.as_described.point, s)]
+            [
+                measured_output,
+                measured.simulate(&origin, s),
+                measured.simulate(&self.as_described.point, s),
+            ]
         });
         Ok(curves.collect())
     }

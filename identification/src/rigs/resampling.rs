@@ -9,7 +9,14 @@ const DRAWS: usize = 1000;
 
 /// `||y - m|| / ||m - mean||` over the samples where `keep` holds.
 pub fn normalised_error(simulated: &[f64], measured: &[f64], keep: &[bool]) -> f64 {
-    let kept = || measured.iter().zip(simulated).zip(keep).filter(|(_, keep)| **keep).map(|(p, _)| p);
+    let kept = || {
+        measured
+            .iter()
+            .zip(simulated)
+            .zip(keep)
+            .filter(|(_, keep)| **keep)
+            .map(|(p, _)| p)
+    };
     let count = kept().count().max(1) as f64;
     let mean = kept().map(|(m, _)| m).sum::<f64>() / count;
     let error: f64 = kept().map(|(m, y)| (y - m).powi(2)).sum();
@@ -31,8 +38,11 @@ pub fn correlation_time(residuals: &[f64]) -> f64 {
     while lag < n / 4 {
         // Long lags stand for their neighbours.
         let stride = (lag / 16).max(1);
-        let product: f64 =
-            residuals.iter().zip(&residuals[lag..]).map(|(a, b)| (a - mean) * (b - mean)).sum();
+        let product: f64 = residuals
+            .iter()
+            .zip(&residuals[lag..])
+            .map(|(a, b)| (a - mean) * (b - mean))
+            .sum();
         if product <= 0.05 * power {
             break;
         }
@@ -97,7 +107,10 @@ mod tests {
     fn the_interval_of_a_gain_that_is_known() {
         let mut random = ChaCha8Rng::seed_from_u64(8);
         let after: Vec<f64> = (0..5000).map(|_| random.random_range(-1.0..1.0)).collect();
-        let before: Vec<f64> = after.iter().map(|a| a + random.random_range(-1.0..1.0)).collect();
+        let before: Vec<f64> = after
+            .iter()
+            .map(|a| a + random.random_range(-1.0..1.0))
+            .collect();
         let (low, high) = gain_interval(&before, &after);
         assert!(low < 0.5 && 0.5 < high && high - low < 0.1, "{low} {high}");
     }

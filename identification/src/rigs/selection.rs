@@ -67,11 +67,19 @@ fn model_of(measured: &Measured<'_>, fit: &Fit, record: usize) -> Model {
 
 /// Error that counts as one, such that the cost has as many units as there are independent samples.
 fn scale_of(model: &Model) -> f64 {
-    (model.squares / model.samples).sqrt().max(f64::MIN_POSITIVE)
+    (model.squares / model.samples)
+        .sqrt()
+        .max(f64::MIN_POSITIVE)
 }
 
 /// Fits everything from `start`, the error's scale once taken anew.
-fn settle(measured: &Measured<'_>, start: &Point, scale: f64, record: usize, rounds: usize) -> Option<Model> {
+fn settle(
+    measured: &Measured<'_>,
+    start: &Point,
+    scale: f64,
+    record: usize,
+    rounds: usize,
+) -> Option<Model> {
     let mut point = start.clone();
     let mut scale = scale;
     let mut model = None;
@@ -121,12 +129,16 @@ fn crossed(measured: &Measured<'_>, part: Selection, model: &Model) -> Option<[V
 
 /// Compares two models by their errors from [`crossed`].
 fn compare(before: &[Vec<f64>; 2], after: &[Vec<f64>; 2]) -> Inside {
-    let both = before.iter().zip(after).all(|(b, a)| {
-        b.iter().map(|e| e * e).sum::<f64>() > a.iter().map(|e| e * e).sum::<f64>()
-    });
+    let both = before
+        .iter()
+        .zip(after)
+        .all(|(b, a)| b.iter().map(|e| e * e).sum::<f64>() > a.iter().map(|e| e * e).sum::<f64>());
     let squares = |errors: &[Vec<f64>; 2]| errors.iter().flatten().map(|e| e * e).sum::<f64>();
     let (worse, better) = (squares(before), squares(after));
-    let independent: f64 = after.iter().map(|a| a.len() as f64 / correlation_time(a)).sum();
+    let independent: f64 = after
+        .iter()
+        .map(|a| a.len() as f64 / correlation_time(a))
+        .sum();
     // Twice the logarithm of the likelihood ratio on data that neither model was fitted to.
     let ratio = independent * (worse / better).ln();
     // A small effect all along a record hides behind slow drift there: its own differences tell.
@@ -150,9 +162,8 @@ fn extensions(measured: &Measured<'_>, base: &Model, record: usize) -> Option<Ve
     let jacobian = Jacobian::at(&rig, &start, &[record])?;
     let mut quick: Vec<(usize, Fit)> = Vec::new();
     for (effect, candidate) in rig.candidates().iter().enumerate() {
-        let held = |i: usize| {
-            i == effect || candidate.look_alikes.contains(&rig.candidates()[i].effect)
-        };
+        let held =
+            |i: usize| i == effect || candidate.look_alikes.contains(&rig.candidates()[i].effect);
         if base.point.effects.iter().any(|(i, _)| held(*i)) {
             continue;
         }
@@ -172,7 +183,10 @@ fn extensions(measured: &Measured<'_>, base: &Model, record: usize) -> Option<Ve
     Some(
         finished
             .filter_map(|(effect, quick)| {
-                Some((effect, settle(measured, &quick.point, rig.scale, record, 4)?))
+                Some((
+                    effect,
+                    settle(measured, &quick.point, rig.scale, record, 4)?,
+                ))
             })
             .collect(),
     )
@@ -182,9 +196,17 @@ fn extensions(measured: &Measured<'_>, base: &Model, record: usize) -> Option<Ve
 pub fn select(measured: &Measured<'_>, part: Selection, verbose: bool) -> Option<Selected> {
     let record = part as usize;
     let names = |model: &Model| -> Vec<&str> {
-        model.point.effects.iter().map(|(i, _)| measured.candidates()[*i].effect).collect()
+        model
+            .point
+            .effects
+            .iter()
+            .map(|(i, _)| measured.candidates()[*i].effect)
+            .collect()
     };
-    let origin = Point { nuisance: vec![0.0; measured.nuisance()], effects: Vec::new() };
+    let origin = Point {
+        nuisance: vec![0.0; measured.nuisance()],
+        effects: Vec::new(),
+    };
     let errors = measured.errors(&origin, record);
     let power = errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64;
     let scale = (power * correlation_time(&errors)).sqrt();
@@ -210,16 +232,25 @@ pub fn select(measured: &Measured<'_>, part: Selection, verbose: bool) -> Option
                     100.0 * inside.gain,
                     inside.deviate,
                     if inside.holds() { ", holds" } else { "" },
-                    model.point.effects.last().map(|(i, q)| measured.candidates()[*i].values(q)),
+                    model
+                        .point
+                        .effects
+                        .last()
+                        .map(|(i, q)| measured.candidates()[*i].values(q)),
                 );
             }
         }
         let pays = |model: &Model| model.squares < (1.0 - LEAST_GAIN) * current.squares;
         tried.retain(|(inside, _, model)| inside.holds() && pays(model));
         let mut tried = tried.into_iter();
-        let Some((best, effect, model)) = tried.next() else { break };
+        let Some((best, effect, model)) = tried.next() else {
+            break;
+        };
         let near = tried.filter(|(inside, ..)| inside.gain > RIVAL * best.gain);
-        rivals.extend(near.map(|(_, rival, _)| Rival { effect: rival, against: effect }));
+        rivals.extend(near.map(|(_, rival, _)| Rival {
+            effect: rival,
+            against: effect,
+        }));
         current = model;
     }
     // What no longer pays goes.
@@ -239,7 +270,12 @@ pub fn select(measured: &Measured<'_>, part: Selection, verbose: bool) -> Option
             .filter(|&i| !compared[i].holds());
         match least {
             Some(i) => current = without.swap_remove(i),
-            None => break (compared.iter().map(|inside| inside.deviate).collect(), without),
+            None => {
+                break (
+                    compared.iter().map(|inside| inside.deviate).collect(),
+                    without,
+                );
+            }
         }
     };
     let held = |effect: usize| current.point.effects.iter().any(|(i, _)| *i == effect);
@@ -249,7 +285,16 @@ pub fn select(measured: &Measured<'_>, part: Selection, verbose: bool) -> Option
     let covariance =
         Jacobian::at(&rig, &last, &[record]).and_then(|jacobian| jacobian.covariance(&rig, &last));
     let deviations = covariance.map_or_else(Vec::new, |covariance| {
-        (0..covariance.nrows()).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect()
+        (0..covariance.nrows())
+            .map(|i| covariance[(i, i)].max(0.0).sqrt())
+            .collect()
     });
-    Some(Selected { nominal, extended: current, deviates, without, rivals, deviations })
+    Some(Selected {
+        nominal,
+        extended: current,
+        deviates,
+        without,
+        rivals,
+        deviations,
+    })
 }

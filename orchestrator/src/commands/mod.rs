@@ -6,6 +6,7 @@ mod compare_tables;
 pub mod design;
 mod design_report;
 pub mod diagnose;
+pub mod diagnose_rig;
 pub mod identify;
 pub mod info;
 pub mod run;
