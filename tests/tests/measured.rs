@@ -15,8 +15,11 @@ fn rig(name: &str) -> Option<(Description, Measurement)> {
         .data
         .iter()
         .map(|file| {
-            let inside: PathBuf =
-                file.iter().skip_while(|part| *part != "measured").skip(1).collect();
+            let inside: PathBuf = file
+                .iter()
+                .skip_while(|part| *part != "measured")
+                .skip(1)
+                .collect();
             measured.join(inside)
         })
         .collect();
@@ -48,14 +51,19 @@ fn print(report: &Report) {
 
 fn names(report: &Report, effects: &[&str]) {
     for effect in effects {
-        assert!(report.named.iter().any(|name| name == effect), "{effect}: {:?}", report.named);
+        assert!(
+            report.named.iter().any(|name| name == effect),
+            "{effect}: {:?}",
+            report.named
+        );
     }
 }
 
 fn value(part: &PartReport, effect: &str, parameter: &str) -> f64 {
     let effect = part.effects.iter().find(|e| e.effect == effect);
-    let parameter =
-        effect.and_then(|e| e.parameters.iter().find(|p| p.name == parameter)).map(|p| p.value);
+    let parameter = effect
+        .and_then(|e| e.parameters.iter().find(|p| p.name == parameter))
+        .map(|p| p.value);
     parameter.unwrap_or(f64::NAN)
 }
 
@@ -72,12 +80,29 @@ fn changed(measurement: &Measurement, change: impl Fn(&Series, usize) -> f64) ->
 
 #[test]
 fn the_drive_has_asymmetric_friction() {
-    let Some(report) = report("positioning_drive") else { return };
-    names(&report, &["asymmetric_friction", "speed_dependent_coulomb", "force_ripple"]);
+    let Some(report) = report("positioning_drive") else {
+        return;
+    };
+    names(
+        &report,
+        &[
+            "asymmetric_friction",
+            "speed_dependent_coulomb",
+            "force_ripple",
+        ],
+    );
     assert_eq!(report.verdict, "named");
     assert!(report.as_described.nominal_error > 0.045);
-    assert!(report.as_described.extended_error < 0.03, "{}", report.as_described.extended_error);
-    assert!(report.swapped.extended_error < 0.035, "{}", report.swapped.extended_error);
+    assert!(
+        report.as_described.extended_error < 0.03,
+        "{}",
+        report.as_described.extended_error
+    );
+    assert!(
+        report.swapped.extended_error < 0.035,
+        "{}",
+        report.swapped.extended_error
+    );
     assert!(report.as_described.gain_interval.0 > 0.5);
     // The ripple is that of the screw: a period of 2.5 mm that nobody told.
     let period = value(&report.as_described, "force_ripple", "period");
@@ -86,11 +111,21 @@ fn the_drive_has_asymmetric_friction() {
 
 #[test]
 fn the_press_has_delay_and_unequal_areas() {
-    let Some(report) = report("servohydraulic_press") else { return };
+    let Some(report) = report("servohydraulic_press") else {
+        return;
+    };
     names(&report, &["delay", "asymmetric_gain", "shared_disturbance"]);
     assert_eq!(report.verdict, "named");
-    assert!(report.as_described.extended_error < 0.034, "{}", report.as_described.extended_error);
-    assert!(report.swapped.extended_error < 0.034, "{}", report.swapped.extended_error);
+    assert!(
+        report.as_described.extended_error < 0.034,
+        "{}",
+        report.as_described.extended_error
+    );
+    assert!(
+        report.swapped.extended_error < 0.034,
+        "{}",
+        report.swapped.extended_error
+    );
     let a = value(&report.as_described, "asymmetric_gain", "asymmetry");
     let b = value(&report.swapped, "asymmetric_gain", "asymmetry");
     assert!((a - b).abs() < 0.005, "{a} {b}");
@@ -98,26 +133,46 @@ fn the_press_has_delay_and_unequal_areas() {
 
 #[test]
 fn the_damper_has_asymmetric_friction_and_free_play() {
-    let Some(three) = report("friction_damper") else { return };
+    let Some(three) = report("friction_damper") else {
+        return;
+    };
     names(&three, &["asymmetric_coulomb_friction", "free_play"]);
-    assert!(three.as_described.extended_error < 0.125, "{}", three.as_described.extended_error);
-    let Some(two) = report("friction_damper_one_inch") else { return };
+    assert!(
+        three.as_described.extended_error < 0.125,
+        "{}",
+        three.as_described.extended_error
+    );
+    let Some(two) = report("friction_damper_one_inch") else {
+        return;
+    };
     names(&two, &["asymmetric_coulomb_friction", "free_play"]);
-    assert!(two.as_described.extended_error < 0.12, "{}", two.as_described.extended_error);
+    assert!(
+        two.as_described.extended_error < 0.12,
+        "{}",
+        two.as_described.extended_error
+    );
 }
 
 #[test]
 fn the_coupon_is_not_the_same_in_both_halves_and_the_report_says_so() {
-    let Some(report) = report("steel_coupon") else { return };
+    let Some(report) = report("steel_coupon") else {
+        return;
+    };
     assert!(!report.not_confirmed.is_empty());
     assert_ne!(report.verdict, "named");
     assert!(report.as_described.extended_error < report.as_described.refitted_error);
-    assert!(report.as_described.fitted_error < 0.06, "{}", report.as_described.fitted_error);
+    assert!(
+        report.as_described.fitted_error < 0.06,
+        "{}",
+        report.as_described.fitted_error
+    );
 }
 
 #[test]
 fn four_more_milliseconds_of_delay_are_found_on_the_press() {
-    let Some((description, measurement)) = rig("servohydraulic_press") else { return };
+    let Some((description, measurement)) = rig("servohydraulic_press") else {
+        return;
+    };
     let before = diagnose(&description, &measurement, false).unwrap();
     let late = changed(&measurement, |series, k| series.output[k.saturating_sub(4)]);
     let after = diagnose(&description, &late, false).unwrap();
@@ -125,7 +180,11 @@ fn four_more_milliseconds_of_delay_are_found_on_the_press() {
     names(&after, &["delay", "asymmetric_gain"]);
     // The nominal lag of the command shares what it can with the delay.
     let time = |report: &Report| {
-        let lag = report.as_described.parameters.iter().find(|p| p.name == "command_lag");
+        let lag = report
+            .as_described
+            .parameters
+            .iter()
+            .find(|p| p.name == "command_lag");
         value(&report.as_described, "delay", "delay") + lag.map_or(f64::NAN, |lag| lag.value)
     };
     let more = time(&after) - time(&before);
@@ -134,8 +193,12 @@ fn four_more_milliseconds_of_delay_are_found_on_the_press() {
 
 #[test]
 fn a_bent_transducer_is_found_on_the_press() {
-    let Some((description, measurement)) = rig("servohydraulic_press") else { return };
-    let bent = changed(&measurement, |s, k| s.output[k] * (1.0 + 40.0 * s.output[k]));
+    let Some((description, measurement)) = rig("servohydraulic_press") else {
+        return;
+    };
+    let bent = changed(&measurement, |s, k| {
+        s.output[k] * (1.0 + 40.0 * s.output[k])
+    });
     let after = diagnose(&description, &bent, false).unwrap();
     print(&after);
     names(&after, &["delay", "asymmetric_gain", "sensor_curvature"]);
@@ -145,19 +208,26 @@ fn a_bent_transducer_is_found_on_the_press() {
 
 #[test]
 fn viscous_friction_put_on_the_damper_is_found() {
-    let Some((description, measurement)) = rig("friction_damper_one_inch") else { return };
+    let Some((description, measurement)) = rig("friction_damper_one_inch") else {
+        return;
+    };
     let thick = changed(&measurement, |s, k| s.output[k] + 4e4 * s.inputs[1][k]);
     let after = diagnose(&description, &thick, false).unwrap();
     print(&after);
     names(&after, &["asymmetric_coulomb_friction", "free_play"]);
     let damping = value(&after.as_described, "viscous", "damping");
     let rate = value(&after.as_described, "rate_dependence", "slope");
-    assert!((2.5e4..5.5e4).contains(&damping), "viscous {damping}, rate {rate}");
+    assert!(
+        (2.5e4..5.5e4).contains(&damping),
+        "viscous {damping}, rate {rate}"
+    );
 }
 
 #[test]
 fn a_delay_put_on_the_damper_is_found() {
-    let Some((description, measurement)) = rig("friction_damper_one_inch") else { return };
+    let Some((description, measurement)) = rig("friction_damper_one_inch") else {
+        return;
+    };
     let late = changed(&measurement, |s, k| s.output[k.saturating_sub(31)]);
     let after = diagnose(&description, &late, false).unwrap();
     print(&after);
