@@ -52,8 +52,8 @@ pub fn correlation_time(residuals: &[f64]) -> f64 {
     1.0 + 2.0 * sum
 }
 
-/// 95 % interval of `1 - (sum of after²) / (sum of before²)` by moving-block bootstrap (Künsch,
-/// Annals of Statistics 17, 1989); the blocks are ten correlation times long.
+/// 95 % interval of `1 - (sum of after²) / (sum of before²)` by circular block bootstrap (Politis
+/// and Romano 1992); the blocks are ten correlation times long.
 pub fn gain_interval(before: &[f64], after: &[f64]) -> (f64, f64) {
     let n = before.len().min(after.len());
     if n < 16 {
@@ -62,7 +62,8 @@ pub fn gain_interval(before: &[f64], after: &[f64]) -> (f64, f64) {
     let block = ((10.0 * correlation_time(after)) as usize).clamp(1, n / 8);
     let sums = |values: &[f64]| {
         let mut total = vec![0.0];
-        for value in &values[..n] {
+        // Round the end to the begin, so that every sample is drawn as often.
+        for value in values[..n].iter().chain(&values[..block]) {
             total.push(total[total.len() - 1] + value * value);
         }
         total
@@ -73,7 +74,7 @@ pub fn gain_interval(before: &[f64], after: &[f64]) -> (f64, f64) {
         .map(|_| {
             let (mut a, mut b) = (0.0, 0.0);
             for _ in 0..n.div_ceil(block) {
-                let start = random.random_range(0..=n - block);
+                let start = random.random_range(0..n);
                 b += before[start + block] - before[start];
                 a += after[start + block] - after[start];
             }
