@@ -1,5 +1,9 @@
 //! Broken records are answered by name, never with a cause.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::f64::consts::TAU;
+
 use identification::case::{Case, CaseError, Nominal, Record};
 use identification::diagnosis::Verdict;
 use identification::diagnosis::experiment::play;
@@ -51,13 +55,13 @@ const SAMPLES: usize = 3000;
 fn record(name: &str, nominal: &Nominal, rig: &IdentifiedRig, seed: u64) -> Record {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let period = 1.0 / nominal.sample_rate;
-    let phases: Vec<f64> = (0..12).map(|_| 6.28 * random.random::<f64>()).collect();
+    let phases: Vec<f64> = (0..12).map(|_| TAU * random.random::<f64>()).collect();
     let reference: Vec<f64> = (0..SAMPLES)
         .map(|k| {
             let t = k as f64 * period;
             let waves = phases.iter().enumerate().map(|(i, phase)| {
                 let f = 0.3 * 1.4f64.powi(i as i32);
-                (6.2832 * f * t + phase).sin() / (1.0 + f * f)
+                (TAU * f * t + phase).sin() / (1.0 + f * f)
             });
             0.004 * (t / 0.5).min(1.0) * waves.sum::<f64>()
         })

@@ -69,6 +69,15 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
         Some(out.iter().map(|z| Complex::new(z.re, z.im)).collect())
     };
     let [x, a, f, specimen_acceleration] = record.channels.each_ref().map(|c| spectrum(c));
+    // Differences are taken before the window, which would leak low frequencies into them.
+    let difference = |at: &dyn Fn(&[f64], usize) -> f64| {
+        let x = &record.channels[0];
+        let inner = |k: usize| k.clamp(1, n.saturating_sub(2).max(1));
+        let values: Vec<f64> = (0..n).map(|k| at(x, inner(k))).collect();
+        spectrum(if x.len() == n && n > 2 { &values } else { &[] })
+    };
+    let velocity = difference(&|x, k| (x[k + 1] - x[k - 1]) / (2.0 * period));
+    let second = difference(&|x, k| (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (period * period));
     let u = spectrum(&record.valve_command);
     let bin = nominal.sample_rate / n as f64;
     let bins = ((BAND.0 / bin) as usize).max(1)..((BAND.1 / bin) as usize).min(n / 2);
@@ -76,6 +85,10 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
     let table = nominal.shake_table.table;
     let mass = nominal.specimen.map_or(0.0, |specimen| specimen.mass);
     let omega = |k: usize| std::f64::consts::TAU * bin * k as f64;
+
+    // What differences make of a derivative.
+    let of_velocity = |s: Complex<f64>| (s * period).sinh() / period;
+    let of_second = |s: Complex<f64>| ((s * period).cosh() - 1.0) * 2.0 / (period * period);
 
     // Mean over the band of |error|² over its variance.
     let ratio = |error: &dyn Fn(usize, Complex<f64>) -> (Complex<f64>, f64)| {
@@ -99,7 +112,7 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
         (whole > 0.0).then(|| (wrong / whole).sqrt())
     };
     let mut all = Vec::new();
-    if let (Some(u), Some(x), Some(f)) = (&u, &x, &f) {
+    if let (Some(u), Some(velocity), Some(f)) = (&u, &velocity, &f) {
         let (g1, g2) = (
             nominal.shake_table.actuator.g1(),
             nominal.shake_table.actuator.g2(),
@@ -110,17 +123,21 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
                 // The command is held over a sample.
                 let held = (1.0 - (-s * period).exp()) / (s * period);
                 let of_x = g2.evaluate(s) * s;
-                let error = f[k] - g1.evaluate(s) * held * u[k] - of_x * x[k];
+                let moved = g2.evaluate(s) * s / of_velocity(s) * velocity[k];
+                let error = f[k] - g1.evaluate(s) * held * u[k] - moved;
                 let of_u = (g1.evaluate(s) * nominal.command_noise).norm_sqr();
                 (error, sf * sf + of_x.norm_sqr() * sx * sx + of_u)
             }),
             relative: None,
         });
     }
-    if let (Some(x), Some(a), Some(f), Some(specimen)) = (&x, &a, &f, &specimen_acceleration) {
+    if let (Some(x), Some(v), Some(a), Some(f), Some(specimen)) =
+        (&x, &velocity, &a, &f, &specimen_acceleration)
+    {
         let error = |k: usize, s: Complex<f64>| {
             let of_x = s * table.damping + table.stiffness;
-            let error = f[k] - specimen[k] * mass - a[k] * table.mass - of_x * x[k];
+            let wall = v[k] * table.damping + x[k] * table.stiffness;
+            let error = f[k] - specimen[k] * mass - a[k] * table.mass - wall;
             let inertia = (table.mass * sa).powi(2) + (mass * ss).powi(2);
             (error, sf * sf + inertia + of_x.norm_sqr() * sx * sx)
         };
@@ -151,10 +168,10 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
             relative: None,
         });
     }
-    if let (Some(x), Some(a)) = (&x, &a) {
+    if let (Some(second), Some(a)) = (&second, &a) {
         let error = |k: usize, s: Complex<f64>| {
             let variance = sa * sa + (s * s).norm_sqr() * sx * sx;
-            (a[k] - s * s * x[k], variance)
+            (a[k] - s * s / of_second(s) * second[k], variance)
         };
         all.push(Relation {
             name: KINEMATICS,

@@ -157,7 +157,13 @@ impl<M: RigModel> Search<'_, M> {
         let track = &self.records[..1];
         let mut jacobians = Vec::new();
         let mut runners = Vec::new();
-        for base in parents {
+        for parent in parents {
+            // What a missing effect bent the nuisance by would mislead: begin at the nominal
+            // values.
+            let base = &Point {
+                nuisance: vec![0.0; self.model.nuisance()],
+                effects: parent.effects.clone(),
+            };
             let jacobian = evaluate(self.model, base, track)
                 .and_then(|fit| Jacobian::at(self.model, &fit, track));
             let Some(jacobian) = jacobian else { continue };
@@ -172,7 +178,7 @@ impl<M: RigModel> Search<'_, M> {
                     continue;
                 }
                 for start in &candidate.starts {
-                    let mut point = (*base).clone();
+                    let mut point = base.clone();
                     point.effects.push((effect, candidate.internal(start)));
                     if let Some(fit) = fit(self.model, &point, track, &jacobian, 1) {
                         runners.push(Runner {
