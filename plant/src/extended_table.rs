@@ -92,7 +92,17 @@ impl ExtendedTable {
     /// Refuses effects that cannot be simulated on a table of `mass` (kg).
     pub fn validate(effects: &Effects, mass: f64) -> Result<(), ModelError> {
         effects.validate()?;
-        ModelError::require_positive("mass of table and added_mass", mass + effects.table.added_mass)
+        if effects.hydraulics.droop_form == 0.0 {
+            return Err(ModelError::Parameter {
+                name: "droop_form",
+                value: 0.0,
+                expected: "a number other than zero",
+            });
+        }
+        ModelError::require_positive(
+            "mass of table and added_mass",
+            mass + effects.table.added_mass,
+        )
     }
 
     /// True when one of `effects` acts on the table.

@@ -180,15 +180,19 @@ pub struct SampledRig {
 /// The states of the table in those of the rig.
 #[inline]
 fn of_table(s: &[f64; STATES]) -> [f64; extended_table::STATES] {
-    [
-        s[0], s[1], s[2], s[3], s[4], s[7], s[8], s[9], s[10], s[11],
-    ]
+    [s[0], s[1], s[2], s[3], s[4], s[7], s[8], s[9], s[10], s[11]]
 }
 
 /// The states of the specimen in those of the rig.
 #[inline]
 fn of_specimen(s: &[f64; STATES]) -> [f64; extended_specimen::STATES] {
-    [s[5], s[6], s[SECOND_MODE], s[SECOND_MODE + 1], s[HYSTERETIC]]
+    [
+        s[5],
+        s[6],
+        s[SECOND_MODE],
+        s[SECOND_MODE + 1],
+        s[HYSTERETIC],
+    ]
 }
 
 impl SampledRig {
@@ -222,9 +226,8 @@ impl SampledRig {
     #[inline]
     fn runge_kutta(&self, state: &mut IdentifiedRigState, command: f64, h: f64) {
         let peak = state.peak_drift;
-        state.continuous = runge_kutta_4(&state.continuous, h, |s| {
-            self.derivative(s, command, peak)
-        });
+        state.continuous =
+            runge_kutta_4(&state.continuous, h, |s| self.derivative(s, command, peak));
         state.peak_drift = peak.max(state.continuous[5].abs());
     }
 

@@ -47,9 +47,14 @@ impl HydraulicEffects {
 
     /// True when supply and oil are not ideal.
     pub fn is_active(&self) -> bool {
-        [self.stall_force, self.droop_loss, self.leakage, self.compliance]
-            .into_iter()
-            .any(|size| size != 0.0)
+        [
+            self.stall_force,
+            self.droop_loss,
+            self.leakage,
+            self.compliance,
+        ]
+        .into_iter()
+        .any(|size| size != 0.0)
     }
 
     /// What is left of the flow `u` (V) under `force` (N) and mean demand (V).

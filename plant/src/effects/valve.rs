@@ -32,11 +32,7 @@ pub struct ValveEffects {
 pub const MAX_DELAY_SAMPLES: usize = 30;
 
 /// Refuses a delay (s) of more than [`MAX_DELAY_SAMPLES`] sampling periods (s).
-pub(crate) fn require_delay(
-    name: &'static str,
-    delay: f64,
-    period: f64,
-) -> Result<(), ModelError> {
+pub(crate) fn require_delay(name: &'static str, delay: f64, period: f64) -> Result<(), ModelError> {
     if delay <= MAX_DELAY_SAMPLES as f64 * period {
         return Ok(());
     }
