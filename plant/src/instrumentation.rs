@@ -4,6 +4,7 @@
 //! told. All effects are off by default; [`Instrumentation::laboratory`] is a plausible set.
 
 use crate::ModelError;
+use crate::effects::SensorEffects;
 use crate::linear::discrete_riccati;
 use crate::sensor::{Channel, ChannelState, Noise};
 use crate::units::{G, INCH, LBF, STROKE};
@@ -162,6 +163,22 @@ impl Instrumentation {
             seed,
             ..Self::default()
         }
+    }
+
+    /// Turns the catalogue's effects on the sensors on.
+    pub fn with_effects(mut self, effects: &SensorEffects) -> Self {
+        self.displacement.scale_error = effects.displacement_scale;
+        self.displacement.corner = effects.displacement_lag;
+        self.acceleration.bias = effects.accelerometer_bias;
+        self.acceleration.scale_error = effects.accelerometer_scale;
+        self.acceleration.delay = effects.accelerometer_delay;
+        self.acceleration.hum_amplitude = effects.hum_amplitude;
+        self.acceleration.hum_frequency = effects.hum_frequency;
+        self.acceleration.hum_phase = effects.hum_phase;
+        self.accelerometer_tilt = effects.accelerometer_tilt;
+        self.actuator_force.scale_error = effects.load_cell_scale;
+        self.actuator_force.bias = effects.load_cell_bias;
+        self
     }
 
     /// The four channels in the order of [`CHANNELS`].

@@ -84,6 +84,32 @@ pub fn inner_step<const N: usize>(model: &impl Dynamics<N>, x: &[f64; N], step: 
     combine(x, &stages(model, x, step), &WEIGHTS)
 }
 
+/// The state `step` seconds later by the classical Runge-Kutta method of fourth order, for
+/// equations without stiff ones among them.
+#[inline]
+pub fn runge_kutta_4<const N: usize>(
+    x: &[f64; N],
+    step: f64,
+    derivatives: impl Fn(&[f64; N]) -> [f64; N],
+) -> [f64; N] {
+    let along = |k: &[f64; N], h: f64| {
+        let mut to = *x;
+        for i in 0..N {
+            to[i] += h * k[i];
+        }
+        to
+    };
+    let k1 = derivatives(x);
+    let k2 = derivatives(&along(&k1, 0.5 * step));
+    let k3 = derivatives(&along(&k2, 0.5 * step));
+    let k4 = derivatives(&along(&k3, step));
+    let mut next = *x;
+    for i in 0..N {
+        next[i] += step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+    }
+    next
+}
+
 /// The number of equal inner steps, none longer than `longest`, that make up `duration` seconds.
 pub fn inner_steps(duration: f64, longest: f64) -> u32 {
     // The tolerance keeps a duration of exactly n steps from being cut into n + 1.

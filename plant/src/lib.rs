@@ -6,6 +6,8 @@
 pub mod actuator;
 pub mod effects;
 pub mod error;
+pub mod extended_specimen;
+pub mod extended_table;
 pub mod hysteresis;
 pub mod identified_rig;
 pub mod instrumentation;

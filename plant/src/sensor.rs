@@ -6,7 +6,7 @@ use crate::ModelError;
 
 /// What a channel does to a signal, in this order: lag, delay, scale and offset, mains and noise,
 /// range, resolution. Zero switches each of them off.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Channel {
     /// Corner of the sensor's first-order lag, Hz.
     pub corner: f64,
@@ -20,12 +20,31 @@ pub struct Channel {
     pub hum_amplitude: f64,
     /// Frequency of the mains, Hz.
     pub hum_frequency: f64,
+    /// Phase of the mains at time zero, rad.
+    pub hum_phase: f64,
     /// White noise, one standard deviation, in the channel's unit.
     pub noise: f64,
     /// Largest magnitude that is read, in the channel's unit.
     pub range: f64,
     /// Step of the converter, in the channel's unit.
     pub resolution: f64,
+}
+
+impl Default for Channel {
+    fn default() -> Self {
+        Self {
+            corner: 0.0,
+            delay: 0.0,
+            scale_error: 0.0,
+            bias: 0.0,
+            hum_amplitude: 0.0,
+            hum_frequency: 60.0,
+            hum_phase: 0.0,
+            noise: 0.0,
+            range: 0.0,
+            resolution: 0.0,
+        }
+    }
 }
 
 /// Samples that a channel can be late, less one.
@@ -124,6 +143,7 @@ impl Channel {
         ModelError::require_finite("scale_error", self.scale_error)?;
         ModelError::require_finite("bias", self.bias)?;
         ModelError::require_finite("hum_amplitude", self.hum_amplitude)?;
+        ModelError::require_finite("hum_phase", self.hum_phase)?;
         if (self.delay + common) / period <= (LENGTH - 2) as f64 {
             return Ok(());
         }
@@ -151,7 +171,7 @@ impl Channel {
         y = state.delayed(y, (self.delay + delay) / period);
         y += self.scale_error * y + self.bias;
         if self.hum_amplitude != 0.0 {
-            y += self.hum_amplitude * (TAU * self.hum_frequency * time).sin();
+            y += self.hum_amplitude * (TAU * self.hum_frequency * time + self.hum_phase).sin();
         }
         if self.noise > 0.0 {
             y += self.noise * noise.gaussian();

@@ -48,6 +48,15 @@ pub trait Component: Clone + Default + Serialize + DeserializeOwned + Send + 'st
     /// Names the parameter that is at fault and what was expected.
     fn initialize(&mut self) -> ComponentResult;
 
+    /// Refuses model exchange with the present parameters, where the continuous states do not tell
+    /// everything; called after [`initialize`](Self::initialize) of a model-exchange instance.
+    ///
+    /// # Errors
+    /// Names what model exchange lacks.
+    fn allow_model_exchange(&self) -> ComponentResult {
+        Ok(())
+    }
+
     /// Computes outputs (and derivatives of states) from states, inputs and `time` [s].
     fn update_outputs(&mut self, time: f64) {
         let _ = time;

@@ -134,7 +134,10 @@ impl<C: Component> Instance<C> {
     #[cold]
     fn prepare(&mut self) -> Outcome {
         if self.now.phase == Phase::Initialization {
-            let outcome = self.now.component.initialize();
+            let mut outcome = self.now.component.initialize();
+            if self.now.kind == Kind::ModelExchange {
+                outcome = outcome.and_then(|()| self.now.component.allow_model_exchange());
+            }
             outcome.map_err(|e| Fault::error(format!("cannot initialize: {e}")))?;
         }
         self.now.unprepared = false;

@@ -1,21 +1,62 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! Linear specimen on the table as an FMU.
 
-use fmu_kit::{Component, ComponentResult, Dependency::Constant, Dependency::Fixed, Variable};
-use plant::specimen::{LinearSpecimen, SampledSpecimen, SpecimenState};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use plant::effects::SpecimenEffects;
+use plant::extended_specimen::{ExtendedSpecimen, ExtendedSpecimenState};
+use plant::specimen::{LinearSpecimen, SampledSpecimen};
 use serde::{Deserialize, Serialize};
 
 /// The linear specimen between the table's acceleration and its force on the table.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Specimen {
     specimen: LinearSpecimen,
-    state: SpecimenState,
+    effects: SpecimenEffects,
+    /// 1 when nothing stands on the table.
+    absent: f64,
+    state: ExtendedSpecimenState,
     table_acceleration: f64,
     force: f64,
     acceleration: f64,
     drift_acceleration: f64,
     #[serde(skip)]
     sampled: Option<SampledSpecimen>,
+    #[serde(skip)]
+    extended: Option<ExtendedSpecimen>,
+}
+
+impl Specimen {
+    /// The specimen with its effects, where one of them is on.
+    fn extended(&mut self) -> Option<ExtendedSpecimen> {
+        if !self.effects.is_active() {
+            return None;
+        }
+        if self.extended.is_none() {
+            self.extended = Some(ExtendedSpecimen::new(Some(self.specimen), &self.effects));
+        }
+        self.extended
+    }
+
+    /// The derivative of `unknown` by `known` in central differences.
+    fn slope(&self, unknown: &str, known: &str) -> f64 {
+        const AMOUNT: f64 = 1e-6;
+        let mut sides = [0.0; 2];
+        for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
+            let mut moved = self.clone();
+            *match known {
+                "drift" => &mut moved.state.specimen.drift,
+                "drift_velocity" => &mut moved.state.specimen.drift_velocity,
+                _ => &mut moved.table_acceleration,
+            } += sign * AMOUNT;
+            moved.update_outputs(0.0);
+            *side = match unknown {
+                "force" => moved.force,
+                "acceleration" => moved.acceleration,
+                _ => moved.drift_acceleration,
+            };
+        }
+        (sides[1] - sides[0]) / (2.0 * AMOUNT)
+    }
 }
 
 impl Component for Specimen {
@@ -29,45 +70,93 @@ impl Component for Specimen {
             input("table_acceleration", s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g")
                 .nominal(10.0);
             output("force", s.force, "Force on the table", "N" => "lbf")
-                .nominal(400.0).depends_on(&["drift", "drift_velocity"], Fixed);
+                .nominal(400.0).depends_on(&["drift", "drift_velocity"], Dependent);
             output("acceleration", s.acceleration, "Absolute acceleration of the mass", "m/s2" => "g")
-                .nominal(10.0).depends_on(&["drift", "drift_velocity"], Fixed);
-            output("drift", s.state.drift, "Displacement relative to the table", "m" => "in").nominal(0.05);
-            output("drift_velocity", s.state.drift_velocity, "Velocity relative to the table", "m/s" => "in/s")
+                .nominal(10.0).depends_on(&["drift", "drift_velocity"], Dependent);
+            output("drift", s.state.specimen.drift, "Displacement relative to the table", "m" => "in").nominal(0.05);
+            output("drift_velocity", s.state.specimen.drift_velocity, "Velocity relative to the table", "m/s" => "in/s")
                 .nominal(0.3).derivative_of("drift");
             parameter("mass", s.specimen.mass, "Mass of the storey", "kg" => "lbf.s2/in");
             parameter("damping", s.specimen.damping, "Viscous damping of the storey", "N.s/m" => "lbf.s/in");
             parameter("stiffness", s.specimen.stiffness, "Stiffness of the storey", "N/m" => "lbf/in");
+            parameter("specimen_yielding.yield_displacement", s.effects.yield_displacement, "Yield displacement of a Bouc-Wen spring; 0 is elastic", "m" => "in").min(0.0);
+            parameter("specimen_yielding.post_yield_ratio", s.effects.yield_post_ratio, "Stiffness after yielding over elastic stiffness", "1");
+            parameter("specimen_yielding.exponent", s.effects.yield_exponent, "Sharpness of yielding", "1").min(0.1);
+            parameter("specimen_stiffness.relative_change", s.effects.stiffness_change, "Relative change of the stiffness; 0 is off", "1");
+            parameter("specimen_damping.relative_change", s.effects.damping_change, "Relative change of the damping; 0 is off", "1");
+            parameter("specimen_second_mode.frequency", s.effects.second_mode_frequency, "Frequency of a part of the mass on its own spring; 0 is off", "Hz").min(0.0);
+            parameter("specimen_second_mode.mass_share", s.effects.second_mode_mass_share, "Share of the mass in it", "1").min(1e-3).max(0.95);
+            parameter("specimen_second_mode.damping_ratio", s.effects.second_mode_damping_ratio, "Damping ratio of it", "1").min(0.0);
+            parameter("specimen_degradation.loss", s.effects.degradation_loss, "Share of the stiffness lost with the largest drift so far; 0 is off", "1").max(1.0);
+            parameter("specimen_degradation.degradation_drift", s.effects.degradation_drift, "Drift at which 1 - 1/e of it is lost", "m" => "in").min(1e-6);
+            parameter("specimen_uplift.uplift_displacement", s.effects.uplift_displacement, "Drift beyond which the spring is softer, without a loop; 0 is off", "m" => "in").min(0.0);
+            parameter("specimen_uplift.post_uplift_ratio", s.effects.uplift_post_ratio, "Stiffness beyond it over stiffness below", "1");
+            parameter("specimen_absent.absent", s.absent, "1: nothing stands on the table; 0 is off", "1").min(0.0).max(1.0);
             local("der(drift_velocity)", s.drift_acceleration, "Acceleration relative to the table", "m/s2" => "g")
                 .derivative_of("drift_velocity")
-                .depends_on(&["table_acceleration"], Constant)
-                .depends_on(&["drift", "drift_velocity"], Fixed)
-                .initially_depends_on(&["table_acceleration"]);
+                .depends_on(&["table_acceleration"], Dependent)
+                .depends_on(&["drift", "drift_velocity"], Dependent)
+                .initially_depends_on(&["table_acceleration", "specimen_absent.absent"]);
         }
     }
 
     fn initialize(&mut self) -> ComponentResult {
         self.specimen.validate()?;
-        self.state = SpecimenState::default();
+        ExtendedSpecimen::validate(&self.effects)?;
+        if self.absent != 0.0 && self.absent != 1.0 {
+            let absent = self.absent;
+            return Err(format!("specimen_absent.absent = {absent}, expected 0 or 1").into());
+        }
+        self.effects.absent = self.absent == 1.0;
+        self.state = ExtendedSpecimenState::default();
         self.sampled = Some(self.specimen.sample(Self::STEP_SIZE));
+        self.extended = None;
+        Ok(())
+    }
+
+    fn allow_model_exchange(&self) -> ComponentResult {
+        if self.effects.is_active() {
+            return Err(
+                "an effect is on (such as specimen_yielding): its memory and its inner \
+                        steps need co-simulation"
+                    .into(),
+            );
+        }
         Ok(())
     }
 
     fn update_outputs(&mut self, _time: f64) {
-        self.force = self.specimen.force(&self.state);
-        self.acceleration = self.specimen.acceleration(&self.state);
+        if let Some(extended) = self.extended() {
+            let at = self.table_acceleration;
+            (self.force, self.acceleration) = extended.outputs(&self.state, at);
+            self.drift_acceleration = if extended.is_present() {
+                self.acceleration - at
+            } else {
+                0.0
+            };
+            return;
+        }
+        self.force = self.specimen.force(&self.state.specimen);
+        self.acceleration = self.specimen.acceleration(&self.state.specimen);
         self.drift_acceleration = self.acceleration - self.table_acceleration;
     }
 
     fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        if let Some(extended) = self.extended() {
+            extended.advance(&mut self.state, self.table_acceleration, step_size);
+            return Ok(());
+        }
         let kept = self.sampled.filter(|sampled| sampled.step() == step_size);
         let sampled = kept.unwrap_or_else(|| self.specimen.sample(step_size));
         self.sampled = Some(sampled);
-        self.state = sampled.advance(&self.state, self.table_acceleration);
+        self.state.specimen = sampled.advance(&self.state.specimen, self.table_acceleration);
         Ok(())
     }
 
     fn partial_derivative(&self, unknown: &str, known: &str) -> f64 {
+        if self.effects.is_active() {
+            return self.slope(unknown, known);
+        }
         let force = match known {
             "drift" => self.specimen.stiffness,
             "drift_velocity" => self.specimen.damping,
@@ -111,5 +200,27 @@ mod tests {
         assert_eq!(component.force, 22.0);
         assert_eq!(component.acceleration, -22.0);
         assert_eq!(component.drift_acceleration, -28.0);
+    }
+
+    #[test]
+    fn an_effect_moves_the_component_as_the_plant() {
+        let mut component = Specimen::default();
+        component.effects.yield_displacement = 0.01;
+        component.effects.degradation_loss = 0.2;
+        component.initialize().unwrap();
+        let plant = ExtendedSpecimen::new(Some(component.specimen), &component.effects);
+        let mut state = ExtendedSpecimenState::default();
+        for k in 0..1000 {
+            component.table_acceleration = (0.0126 * f64::from(k)).sin();
+            component.step(0.0, 0.002).unwrap();
+            plant.advance(&mut state, component.table_acceleration, 0.002);
+        }
+        assert_eq!(component.state, state);
+        assert!(state.peak_drift > 0.02, "{}", state.peak_drift);
+        let refused = component.allow_model_exchange().unwrap_err().to_string();
+        assert!(refused.contains("co-simulation"), "{refused}");
+        component.absent = 0.5;
+        let refused = component.initialize().unwrap_err().to_string();
+        assert!(refused.contains("specimen_absent.absent"), "{refused}");
     }
 }

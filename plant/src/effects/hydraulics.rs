@@ -45,6 +45,18 @@ impl HydraulicEffects {
         ModelError::require_finite("compliance", self.compliance)
     }
 
+    /// True when supply and oil are not ideal.
+    pub fn is_active(&self) -> bool {
+        [
+            self.stall_force,
+            self.droop_loss,
+            self.leakage,
+            self.compliance,
+        ]
+        .into_iter()
+        .any(|size| size != 0.0)
+    }
+
     /// What is left of the flow `u` (V) under `force` (N) and mean demand (V).
     #[inline]
     pub fn available_flow(&self, mut u: f64, force: f64, demand: f64) -> f64 {

@@ -79,6 +79,21 @@ impl SpecimenEffects {
         ModelError::require_finite("uplift_post_ratio", self.uplift_post_ratio)
     }
 
+    /// True when the specimen is not the linear one.
+    pub fn is_active(&self) -> bool {
+        self.absent
+            || [
+                self.yield_displacement,
+                self.stiffness_change,
+                self.damping_change,
+                self.second_mode_frequency,
+                self.degradation_loss,
+                self.uplift_displacement,
+            ]
+            .into_iter()
+            .any(|size| size != 0.0)
+    }
+
     /// Deformation that the spring of stiffness `k` answers to (its force over `k`), from drift,
     /// the hysteretic deformation `z` and the largest drift so far, all m.
     #[inline]

@@ -15,6 +15,13 @@ pub struct TableEffects {
 }
 
 impl TableEffects {
+    /// True when the table is not that of the model.
+    pub fn is_active(&self) -> bool {
+        [self.added_mass, self.viscous_damping, self.cubic_stiffness]
+            .into_iter()
+            .any(|size| size != 0.0)
+    }
+
     /// Refuses values that are not finite.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_finite("added_mass", self.added_mass)?;

@@ -31,6 +31,64 @@ pub struct ValveEffects {
 /// Steps that a delayed command or channel can be late.
 pub const MAX_DELAY_SAMPLES: usize = 30;
 
+/// Refuses a delay (s) of more than [`MAX_DELAY_SAMPLES`] sampling periods (s).
+pub(crate) fn require_delay(name: &'static str, delay: f64, period: f64) -> Result<(), ModelError> {
+    if delay <= MAX_DELAY_SAMPLES as f64 * period {
+        return Ok(());
+    }
+    Err(ModelError::Parameter {
+        name,
+        value: delay,
+        expected: "at most thirty sampling periods",
+    })
+}
+
+/// Length of the memory of a delay.
+pub(crate) const RING: usize = MAX_DELAY_SAMPLES + 2;
+
+/// What lies between the command and the spool's drive: delay and play.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct CommandPath {
+    /// Spool behind its play, V.
+    pub play: f64,
+    /// Past commands, V, a ring.
+    commands: [f64; RING],
+    at: usize,
+}
+
+impl Default for CommandPath {
+    fn default() -> Self {
+        Self {
+            play: 0.0,
+            commands: [0.0; RING],
+            at: 0,
+        }
+    }
+}
+
+impl CommandPath {
+    /// Takes the `command` (V) held over the next `period` (s) and gives what drives the spool:
+    /// two pieces of voltage (V) and duration (s); the first has no duration unless the delay
+    /// falls between samples.
+    #[inline]
+    pub fn advance(&mut self, valve: &ValveEffects, command: f64, period: f64) -> [(f64, f64); 2] {
+        self.at = if self.at + 1 == RING { 0 } else { self.at + 1 };
+        self.commands[self.at] = command;
+        if valve.command_delay == 0.0 {
+            self.play = valve.play(self.play, command);
+            return [(self.play, 0.0), (self.play, period)];
+        }
+        let samples = valve.command_delay / period;
+        let whole = (samples as usize).min(MAX_DELAY_SAMPLES);
+        let split = (samples - whole as f64) * period;
+        let behind = |n: usize| self.commands[(self.at + RING - n) % RING];
+        let (earlier, later) = (behind(whole + 1), behind(whole));
+        let first = valve.play(self.play, earlier);
+        self.play = valve.play(first, later);
+        [(first, split), (self.play, period - split)]
+    }
+}
+
 impl Default for ValveEffects {
     fn default() -> Self {
         Self {
@@ -59,6 +117,30 @@ impl ValveEffects {
         ModelError::require_non_negative("command_delay", self.command_delay)?;
         ModelError::require_non_negative("spool_limit", self.spool_limit)?;
         ModelError::require_non_negative("hysteresis", self.hysteresis)
+    }
+
+    /// True when the valve is not ideal.
+    pub fn is_active(&self) -> bool {
+        let Self {
+            null_bias,
+            dead_band,
+            flow_gain,
+            asymmetry,
+            spool_frequency,
+            spool_damping: _,
+            command_delay,
+            spool_limit,
+            hysteresis,
+        } = *self;
+        [null_bias, dead_band, flow_gain, asymmetry, spool_frequency]
+            .into_iter()
+            .chain([command_delay, spool_limit, hysteresis])
+            .any(|size| size != 0.0)
+    }
+
+    /// Refuses a delay of the command that is longer than the memory at `period` s.
+    pub fn validate_delay(&self, period: f64) -> Result<(), ModelError> {
+        require_delay("command_delay", self.command_delay, period)
     }
 
     /// The spool behind its play (V), from its position before and the command now.
