@@ -7,9 +7,10 @@
 //! - displacement PID and loop shaping: the printed controller, its gain changed so that the
 //!   displacement gain is that of three-variable control (half the gain at which the loop
 //!   oscillates);
-//! - force loop under sliding mode: the printed one, its gain changed to that of the printed loop on
-//!   the identified plant at the same share of the valve (the ratio of the plants' gains from valve
-//!   to force); lambda and K by [`rate_by_rule`];
+//! - force loop under sliding mode: the printed one, its gain changed by the ratio of the plants'
+//!   gains from valve to force and by `FORCE_PART`; lambda and K are `RATE_PART` of
+//!   [`rate_by_rule`] for the loop without that part. Both parts were found by running the rig: with
+//!   the whole gain the noise of the sensors and the late measurements make it oscillate;
 //! - sliding mode and model predictive control have the fitted model as theirs and know the delay.
 
 use controllers::allocation::ControlAllocation;
@@ -152,8 +153,8 @@ impl Rules {
             model,
             gains,
             displacement: gains.proportional / printed.proportional,
-            force,
-            rate,
+            force: FORCE_PART * force,
+            rate: RATE_PART * rate,
         })
     }
 
@@ -271,6 +272,11 @@ impl Rules {
         );
     }
 }
+
+/// Part of the force loop's gain that sensor noise and late measurements leave.
+const FORCE_PART: f64 = 0.2;
+/// Part of the rate that the weaker force loop can follow.
+const RATE_PART: f64 = 0.35;
 
 /// Where the plants' gains from valve to force are compared, Hz: the middle of the motions' band on
 /// a logarithmic scale.
