@@ -1,0 +1,289 @@
+//! The hidden-effect suite: fresh cases, the diagnosis of each, and what came of them.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::time::Instant;
+
+use hidden_effects::score::{Estimate, NamedEffect, outcome, parameter_errors, wilson};
+use hidden_effects::{Case, Kind, Outcome, Settings, Truth, Verdict};
+use identification::case::Case as Laboratory;
+use identification::diagnosis::shake_table::{Diagnosis, diagnose};
+use rayon::prelude::*;
+
+/// How many cases of each kind, and from which seed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// First seed; every case takes the next one.
+    pub seed: u64,
+    /// Cases with one effect.
+    pub one: usize,
+    /// Cases with two.
+    pub two: usize,
+    /// Cases with none.
+    pub nothing: usize,
+    /// Cases with something outside the catalogue.
+    pub outside: usize,
+    /// Relative standard deviation of the plant's parameters.
+    pub mismatch: f64,
+    /// Factor on the sensors' noise.
+    pub noise: f64,
+}
+
+/// One case with its outcome.
+#[derive(Debug, Clone)]
+pub struct Scored {
+    /// The seed it came from.
+    pub seed: u64,
+    /// `one`, `two`, `nothing` or `outside`.
+    pub kind: &'static str,
+    /// What was hidden.
+    pub truth: Truth,
+    /// What was said.
+    pub verdict: Verdict,
+    /// Right, wrong or silent.
+    pub outcome: Outcome,
+    /// Relative error of each parameter and whether its 95 % interval holds the truth.
+    pub errors: Vec<(f64, bool)>,
+    /// Seconds that the diagnosis took.
+    pub seconds: f64,
+    /// The diagnosis's sentence, or why it refused.
+    pub sentence: String,
+}
+
+/// Draws a case, writes it down, reads it as a laboratory's and diagnoses it.
+///
+/// # Panics
+/// When the case cannot be written or read back: the suite itself is at fault then.
+pub fn run(seed: u64, kind: &'static str, settings: &Settings) -> Scored {
+    let case = Case::draw(seed, settings);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    case.write(folder.path())
+        .expect("a case that can be written");
+    let laboratory = Laboratory::read(folder.path()).expect("a case that can be read");
+    let begin = Instant::now();
+    let diagnosis = diagnose(&laboratory, false);
+    let seconds = begin.elapsed().as_secs_f64();
+    let (verdict, sentence) = match diagnosis {
+        Ok(diagnosis) => (as_scored(&diagnosis), diagnosis.sentence),
+        Err(error) => (Verdict::default(), error.to_string()),
+    };
+    Scored {
+        seed,
+        kind,
+        outcome: outcome(&case.truth, &verdict),
+        errors: parameter_errors(&case.truth, &verdict, |value, from, to| {
+            shakebench::units::convert(value, from, to).ok()
+        }),
+        truth: case.truth,
+        verdict,
+        seconds,
+        sentence,
+    }
+}
+
+/// A diagnosis in the words of the exchange format.
+pub fn as_scored(diagnosis: &Diagnosis) -> Verdict {
+    let effects = diagnosis.effects.iter().map(|effect| NamedEffect {
+        effect: effect.effect.into(),
+        parameters: effect
+            .parameters
+            .iter()
+            .map(|p| {
+                let estimate = Estimate {
+                    value: p.value,
+                    unit: p.unit.into(),
+                    standard_error: p.standard_error,
+                };
+                (p.name.clone(), estimate)
+            })
+            .collect(),
+    });
+    Verdict {
+        verdict: diagnosis.verdict.word().into(),
+        effects: effects.collect(),
+        alternatives: diagnosis
+            .alternatives
+            .iter()
+            .map(|set| set.iter().map(|name| (*name).into()).collect())
+            .collect(),
+    }
+}
+
+/// All cases of a plan, in parallel; `progress` is told of each.
+pub fn run_all(plan: &Plan, progress: impl Fn(&Scored) + Sync) -> Vec<Scored> {
+    let kinds = [
+        ("one", Kind::One, plan.one),
+        ("two", Kind::Two, plan.two),
+        ("nothing", Kind::Nothing, plan.nothing),
+        ("outside", Kind::Outside, plan.outside),
+    ];
+    let cases: Vec<(&'static str, Kind)> = kinds
+        .iter()
+        .flat_map(|&(name, kind, count)| std::iter::repeat_n((name, kind), count))
+        .collect();
+    cases
+        .par_iter()
+        .enumerate()
+        .map(|(i, &(name, kind))| {
+            let settings = Settings {
+                mismatch: plan.mismatch,
+                noise: plan.noise,
+                ..Settings::new(kind)
+            };
+            let scored = run(plan.seed + i as u64, name, &settings);
+            progress(&scored);
+            scored
+        })
+        .collect()
+}
+
+/// Rates with Wilson intervals by kind, strength and excitation, parameter errors, coverage, time
+/// and every case that is not right.
+pub fn table(results: &[Scored]) -> String {
+    let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "{:<34}{:>6}{:>7}{:>7}{:>8}   right, 95 % interval",
+        "cases", "all", "right", "wrong", "silent"
+    );
+    let mut row = |name: &str, filter: &dyn Fn(&Scored) -> bool| {
+        let chosen: Vec<&Scored> = results.iter().filter(|r| filter(r)).collect();
+        if chosen.is_empty() {
+            return;
+        }
+        let count = |o: Outcome| chosen.iter().filter(|r| r.outcome == o).count();
+        let (right, wrong) = (count(Outcome::Right), count(Outcome::Wrong));
+        let (low, high) = wilson(right, chosen.len());
+        let _ = writeln!(
+            text,
+            "{name:<34}{:>6}{right:>7}{wrong:>7}{:>8}   {:.1} to {:.1} %",
+            chosen.len(),
+            count(Outcome::Silent),
+            100.0 * low,
+            100.0 * high
+        );
+    };
+    row("all", &|_| true);
+    for kind in ["one", "two", "nothing", "outside"] {
+        row(kind, &|r| r.kind == kind);
+    }
+    for (name, low, high) in [
+        ("weak (lower third)", 0.0, 0.33),
+        ("middling", 0.33, 0.67),
+        ("strong", 0.67, 1.01),
+    ] {
+        row(&format!("strength: {name}"), &|r| {
+            r.truth.strength.is_some_and(|s| (low..high).contains(&s))
+        });
+    }
+    for excitation in hidden_effects::excitation::EXCITATIONS {
+        row(&format!("identified on: {excitation:?}"), &|r| {
+            r.truth.excitation.first() == Some(&excitation)
+        });
+    }
+    let mut by_effect: BTreeMap<&str, Vec<&Scored>> = BTreeMap::new();
+    for scored in results.iter().filter(|r| r.kind == "one") {
+        for effect in &scored.truth.effects {
+            by_effect.entry(&effect.effect).or_default().push(scored);
+        }
+    }
+    for effect in by_effect.keys() {
+        row(effect, &|r| {
+            r.kind == "one" && r.truth.effects[0].effect == *effect
+        });
+    }
+
+    let mut errors: Vec<f64> = results
+        .iter()
+        .flat_map(|r| &r.errors)
+        .map(|e| e.0)
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    let mut seconds: Vec<f64> = results.iter().map(|r| r.seconds).collect();
+    seconds.sort_by(f64::total_cmp);
+    if !errors.is_empty() {
+        let held = results
+            .iter()
+            .flat_map(|r| &r.errors)
+            .filter(|e| e.1)
+            .count();
+        let (low, high) = wilson(held, errors.len());
+        let _ = writeln!(
+            text,
+            "\nparameter error: median {:.2} %, 90th percentile {:.1} % ({} parameters)\n\
+             95 % intervals that hold the truth: {:.1} % ({:.1} to {:.1})",
+            100.0 * quantile(&errors, 0.5),
+            100.0 * quantile(&errors, 0.9),
+            errors.len(),
+            100.0 * held as f64 / errors.len() as f64,
+            100.0 * low,
+            100.0 * high
+        );
+    }
+    if !seconds.is_empty() {
+        let _ = writeln!(
+            text,
+            "seconds a case: median {:.1}, longest {:.1}",
+            quantile(&seconds, 0.5),
+            quantile(&seconds, 1.0)
+        );
+    }
+    for scored in results.iter().filter(|r| r.outcome != Outcome::Right) {
+        let _ = writeln!(text, "{}", line(scored));
+    }
+    text
+}
+
+/// One case in one line: what was hidden and what was said.
+pub fn line(scored: &Scored) -> String {
+    let hidden: Vec<String> = scored
+        .truth
+        .effects
+        .iter()
+        .map(|e| e.effect.clone())
+        .collect();
+    let named: Vec<&str> = scored
+        .verdict
+        .effects
+        .iter()
+        .map(|e| e.effect.as_str())
+        .collect();
+    format!(
+        "seed {} {:?}: hidden {} {}(strength {:.2}, {:?}), said {} {named:?} {:?}",
+        scored.seed,
+        scored.outcome,
+        if hidden.is_empty() {
+            "nothing".into()
+        } else {
+            hidden.join(" + ")
+        },
+        scored
+            .truth
+            .outside
+            .as_ref()
+            .map(|o| format!("[{o}] "))
+            .unwrap_or_default(),
+        scored.truth.strength.unwrap_or(0.0),
+        scored.truth.excitation,
+        if scored.verdict.verdict.is_empty() {
+            &scored.sentence
+        } else {
+            &scored.verdict.verdict
+        },
+        scored.verdict.alternatives,
+    )
+}
+
+/// The outcome rates of a kind: right and wrong as fractions.
+pub fn rates(results: &[Scored], kind: &str) -> (f64, f64) {
+    let chosen: Vec<&Scored> = results.iter().filter(|r| r.kind == kind).collect();
+    let share = |o: Outcome| {
+        chosen.iter().filter(|r| r.outcome == o).count() as f64 / chosen.len().max(1) as f64
+    };
+    (share(Outcome::Right), share(Outcome::Wrong))
+}
+
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let last = sorted.len() - 1;
+    sorted[((last as f64 * share).round() as usize).min(last)]
+}
