@@ -11,7 +11,8 @@
 //!   gains from valve to force and by `FORCE_PART`; lambda and K are `RATE_PART` of
 //!   [`rate_by_rule`] for the loop without that part. Both parts were found by running the rig: with
 //!   the whole gain the noise of the sensors and the late measurements make it oscillate;
-//! - sliding mode and model predictive control have the fitted model as theirs and know the delay.
+//! - sliding mode and model predictive control have the fitted model as theirs and know the delay;
+//!   the latter also knows the sensors' noise and weighs outputs in units of stroke, 20 in/s and 1 g.
 
 use controllers::allocation::ControlAllocation;
 use controllers::sliding_mode::{force_loop, rate_by_rule};
@@ -245,6 +246,19 @@ impl Rules {
     fn model_predictive(&self, component: &mut ComponentFile) {
         self.model(component);
         self.three_variable(component);
+        // The sensors' noise, and outputs in units of the stroke, 20 in/s and 1 g: with the printed
+        // weights on unscaled outputs displacement counts for nothing and drifts.
+        set(
+            component,
+            &[
+                ("displacement_measurement_noise", 1.27e-5),
+                ("velocity_measurement_noise", 2e-3),
+                ("acceleration_measurement_noise", 0.04),
+                ("displacement_scale", 0.0381),
+                ("velocity_scale", 0.508),
+                ("acceleration_scale", 9.80665),
+            ],
+        );
         set_count(component, &[("loop_delay_samples", DELAY)]);
     }
 
