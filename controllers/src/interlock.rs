@@ -41,6 +41,13 @@ pub struct Interlock {
     pub stale_travel: f64,
     /// Samples after which the heartbeat must have changed; 0 if there is none.
     pub heartbeat_samples: u32,
+    /// A specimen's accelerometer that stays below this magnitude is silent, m/s²; 0 for no check.
+    pub specimen_silence: f64,
+    /// The table moves when its acceleration exceeds this magnitude, m/s².
+    pub specimen_table_motion: f64,
+    /// A specimen that answered before and is silent while the table moves for this long (counted
+    /// without interruption of the silence) is lost, s.
+    pub specimen_silence_time: f64,
     /// What the interlock remembers.
     pub memory: InterlockMemory,
 }
@@ -75,11 +82,13 @@ pub enum Trip {
     Saturation = 10,
     /// The operator pressed stop.
     Stop = 11,
+    /// The specimen does not answer to the table any more.
+    SpecimenLost = 12,
 }
 
 impl Trip {
     /// All causes, in the order of their numbers.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::None,
         Self::NotFinite,
         Self::Stale,
@@ -92,6 +101,7 @@ impl Trip {
         Self::TrackingError,
         Self::Saturation,
         Self::Stop,
+        Self::SpecimenLost,
     ];
 
     /// The cause in words.
@@ -109,6 +119,7 @@ impl Trip {
             Self::TrackingError => "the displacement is too far from the reference",
             Self::Saturation => "the valve command was saturated for too long",
             Self::Stop => "the operator pressed stop",
+            Self::SpecimenLost => "the specimen does not answer to the table any more",
         }
     }
 }
@@ -131,10 +142,12 @@ pub struct InterlockMemory {
     /// Whether there was a sample.
     started: bool,
     saturated: f64,
-    last: [f64; 4],
+    last: [f64; 5],
     last_reference: f64,
-    repeats: [u32; 4],
-    travel: [f64; 4],
+    repeats: [u32; 5],
+    travel: [f64; 5],
+    specimen_answered: bool,
+    silent: f64,
     heartbeat: i32,
     beats_missed: u32,
     reset_was_held: bool,
@@ -151,6 +164,8 @@ pub struct InterlockInput {
     pub measured: Motion,
     /// Measured force of the actuator, N.
     pub measured_force: f64,
+    /// Measured absolute acceleration of the specimen; zero without one.
+    pub specimen_acceleration: f64,
     /// A number that the controller changes at every sample.
     pub heartbeat: i32,
     /// The operator's stop.
@@ -176,6 +191,9 @@ impl Interlock {
             stale_samples: 10,
             stale_travel: 0.02 * INCH,
             heartbeat_samples: 0,
+            specimen_silence: 0.0,
+            specimen_table_motion: 0.05 * G,
+            specimen_silence_time: 0.1,
             memory: InterlockMemory {
                 fade: 1.0,
                 ..InterlockMemory::default()
@@ -196,12 +214,13 @@ impl Interlock {
             y.velocity,
             y.acceleration,
             input.measured_force,
+            input.specimen_acceleration,
         ];
         let m = &mut self.memory;
         let travelled = (input.reference_displacement - m.last_reference).abs();
         m.last_reference = input.reference_displacement;
         let mut stale = false;
-        for i in 0..4 {
+        for i in 0..5 {
             // A channel that was never anything but zero is not connected.
             if m.started && now[i] == m.last[i] && now[i] != 0.0 {
                 m.repeats[i] = m.repeats[i].saturating_add(1);
@@ -213,6 +232,23 @@ impl Interlock {
             m.last[i] = now[i];
         }
         stale
+    }
+
+    /// Whether a specimen that answered before has been silent while the table moved. One that stands
+    /// on its columns answers a moving table within a fraction of its period, and rings on after it.
+    fn misses_the_specimen(&mut self, input: &InterlockInput, period: f64) -> bool {
+        let m = &mut self.memory;
+        if self.specimen_silence == 0.0 {
+            return false;
+        }
+        let answer = input.specimen_acceleration.abs();
+        if answer >= self.specimen_silence {
+            m.specimen_answered |= answer >= 3.0 * self.specimen_silence;
+            m.silent = 0.0;
+        } else if input.measured.acceleration.abs() >= self.specimen_table_motion {
+            m.silent += period;
+        }
+        m.specimen_answered && m.silent >= self.specimen_silence_time - 1e-9
     }
 
     fn misses_beats(&mut self, heartbeat: i32) -> bool {
@@ -238,10 +274,12 @@ impl Interlock {
             y.velocity,
             y.acceleration,
             input.measured_force,
+            input.specimen_acceleration,
         ];
         // Each check keeps a count, so all run at every sample.
         let stale = self.counts_stale(input);
         let silent = self.misses_beats(input.heartbeat);
+        let lost = self.misses_the_specimen(input, period);
         let m = &mut self.memory;
         if input.valve_command.abs() >= self.saturation_level {
             m.saturated += period;
@@ -272,6 +310,7 @@ impl Interlock {
             (input.measured_force.abs() > self.force_limit, Trip::Force),
             (error.abs() > self.tracking_limit, Trip::TrackingError),
             (saturated, Trip::Saturation),
+            (lost, Trip::SpecimenLost),
         ];
         checks
             .into_iter()
@@ -301,9 +340,12 @@ impl Controller for Interlock {
             ("saturation_time", self.saturation_time),
             ("ramp_time", self.ramp_time),
             ("stale_travel", self.stale_travel),
+            ("specimen_table_motion", self.specimen_table_motion),
+            ("specimen_silence_time", self.specimen_silence_time),
         ] {
             ModelError::require_positive(name, value)?;
         }
+        ModelError::require_non_negative("specimen_silence", self.specimen_silence)?;
         ModelError::require_non_negative("reaction_time", self.reaction_time)?;
         ModelError::require_positive("stale_samples", f64::from(self.stale_samples))
     }

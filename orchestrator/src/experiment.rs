@@ -9,6 +9,7 @@ use crate::fmu::FmiVersion;
 use crate::library::FmuLibrary;
 use crate::master::{Algorithm, MasterError, Outcome, Pace, Simulation};
 use crate::motion::{self, Motion, Scaling};
+use crate::system::tuning::Tuning;
 use crate::system::{self, System, SystemFile, built_in};
 
 /// What a run is asked to be; a manifest keeps it.
@@ -20,6 +21,9 @@ pub struct Request {
     pub plant: String,
     /// Specimen of a built-in system.
     pub specimen: String,
+    /// Parameters of a built-in system's controllers; absent: by its plant.
+    #[serde(default)]
+    pub tuning: Option<Tuning>,
     /// Record to play.
     pub record: Option<PathBuf>,
     /// Reference to play.
@@ -71,6 +75,7 @@ impl Request {
             system: system.to_string(),
             plant: built_in::DEFAULT_PLANT.to_string(),
             specimen: built_in::DEFAULT_SPECIMEN.to_string(),
+            tuning: None,
             record: None,
             reference: None,
             seed: motion::DEFAULT_SEED,
@@ -112,7 +117,12 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
     let file = if is_file(&request.system) {
         SystemFile::read(Path::new(&request.system))?
     } else {
-        built_in::system(&request.system, &request.plant, &request.specimen)?
+        built_in::system(
+            &request.system,
+            &request.plant,
+            &request.specimen,
+            request.tuning,
+        )?
     };
     let motion = motion(request, &file)?;
     let mut library = FmuLibrary::new(request.fmi, file.directory.as_deref());

@@ -16,6 +16,7 @@ pub struct Interlock {
     reference_displacement: f64,
     measured: controllers::Motion,
     measured_force: f64,
+    specimen_acceleration: f64,
     measurement_valid: bool,
     heartbeat: i32,
     stop: bool,
@@ -35,6 +36,7 @@ impl Default for Interlock {
             reference_displacement: 0.0,
             measured: controllers::Motion::default(),
             measured_force: 0.0,
+            specimen_acceleration: 0.0,
             measurement_valid: true,
             heartbeat: 0,
             stop: false,
@@ -52,13 +54,14 @@ impl Component for Interlock {
     const DOCUMENTATION: &'static str = include_str!("../README.md");
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 6] = [
+        const INPUTS: [&str; 7] = [
             "controller_command",
             "reference_displacement",
             "measured_displacement",
             "measured_velocity",
             "measured_acceleration",
             "measured_force",
+            "specimen_acceleration",
         ];
         fmu_kit::table! { Self, s:
             input("controller_command", s.controller_command, "Command of the controller", "V").nominal(10.0);
@@ -67,6 +70,7 @@ impl Component for Interlock {
             input("measured_velocity", s.measured.velocity, "Measured velocity", "m/s" => "in/s").nominal(0.5);
             input("measured_acceleration", s.measured.acceleration, "Measured acceleration", "m/s2" => "g").nominal(10.0);
             input("measured_force", s.measured_force, "Measured force of the actuator", "N" => "lbf").nominal(400.0);
+            input("specimen_acceleration", s.specimen_acceleration, "Measured absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
             input("measurement_valid", s.measurement_valid, "Whether all measurements are numbers");
             input("heartbeat", s.heartbeat, "A number that the controller changes at every sample");
             input("stop", s.stop, "The operator's stop");
@@ -89,6 +93,9 @@ impl Component for Interlock {
             parameter("stale_samples", s.stale_samples, "Repetitions that make a channel stale ...").min(1.0);
             parameter("stale_travel", s.law.stale_travel, "... while the reference travels this far", "m" => "in");
             parameter("heartbeat_samples", s.heartbeat_samples, "Samples after which the heartbeat must have changed, 0 without one").min(0.0);
+            parameter("specimen_silence", s.law.specimen_silence, "The specimen is silent below this acceleration, 0 for no check", "m/s2" => "g");
+            parameter("specimen_table_motion", s.law.specimen_table_motion, "The table moves above this acceleration", "m/s2" => "g");
+            parameter("specimen_silence_time", s.law.specimen_silence_time, "Time of the moving table in which a specimen must not be silent", "s");
         }
     }
 
@@ -114,6 +121,7 @@ impl Component for Interlock {
                 } else {
                     f64::NAN
                 },
+                specimen_acceleration: self.specimen_acceleration,
                 heartbeat: self.heartbeat,
                 stop: self.stop,
                 reset: self.reset,

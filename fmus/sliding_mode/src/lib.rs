@@ -9,7 +9,7 @@ use controllers::{
     sliding_mode::{self, LowLevelReferences, SlidingMode as Law, SlidingModeInput},
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
-use plant::{ModelError, shake_table::ShakeTable, units::SAMPLING_PERIOD};
+use plant::{ModelError, actuator::IdentifiedActuator, shake_table::ShakeTable, units::SAMPLING_PERIOD};
 use serde::{Deserialize, Serialize};
 
 /// The sliding-mode law over the loops of Fig 4-3.
@@ -23,6 +23,7 @@ pub struct SlidingMode {
     command_delay_samples: i32,
     reference_ahead: bool,
     sampling_period: f64,
+    actuator: IdentifiedActuator,
     displacement_loop: Pid,
     force_loop: Pid,
     allocation: ControlAllocation,
@@ -40,6 +41,7 @@ impl Default for SlidingMode {
             command_delay_samples: 0,
             reference_ahead: false,
             sampling_period: SAMPLING_PERIOD,
+            actuator: ShakeTable::default().actuator,
             displacement_loop: sliding_mode::displacement_loop(&allocation),
             force_loop: sliding_mode::force_loop(&allocation),
             allocation,
@@ -96,6 +98,15 @@ impl Component for SlidingMode {
             parameter("command_delay_samples", s.command_delay_samples, "Samples from this law to the low-level loops");
             parameter("reference_ahead", s.reference_ahead, "The references are those of loop_delay_samples later");
             parameter("sampling_period", s.sampling_period, "Period of the prediction", "s" => "ms");
+            parameter("actuator_a2", s.actuator.denominator[0], "Prediction: actuator, denominator, s^2", "1/s");
+            parameter("actuator_a1", s.actuator.denominator[1], "Prediction: actuator, denominator, s", "1/s2");
+            parameter("actuator_a0", s.actuator.denominator[2], "Prediction: actuator, denominator, constant", "1/s3");
+            parameter("actuator_b2", s.actuator.voltage_to_force[0], "Prediction: valve command to force, s^2", "N/(V.s)" => "lbf/(V.s)");
+            parameter("actuator_b1", s.actuator.voltage_to_force[1], "Prediction: valve command to force, s", "N/(V.s2)" => "lbf/(V.s2)");
+            parameter("actuator_b0", s.actuator.voltage_to_force[2], "Prediction: valve command to force, constant", "N/(V.s3)" => "lbf/(V.s3)");
+            parameter("actuator_e2", s.actuator.velocity_to_force[0], "Prediction: velocity to force, s^2", "N/m" => "lbf/in");
+            parameter("actuator_e1", s.actuator.velocity_to_force[1], "Prediction: velocity to force, s", "N/(m.s)" => "lbf/(in.s)");
+            parameter("actuator_e0", s.actuator.velocity_to_force[2], "Prediction: velocity to force, constant", "N/(m.s2)" => "lbf/(in.s2)");
             parameter("displacement_loop_proportional_gain", s.displacement_loop.proportional, "Of the displacement loop", "V/m" => "V/in");
             parameter("displacement_loop_integral_gain", s.displacement_loop.integral, "Of the displacement loop", "V/(m.s)" => "V/(in.s)");
             parameter("displacement_loop_integral_leak", s.displacement_loop.integral_leak, "Of the displacement loop", "1/s");
@@ -128,7 +139,7 @@ impl Component for SlidingMode {
         if loop_delay > 0 || command_delay > 0 {
             let table = ShakeTable {
                 table: self.law.table,
-                ..ShakeTable::default()
+                actuator: self.actuator,
             };
             let mut prediction =
                 PredictionOverDelay::new(&table, self.sampling_period, loop_delay, command_delay)?;

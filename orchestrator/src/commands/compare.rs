@@ -16,6 +16,7 @@ use crate::master::Algorithm;
 use crate::metrics;
 use crate::motion;
 use crate::system::built_in;
+use crate::system::tuning::Tuning;
 
 /// Options of `shakebench compare`.
 #[derive(Debug, Args)]
@@ -32,12 +33,15 @@ pub struct Arguments {
     /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Plant [default: identified]
+    /// Plant: identified, servohydraulic [default: identified]
     #[arg(long)]
     plant: Option<String>,
-    /// Specimen: none, linear [default: linear]
+    /// Specimen: none, linear, yielding [default: linear]
     #[arg(long)]
     specimen: Option<String>,
+    /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
+    #[arg(long, value_enum)]
+    tuning: Option<Tuning>,
     /// Folder for report.html and comparison.json [default: shakebench-results/comparison]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -227,6 +231,7 @@ fn request(arguments: &Arguments, controller: &str, played: &Played) -> Request 
         system: controller.to_string(),
         plant: plant(arguments).to_string(),
         specimen: specimen(arguments).to_string(),
+        tuning: arguments.tuning,
         record,
         reference,
         seed,

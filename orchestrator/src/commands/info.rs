@@ -41,6 +41,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             &name,
             built_in::DEFAULT_PLANT,
             built_in::DEFAULT_SPECIMEN,
+            None,
         )?)?,
         _ => {
             let reason = format!(

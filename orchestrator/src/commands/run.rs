@@ -14,6 +14,7 @@ use crate::master::{Algorithm, Ended, Pace};
 use crate::motion;
 use crate::results::Results;
 use crate::system::built_in;
+use crate::system::tuning::Tuning;
 use crate::units::{self, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
@@ -33,12 +34,15 @@ pub struct Arguments {
     /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Plant of a built-in system [default: identified]
+    /// Plant of a built-in system: identified, servohydraulic [default: identified]
     #[arg(long)]
     plant: Option<String>,
-    /// Specimen of a built-in system: none, linear [default: linear]
+    /// Specimen of a built-in system: none, linear, yielding [default: linear]
     #[arg(long)]
     specimen: Option<String>,
+    /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
+    #[arg(long, value_enum)]
+    tuning: Option<Tuning>,
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
@@ -77,7 +81,7 @@ pub struct Arguments {
     json: bool,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
-        "system", "record", "reference", "plant", "specimen", "set", "fmi", "algorithm", "step",
+        "system", "record", "reference", "plant", "specimen", "tuning", "set", "fmi", "algorithm", "step",
         "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
@@ -196,6 +200,7 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         },
         plant: or(&arguments.plant, built_in::DEFAULT_PLANT),
         specimen: or(&arguments.specimen, built_in::DEFAULT_SPECIMEN),
+        tuning: arguments.tuning,
         record: arguments.record.as_deref().map(absolute),
         reference: arguments.reference.as_deref().map(absolute),
         seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),

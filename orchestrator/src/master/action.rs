@@ -64,11 +64,16 @@ impl Action {
                 let Some(every) = part.every.filter(|every| at.tick.is_multiple_of(*every)) else {
                     return Ok(());
                 };
+                if part.failure.is_some() {
+                    return Ok(());
+                }
                 part.inputs.transfer(signals, &part.instance)?;
                 if at.calls {
-                    part.instance.do_step(at.time, every as f64 * at.step)?;
+                    part.step(at.time, every as f64 * at.step)?;
                 }
-                part.outputs.read(signals, &part.instance)?;
+                if part.failure.is_none() {
+                    part.outputs.read(signals, &part.instance)?;
+                }
             }
             Self::Iterate {
                 actions,
@@ -77,6 +82,9 @@ impl Action {
             } => {
                 for &part in called.iter().filter(|_| at.calls) {
                     let part = &mut parts[part];
+                    if part.failure.is_some() {
+                        continue;
+                    }
                     part.instance.save_state(&mut part.state)?;
                 }
                 for pass in 1.. {
@@ -89,6 +97,9 @@ impl Action {
                     }
                     for &part in called.iter().filter(|_| at.calls) {
                         let part = &mut parts[part];
+                        if part.failure.is_some() {
+                            continue;
+                        }
                         part.instance.restore_state(&part.state)?;
                     }
                 }

@@ -50,6 +50,9 @@ impl Simulation {
                 inputs: plan.inputs(&mut reference, index, |_| true),
                 outputs: std::mem::take(&mut plan.outputs[index]),
                 state: State::default(),
+                may_fail: component.period.is_some()
+                    && system.stop.is_some_and(|(guard, _)| guard != index),
+                failure: None,
             });
         }
         let actions = schedule
@@ -63,6 +66,15 @@ impl Simulation {
                 variable,
             };
             (plan.signal(&mut reference, source), system.end_after)
+        });
+        let cause = system.end_when.and_then(|(component, _)| {
+            let description = &system.components[component].fmu.description;
+            let variable = description.position("trip_cause")?;
+            plan.places.get(&(component, variable)).copied()
+        });
+        let stop = system.stop.map(|(part, variable)| {
+            let variables = &system.components[part].fmu.description.variables;
+            (part, variables[variable].reference)
         });
         let signals = vec![0.0; plan.names.len()];
         let mut simulation = Self {
@@ -78,6 +90,8 @@ impl Simulation {
             parts,
             actions,
             end_when,
+            stop,
+            cause,
         };
         start::initialize(&mut simulation, motion.len() as f64 * motion.dt)?;
         Ok(simulation)

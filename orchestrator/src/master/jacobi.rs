@@ -7,15 +7,18 @@ use super::{MasterError, Simulation};
 pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     let (tick, time, step) = (simulation.tick, simulation.time(), simulation.step);
     let parts = &mut simulation.parts;
-    for part in parts.iter_mut().filter(|part| part.is_due(tick)) {
+    for part in parts
+        .iter_mut()
+        .filter(|part| part.is_due(tick) && part.failure.is_none())
+    {
         part.inputs.transfer(&simulation.signals, &part.instance)?;
     }
     for part in parts.iter_mut().filter(|part| part.is_due(tick)) {
         let ticks = part.every.unwrap_or(1);
-        part.instance.do_step(time, ticks as f64 * step)?;
+        part.step(time, ticks as f64 * step)?;
     }
     // A sampled component's outputs are seen by the others at the next tick.
-    for part in parts.iter() {
+    for part in parts.iter().filter(|part| part.failure.is_none()) {
         part.outputs.read(&mut simulation.signals, &part.instance)?;
     }
     Ok(())

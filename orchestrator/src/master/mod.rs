@@ -80,6 +80,10 @@ pub struct Simulation {
     actions: Vec<Action>,
     /// The signal that ends the run when it is not 0, and how long the run goes on then, s.
     end_when: Option<(usize, f64)>,
+    /// The part and input that is set when a sampled component fails.
+    stop: Option<(usize, u32)>,
+    /// The output that says why the run was ended, beside that of `end_when`.
+    cause: Option<usize>,
     /// The signals at the tick before; in [`Algorithm::Iterative`] those of the last repetition.
     last_signals: Vec<f64>,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
@@ -97,9 +101,25 @@ struct Part {
     outputs: Outputs,
     /// Where the state is kept that a repetition goes back to.
     state: State,
+    /// Whether the run goes on when it fails, until the valve is at null.
+    may_fail: bool,
+    /// Why it is called no more; its outputs keep their last values.
+    failure: Option<MasterError>,
 }
 
 impl Part {
+    /// Steps it; a failure that may be is kept instead of given.
+    fn step(&mut self, time: f64, length: f64) -> Result<(), MasterError> {
+        if self.failure.is_some() {
+            return Ok(());
+        }
+        match self.instance.do_step(time, length) {
+            Err(error) if self.may_fail => self.failure = Some(error.into()),
+            done => done?,
+        }
+        Ok(())
+    }
+
     fn is_due(&self, tick: usize) -> bool {
         self.every.is_none_or(|every| tick.is_multiple_of(every))
     }

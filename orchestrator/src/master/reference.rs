@@ -7,7 +7,7 @@ use crate::system::Quantity;
 pub(super) struct Reference {
     histories: [Vec<f64>; 3],
     /// Which history and how many samples ahead, one for each of the first signals.
-    taps: Vec<(usize, usize)>,
+    taps: Vec<(usize, isize)>,
 }
 
 impl Reference {
@@ -23,7 +23,7 @@ impl Reference {
     }
 
     /// The signal of a quantity `ahead` samples ahead.
-    pub(super) fn tap(&mut self, quantity: Quantity, ahead: usize) -> usize {
+    pub(super) fn tap(&mut self, quantity: Quantity, ahead: isize) -> usize {
         let history = Quantity::ALL
             .iter()
             .position(|&q| q == quantity)
@@ -40,8 +40,8 @@ impl Reference {
         self.taps.len()
     }
 
-    /// Puts the values at `sample` into the first signals; after its end the motion stands still
-    /// at its last displacement.
+    /// Puts the values at `sample` into the first signals; before its beginning the motion rests at
+    /// zero, after its end at its last displacement.
     pub(super) fn sample(&self, sample: usize, signals: &mut [f64]) {
         for (signal, &(history, ahead)) in signals.iter_mut().zip(&self.taps) {
             let values = &self.histories[history];
@@ -50,7 +50,9 @@ impl Reference {
             } else {
                 0.0
             };
-            *signal = values.get(sample + ahead).copied().unwrap_or(at_rest);
+            *signal = sample
+                .checked_add_signed(ahead)
+                .map_or(0.0, |place| values.get(place).copied().unwrap_or(at_rest));
         }
     }
 }

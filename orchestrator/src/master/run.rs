@@ -2,8 +2,10 @@
 
 use std::time::{Duration, Instant};
 
+use controllers::interlock::Trip;
+
 use super::{MasterError, Record, Simulation};
-use crate::fmu::Message;
+use crate::fmu::{Kind, Message};
 
 /// How a run ended.
 #[derive(Debug)]
@@ -16,9 +18,18 @@ pub enum Ended {
         signal: String,
         /// When, s.
         time: f64,
+        /// Why, in words, where the component says it.
+        cause: Option<&'static str>,
     },
     /// A component failed.
     Failed(MasterError),
+    /// A sampled component failed and the interlock brought the valve to null.
+    Stopped {
+        /// What failed.
+        error: MasterError,
+        /// When the valve began to be brought to null, s.
+        time: f64,
+    },
 }
 
 impl Ended {
@@ -27,7 +38,7 @@ impl Ended {
         match self {
             Self::Complete => "complete",
             Self::Interlock { .. } => "interlock",
-            Self::Failed(_) => "failed",
+            Self::Failed(_) | Self::Stopped { .. } => "failed",
         }
     }
 
@@ -35,7 +46,17 @@ impl Ended {
     pub fn story(&self) -> String {
         match self {
             Self::Complete => "complete".to_string(),
-            Self::Interlock { signal, time } => format!("`{signal}` became true at {time:.3} s"),
+            Self::Interlock {
+                signal,
+                time,
+                cause,
+            } => {
+                let cause = cause.map_or(String::new(), |cause| format!(": {cause}"));
+                format!("`{signal}` became true at {time:.3} s{cause}")
+            }
+            Self::Stopped { error, time } => format!(
+                "{error}; the interlock was told to stop at {time:.3} s and brought the valve to null"
+            ),
             Self::Failed(error) => error.to_string(),
         }
     }
@@ -117,7 +138,8 @@ impl Simulation {
         record: &mut Record,
     ) -> Result<Ended, MasterError> {
         let begin = Instant::now();
-        let mut tripped = None;
+        let mut tripped: Option<(f64, f64, Option<&'static str>)> = None;
+        let mut stopped = false;
         while self.tick < samples * self.ticks_per_row {
             if pace == Pace::RealTime {
                 let ahead = Duration::from_secs_f64(self.time()).saturating_sub(begin.elapsed());
@@ -131,28 +153,43 @@ impl Simulation {
                     progress(sample);
                 }
             }
+            if let Some((part, input)) = self.stop
+                && !stopped
+                && self.parts.iter().any(|part| part.failure.is_some())
+            {
+                // The guard acts on it when it is called next, at the sample after this one.
+                self.parts[part]
+                    .instance
+                    .set(&Kind::Boolean, &[input], &[1.0])?;
+                stopped = true;
+            }
             if let Some((signal, after)) = self.end_when {
                 if tripped.is_none() && self.signals[signal] != 0.0 {
-                    tripped = Some((self.time(), self.time() + after));
+                    tripped = Some((self.time(), self.time() + after, self.cause_in_words()));
                 }
-                if let Some((time, end)) = tripped
-                    && self.time() >= end
-                {
-                    return Ok(Ended::Interlock {
-                        signal: self.names[signal].clone(),
-                        time,
-                    });
+                if tripped.is_some_and(|(_, end, _)| self.time() >= end) {
+                    break;
                 }
             }
             self.advance()?;
         }
+        let time = tripped.map_or(self.time(), |(time, _, _)| time);
+        if let Some(error) = self.parts.iter_mut().find_map(|part| part.failure.take()) {
+            return Ok(Ended::Stopped { error, time });
+        }
         Ok(match (tripped, self.end_when) {
-            (Some((time, _)), Some((signal, _))) => Ended::Interlock {
+            (Some((time, _, cause)), Some((signal, _))) => Ended::Interlock {
                 signal: self.names[signal].clone(),
                 time,
+                cause,
             },
             _ => Ended::Complete,
         })
+    }
+
+    fn cause_in_words(&self) -> Option<&'static str> {
+        let number = self.signals[self.cause?] as usize;
+        Trip::ALL.get(number).map(|cause| cause.words())
     }
 }
 

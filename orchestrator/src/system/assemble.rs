@@ -85,6 +85,7 @@ pub fn assemble(
         }
     }
     let (end_when, end_after) = end(file, &components)?;
+    let stop = stop(file, &components)?;
     Ok(System {
         name: file.name.clone(),
         description: file.description.clone(),
@@ -92,6 +93,7 @@ pub fn assemble(
         connections,
         end_when,
         end_after,
+        stop,
     })
 }
 
@@ -270,16 +272,39 @@ fn end(
     let Some(name) = &experiment.end_when else {
         return Ok((None, after));
     };
-    let found = || {
-        let (component, variable) = split(name)?;
-        let component = component_index(components, component)?;
-        let fmu = &components[component].fmu;
-        let variable = find(fmu, variable, Causality::Output)?;
-        match fmu.description.variables[variable].kind {
-            Kind::Boolean => Ok((component, variable)),
-            _ => Err(format!("`{name}` is not Boolean")),
-        }
-    };
-    let output = found().map_err(|reason| at("end_when", reason))?;
+    let output = truth(components, name, Causality::Output);
+    let output = output.map_err(|reason| at("end_when", reason))?;
     Ok((Some(output), after))
+}
+
+fn stop(
+    file: &SystemFile,
+    components: &[Component],
+) -> Result<Option<(usize, usize)>, SystemError> {
+    let Some(name) = &file.experiment.stop else {
+        return Ok(None);
+    };
+    truth(components, name, Causality::Input)
+        .map(Some)
+        .map_err(|reason| SystemError::Place {
+            origin: file.origin.clone(),
+            place: "experiment.stop".to_string(),
+            reason,
+        })
+}
+
+/// A Boolean output or input, by its name.
+fn truth(
+    components: &[Component],
+    name: &str,
+    causality: Causality,
+) -> Result<(usize, usize), String> {
+    let (component, variable) = split(name)?;
+    let component = component_index(components, component)?;
+    let fmu = &components[component].fmu;
+    let variable = find(fmu, variable, causality)?;
+    match fmu.description.variables[variable].kind {
+        Kind::Boolean => Ok((component, variable)),
+        _ => Err(format!("`{name}` is not Boolean")),
+    }
 }

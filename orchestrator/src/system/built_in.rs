@@ -1,6 +1,7 @@
 //! The systems that come with the program. A rig (plant and specimen) and a controller are files
 //! of their own; a system is a controller on a rig.
 
+use super::tuning::{self, Tuning};
 use super::{SystemError, SystemFile, hint};
 
 macro_rules! parts {
@@ -18,9 +19,9 @@ const CONTROLLERS: [(&str, &str); 5] = parts![
     "mpc",
 ];
 /// Tables with their actuators.
-const PLANTS: [(&str, &str); 1] = parts!["plant/identified"];
+const PLANTS: [(&str, &str); 2] = parts!["plant/identified", "plant/servohydraulic"];
 /// What stands on the table.
-const SPECIMENS: [(&str, &str); 1] = parts!["specimen/linear"];
+const SPECIMENS: [(&str, &str); 2] = parts!["specimen/linear", "specimen/yielding"];
 
 /// The system run when none is named.
 pub const DEFAULT_SYSTEM: &str = "three-variable";
@@ -44,13 +45,29 @@ pub fn specimens() -> impl Iterator<Item = &'static str> {
     std::iter::once("none").chain(SPECIMENS.iter().map(|(name, _)| short(name)))
 }
 
-/// A built-in system: the controller `name` on a rig of `plant` and `specimen` (or `none`).
+/// A built-in system: the controller `name` on a rig of `plant` and `specimen` (or `none`), with the
+/// parameters of `tuning`, by default tuned for the physical rig and as printed for the identified.
 ///
 /// # Errors
-/// A name that is unknown.
-pub fn system(name: &str, plant: &str, specimen: &str) -> Result<SystemFile, SystemError> {
+/// A name that is unknown, or a rig for which there is no tuning.
+pub fn system(
+    name: &str,
+    plant: &str,
+    specimen: &str,
+    tuning: Option<Tuning>,
+) -> Result<SystemFile, SystemError> {
     let mut file = part("system", &CONTROLLERS, name, names())?;
-    file.extend(part("plant", &PLANTS, plant, plants())?);
+    let rig = part("plant", &PLANTS, plant, plants())?;
+    if specimen == "none" {
+        file.disconnect("specimen");
+    }
+    tuning::apply(&mut file, plant, specimen, tuning).map_err(|reason| SystemError::Place {
+        origin: format!("{name} (built-in)"),
+        place: "tuning".to_string(),
+        reason,
+    })?;
+    file.redirect(&rig.instead);
+    file.extend(rig);
     if specimen == "none" {
         file.disconnect("specimen");
     } else {

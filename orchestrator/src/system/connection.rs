@@ -12,8 +12,8 @@ pub enum Source {
     Reference {
         /// What of it.
         quantity: Quantity,
-        /// How many samples ahead of the present one.
-        ahead: usize,
+        /// How many samples ahead of the present one; negative: before it.
+        ahead: isize,
     },
     /// An output of a component.
     Output {
@@ -102,7 +102,11 @@ fn reference(variable: &str) -> Option<Source> {
             let (name, index) = rest.split_once('[')?;
             (
                 name,
-                index.trim().parse().ok().filter(|&ahead| ahead < 100_000)?,
+                index
+                    .trim()
+                    .parse()
+                    .ok()
+                    .filter(|ahead: &isize| ahead.abs() < 100_000)?,
             )
         }
     };

@@ -24,6 +24,10 @@ pub struct SystemFile {
     /// The components by name.
     #[serde(default)]
     pub components: BTreeMap<String, ComponentFile>,
+    /// In a plant: what controllers are connected to in place of `table.` and `specimen.`
+    /// variables, such as the sensors' readings.
+    #[serde(default)]
+    pub instead: BTreeMap<String, String>,
     /// What is done with it.
     #[serde(default)]
     pub experiment: ExperimentFile,
@@ -81,6 +85,10 @@ pub struct ExperimentFile {
     /// How long the run goes on after that, such as `"0.5 s"`.
     #[serde(default)]
     pub end_after: Option<toml::Value>,
+    /// A Boolean input that is set when a sampled component fails, such as `"interlock.stop"`; the
+    /// run then goes on, with the failed component's last outputs, until `end_when` ends it.
+    #[serde(default)]
+    pub stop: Option<String>,
 }
 
 impl SystemFile {
@@ -153,6 +161,20 @@ impl SystemFile {
         (self.connections, self.lines) = kept.map(|(text, line)| (text.clone(), *line)).unzip();
     }
 
+    /// Connects to what `instead` names in place of its keys, on either side.
+    pub fn redirect(&mut self, instead: &BTreeMap<String, String>) {
+        for connection in &mut self.connections {
+            let text = connection.get_mut();
+            if let Some((from, to)) = text.split_once("->") {
+                let end = |end: &str| {
+                    let end = end.trim();
+                    instead.get(end).map_or(end, String::as_str).to_string()
+                };
+                *text = format!("{} -> {}", end(from), end(to));
+            }
+        }
+    }
+
     /// Adds the components, connections and experiment of `part`; what `part` says goes before.
     pub fn extend(&mut self, part: Self) {
         self.connections.extend(part.connections);
@@ -164,6 +186,7 @@ impl SystemFile {
         own.record = other.record.or(own.record.take());
         own.reference = other.reference.or(own.reference.take());
         own.end_when = other.end_when.or(own.end_when.take());
+        own.stop = other.stop.or(own.stop.take());
         own.end_after = other.end_after.or(own.end_after.take());
     }
 }

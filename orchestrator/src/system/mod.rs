@@ -8,6 +8,7 @@ mod error;
 mod file;
 mod graph;
 mod model;
+pub mod tuning;
 mod value;
 
 use std::path::PathBuf;
@@ -40,6 +41,8 @@ pub struct System {
     pub end_when: Option<(usize, usize)>,
     /// How long the run goes on after that, s.
     pub end_after: f64,
+    /// The Boolean input that is set when a sampled component fails, as component and variable.
+    pub stop: Option<(usize, usize)>,
 }
 
 /// A component of a [`System`].
