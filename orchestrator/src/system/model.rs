@@ -49,8 +49,12 @@ pub(super) fn parameters(
         _ => Table::equation_2_28(),
     };
     let values = shake_table_values(&ShakeTable { actuator, table });
-    place(&values, component)
-        .ok_or_else(|| format!("`{name}` is a model of ShakeTable, not of {}", component.model_name))
+    place(&values, component).ok_or_else(|| {
+        format!(
+            "`{name}` is a model of ShakeTable, not of {}",
+            component.model_name
+        )
+    })
 }
 
 fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>, String> {
