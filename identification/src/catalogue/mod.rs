@@ -2,8 +2,11 @@
 //! catalogue, and the innovations of every record.
 
 mod effects;
+mod entry;
+mod sensors_and_specimen;
 
-pub use effects::{Apply, catalogue};
+pub use effects::catalogue;
+pub use entry::Apply;
 
 use plant::identified_rig::IdentifiedRig;
 

@@ -144,6 +144,8 @@ pub struct Candidate {
     pub starts: Vec<Vec<f64>>,
     /// Effects that one record often cannot tell from this one.
     pub look_alikes: &'static [&'static str],
+    /// How much larger than usual the traces may be that the right model with this effect leaves.
+    pub tolerance: f64,
     /// Effect that this one holds as a special case.
     pub contains: Option<&'static str>,
 }

@@ -9,6 +9,9 @@ use crate::case::{Nominal, Record};
 
 /// Band in which the relations are checked, Hz.
 const BAND: (f64, f64) = (0.5, 15.0);
+/// Upper end of the band in which signs and units are checked, Hz: lags and delays of the
+/// catalogue are small there.
+const SLOW: f64 = 3.0;
 
 /// A relation and its error.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +20,29 @@ pub struct Relation {
     pub name: &'static str,
     /// Root mean square error in units of what the sensors' noise makes of it.
     pub ratio: f64,
+    /// Error below 3 Hz over the size of what it is an error of, where that is a channel.
+    pub relative: Option<f64>,
+}
+
+const EQUILIBRIUM: &str = "R2 equilibrium of the table";
+const KINEMATICS: &str = "R4 kinematics";
+
+/// What shows that columns and nominal model do not belong together: signs, units, another rig.
+/// The limits lie beyond anything that an effect of the catalogue does.
+pub fn misfit(relations: &[Relation]) -> Option<String> {
+    relations.iter().find_map(|relation| {
+        let (limit, what) = match relation.name {
+            KINEMATICS => (0.8, "acceleration and displacement are not of one motion"),
+            EQUILIBRIUM => (1.2, "forces do not balance what moves"),
+            _ => return None,
+        };
+        let relative = relation.relative.filter(|relative| *relative > limit)?;
+        Some(format!(
+            "the nominal model does not fit the columns: {what} ({}, error {relative:.2} times \
+             the signal below {SLOW} Hz); check units, signs and which rig this is",
+            relation.name
+        ))
+    })
 }
 
 /// The relations that the columns of `record` allow, on the nominal model.
@@ -43,6 +69,15 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
         Some(out.iter().map(|z| Complex::new(z.re, z.im)).collect())
     };
     let [x, a, f, specimen_acceleration] = record.channels.each_ref().map(|c| spectrum(c));
+    // Differences are taken before the window, which would leak low frequencies into them.
+    let difference = |at: &dyn Fn(&[f64], usize) -> f64| {
+        let x = &record.channels[0];
+        let inner = |k: usize| k.clamp(1, n.saturating_sub(2).max(1));
+        let values: Vec<f64> = (0..n).map(|k| at(x, inner(k))).collect();
+        spectrum(if x.len() == n && n > 2 { &values } else { &[] })
+    };
+    let velocity = difference(&|x, k| (x[k + 1] - x[k - 1]) / (2.0 * period));
+    let second = difference(&|x, k| (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (period * period));
     let u = spectrum(&record.valve_command);
     let bin = nominal.sample_rate / n as f64;
     let bins = ((BAND.0 / bin) as usize).max(1)..((BAND.1 / bin) as usize).min(n / 2);
@@ -50,6 +85,10 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
     let table = nominal.shake_table.table;
     let mass = nominal.specimen.map_or(0.0, |specimen| specimen.mass);
     let omega = |k: usize| std::f64::consts::TAU * bin * k as f64;
+
+    // What differences make of a derivative.
+    let of_velocity = |s: Complex<f64>| (s * period).sinh() / period;
+    let of_second = |s: Complex<f64>| ((s * period).cosh() - 1.0) * 2.0 / (period * period);
 
     // Mean over the band of |error|² over its variance.
     let ratio = |error: &dyn Fn(usize, Complex<f64>) -> (Complex<f64>, f64)| {
@@ -62,8 +101,18 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
             .sum();
         (sum / bins.len().max(1) as f64).sqrt()
     };
+    let relative = |error: &dyn Fn(usize, Complex<f64>) -> (Complex<f64>, f64),
+                    size: &[Complex<f64>]| {
+        let slow = bins.start..((SLOW / bin) as usize).clamp(bins.start, bins.end);
+        let (mut wrong, mut whole) = (0.0, 0.0);
+        for k in slow {
+            wrong += error(k, Complex::new(0.0, omega(k))).0.norm_sqr();
+            whole += size[k].norm_sqr();
+        }
+        (whole > 0.0).then(|| (wrong / whole).sqrt())
+    };
     let mut all = Vec::new();
-    if let (Some(u), Some(x), Some(f)) = (&u, &x, &f) {
+    if let (Some(u), Some(velocity), Some(f)) = (&u, &velocity, &f) {
         let (g1, g2) = (
             nominal.shake_table.actuator.g1(),
             nominal.shake_table.actuator.g2(),
@@ -74,21 +123,28 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
                 // The command is held over a sample.
                 let held = (1.0 - (-s * period).exp()) / (s * period);
                 let of_x = g2.evaluate(s) * s;
-                let error = f[k] - g1.evaluate(s) * held * u[k] - of_x * x[k];
+                let moved = g2.evaluate(s) * s / of_velocity(s) * velocity[k];
+                let error = f[k] - g1.evaluate(s) * held * u[k] - moved;
                 let of_u = (g1.evaluate(s) * nominal.command_noise).norm_sqr();
                 (error, sf * sf + of_x.norm_sqr() * sx * sx + of_u)
             }),
+            relative: None,
         });
     }
-    if let (Some(x), Some(a), Some(f), Some(specimen)) = (&x, &a, &f, &specimen_acceleration) {
+    if let (Some(x), Some(v), Some(a), Some(f), Some(specimen)) =
+        (&x, &velocity, &a, &f, &specimen_acceleration)
+    {
+        let error = |k: usize, s: Complex<f64>| {
+            let of_x = s * table.damping + table.stiffness;
+            let wall = v[k] * table.damping + x[k] * table.stiffness;
+            let error = f[k] - specimen[k] * mass - a[k] * table.mass - wall;
+            let inertia = (table.mass * sa).powi(2) + (mass * ss).powi(2);
+            (error, sf * sf + inertia + of_x.norm_sqr() * sx * sx)
+        };
         all.push(Relation {
-            name: "R2 equilibrium of the table",
-            ratio: ratio(&|k, s| {
-                let of_x = s * table.damping + table.stiffness;
-                let error = f[k] - specimen[k] * mass - a[k] * table.mass - of_x * x[k];
-                let inertia = (table.mass * sa).powi(2) + (mass * ss).powi(2);
-                (error, sf * sf + inertia + of_x.norm_sqr() * sx * sx)
-            }),
+            name: EQUILIBRIUM,
+            ratio: ratio(&error),
+            relative: relative(&error, f),
         });
     }
     if let (
@@ -109,12 +165,18 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
                 let error = specimen[k] - passed * a[k];
                 (error, ss * ss + passed.norm_sqr() * sa * sa)
             }),
+            relative: None,
         });
     }
-    if let (Some(x), Some(a)) = (&x, &a) {
+    if let (Some(second), Some(a)) = (&second, &a) {
+        let error = |k: usize, s: Complex<f64>| {
+            let variance = sa * sa + (s * s).norm_sqr() * sx * sx;
+            (a[k] - s * s / of_second(s) * second[k], variance)
+        };
         all.push(Relation {
-            name: "R4 kinematics",
-            ratio: ratio(&|k, s| (a[k] - s * s * x[k], sa * sa + (s * s).norm_sqr() * sx * sx)),
+            name: KINEMATICS,
+            ratio: ratio(&error),
+            relative: relative(&error, a),
         });
     }
     if let Some(law) = nominal.controller {
@@ -130,6 +192,7 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
             all.push(Relation {
                 name: "R5 the controller's law",
                 ratio: (sum / count).sqrt() / nominal.command_noise,
+                relative: None,
             });
         }
     }

@@ -92,7 +92,8 @@ pub fn matters(candidates: &[Candidate], point: &Point) -> bool {
 
 /// One start of a race.
 struct Runner {
-    fit: Fit,
+    point: Point,
+    cost: f64,
     effect: usize,
     parent: usize,
 }
@@ -149,60 +150,78 @@ impl<M: RigModel> Search<'_, M> {
         self.hypothesis(&start, 6)
     }
 
-    /// Best extensions of `parents` by one more effect: short fits from every start, of which
-    /// the better part runs on, then the `keep` best effects polished.
-    fn extend(&self, parents: &[(&Fit, &Jacobian)], keep: usize) -> Vec<Hypothesis> {
+    /// Best extensions of `parents` by one more effect: short fits to the first record from every
+    /// start, of which the better part runs on, then the `keep` best sets fitted to all records.
+    fn extend(&self, parents: &[&Point], keep: usize) -> Vec<Hypothesis> {
         let candidates = self.model.candidates();
+        let track = &self.records[..1];
+        let mut jacobians = Vec::new();
         let mut runners = Vec::new();
-        for (parent, (base, jacobian)) in parents.iter().enumerate() {
+        for parent in parents {
+            // What a missing effect bent the nuisance by would mislead: begin at the nominal
+            // values.
+            let base = &Point {
+                nuisance: vec![0.0; self.model.nuisance()],
+                effects: parent.effects.clone(),
+            };
+            let jacobian = evaluate(self.model, base, track)
+                .and_then(|fit| Jacobian::at(self.model, &fit, track));
+            let Some(jacobian) = jacobian else { continue };
+            let parent = jacobians.len();
             for (effect, candidate) in candidates.iter().enumerate() {
                 let held = |(i, _): &(usize, Vec<f64>)| {
                     *i == effect
                         || candidate.contains == Some(candidates[*i].effect)
                         || candidates[*i].contains == Some(candidate.effect)
                 };
-                if base.point.effects.iter().any(held) {
+                if base.effects.iter().any(held) {
                     continue;
                 }
                 for start in &candidate.starts {
-                    let mut point = base.point.clone();
+                    let mut point = base.clone();
                     point.effects.push((effect, candidate.internal(start)));
-                    if let Some(fit) = fit(self.model, &point, &self.records, jacobian, 2) {
+                    if let Some(fit) = fit(self.model, &point, track, &jacobian, 1) {
                         runners.push(Runner {
-                            fit,
+                            point: fit.point,
+                            cost: fit.cost,
                             effect,
                             parent,
                         });
                     }
                 }
             }
+            jacobians.push(jacobian);
         }
-        runners.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-        // Two starts of each set of effects run on.
-        let mut starts: Vec<(usize, usize)> = Vec::new();
-        runners.retain(|runner| {
-            let key = (runner.parent, runner.effect);
-            starts.push(key);
-            starts.iter().filter(|seen| **seen == key).count() <= 2
-        });
-        runners.truncate(16 + 4 * parents.len());
-        for runner in &mut runners {
-            let jacobian = parents[runner.parent].1;
-            if let Some(further) = fit(self.model, &runner.fit.point, &self.records, jacobian, 4) {
-                runner.fit = further;
+        for (iterations, share) in [(1, 2), (4, 4)] {
+            runners.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+            // Two starts of each set of effects run on.
+            let mut starts: Vec<(usize, usize)> = Vec::new();
+            runners.retain(|runner| {
+                let key = (runner.parent, runner.effect);
+                starts.push(key);
+                starts.iter().filter(|seen| **seen == key).count() <= 2
+            });
+            runners.truncate(8 + 40 * parents.len() / share);
+            for runner in &mut runners {
+                let jacobian = &jacobians[runner.parent];
+                if let Some(fit) = fit(self.model, &runner.point, track, jacobian, iterations) {
+                    runner.point = fit.point;
+                    runner.cost = fit.cost;
+                }
             }
         }
-        runners.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        runners.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let mut seen: Vec<Vec<usize>> = Vec::new();
         let mut best = Vec::new();
         for runner in runners {
-            let mut set: Vec<usize> = runner.fit.point.effects.iter().map(|(i, _)| *i).collect();
+            let mut set: Vec<usize> = runner.point.effects.iter().map(|(i, _)| *i).collect();
             set.sort_unstable();
             if seen.contains(&set) {
                 continue;
             }
             seen.push(set);
-            best.extend(self.hypothesis(&runner.fit, 4));
+            let start = evaluate(self.model, &runner.point, &self.records);
+            best.extend(start.and_then(|start| self.hypothesis(&start, 4)));
             if best.len() == keep {
                 break;
             }
@@ -277,9 +296,7 @@ impl<M: RigModel> Search<'_, M> {
             self.refine(&nominal)
         } else {
             // A strong effect bends the nominal fit: begin at the nominal values themselves.
-            let start = evaluate(self.model, &origin, &self.records)?;
-            let jacobian = Jacobian::at(self.model, &start, &self.records)?;
-            self.extend(&[(&start, &jacobian)], 6)
+            self.extend(&[&origin], 6)
         };
         level.retain(worth);
         for hypothesis in &level {
@@ -308,13 +325,13 @@ impl<M: RigModel> Search<'_, M> {
                     break;
                 }
                 let excess = |hypothesis: &Hypothesis| hypothesis.mean_square() - 1.0;
-                let mut parents = vec![(&current.fit, &current.jacobian)];
+                let mut parents = vec![&current.fit.point];
                 parents.extend(
                     others
                         .iter()
                         .filter(|other| excess(other) < 5.0 * excess(current))
                         .take(2)
-                        .map(|other| (&other.fit, &other.jacobian)),
+                        .map(|other| &other.fit.point),
                 );
                 self.extend(&parents, 5)
             };

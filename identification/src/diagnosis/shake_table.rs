@@ -9,7 +9,7 @@ use plant::units::INCH;
 
 use super::experiment;
 use super::gain::{Gain, gain};
-use super::relations::{Relation, relations};
+use super::relations::{Relation, misfit, relations};
 use super::verdict::{NamedEffect, Verdict, judge};
 use super::{Point, Test};
 use crate::case::{CHANNELS, Case, CaseError, Nominal, Record, blind_spot, problems};
@@ -19,9 +19,6 @@ use crate::predictor::{Predictor, Signals};
 /// R5 fires, and the recorded command is used, where it misses the law by more than this many
 /// standard deviations of its noise.
 const LAW_HOLDS_WITHIN: f64 = 4.0;
-/// A nominal model whose one-step prediction misses a channel's variation by more than this
-/// factor does not belong to the columns.
-const DOES_NOT_FIT: f64 = 1.0;
 
 /// The parameter set that the FMUs of table, specimen and instrumentation take, SI.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -181,6 +178,10 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     };
     let mut notes = Vec::new();
     let model = prepare(case, &mut notes)?;
+    let relations = relations(&case.identification, &case.nominal);
+    if let Some(problem) = misfit(&relations) {
+        return Err(unfit(&problem));
+    }
     let held_out = model.records.len() - 1;
     let fitted: Vec<usize> = (0..held_out).collect();
     let origin = Point {
@@ -195,23 +196,6 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     };
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
     let signals = &model.records[held_out].signals;
-    let crude = gain(
-        signals,
-        &CHANNELS,
-        (&before.0, &before.1),
-        (&before.0, &before.1),
-    );
-    if let Some(channel) = crude
-        .channels
-        .iter()
-        .find(|c| c.before > DOES_NOT_FIT.max(3.0 * c.floor))
-    {
-        return Err(unfit(&format!(
-            "the nominal model does not fit the columns: its one-step prediction misses `{}` by \
-             {:.1} times that channel's variation; check units, signs and which rig this is",
-            channel.channel, channel.before
-        )));
-    }
     let judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
     let after = prediction(&model, &judgement.best.point, held_out).ok_or_else(lost)?;
     let gain = gain(
@@ -260,7 +244,6 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
         })
         .filter(|(_, error)| error.is_finite())
         .collect();
-    let relations = relations(&case.identification, &case.nominal);
     let sentence = sentence(
         judgement.verdict,
         &effects,

@@ -2,7 +2,7 @@
 
 use super::adequacy::{self, Test};
 use super::fit::{Fit, Jacobian, evaluate, polish};
-use super::model::{Point, RigModel, Role, Scale};
+use super::model::{Point, RigModel, Role};
 use super::search::{Found, Hypothesis, RIVAL_WITHIN, Search};
 
 /// Largest deviate that noise alone may show among the few hundred tests.
@@ -172,10 +172,7 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
     // all that is left is asked of a fit to everything, free of the parameters' own errors.
     let joint = evaluate(model, &best.fit.point, &everything)
         .and_then(|start| polish(model, &start, &everything, 4));
-    let (joint_fit, joint_jacobian) = match joint {
-        Some((fit, jacobian)) => (fit, Some(jacobian)),
-        None => (best.fit.clone(), None),
-    };
+    let joint_fit = joint.map_or_else(|| best.fit.clone(), |(fit, _)| fit);
     let mut tests = Vec::new();
     let mut rest = joint_fit.residuals.as_slice();
     for &record in &everything {
@@ -205,9 +202,13 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
         });
     }
     tests.sort_by(|a, b| b.deviate.total_cmp(&a.deviate));
+    let effects = best.fit.point.effects.iter();
+    let tolerance = effects.fold(1.0f64, |most, (i, _)| {
+        most.max(model.candidates()[*i].tolerance)
+    });
     let adequate = tests
         .first()
-        .is_none_or(|worst| worst.deviate < LARGEST_DEVIATE);
+        .is_none_or(|worst| worst.deviate < tolerance * LARGEST_DEVIATE);
 
     let best_names = names(model, &best);
     let nested = |set: &[&'static str]| {
@@ -243,10 +244,6 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
         (true, true, false) => Verdict::Ambiguous,
     };
     let mut effects = estimates(model, &best.fit, &best.jacobian);
-    if let Some(jacobian) = joint_jacobian {
-        // Standard errors of the fit itself; the joint one only confirms.
-        let _ = jacobian;
-    }
     for effect in &mut effects {
         effect.confidence = 1.0 / weight;
     }
@@ -265,9 +262,4 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
         tests,
         share_explained,
     }
-}
-
-/// True when a parameter counted like this is stronger the smaller it is.
-pub fn weaker_when_larger(scale: Scale) -> bool {
-    !matches!(scale, Scale::Linear(_))
 }

@@ -5,6 +5,7 @@ pub mod compare;
 mod compare_tables;
 pub mod design;
 mod design_report;
+pub mod diagnose;
 pub mod identify;
 pub mod info;
 pub mod run;

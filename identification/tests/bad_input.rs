@@ -1,0 +1,278 @@
+//! Broken records are answered by name, never with a cause.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::f64::consts::TAU;
+
+use identification::case::{Case, CaseError, Nominal, Record};
+use identification::diagnosis::Verdict;
+use identification::diagnosis::experiment::play;
+use identification::diagnosis::shake_table::diagnose;
+use plant::effects::{Effects, ValveEffects};
+use plant::identified_rig::IdentifiedRig;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+const NOMINAL: &str = "
+sample_rate = 500.0
+[actuator]
+denominator = [1.0, 56.18, 13330.0, 178.2]
+voltage_to_force = [3430.0, 38600.0, 403.3]
+velocity_to_force = [565.1, -1818.0, 312000.0]
+[table]
+mass = 0.1212
+damping = 0.2465
+stiffness = 23.3189
+[specimen]
+mass = 0.258799172
+damping = 0.162608315
+stiffness = 10.216981782
+[controller]
+kind = \"three_variable_control\"
+proportional = 6.15
+integral = 0.161
+velocity_feedforward = 0.125
+acceleration_feedforward = 0.0001
+velocity_feedback = 0.005
+acceleration_feedback = 0.0001
+velocity_filter = 0.25
+limit = 10.0
+[noise]
+displacement = 0.0005
+acceleration = 1.5
+actuator_force = 0.3
+specimen_acceleration = 1.0
+valve_command = 0.0005
+[uncertainty]
+relative = 0.01
+";
+
+const SAMPLES: usize = 3000;
+
+/// A record of the rig in closed loop with sensor noise that the controller does not see: enough
+/// for looking at its columns.
+fn record(name: &str, nominal: &Nominal, rig: &IdentifiedRig, seed: u64) -> Record {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let period = 1.0 / nominal.sample_rate;
+    let phases: Vec<f64> = (0..12).map(|_| TAU * random.random::<f64>()).collect();
+    let reference: Vec<f64> = (0..SAMPLES)
+        .map(|k| {
+            let t = k as f64 * period;
+            let waves = phases.iter().enumerate().map(|(i, phase)| {
+                let f = 0.3 * 1.4f64.powi(i as i32);
+                (TAU * f * t + phase).sin() / (1.0 + f * f)
+            });
+            0.004 * (t / 0.5).min(1.0) * waves.sum::<f64>()
+        })
+        .collect();
+    let law = nominal.controller.unwrap();
+    let rows = play(rig, &law, &reference, period).unwrap();
+    let mut channels: [Vec<f64>; 4] = Default::default();
+    for row in &rows {
+        for i in 0..4 {
+            let noise: f64 = random.sample(StandardNormal);
+            channels[i].push(row[i] + nominal.noise[i] * noise);
+        }
+    }
+    let valve_command = law.commands(&reference, &channels[0], &channels[1], period);
+    Record {
+        name: name.into(),
+        time: (0..SAMPLES).map(|k| k as f64 * period).collect(),
+        valve_command,
+        channels,
+        reference,
+    }
+}
+
+fn healthy() -> Case {
+    let nominal = Nominal::parse(NOMINAL).unwrap();
+    let rig = IdentifiedRig {
+        shake_table: nominal.shake_table,
+        specimen: nominal.specimen,
+        effects: Effects {
+            valve: ValveEffects {
+                dead_band: 0.1,
+                ..Default::default()
+            },
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    Case {
+        identification: record("identification", &nominal, &rig, 1),
+        validation: record("validation", &nominal, &rig, 2),
+        small: None,
+        baseline: None,
+        nominal,
+    }
+}
+
+fn refused(case: &Case) -> String {
+    match diagnose(case, false) {
+        Err(error @ CaseError::Unfit { .. }) => error.to_string(),
+        other => panic!("expected a refusal, got {other:?}"),
+    }
+}
+
+#[test]
+fn a_gap_is_named_with_its_place() {
+    let mut case = healthy();
+    for time in &mut case.validation.time[1200..] {
+        *time += 0.006;
+    }
+    let message = refused(&case);
+    assert!(
+        message.contains("validation: a gap after 2.3980 s"),
+        "{message}"
+    );
+    assert!(message.contains("about 3 samples"), "{message}");
+}
+
+#[test]
+fn another_sampling_rate_is_named() {
+    let mut case = healthy();
+    case.identification.time.iter_mut().for_each(|t| *t *= 2.0);
+    let message = refused(&case);
+    assert!(
+        message.contains("identification: sampled at 250.0000 Hz"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_clipped_sensor_is_named() {
+    let mut case = healthy();
+    let acceleration = &mut case.identification.channels[1];
+    let limit = 0.4 * acceleration.iter().fold(0.0f64, |m, a| m.max(a.abs()));
+    acceleration
+        .iter_mut()
+        .for_each(|a| *a = a.clamp(-limit, limit));
+    let message = refused(&case);
+    assert!(message.contains("`acceleration` is clipped"), "{message}");
+}
+
+#[test]
+fn a_frozen_sensor_is_named() {
+    let mut case = healthy();
+    case.validation.channels[2][500..900].fill(1.0);
+    let message = refused(&case);
+    assert!(
+        message.contains("validation: `actuator_force` is frozen"),
+        "{message}"
+    );
+}
+
+#[test]
+fn dropped_readings_are_named() {
+    let mut case = healthy();
+    case.identification.channels[0][77] = f64::NAN;
+    let message = refused(&case);
+    assert!(message.contains("`displacement` has 1 empty"), "{message}");
+    assert!(message.contains("sample 77"), "{message}");
+}
+
+#[test]
+fn too_little_excitation_is_named() {
+    let mut case = healthy();
+    let record = &mut case.identification;
+    record.channels[0].iter_mut().for_each(|x| *x *= 1e-3);
+    let message = refused(&case);
+    assert!(
+        message.contains("identification: too little excitation"),
+        "{message}"
+    );
+}
+
+#[test]
+fn too_few_samples_are_named() {
+    let mut case = healthy();
+    case.validation.time.truncate(100);
+    case.validation.valve_command.truncate(100);
+    case.validation
+        .channels
+        .iter_mut()
+        .for_each(|c| c.truncate(100));
+    let message = refused(&case);
+    assert!(message.contains("100 samples are too few"), "{message}");
+}
+
+#[test]
+fn a_sign_turned_over_is_told_from_an_effect() {
+    let mut case = healthy();
+    for record in [&mut case.identification, &mut case.validation] {
+        record.channels[1].iter_mut().for_each(|a| *a = -*a);
+    }
+    let message = refused(&case);
+    assert!(
+        message.contains("acceleration and displacement are not of one motion"),
+        "{message}"
+    );
+}
+
+#[test]
+fn records_with_other_channels_are_not_of_one_rig() {
+    let mut case = healthy();
+    case.validation.channels[3].clear();
+    let message = refused(&case);
+    assert!(message.contains("are the records of one rig"), "{message}");
+}
+
+#[test]
+fn a_missing_channel_is_told_and_the_rest_used() {
+    let mut case = healthy();
+    for record in [&mut case.identification, &mut case.validation] {
+        record.channels[3].clear();
+    }
+    let diagnosis = diagnose(&case, false).unwrap();
+    let notes = diagnosis.notes.join("; ");
+    assert!(
+        notes.contains("`specimen_acceleration` is missing"),
+        "{notes}"
+    );
+    assert_ne!(diagnosis.verdict, Verdict::Adequate);
+}
+
+#[test]
+fn a_column_without_unit_is_named() {
+    let error = Record::parse("r", "time [s],displacement\n0,1\n").unwrap_err();
+    assert!(
+        error.contains("column `displacement` has no unit"),
+        "{error}"
+    );
+    let error = Record::parse("r", "time [s],displacement [lbf]\n0,1\n").unwrap_err();
+    assert!(
+        error.contains("`lbf` does not measure what `m` does"),
+        "{error}"
+    );
+    let error = Record::parse("r", "time [s],displacement [in]\n0,1\n0.002,x\n").unwrap_err();
+    assert!(
+        error.contains("line 3, column `displacement`: `x` is no number"),
+        "{error}"
+    );
+}
+
+#[test]
+fn order_units_and_unknown_columns_change_nothing() {
+    let a = Record::parse("r", "time [s],valve_command [V],displacement [in]\n0,1,2\n").unwrap();
+    let b = Record::parse(
+        "r",
+        "extra,displacement [mm],time [ms],valve_command [mV]\nx,50.8,0,1000\n",
+    )
+    .unwrap();
+    assert_eq!(a.time, b.time);
+    assert!((a.channels[0][0] - b.channels[0][0]).abs() < 1e-15);
+    assert_eq!(a.valve_command, b.valve_command);
+}
+
+#[test]
+fn the_extended_model_reads_back_as_written() {
+    let diagnosis = diagnose(&healthy(), false).unwrap();
+    assert_eq!(diagnosis.verdict, Verdict::Named, "{}", diagnosis.sentence);
+    assert_eq!(diagnosis.effects[0].effect, "valve_dead_band");
+    let text = toml::to_string(&diagnosis.extended_model).unwrap();
+    let back: identification::diagnosis::shake_table::ExtendedModel =
+        toml::from_str(&text).unwrap();
+    assert!((back.effects.valve.dead_band - 0.1).abs() < 2e-3, "{text}");
+    assert_eq!(back, diagnosis.extended_model);
+}
