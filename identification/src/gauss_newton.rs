@@ -127,7 +127,7 @@ struct Sensitivity<const P: usize> {
 
 const MAX_ITERATIONS: usize = 60;
 /// A tolerance for [`fit`] that costs no accuracy.
-pub const FINE: f64 = 0.02;
+pub const FINE: f64 = 0.1;
 /// Eigenvalues of the information matrix below this, relative to the unit diagonal, are flat.
 const FLAT: f64 = 1e-11;
 
@@ -141,6 +141,26 @@ pub fn fit<const P: usize>(
     parameters: &[Parameter],
     tolerance: f64,
 ) -> Result<Estimate, IdentificationError> {
+    let (estimate, converged) = fit_within(model, parameters, tolerance, MAX_ITERATIONS)?;
+    if converged {
+        return Ok(estimate);
+    }
+    Err(IdentificationError::NotConverged {
+        method: "the Gauss-Newton refinement",
+        reason: format!("still moving after {MAX_ITERATIONS} iterations"),
+    })
+}
+
+/// Fits as [`fit`] for at most so many iterations, and says whether it got there.
+///
+/// # Errors
+/// The start makes no model.
+pub fn fit_within<const P: usize>(
+    model: &impl PredictionModel<P>,
+    parameters: &[Parameter],
+    tolerance: f64,
+    iterations: usize,
+) -> Result<(Estimate, bool), IdentificationError> {
     let failed = |reason: &str| IdentificationError::NotConverged {
         method: "the Gauss-Newton refinement",
         reason: reason.to_string(),
@@ -149,7 +169,7 @@ pub fn fit<const P: usize>(
     let mut base = evaluate(model, &values).ok_or_else(|| failed("the start makes no model"))?;
     let mut cost: f64 = base.iter().map(Whitened::cost).sum();
     let mut damping = 1e-3;
-    for iteration in 1..=MAX_ITERATIONS {
+    for iteration in 1..=iterations {
         let (information, gradient) = scoring(model, parameters, &values, &base)?;
         let active: Vec<usize> = (0..parameters.len())
             .filter(|&i| parameters[i].free && !pushes_out(&parameters[i], values[i], gradient[i]))
@@ -179,44 +199,46 @@ pub fn fit<const P: usize>(
                 damping = (damping * 0.1).max(1e-9);
                 accepted = true;
                 if decrement.abs() < tolerance * tolerance && gained < tolerance * tolerance {
-                    return finish(model, parameters, values, &base, cost, iteration);
+                    let estimate = finish(model, parameters, values, &base, cost, iteration)?;
+                    return Ok((estimate, true));
                 }
                 break;
             }
             if decrement.abs() < tolerance * tolerance {
-                return finish(model, parameters, values, &base, cost, iteration);
+                let estimate = finish(model, parameters, values, &base, cost, iteration)?;
+                return Ok((estimate, true));
             }
             damping *= if damping < 1e-4 { 100.0 } else { 10.0 };
         }
         if !accepted {
-            return finish(model, parameters, values, &base, cost, iteration);
+            let estimate = finish(model, parameters, values, &base, cost, iteration)?;
+            return Ok((estimate, true));
         }
     }
-    Err(failed(&format!(
-        "still moving after {MAX_ITERATIONS} iterations"
-    )))
+    let estimate = finish(model, parameters, values, &base, cost, iterations)?;
+    Ok((estimate, false))
 }
 
-/// Where one held parameter would go in one step from an optimum of the others, and the standard
-/// error of that (a score test).
+/// Where one held parameter would go in one step of all from the start values, and the standard
+/// error of that (from an optimum of the others, a score test).
 ///
 /// # Errors
-/// The estimate makes no model.
+/// The start makes no model.
 pub fn score_test<const P: usize>(
     model: &impl PredictionModel<P>,
     parameters: &[Parameter],
-    estimate: &Estimate,
     index: usize,
 ) -> Result<(f64, f64), IdentificationError> {
     let mut freed = parameters.to_vec();
     freed[index].free = true;
-    let base = evaluate(model, &estimate.parameters).ok_or(IdentificationError::NotConverged {
+    let values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
+    let base = evaluate(model, &values).ok_or(IdentificationError::NotConverged {
         method: "the score test",
-        reason: "the estimate makes no model".into(),
+        reason: "the start makes no model".into(),
     })?;
-    let (information, gradient) = scoring(model, &freed, &estimate.parameters, &base)?;
+    let (information, gradient) = scoring(model, &freed, &values, &base)?;
     let active: Vec<usize> = (0..freed.len())
-        .filter(|&i| freed[i].free && !pushes_out(&freed[i], estimate.parameters[i], gradient[i]))
+        .filter(|&i| freed[i].free && !pushes_out(&freed[i], values[i], gradient[i]))
         .collect();
     let step = damped_step(&information, &gradient, &active, 1e-9);
     let mut unit = DVector::zeros(freed.len());

@@ -10,6 +10,7 @@ mod error;
 pub mod frequency_response;
 pub mod gauss_newton;
 mod identifiability;
+pub mod input_matrices;
 pub mod instrumental_variables;
 mod least_squares;
 pub mod model_file;

@@ -155,16 +155,10 @@ pub fn identify(
         identifiable = false;
     }
     approach(&model, &mut parameters)?;
-    let mut estimate = gauss_newton::fit(&model, &parameters, FINE)?;
     if options.delay && identifiable {
-        let (late, error) = gauss_newton::score_test(&model, &parameters, &estimate, DELAY)?;
-        if late > 4.0 * error && late > 1e-3 * model.experiments[0].period {
-            restart(&mut parameters, &estimate);
-            parameters[DELAY].free = true;
-            parameters[DELAY].start = late.min(0.05);
-            estimate = gauss_newton::fit(&model, &parameters, FINE)?;
-        }
+        free_late_command(&model, &mut parameters)?;
     }
+    let mut estimate = gauss_newton::fit(&model, &parameters, FITTED)?;
     if identifiable {
         estimate = hold_undetermined_slow_zero(&model, &mut parameters, estimate, &mut warnings)?;
     }
@@ -184,6 +178,26 @@ pub fn identify(
     found.singular_values = start.singular_values;
     found.take(&parameters, estimate);
     Ok(found)
+}
+
+/// Tolerance of the fit that is validated; the last one starts from it.
+const FITTED: f64 = 0.3;
+
+/// Goes on with the delay free, and keeps it so where it is clearly above zero.
+fn free_late_command(
+    model: &RigModel,
+    parameters: &mut [Parameter],
+) -> Result<(), IdentificationError> {
+    let mut late = parameters.to_vec();
+    late[DELAY].free = true;
+    late[DELAY].largest_step = 2.0 * model.experiments[0].period;
+    approach(model, &mut late)?;
+    let (step, error) = gauss_newton::score_test(model, &late, DELAY)?;
+    let delay = late[DELAY].start + step;
+    if delay > 4.0 * error && delay > 1e-3 * model.experiments[0].period {
+        parameters.clone_from_slice(&late);
+    }
+    Ok(())
 }
 
 /// The same experiments to their end, with the scales of the fitted part.
@@ -349,9 +363,11 @@ fn approach(model: &RigModel, parameters: &mut [Parameter]) -> Result<(), Identi
         let payload = (0..model.experiments.len()).any(|e| i == model.nuisance(e));
         parameter.free &= i >= PHYSICAL && !payload;
     }
-    let estimate = gauss_newton::fit(model, &linear, COARSE)?;
+    // What a late command makes of these steps need not settle.
+    const STEPS: usize = 12;
+    let (estimate, _) = gauss_newton::fit_within(model, &linear, COARSE, STEPS)?;
     restart(&mut held, &estimate);
-    let estimate = gauss_newton::fit(model, &held, COARSE)?;
+    let (estimate, _) = gauss_newton::fit_within(model, &held, COARSE, STEPS)?;
     restart(parameters, &estimate);
     Ok(())
 }
@@ -399,7 +415,7 @@ fn hold_undetermined_slow_zero(
         parameters[i].start = 0.0;
         parameters[i].free = false;
     }
-    gauss_newton::fit(model, parameters, FINE)
+    gauss_newton::fit(model, parameters, FITTED)
 }
 
 /// Refuses a rig that is none, and compares what was fitted with what was not.

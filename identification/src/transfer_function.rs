@@ -34,6 +34,8 @@ pub struct Estimate {
     pub denominator: Vec<f64>,
     /// Delay, s.
     pub delay: f64,
+    /// What adds to the output.
+    pub offset: f64,
     /// Standard errors: numerator, denominator without its 1, delay. Right where the simulated
     /// error is white.
     pub standard_error: Vec<f64>,
@@ -41,6 +43,18 @@ pub struct Estimate {
     pub normalised_error: f64,
     /// The simulated output.
     pub simulated: Vec<f64>,
+}
+
+impl Estimate {
+    /// The output from an input alone, from rest, for data that were not fitted.
+    pub fn simulate(&self, input: &[f64], period: f64, between: Between) -> Vec<f64> {
+        let late = delayed(input, self.delay / period);
+        let mut model = simulate(&self.numerator, &self.denominator, &late, period, between);
+        for value in &mut model {
+            *value += self.offset;
+        }
+        model
+    }
 }
 
 struct OutputError<'a> {
@@ -202,6 +216,7 @@ pub fn identify(
         numerator: p[..=zeros].to_vec(),
         denominator,
         delay: p[zeros + 1 + order],
+        offset: p[zeros + order + 2],
         standard_error: (0..zeros + order + 2)
             .map(|i| found.standard_error(i))
             .collect(),

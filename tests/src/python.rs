@@ -1,4 +1,5 @@
-//! A Python with the importers of `tests/importers/requirements.txt`, made once under `target/`.
+//! Pythons with what `tests/importers` pins, made once under `target/`: the importers of
+//! `requirements.txt`, and SIPPY of `requirements-sippy.txt` apart from them.
 
 use std::{
     ffi::OsStr,
@@ -19,7 +20,8 @@ pub fn importers() -> PathBuf {
 /// When the environment cannot be made, with what to install.
 pub fn python() -> Command {
     static ENVIRONMENT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
-    let environment = match ENVIRONMENT.get_or_init(make_environment) {
+    let made = ENVIRONMENT.get_or_init(|| make_environment("python", "requirements.txt"));
+    let environment = match made {
         Ok(environment) => environment,
         Err(problem) => panic!("no Python for the importers: {problem}"),
     };
@@ -36,6 +38,17 @@ pub fn python() -> Command {
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .env("PYTHONUNBUFFERED", "1");
     command
+}
+
+/// A command that runs Python with SIPPY installed.
+///
+/// # Panics
+/// When the environment cannot be made, with what to install.
+pub fn sippy() -> Command {
+    match make_environment("sippy", "requirements-sippy.txt") {
+        Ok(environment) => Command::new(program(&environment)),
+        Err(problem) => panic!("no Python with SIPPY: {problem}"),
+    }
 }
 
 /// Runs a script of `tests/importers` and returns what it printed.
@@ -73,8 +86,9 @@ fn program(environment: &Path) -> PathBuf {
     })
 }
 
-fn make_environment() -> Result<PathBuf, String> {
-    let requirements_file = importers().join("requirements.txt");
+/// An environment `name` under `target/importers` with what the file `pinned` lists.
+fn make_environment(name: &str, pinned: &str) -> Result<PathBuf, String> {
+    let requirements_file = importers().join(pinned);
     let requirements = fs::read_to_string(&requirements_file)
         .map_err(|e| format!("{}: {e}", requirements_file.display()))?;
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/importers");
@@ -85,7 +99,7 @@ fn make_environment() -> Result<PathBuf, String> {
     let lock = File::create(folder.join("lock")).map_err(|e| format!("lock: {e}"))?;
     lock.lock().map_err(|e| format!("lock: {e}"))?;
 
-    let environment = folder.join("python");
+    let environment = folder.join(name);
     // Written last: there only if everything before it succeeded.
     let done = environment.join("requirements.txt");
     if fs::read_to_string(&done).is_ok_and(|text| text == requirements) {

@@ -1,5 +1,6 @@
 //! Real measurements: a servo-hydraulic press and a positioning drive, where they are present.
 
+use std::ops::Range;
 use std::path::PathBuf;
 
 use identification::data::fit_percent;
@@ -53,14 +54,20 @@ fn the_press_is_one_pole_and_a_delay_of_four_milliseconds() {
     assert!(found.normalised_error < 0.0445);
     assert!((found.delay - 0.0045).abs() < 0.001);
 
-    // Fitted to the first two thirds of the sweep, judged on the last.
+    // Fitted to the first two thirds of the sweep, judged on the last, where it is fastest.
     let part = 2 * command.len() / 3;
-    let half = identify(&command[..part], &position[..part], 0.001, structure).unwrap();
-    println!(
-        "first two thirds: delay {:.2} ms, error {:.2} %",
-        1e3 * half.delay,
-        100.0 * half.normalised_error
-    );
+    let unseen = |structure: Structure| {
+        let found = identify(&command[..part], &position[..part], 0.001, structure).unwrap();
+        let model = found.simulate(command, 0.001, structure.between);
+        let unseen = 1.0 - 0.01 * fit_percent(&position[part..], &model[part..]);
+        println!(
+            "first two thirds: error {:.2} %; last third, not fitted: {:.2} %",
+            100.0 * found.normalised_error,
+            100.0 * unseen
+        );
+        unseen
+    };
+    let one_unseen = unseen(structure);
 
     let two = Structure {
         order: 2,
@@ -74,6 +81,11 @@ fn the_press_is_one_pole_and_a_delay_of_four_milliseconds() {
         100.0 * found.normalised_error
     );
     assert!(found.normalised_error < 0.052);
+    let two_unseen = unseen(two);
+    assert!(
+        one_unseen < 0.10 && two_unseen < 0.15,
+        "{one_unseen} {two_unseen}"
+    );
 }
 
 #[test]
@@ -102,28 +114,30 @@ fn the_drive_s_force_follows_from_its_motion() {
     let (forward, backward) = (sign(1.0), sign(-1.0));
     let both: Vec<f64> = forward.iter().zip(&backward).map(|(a, b)| a + b).collect();
     let one = vec![1.0; count];
-    let fit = |columns: &[&Vec<f64>]| -> (Vec<f64>, f64) {
+    // Parameters fitted to some samples, and the relative error of the force on others.
+    let fit = |columns: &[&Vec<f64>], fitted: Range<usize>, judged: Range<usize>| {
         let n = columns.len();
         let normal = nalgebra::DMatrix::from_fn(n, n, |i, j| {
-            (200..count)
+            fitted
+                .clone()
                 .map(|k| columns[i][k] * columns[j][k])
                 .sum::<f64>()
         });
         let right = nalgebra::DVector::from_fn(n, |i, _| {
-            (200..count).map(|k| columns[i][k] * force[k]).sum::<f64>()
+            fitted
+                .clone()
+                .map(|k| columns[i][k] * force[k])
+                .sum::<f64>()
         });
         let theta = normal.lu().solve(&right).unwrap();
-        let model: Vec<f64> = (0..count)
-            .map(|k| (0..n).map(|i| theta[i] * columns[i][k]).sum())
-            .collect();
-        let error = (200..count)
-            .map(|k| (force[k] - model[k]).powi(2))
-            .sum::<f64>();
-        let size = (200..count).map(|k| force[k].powi(2)).sum::<f64>();
-        assert!(fit_percent(&force[200..], &model[200..]) > 90.0);
+        let model = |k: usize| (0..n).map(|i| theta[i] * columns[i][k]).sum::<f64>();
+        let error: f64 = judged.clone().map(|k| (force[k] - model(k)).powi(2)).sum();
+        let size: f64 = judged.map(|k| force[k].powi(2)).sum();
         (theta.as_slice().to_vec(), 100.0 * (error / size).sqrt())
     };
-    let (symmetric, error) = fit(&[&position[2], &position[1], &both, &one]);
+    let (all, half) = (200..count, count / 2);
+    let columns = [&position[2], &position[1], &both, &one];
+    let (symmetric, error) = fit(&columns, all.clone(), all.clone());
     println!(
         "symmetric: mass {:.2} kg, viscous {:.1} N s/m, Coulomb {:.2} N, offset {:.2} N: error {error:.2} %",
         symmetric[0], symmetric[1], symmetric[2], symmetric[3]
@@ -131,7 +145,15 @@ fn the_drive_s_force_follows_from_its_motion() {
     assert!(error < 4.08, "{error}");
     assert!((symmetric[0] - 95.0).abs() < 3.0);
     let turning: Vec<f64> = position[1].iter().map(|v| v.max(0.0)).collect();
-    let (_, error) = fit(&[&position[2], &position[1], &turning, &forward, &backward]);
+    let (_, symmetric_unseen) = fit(&columns, 200..half, half..count);
+    let columns = [&position[2], &position[1], &turning, &forward, &backward];
+    let (_, error) = fit(&columns, all.clone(), all);
+    let (_, unseen) = fit(&columns, 200..half, half..count);
     println!("asymmetric: error {error:.2} %");
+    println!(
+        "second half by the first: symmetric {symmetric_unseen:.2} %, asymmetric {unseen:.2} %"
+    );
     assert!(error < 3.11, "{error}");
+    assert!(symmetric_unseen < 4.08, "{symmetric_unseen}");
+    assert!(unseen < 3.11, "{unseen}");
 }

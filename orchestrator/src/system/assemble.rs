@@ -210,7 +210,8 @@ fn article(causality: Causality) -> String {
     format!("{} {word}", if vowel { "an" } else { "a" })
 }
 
-/// Carries out `component.variable=VALUE` of the command line.
+/// Carries out `component.variable=VALUE` of the command line; `component.model=NAME` sets all
+/// that a published model or a model file gives to the component.
 fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
     let expected = "expected component.variable=VALUE, such as control.valve_limit=\"5 V\"";
     let (name, text) = setting.split_once('=').ok_or(expected)?;
@@ -218,6 +219,13 @@ fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
     let index = component_index(components, component)?;
     let part = &mut components[index];
     let fmu = part.fmu.clone();
+    if variable == "model" && fmu.description.variable(variable).is_none() {
+        let set = model::parameters(text.trim(), &fmu.description, None)?;
+        for (position, value) in set {
+            put(&mut part.parameters, position, value);
+        }
+        return Ok(());
+    }
     let is_input = fmu.description.variable(variable);
     let is_input = is_input.is_some_and(|v| v.causality == Causality::Input);
     let (causality, values) = if is_input {

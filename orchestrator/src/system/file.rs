@@ -49,7 +49,8 @@ pub struct ComponentFile {
     /// Name of a component of this project (`"ShakeTable"`), or a path to an `.fmu` file, relative
     /// to the system file.
     pub fmu: String,
-    /// A set of parameters: `"equation-2-13"`, `"derounded"`, or a path to a `MODEL.toml`.
+    /// A set of parameters: `"equation-2-13"`, `"derounded"`, or a path to a `MODEL.toml`
+    /// as `shakebench identify` writes it.
     #[serde(default)]
     pub model: Option<String>,
     /// Sampling period; it makes the component a sampled one.

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use identification::model_file::ModelFile;
 use plant::actuator::PublishedActuator;
+use plant::shake_table::ShakeTable;
 use plant::table::Table;
-use serde::Deserialize;
 
-use super::{Value, hint, value};
+use super::{Value, hint};
 use crate::fmu::{Causality, Description};
 
 /// Published models of `ShakeTable`.
@@ -16,18 +17,13 @@ const PUBLISHED: [(&str, PublishedActuator); 3] = [
     ("derounded", PublishedActuator::Derounded),
 ];
 
-/// A `MODEL.toml`: `[parameters.NAME]` for the component NAME, values as in a system file. Other
-/// tables of it tell how the model came about and are not read here.
-#[derive(Deserialize)]
-struct ModelFile {
-    parameters: std::collections::BTreeMap<String, toml::Table>,
-}
-
 /// The parameters that the model `name` gives to a component, as position and value; paths are
-/// relative to `directory`.
+/// relative to `directory`. A published model is one of `ShakeTable`; a file gives its actuator
+/// and table to `ShakeTable` and its specimen to `Specimen`.
 ///
 /// # Errors
-/// An unknown name, a model that must not be simulated (with the reason), a file at fault.
+/// An unknown name, a model that must not be simulated (with the reason), a file at fault, a
+/// component that the model says nothing of.
 pub(super) fn parameters(
     name: &str,
     component: &Description,
@@ -35,7 +31,7 @@ pub(super) fn parameters(
 ) -> Result<Vec<(usize, Value)>, String> {
     if name.ends_with(".toml") {
         let path = directory.unwrap_or(Path::new("")).join(name);
-        return from_file(&path, component).map_err(|r| format!("{}: {r}", path.display()));
+        return from_file(&path, component);
     }
     let found = PUBLISHED.iter().find(|(known, _)| *known == name);
     let Some(&(_, published)) = found else {
@@ -52,10 +48,51 @@ pub(super) fn parameters(
         PublishedActuator::Derounded => Table::derounded(),
         _ => Table::equation_2_28(),
     };
+    let values = shake_table_values(&ShakeTable { actuator, table });
+    place(&values, component).ok_or_else(|| {
+        format!(
+            "`{name}` is a model of ShakeTable, not of {}",
+            component.model_name
+        )
+    })
+}
+
+fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>, String> {
+    let name = path.display().to_string();
+    let file = ModelFile::read(path).map_err(|error| error.to_string())?;
+    let is_table = component.position("actuator_a2").is_some();
+    let values = if is_table {
+        let rig = file.shake_table(&name).map_err(|error| error.to_string())?;
+        shake_table_values(&rig).to_vec()
+    } else {
+        let specimen = file.specimen(&name).map_err(|error| error.to_string())?;
+        let specimen = specimen.ok_or_else(|| {
+            format!(
+                "{name}: there is no [specimen], and {} is no ShakeTable",
+                component.model_name
+            )
+        })?;
+        vec![
+            ("mass", specimen.mass),
+            ("damping", specimen.damping),
+            ("stiffness", specimen.stiffness),
+        ]
+    };
+    place(&values, component).ok_or_else(|| {
+        format!(
+            "{name}: a model of ShakeTable and Specimen, not of {}",
+            component.model_name
+        )
+    })
+}
+
+/// The parameters of the FMU `ShakeTable`, SI.
+fn shake_table_values(rig: &ShakeTable) -> [(&'static str, f64); 12] {
+    let ShakeTable { actuator, table } = rig;
     let [a2, a1, a0] = actuator.denominator;
     let [b2, b1, b0] = actuator.voltage_to_force;
     let [e2, e1, e0] = actuator.velocity_to_force;
-    let values = [
+    [
         ("table_mass", table.mass),
         ("table_damping", table.damping),
         ("table_stiffness", table.stiffness),
@@ -68,38 +105,18 @@ pub(super) fn parameters(
         ("actuator_e2", e2),
         ("actuator_e1", e1),
         ("actuator_e0", e0),
-    ];
-    let place = |(parameter, value)| {
-        let position = component.position(parameter).ok_or_else(|| {
-            format!(
-                "`{name}` is a model of ShakeTable; {} has no parameter `{parameter}`",
-                component.model_name
-            )
-        })?;
-        Ok((position, Value::Number(value)))
-    };
-    values.into_iter().map(place).collect()
+    ]
 }
 
-fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>, String> {
-    let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
-    let file: ModelFile = toml::from_str(&text).map_err(|error| error.to_string())?;
-    let given = file
-        .parameters
-        .get(&component.model_name)
-        .ok_or_else(|| format!("there is no [parameters.{}]", component.model_name))?;
-    let read = |(name, written): (&String, &toml::Value)| {
-        let at = |reason: String| format!("parameters.{}.{name}: {reason}", component.model_name);
-        let position = component
+/// Positions of the parameters, or nothing where the component lacks one.
+fn place(values: &[(&str, f64)], component: &Description) -> Option<Vec<(usize, Value)>> {
+    let position = |name: &str| {
+        component
             .of(Causality::Parameter)
-            .find(|&index| component.variables[index].name == *name);
-        let position = position.ok_or_else(|| {
-            let known = component.of(Causality::Parameter);
-            let known = known.map(|index| component.variables[index].name.as_str());
-            at(format!("no parameter of that name{}", hint(name, known)))
-        })?;
-        let value = value::read(&component.variables[position], written).map_err(at)?;
-        Ok((position, value))
+            .find(|&index| component.variables[index].name == name)
     };
-    given.iter().map(read).collect()
+    values
+        .iter()
+        .map(|&(name, value)| Some((position(name)?, Value::Number(value))))
+        .collect()
 }
