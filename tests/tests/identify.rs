@@ -175,20 +175,3 @@ fn ninety_five_per_cent_intervals_hold_the_truth_in_90_to_99_of_100() {
         assert!(*held as f64 > expected - slack, "{name}: {held} of {count}");
     }
 }
-
-#[test]
-fn a_late_command_is_found_with_its_delay() {
-    let recording = Test {
-        delay: 2,
-        duration: 40.0,
-        ..Test::default()
-    }
-    .record();
-    let found = identify(&[recording], Options::default()).unwrap();
-    let (delay, error) = (found.physical[15], found.standard_error[15]);
-    assert!(
-        (delay - 0.004).abs() < 4.0 * error && error < 2e-4,
-        "{delay} {error}"
-    );
-    assert!(response_error(&found, 0.1, 30.0) < 0.03);
-}

@@ -9,7 +9,9 @@ use controllers::{
     sliding_mode::{self, LowLevelReferences, SlidingMode as Law, SlidingModeInput},
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
-use plant::{ModelError, actuator::IdentifiedActuator, shake_table::ShakeTable, units::SAMPLING_PERIOD};
+use plant::{
+    ModelError, actuator::IdentifiedActuator, shake_table::ShakeTable, units::SAMPLING_PERIOD,
+};
 use serde::{Deserialize, Serialize};
 
 /// The sliding-mode law over the loops of Fig 4-3.
