@@ -39,46 +39,34 @@ fn the_generator_shares_no_code_with_the_plant() {
     }
 }
 
+/// The seed of the small suite; any other with `SHAKEBENCH_SEED`.
+const SEED: u64 = 5000;
+
 #[test]
-fn a_few_fresh_cases_are_diagnosed() {
+fn hidden_effects_are_found_and_nothing_where_nothing_is() {
+    let seed = std::env::var("SHAKEBENCH_SEED").ok();
     let plan = Plan {
-        seed: rand::random_range(1..1_000_000_000),
-        one: 16,
-        two: 4,
-        nothing: 4,
-        outside: 6,
+        seed: seed.and_then(|text| text.parse().ok()).unwrap_or(SEED),
+        one: 12,
+        two: 3,
+        nothing: 3,
+        outside: 4,
         mismatch: 0.01,
         noise: 1.0,
     };
-    println!("{plan:?}");
     let results = run_all(&plan, |_| {});
     let report = table(&results);
-    println!("{report}");
-    // Bounds that the required rates (95 %, 85 %, 95 %; wrong 1 %) miss once in some thousand
-    // runs; the command `hidden_effects_suite` measures the rates themselves.
-    assert!(
-        rates(&results, "one").0 >= 0.75,
-        "seed {}\n{report}",
-        plan.seed
-    );
-    assert!(
-        rates(&results, "two").0 >= 0.25,
-        "seed {}\n{report}",
-        plan.seed
-    );
-    assert!(
-        rates(&results, "outside").0 >= 0.5,
-        "seed {}\n{report}",
-        plan.seed
-    );
-    assert!(
-        rates(&results, "nothing").0 >= 1.0,
-        "seed {}\n{report}",
-        plan.seed
-    );
-    let wrong: f64 = ["one", "two", "nothing", "outside"]
-        .iter()
-        .map(|kind| rates(&results, kind).1)
-        .sum();
-    assert!(wrong <= 0.25, "seed {}\n{report}", plan.seed);
+    println!("{plan:?}\n{report}");
+    // The rates themselves are measured by the example `hidden_effects_suite`.
+    let kinds = [
+        ("one", 0.9),
+        ("two", 0.6),
+        ("nothing", 1.0),
+        ("outside", 0.75),
+    ];
+    for (kind, bound) in kinds {
+        let (right, wrong) = rates(&results, kind);
+        assert!(right >= bound, "{kind}, seed {}\n{report}", plan.seed);
+        assert!(wrong == 0.0, "{kind}, seed {}\n{report}", plan.seed);
+    }
 }
