@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{build, compare, design, identify, info, run};
+use crate::commands::{build, compare, design, diagnose, identify, info, run};
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -29,6 +29,8 @@ enum Command {
     Compare(compare::Arguments),
     /// Print margins of the loops and draw their frequency responses
     Design(design::Arguments),
+    /// Show what a nominal model gets wrong, name the cause and measure what knowing it brings
+    Diagnose(diagnose::Arguments),
     /// Find a rig's parameters from measured data
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
@@ -44,6 +46,7 @@ pub fn main() -> ExitCode {
         Some(Command::Build(arguments)) => build::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::Design(arguments)) => design::execute(&arguments),
+        Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
