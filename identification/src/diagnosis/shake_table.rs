@@ -60,6 +60,21 @@ pub struct Diagnosis {
     pub share_explained: f64,
     /// What the reader should know: missing channels, a law that does not hold.
     pub notes: Vec<String>,
+    /// The validation record before and after.
+    pub validation: Validation,
+}
+
+/// One-step errors on the validation record, whitened: the noise alone has a deviation of one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Validation {
+    /// Sampling period, s.
+    pub period: f64,
+    /// What acted and what was measured, SI.
+    pub signals: Signals,
+    /// Errors of the nominal model, four channels a sample.
+    pub before: Vec<f64>,
+    /// Errors of the extended model.
+    pub after: Vec<f64>,
 }
 
 /// The command that acted: by the law where it explains the record, as recorded elsewhere.
@@ -279,6 +294,12 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
             .collect(),
         share_explained: judgement.share_explained,
         notes,
+        validation: Validation {
+            period: model.period,
+            signals: signals.clone(),
+            before: before.1,
+            after: after.1,
+        },
     })
 }
 

@@ -15,8 +15,11 @@ use crate::report::{Abscissa, Axis, Panel, Series, Style, Units, svg};
 /// What `diagnose` takes.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    shakebench diagnose CASE_FOLDER\n  \
-    shakebench diagnose identification/rigs/positioning_drive.toml --out results")]
+    shakebench diagnose cases/dev-03 --out results/dev-03 --json\n  \
+    shakebench diagnose identification/rigs/positioning_drive.toml --out results\n\n\
+    A case is a folder with nominal.toml, identification.csv and validation.csv, and may have\n\
+    small.csv and baseline.csv. Each header cell is `name [unit]`, in any order and unit; columns\n\
+    of other names are left alone.")]
 pub struct Arguments {
     /// Folder of a case (nominal.toml and records), or description of a rig (.toml)
     case: PathBuf,
@@ -42,13 +45,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         .extension()
         .is_none_or(|extension| extension != "toml")
     {
-        let report = diagnose::diagnose(&arguments.case, out)?;
-        if arguments.json {
-            println!("{}", json(&arguments.case, &report)?);
-        } else {
-            println!("{}", report.sentence);
-        }
-        return Ok(ExitCode::SUCCESS);
+        return diagnose::execute(&arguments.case, out, arguments.json);
     }
     let begun = Instant::now();
     let fail = |error: DescriptionError| fault(&arguments.case, error);
@@ -81,10 +78,6 @@ fn fault(path: &Path, error: impl std::fmt::Display) -> Error {
         path: path.into(),
         reason: error.to_string(),
     }
-}
-
-fn json(path: &Path, value: &impl serde::Serialize) -> Result<serde_json::Value, Error> {
-    serde_json::to_value(value).map_err(|error| fault(path, error))
 }
 
 /// The fields that scripts read from every diagnosis, and `rig` with everything.

@@ -4,6 +4,7 @@
 
 mod archives;
 mod contract;
+mod diagnosis;
 mod failures;
 mod motions;
 mod systems;

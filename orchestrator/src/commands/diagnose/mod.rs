@@ -1,7 +1,10 @@
 //! `diagnose`: what the nominal model of a case gets wrong, why, and what knowing it brings.
 
+mod page;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::time::Instant;
 
 use identification::case::{Case, CaseError};
@@ -9,9 +12,13 @@ use identification::diagnosis::shake_table::{self, Diagnosis};
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::report;
+use crate::results::Results;
 
 /// File with the extended model, in the folder of `--out`.
 pub const EXTENDED_MODEL: &str = "extended_model.toml";
+/// File with the report, in the folder of `--out`.
+pub const REPORT: &str = "report.html";
 
 /// The JSON object of `diagnose`; SI.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -148,32 +155,67 @@ impl DiagnosisReport {
     }
 }
 
-/// Diagnoses the case in folder `case`; with `out`, writes the extended model there.
+/// Diagnoses the case in folder `case`; with `out`, writes the extended model and the HTML report
+/// there, all or nothing.
 ///
-/// Fails where the case cannot be read or its records would mislead; nothing is written then.
+/// # Errors
+/// A case that cannot be read, records that would mislead, a folder that cannot be written.
 pub fn diagnose(case: &Path, out: Option<&Path>) -> Result<DiagnosisReport, Error> {
     let begun = Instant::now();
     let fail = |path: &Path, reason: String| Error::File {
         path: path.into(),
         reason,
     };
+    if let Some(folder) = out {
+        Results::check(folder)?;
+    }
     let read = Case::read(case).map_err(|error| match error {
         CaseError::File { file, reason } => Error::File { path: file, reason },
         other => fail(case, other.to_string()),
     })?;
     let diagnosis = shake_table::diagnose(&read, false).map_err(|e| fail(case, e.to_string()))?;
-    let extended_model = match out {
-        None => None,
-        Some(folder) => {
-            let path = folder.join(EXTENDED_MODEL);
-            let text = toml::to_string(&diagnosis.extended_model)
-                .map_err(|error| fail(&path, error.to_string()))?;
-            std::fs::create_dir_all(folder)
-                .and_then(|()| std::fs::write(&path, text))
-                .map_err(|error| fail(&path, error.to_string()))?;
-            Some(path)
-        }
-    };
+    let extended_model = out.map(|folder| folder.join(EXTENDED_MODEL));
     let wall = begun.elapsed().as_secs_f64();
-    Ok(DiagnosisReport::new(&diagnosis, extended_model, wall))
+    let report = DiagnosisReport::new(&diagnosis, extended_model, wall);
+    if let Some(folder) = out {
+        let model = toml::to_string(&diagnosis.extended_model)
+            .map_err(|error| fail(&folder.join(EXTENDED_MODEL), error.to_string()))?;
+        let page = report::html(&page::page(
+            &case.display().to_string(),
+            &report,
+            &diagnosis,
+        ))
+        .map_err(|error| fail(&folder.join(REPORT), error.to_string()))?;
+        let mut results = Results::begin(folder)?;
+        results.write_text(EXTENDED_MODEL, &model)?;
+        results.write_text(REPORT, &page)?;
+        results.finish()?;
+    }
+    Ok(report)
+}
+
+/// Diagnoses a case, writes its files and prints what was found.
+///
+/// # Errors
+/// As [`diagnose`]; nothing is written then.
+pub fn execute(case: &Path, out: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+    let folder = out.map_or_else(
+        || {
+            let place = std::path::absolute(case).unwrap_or_else(|_| case.to_path_buf());
+            let name = place.file_name().unwrap_or_default().to_string_lossy();
+            Path::new("shakebench-results").join(format!("diagnosis-{name}"))
+        },
+        Path::to_path_buf,
+    );
+    let report = diagnose(case, Some(&folder))?;
+    if json {
+        println!("{}", serde_json::json!(report));
+    } else {
+        print!("{}", page::text(&report));
+        println!("\nwritten ({:.1} s):", report.wall_s);
+        for file in [EXTENDED_MODEL, REPORT] {
+            println!("  {}", folder.join(file).display());
+        }
+    }
+    Ok(ExitCode::SUCCESS)
 }
