@@ -98,7 +98,7 @@ impl Test {
         let system = rig.state_space().sample(PERIOD);
         let mut state = nalgebra::DVector::zeros(7);
         let mut law = ThreeVariableControl::table_3_2();
-        let mut recorded = vec![Vec::with_capacity(reference.len()); 6];
+        let mut recorded = vec![Vec::new(); 6];
         let (mut velocity, mut before) = (0.0, 0.0);
         for wanted in reference {
             let outputs = &system.c * &state;
