@@ -13,6 +13,7 @@ const DURATION: f64 = 3.0;
 
 /// Displacement, acceleration, force, specimen's acceleration at every 10 ms.
 type Trace = Vec<[f64; 4]>;
+type Named<T> = (&'static str, fn(&mut T));
 
 fn command(displacement: f64, time: f64) -> f64 {
     // A proportional law keeps the table, whose open loop is slightly unstable, near the middle.
@@ -22,7 +23,7 @@ fn command(displacement: f64, time: f64) -> f64 {
 
 /// The command is renewed every 2 ms in both.
 fn in_one_piece(rig: &IdentifiedRig, step: f64) -> Trace {
-    let sampled = rig.sample(step, 4).unwrap();
+    let sampled = rig.sample(step, 4).expect("a valid rig");
     let mut state = IdentifiedRigState::default();
     let (mut u, mut trace) = (0.0, Vec::new());
     for k in 0..(DURATION / step).round() as usize {
@@ -43,8 +44,8 @@ fn in_parts(rig: &IdentifiedRig, step: f64) -> Trace {
     let table = ExtendedTable::new(&rig.shake_table, &rig.effects);
     let specimen = ExtendedSpecimen::new(rig.specimen, &rig.effects.specimen);
     let sensors = Instrumentation::default().with_effects(&rig.sensors);
-    sensors.validate(step).unwrap();
-    let filter = sensors.velocity_filter(step).unwrap();
+    sensors.validate(step).expect("a valid rig");
+    let filter = sensors.velocity_filter(step).expect("a valid rig");
     let mut sensed = InstrumentationState::default();
     let (mut s, mut d) = (
         ExtendedTableState::default(),
@@ -93,7 +94,7 @@ fn distance(a: &Trace, b: &Trace) -> f64 {
 }
 
 fn effects() -> Vec<(&'static str, Effects, SensorEffects)> {
-    let rig: [(&'static str, fn(&mut Effects)); 25] = [
+    let rig: [Named<Effects>; 25] = [
         ("valve_null_bias", |e| e.valve.null_bias = 0.2),
         ("valve_dead_band", |e| e.valve.dead_band = 0.15),
         ("valve_flow_gain", |e| e.valve.flow_gain = -0.2),
@@ -141,7 +142,7 @@ fn effects() -> Vec<(&'static str, Effects, SensorEffects)> {
         }),
         ("specimen_absent", |e| e.specimen.absent = true),
     ];
-    let sensors: [(&'static str, fn(&mut SensorEffects)); 9] = [
+    let sensors: [Named<SensorEffects>; 9] = [
         ("accelerometer_bias", |s| s.accelerometer_bias = 10.0 * INCH),
         ("accelerometer_scale", |s| s.accelerometer_scale = 0.15),
         ("accelerometer_tilt", |s| s.accelerometer_tilt = 0.04 / INCH),
