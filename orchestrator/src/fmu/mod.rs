@@ -8,7 +8,7 @@ mod instance;
 mod messages;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use sha2::{Digest, Sha256};
 
@@ -16,6 +16,9 @@ pub use description::{Causality, Description, FmiVersion, Kind, Variability, Var
 pub use error::{CallError, FmuError};
 pub use instance::{Instance, State};
 pub use messages::Message;
+
+/// `fmi-rs` checks variable names with a parser that keeps its state in globals: one at a time.
+static PARSER: Mutex<()> = Mutex::new(());
 
 /// An FMU file: described and unpacked, not yet loaded.
 #[derive(Debug)]
@@ -43,7 +46,10 @@ impl Fmu {
             source,
         })?;
         let unpacked = archive::unpack(path, &bytes)?;
-        let description = description::read(path, unpacked.path())?;
+        let description = {
+            let _alone = PARSER.lock().unwrap_or_else(PoisonError::into_inner);
+            description::read(path, unpacked.path())?
+        };
         let platforms = archive::platforms(unpacked.path());
         Ok(Arc::new(Self {
             path: path.to_path_buf(),
