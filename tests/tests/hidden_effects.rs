@@ -57,12 +57,14 @@ fn hidden_effects_are_found_and_nothing_where_nothing_is() {
     let results = run_all(&plan, |_| {});
     let report = table(&results);
     println!("{plan:?}\n{report}");
-    // The rates themselves are measured by the example `hidden_effects_suite`.
+    // So few cases cannot measure rates: the bounds are those that a diagnosis with the required
+    // rates (95, 85, 100 and 95 %) misses less than once in a hundred draws. The rates themselves
+    // are measured by the example `hidden_effects_suite`.
     let kinds = [
-        ("one", 0.9),
-        ("two", 0.6),
+        ("one", 0.75),
+        ("two", 0.3),
         ("nothing", 1.0),
-        ("outside", 0.75),
+        ("outside", 0.5),
     ];
     for (kind, bound) in kinds {
         let (right, wrong) = rates(&results, kind);
