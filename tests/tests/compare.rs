@@ -3,21 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
+use acceptance::shared;
 use shakebench::experiment::{Request, prepare};
 use shakebench::metrics::tracking;
 
 fn records() -> Option<Vec<PathBuf>> {
-    let shared = std::env::var_os("SHAKEBENCH_SHARED").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-        PathBuf::from,
-    );
-    let entries = std::fs::read_dir(shared.join("records")).ok()?;
-    let mut records: Vec<PathBuf> = entries
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|e| e == "csv" || e == "AT2"))
-        .collect();
-    records.sort();
-    (records.len() == 8).then_some(records)
+    let records = shared::records();
+    (!records.is_empty()).then_some(records)
 }
 
 fn request(system: &str, specimen: &str, record: &Path) -> Request {

@@ -1,7 +1,6 @@
 //! Real measurements: a servo-hydraulic press and a positioning drive, where they are present.
 
 use std::ops::Range;
-use std::path::PathBuf;
 
 use identification::data::fit_percent;
 use identification::state_variable_filter::{Between, equal_lags, filter};
@@ -9,11 +8,7 @@ use identification::transfer_function::{Structure, identify};
 
 /// Columns of a file under `measured`, or nothing and a word about it.
 fn measured(file: &str) -> Option<Vec<Vec<f64>>> {
-    let shared = std::env::var_os("SHAKEBENCH_SHARED").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-        PathBuf::from,
-    );
-    let path = shared.join("measured").join(file);
+    let path = acceptance::shared::folder()?.join("measured").join(file);
     let Ok(text) = std::fs::read_to_string(&path) else {
         println!("skipped: {} is not there", path.display());
         return None;

@@ -1,8 +1,7 @@
 //! Model predictive control on the thesis's records, bare and with the linear specimen: the goals
 //! for its time-domain error (Table 5-2's measure) and its order before three-variable control.
 
-use std::path::{Path, PathBuf};
-
+use acceptance::shared;
 use controllers::mpc::{
     ModelPredictiveControl, ModelPredictiveInput, Outlook, Parameters, prediction_plant,
 };
@@ -16,22 +15,8 @@ use shakebench::motion;
 
 const H: f64 = 0.002;
 
-fn shared() -> PathBuf {
-    std::env::var_os("SHAKEBENCH_SHARED").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-        PathBuf::from,
-    )
-}
-
 fn records() -> Vec<(String, Vec<Motion>)> {
-    let folder = shared().join("records");
-    let Ok(files) = std::fs::read_dir(&folder) else {
-        return Vec::new();
-    };
-    let mut paths: Vec<PathBuf> = files.map(|file| file.unwrap().path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|e| e == "csv" || e == "AT2"));
-    paths.sort();
-    paths
+    shared::records()
         .iter()
         .map(|path| {
             let played = motion::load(path, &motion::Options::default()).unwrap();
@@ -95,7 +80,6 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn records_are_followed_to_the_goals_and_before_three_variable_control() {
     let records = records();
     if records.is_empty() {
-        println!("SKIPPED: no records in {}", shared().display());
         return;
     }
     let bare = Rig::default();

@@ -87,7 +87,7 @@ fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>
 }
 
 /// The parameters of the FMU `ShakeTable`, SI.
-fn shake_table_values(rig: &ShakeTable) -> [(&'static str, f64); 12] {
+pub(super) fn shake_table_values(rig: &ShakeTable) -> [(&'static str, f64); 12] {
     let ShakeTable { actuator, table } = rig;
     let [a2, a1, a0] = actuator.denominator;
     let [b2, b1, b0] = actuator.voltage_to_force;

@@ -26,6 +26,7 @@ use serde::{Deserialize, Serialize};
 
 use super::SystemFile;
 use super::file::ComponentFile;
+use super::model::shake_table_values;
 
 /// Samples by which the sensors of the physical rig are late.
 const DELAY: usize = 1;
@@ -263,27 +264,7 @@ impl Rules {
     }
 
     fn model(&self, component: &mut ComponentFile) {
-        let ShakeTable { table, actuator } = &self.model;
-        let [a2, a1, a0] = actuator.denominator;
-        let [b2, b1, b0] = actuator.voltage_to_force;
-        let [e2, e1, e0] = actuator.velocity_to_force;
-        set(
-            component,
-            &[
-                ("table_mass", table.mass),
-                ("table_damping", table.damping),
-                ("table_stiffness", table.stiffness),
-                ("actuator_a2", a2),
-                ("actuator_a1", a1),
-                ("actuator_a0", a0),
-                ("actuator_b2", b2),
-                ("actuator_b1", b1),
-                ("actuator_b0", b0),
-                ("actuator_e2", e2),
-                ("actuator_e1", e1),
-                ("actuator_e0", e0),
-            ],
-        );
+        set(component, &shake_table_values(&self.model));
     }
 }
 
