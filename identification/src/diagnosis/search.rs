@@ -26,7 +26,7 @@ const NOISE_OF_A_RACE: f64 = 1e4;
 /// Rounds of a fit at most; curved valleys take many.
 pub(super) const ROUNDS: usize = 12;
 /// Share of the excess over noise that one more round must gain.
-pub(super) const SETTLED: f64 = 0.01;
+pub(super) const SETTLED: f64 = 0.003;
 
 /// A fitted model with its derivatives.
 pub struct Hypothesis {
@@ -226,10 +226,13 @@ impl<M: RigModel> Search<'_, M> {
         let excess = |runner: &Runner| (runner.cost - samples as f64).max(0.0);
         let farthest =
             runners.first().map_or(0.0, |first| BEHIND * excess(first)) + NOISE_OF_A_RACE;
-        runners.retain(|runner| excess(runner) < farthest);
         let mut seen: Vec<Vec<usize>> = Vec::new();
-        let mut best = Vec::new();
+        let mut best: Vec<Hypothesis> = Vec::new();
         for runner in runners {
+            let strong = |found: &Hypothesis| matters(candidates, &found.fit.point);
+            if excess(&runner) > farthest && best.iter().any(strong) {
+                break;
+            }
             let mut set: Vec<usize> = runner.point.effects.iter().map(|(i, _)| *i).collect();
             set.sort_unstable();
             if seen.contains(&set) {

@@ -1,7 +1,7 @@
 //! From a search to a verdict: is the best model adequate, and does anything rival it?
 
 use super::adequacy::{self, Test};
-use super::fit::{Fit, Jacobian, evaluate, polish_to};
+use super::fit::{Fit, Jacobian, evaluate, fit as refit, polish_to};
 use super::model::{Point, RigModel, Role};
 use super::search::{Found, Hypothesis, RIVAL_WITHIN, ROUNDS, SETTLED, Search};
 
@@ -173,7 +173,13 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
     // The held-out record is predicted with the fitted parameters for the gain; whether noise is
     // all that is left is asked of a fit to everything, free of the parameters' own errors.
     let joint = evaluate(model, &best.fit.point, &everything)
-        .and_then(|start| polish_to(model, &start, &everything, ROUNDS, SETTLED));
+        .and_then(|start| polish_to(model, &start, &everything, ROUNDS, SETTLED))
+        .map(|(fit, jacobian)| {
+            // Directions that only the priors hold are told from others by exact derivatives only.
+            let exact = Jacobian::central(model, &fit, &everything).unwrap_or(jacobian);
+            let settled = refit(model, &fit.point, &everything, &exact, 3);
+            (settled.unwrap_or(fit), exact)
+        });
     let (joint_fit, joint_jacobian) = match joint {
         Some((fit, jacobian)) => (fit, Some(jacobian)),
         None => (best.fit.clone(), None),
