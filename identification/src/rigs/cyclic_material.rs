@@ -146,10 +146,7 @@ impl Rig for CyclicMaterial {
                 (slow, slow_recovery),
                 (fast, fast_recovery),
             ],
-            isotropic: [
-                (saturation, rate),
-                (-drop, drop_rate),
-            ],
+            isotropic: [(saturation, rate), (-drop, drop_rate)],
             lasting,
             degradation: (degradation, degradation_rate),
             differential,
