@@ -34,20 +34,26 @@ impl Rig for CyclicMaterial {
     }
 
     fn effects(&self) -> Vec<Effect> {
-        let backstress = |name, recovery: f64| {
+        let backstress = |name, recovery: f64, spread, starts: &[&[f64]]| {
             effect(
                 name,
                 vec![
                     size("hardening", "Pa", 1e8, (0.0, 1e12)),
-                    shape("recovery", "1", recovery, 0.8),
+                    shape("recovery", "1", recovery, spread),
                 ],
                 &[0.0, recovery],
-                &[&[1e9, recovery], &[1e10, recovery]],
+                starts,
             )
         };
         vec![
-            backstress("slow_backstress", 20.0),
-            backstress("fast_backstress", 800.0),
+            backstress(
+                "second_backstress",
+                200.0,
+                1.2,
+                &[&[1e9, 20.0], &[1e10, 200.0], &[5e10, 1000.0]],
+            ),
+            // A third one that hardly recovers.
+            backstress("lasting_backstress", 5.0, 0.5, &[&[1e9, 5.0]]),
             // R = Q (1 - e^{-b p}), p the plastic path (Voce 1948).
             effect(
                 "isotropic_hardening",
@@ -103,9 +109,9 @@ impl Rig for CyclicMaterial {
                 &[0.0],
                 &[&[2e-12], &[8e-12]],
             ),
-            // Strain recorded late by a part of a sample, or stress.
+            // Stress recorded late by a part of a sample, or strain.
             effect(
-                "strain_late",
+                "stress_late",
                 vec![size("samples", "1", 0.05, (-2.0, 2.0))],
                 &[0.0],
                 &[&[0.3], &[-0.3]],
@@ -155,20 +161,14 @@ impl Rig for CyclicMaterial {
             path: 0.0,
         };
         let last = strain.len() - 1;
-        let at = |k: usize| {
-            let place = (k as f64 + late).clamp(0.0, last as f64);
-            let before = place as usize;
-            let share = place - before as f64;
-            strain[before] * (1.0 - share) + strain[(before + 1).min(last)] * share
-        };
         let mut now = first;
         let mut direction = 0.0f64;
         let mut k = 0;
         while k <= last {
             // Where the strain was interpolated, only the reading behind it is known.
-            let interpolated = late == 0.0 && series.between.get(k) == Some(&true);
+            let interpolated = series.between.get(k) == Some(&true);
             let reading = if interpolated { k + 1 } else { k };
-            let next = at(reading);
+            let next = strain[reading];
             if next != now {
                 let turn = (next - now).signum();
                 let peak = direction * amplitude;
@@ -192,6 +192,15 @@ impl Rig for CyclicMaterial {
             }
             out[reading] = state.stress;
             k = reading + 1;
+        }
+        if late != 0.0 {
+            let shown = out.to_vec();
+            for (k, stress) in out.iter_mut().enumerate() {
+                let place = (k as f64 - late).clamp(0.0, last as f64);
+                let before = place as usize;
+                let share = place - before as f64;
+                *stress = shown[before] * (1.0 - share) + shown[(before + 1).min(last)] * share;
+            }
         }
     }
 }
