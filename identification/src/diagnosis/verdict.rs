@@ -69,6 +69,8 @@ pub struct Judgement {
     pub alternatives: Vec<Vec<&'static str>>,
     /// Points of the rivals, in the order of `alternatives`.
     pub rival_points: Vec<Point>,
+    /// Standard errors of the nominal parameters, in their stated standard deviations.
+    pub nuisance_errors: Vec<f64>,
     /// The best model, fitted to the fitting records.
     pub best: Fit,
     /// Tests of what is left over, strongest first.
@@ -244,6 +246,11 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
         (true, true, false) => Verdict::Ambiguous,
     };
     let mut effects = estimates(model, &best.fit, &best.jacobian);
+    let covariance = best.jacobian.covariance(model, &best.fit);
+    let nuisance_errors = covariance.map_or_else(Vec::new, |c| {
+        let count = best.fit.point.nuisance.len();
+        (0..count).map(|i| c[(i, i)].max(0.0).sqrt()).collect()
+    });
     for effect in &mut effects {
         effect.confidence = 1.0 / weight;
     }
@@ -258,6 +265,7 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
         effects,
         alternatives,
         rival_points,
+        nuisance_errors,
         best: best.fit,
         tests,
         share_explained,
