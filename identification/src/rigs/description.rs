@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::{KINDS, Named, Rig, of_kind};
-use crate::case::factor_to;
+use crate::units::convert;
 
 /// A set of measurements of one rig.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -218,8 +218,8 @@ impl Description {
         quantity: &Quantity,
         si: &str,
     ) -> Result<(f64, f64), DescriptionError> {
-        let factor =
-            factor_to(&quantity.unit, si).map_err(|why| self.wrong(format!("`{what}`: {why}")))?;
+        let factor = convert(1.0, &quantity.unit, si)
+            .map_err(|why| self.wrong(format!("`{what}`: {why}")))?;
         if !quantity.value.is_finite() || quantity.plus_minus.is_nan() || quantity.plus_minus < 0.0
         {
             return Err(self.wrong(format!(
@@ -356,7 +356,7 @@ impl Description {
             let column = self.columns.get(*name).ok_or_else(|| {
                 self.wrong(format!("`columns.{name}` is missing: a column in {si}"))
             })?;
-            let factor = factor_to(&column.unit, si)
+            let factor = convert(1.0, &column.unit, si)
                 .map_err(|why| self.wrong(format!("`columns.{name}`: {why}")))?;
             let place = header
                 .iter()
