@@ -238,7 +238,11 @@ fn pictures(
     let step = series.step * every as f64;
     let over_time = Panel {
         title: format!("{}: error of {output} on the data left out", report.name),
-        x: Axis::linear("time", Units::TIME),
+        x: if description.columns.contains_key("time") {
+            Axis::linear("time", Units::TIME)
+        } else {
+            Axis::linear("sample", Units::NONE)
+        },
         y: Axis::linear("measured - simulated", units(si)),
         series: vec![
             Series::history("nominal", step, &thin(&nominal_errors)).coloured(2),
@@ -257,7 +261,7 @@ fn pictures(
                 .coloured(colour)
         };
         Panel {
-            title: format!("{}: {output} over {input}, {}", report.name, series.name),
+            title: format!("{}, {}", report.name, series.name),
             x: Axis::linear(input, units(input_si)),
             y: Axis::linear(output, units(si)),
             series: vec![
