@@ -344,10 +344,14 @@ fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
             let (low, high) = parameter.bounds;
             let near = |end: f64| (value - end).abs() < 1e-3 * end.abs();
             if matches!(parameter.role, Role::Size { .. }) && (near(low) || near(high)) {
+                let unit = Some(parameter.unit).filter(|unit| *unit != "1");
                 notes.push(format!(
-                    "{}.{} ran to the end of what is plausible ({value:.3} {}): does nominal.toml \
+                    "{}.{} ran to the end of what is plausible, {value:.3}{}{}: does nominal.toml \
                      belong to this rig?",
-                    candidate.effect, parameter.name, parameter.unit
+                    candidate.effect,
+                    parameter.name,
+                    unit.map_or("", |_| " "),
+                    unit.unwrap_or_default()
                 ));
             }
         }

@@ -190,7 +190,7 @@ pub fn diagnose(case: &Path, folder: &Path) -> Result<DiagnosisReport, Error> {
     if report.effects.is_empty() && !diagnosis.modelled.is_empty() {
         let names: Vec<&str> = diagnosis.modelled.iter().map(|e| e.effect).collect();
         report.notes.push(format!(
-            "the extended model holds {}, which helps and is not the cause",
+            "in the extended model for the help they are, not as the cause: {}",
             names.join(" and ")
         ));
     }

@@ -96,12 +96,18 @@ pub(super) fn remarks(report: &DiagnosisReport) -> Vec<String> {
 }
 
 /// Columns of [`relations`].
-pub(super) const RELATIONS: [&str; 5] = ["relation", "nominal", "re-estimated", "healthy rig", ""];
+pub(super) const RELATIONS: [&str; 5] = [
+    "relation",
+    "nominal",
+    "re-estimated",
+    "healthy rig",
+    "state",
+];
 
 /// The relations with a word each: how they are with the nominal parameters, and with re-estimated
 /// ones, against a healthy rig.
 pub(super) fn relations(report: &DiagnosisReport) -> Vec<Vec<String>> {
-    let holds = |ratio: f64, healthy: f64| ratio < 1.5 * healthy;
+    let holds = |ratio: f64, healthy: f64| ratio < 1.3 * healthy;
     let relations = report.relations.iter();
     relations
         .map(|(name, relation)| {
