@@ -109,10 +109,11 @@ impl ShakeTableModel {
         }
     }
 
-    /// The nominal rig with `nuisance` (in standard deviations) and no effects.
+    /// The nominal rig with `nuisance` (in standard deviations of the parameters' logarithms, so that
+    /// factors add up) and no effects.
     pub fn rig_without_effects(&self, nuisance: &[f64]) -> IdentifiedRig {
         let mut rig = self.nominal;
-        let mut factors = nuisance.iter().map(|p| 1.0 + self.uncertainty * p);
+        let mut factors = nuisance.iter().map(|p| (self.uncertainty * p).exp());
         let mut scale = |value: &mut f64| *value *= factors.next().unwrap_or(1.0);
         let actuator = &mut rig.shake_table.actuator;
         actuator.denominator.iter_mut().for_each(&mut scale);

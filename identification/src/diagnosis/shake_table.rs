@@ -230,7 +230,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
         (&before.0, &before.1),
         (&after.0, &after.1),
     );
-    let rig = model.rig(&judgement.best.point);
+    let rig = model.rig(&judgement.all.point);
     let effects = readable(judgement.effects);
     let separating_experiment = judgement.rival_points.first().and_then(|rival| {
         let law = case.nominal.controller?;
