@@ -23,6 +23,7 @@ pub mod rigs;
 pub mod state_variable_filter;
 pub mod subspace;
 pub mod transfer_function;
+pub mod units;
 pub mod validation;
 
 pub use error::IdentificationError;

@@ -242,7 +242,7 @@ fn a_column_without_unit_is_named() {
     );
     let error = Record::parse("r", "time [s],displacement [lbf]\n0,1\n").unwrap_err();
     assert!(
-        error.contains("`lbf` does not measure what `m` does"),
+        error.contains("unit \"lbf\" (kg m s^-2) does not fit \"m\" (m)"),
         "{error}"
     );
     let error = Record::parse("r", "time [s],displacement [in]\n0,1\n0.002,x\n").unwrap_err();
