@@ -253,6 +253,7 @@ pub(super) fn write(
             tables: tables.iter().map(Words::table).collect(),
             notes: early(rows),
             panels: panels(rows),
+            ..Section::default()
         }],
         footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
         ..Report::default()
