@@ -283,3 +283,52 @@ impl Steel {
         self.stress = trial - side * modulus * plastic;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stress(strain: &[f64], amplitude: f64, compliance: f64) -> Vec<f64> {
+        let series = Series::new("path", 1.0, vec![strain.to_vec()], vec![0.0; strain.len()]);
+        let effects: Vec<f64> = CyclicMaterial
+            .effects()
+            .iter()
+            .flat_map(|effect| {
+                if effect.candidate.effect == "frame_compliance" {
+                    vec![compliance]
+                } else {
+                    effect.off.clone()
+                }
+            })
+            .collect();
+        // Perfectly plastic at 400 MPa.
+        let nominal = [2e11, 4e8, 0.0, 1.0, amplitude];
+        let mut out = vec![0.0; strain.len()];
+        CyclicMaterial.simulate(&series, &nominal, &effects, &mut out);
+        out
+    }
+
+    #[test]
+    fn a_turn_between_readings_reaches_the_amplitude_and_its_sample_lies_half_way() {
+        // From 1.95 % on to 2 % and back to 1.8 %: half of that path is 0.075 % behind the turn.
+        let strain = [0.0, 0.0195, 0.01875, 0.018];
+        let out = stress(&strain, 0.02, 0.0);
+        assert!((out[1] - 4e8).abs() < 1.0);
+        assert!((out[2] - (4e8 - 2e11 * 7.5e-4)).abs() < 1e6, "{}", out[2]);
+        assert!(out[3].abs() < 1e6, "{}", out[3]);
+        // Without a known amplitude the readings are all there is.
+        let plain = stress(&strain, 0.0, 0.0);
+        assert!((plain[3] - 1e8).abs() < 1e6, "{}", plain[3]);
+    }
+
+    #[test]
+    fn a_compliant_frame_moves_the_sample_that_was_interpolated() {
+        // Back from 4e8 Pa by 0.4 % strain to -4e8 Pa at 0.4 %, then 0.2 % of plastic strain. With
+        // compliance C the path is 0.004 + C 8e8 Pa, then 0.002; its half lies in the elastic leg.
+        let strain = [0.0, 0.018, 0.015, 0.012];
+        let [stiff, soft] = [0.0, 5e-12].map(|c| stress(&strain, 0.0, c)[2]);
+        let expected = |c: f64| 4e8 - 2e11 * 0.5 * (0.006 + 8e8 * c) / (1.0 + 2e11 * c);
+        assert!((stiff - expected(0.0)).abs() < 1e6, "{stiff}");
+        assert!((soft - expected(5e-12)).abs() < 1e6, "{soft}");
+    }
+}
