@@ -27,6 +27,7 @@ pub mod specimen_file;
 pub mod state_variable_filter;
 pub mod subspace;
 pub mod transfer_function;
+pub mod units;
 pub mod validation;
 
 pub use error::IdentificationError;

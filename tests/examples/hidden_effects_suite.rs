@@ -1,7 +1,7 @@
 //! Hides effects in fresh cases, diagnoses them and prints what came of it.
 //!
 //! `cargo run --release -p acceptance --example hidden_effects_suite -- [--one N] [--two N]
-//! [--nothing N] [--outside N] [--noise F] [--mismatch F] [--seed S]`
+//! [--nothing N] [--outside N] [--noise F,...] [--mismatch F,...] [--seed S] [--verbose 1]`
 
 use std::env;
 use std::process::ExitCode;
@@ -16,13 +16,16 @@ fn main() -> ExitCode {
         two: 50,
         nothing: 30,
         outside: 40,
-        mismatch: 0.01,
-        noise: 1.0,
+        mismatch: vec![0.01],
+        noise: vec![1.0],
+        verbose: false,
     };
     let mut arguments = env::args().skip(1);
     while let Some(option) = arguments.next() {
-        let Some(value) = arguments.next().and_then(|text| text.parse::<f64>().ok()) else {
-            eprintln!("{option}: expected a number after it");
+        let text = arguments.next().unwrap_or_default();
+        let list: Result<Vec<f64>, _> = text.split(',').map(str::parse::<f64>).collect();
+        let Some((value, list)) = list.ok().and_then(|list| Some((*list.first()?, list))) else {
+            eprintln!("{option}: expected a number after it (of noise and mismatch several: 1,3)");
             return ExitCode::from(2);
         };
         match option.as_str() {
@@ -30,13 +33,14 @@ fn main() -> ExitCode {
             "--two" => plan.two = value as usize,
             "--nothing" => plan.nothing = value as usize,
             "--outside" => plan.outside = value as usize,
-            "--noise" => plan.noise = value,
-            "--mismatch" => plan.mismatch = value,
+            "--noise" => plan.noise = list,
+            "--mismatch" => plan.mismatch = list,
             "--seed" => plan.seed = value as u64,
+            "--verbose" => plan.verbose = value != 0.0,
             _ => {
                 eprintln!(
                     "{option} is unknown; expected --one, --two, --nothing, --outside, --noise, \
-                     --mismatch or --seed"
+                     --mismatch, --seed or --verbose"
                 );
                 return ExitCode::from(2);
             }

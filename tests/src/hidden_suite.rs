@@ -1,6 +1,6 @@
 //! The hidden-effect suite: fresh cases, the diagnosis of each, and what came of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ use identification::diagnosis::shake_table::{Diagnosis, diagnose};
 use rayon::prelude::*;
 
 /// How many cases of each kind, and from which seed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// First seed; every case takes the next one.
     pub seed: u64,
@@ -23,10 +23,12 @@ pub struct Plan {
     pub nothing: usize,
     /// Cases with something outside the catalogue.
     pub outside: usize,
-    /// Relative standard deviation of the plant's parameters.
-    pub mismatch: f64,
-    /// Factor on the sensors' noise.
-    pub noise: f64,
+    /// Relative standard deviations of the plant's parameters, which the cases take in turn.
+    pub mismatch: Vec<f64>,
+    /// Factors on the sensors' noise, which the cases take in turn.
+    pub noise: Vec<f64>,
+    /// Prints each search's steps and what is left over to standard error.
+    pub verbose: bool,
 }
 
 /// One case with its outcome.
@@ -54,15 +56,21 @@ pub struct Scored {
 ///
 /// # Panics
 /// When the case cannot be written or read back: the suite itself is at fault then.
-pub fn run(seed: u64, kind: &'static str, settings: &Settings) -> Scored {
+pub fn run(seed: u64, kind: &'static str, settings: &Settings, verbose: bool) -> Scored {
     let case = Case::draw(seed, settings);
     let folder = tempfile::tempdir().expect("a temporary folder");
     case.write(folder.path())
         .expect("a case that can be written");
     let laboratory = Laboratory::read(folder.path()).expect("a case that can be read");
     let begin = Instant::now();
-    let diagnosis = diagnose(&laboratory, false);
+    let diagnosis = diagnose(&laboratory, verbose);
     let seconds = begin.elapsed().as_secs_f64();
+    if verbose && let Ok(diagnosis) = &diagnosis {
+        eprintln!("truth: {:?}\n{}", case.truth, diagnosis.sentence);
+        for test in &diagnosis.remaining {
+            eprintln!("    {:.1}: {}", test.deviate, test.what);
+        }
+    }
     let (verdict, sentence) = match diagnosis {
         Ok(diagnosis) => (as_scored(&diagnosis), diagnosis.sentence),
         Err(error) => (Verdict::default(), error.to_string()),
@@ -125,12 +133,17 @@ pub fn run_all(plan: &Plan, progress: impl Fn(&Scored) + Sync) -> Vec<Scored> {
         .par_iter()
         .enumerate()
         .map(|(i, &(name, kind))| {
-            let settings = Settings {
-                mismatch: plan.mismatch,
-                noise: plan.noise,
-                ..Settings::new(kind)
+            let plain = Settings::new(kind);
+            let in_turn = |values: &[f64], turn: usize, otherwise: f64| {
+                let place = turn.checked_rem(values.len());
+                place.map_or(otherwise, |place| values[place])
             };
-            let scored = run(plan.seed + i as u64, name, &settings);
+            let settings = Settings {
+                mismatch: in_turn(&plan.mismatch, i / plan.noise.len().max(1), plain.mismatch),
+                noise: in_turn(&plan.noise, i, plain.noise),
+                ..plain
+            };
+            let scored = run(plan.seed + i as u64, name, &settings, plan.verbose);
             progress(&scored);
             scored
         })
@@ -181,6 +194,37 @@ pub fn table(results: &[Scored]) -> String {
             r.truth.excitation.first() == Some(&excitation)
         });
     }
+    for usual in [true, false] {
+        let name = if usual { "the usual" } else { "others" };
+        row(&format!("forms of the effects: {name}"), &|r| {
+            r.truth.usual_form == usual && matches!(r.kind, "one" | "two")
+        });
+    }
+    let distinct = |value: fn(&Truth) -> f64| {
+        let mut values: Vec<f64> = results.iter().map(|r| value(&r.truth)).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        values
+    };
+    for noise in distinct(|truth| truth.noise) {
+        row(&format!("noise: {noise} times"), &|r| {
+            r.truth.noise == noise
+        });
+    }
+    for mismatch in distinct(|truth| truth.mismatch) {
+        row(&format!("mismatch: {} %", 100.0 * mismatch), &|r| {
+            r.truth.mismatch == mismatch
+        });
+    }
+    let outside: BTreeSet<&str> = results
+        .iter()
+        .filter_map(|r| r.truth.outside.as_deref())
+        .collect();
+    for kind in outside {
+        row(&format!("outside: {kind}"), &|r| {
+            r.truth.outside.as_deref() == Some(kind)
+        });
+    }
     let mut by_effect: BTreeMap<&str, Vec<&Scored>> = BTreeMap::new();
     for scored in results.iter().filter(|r| r.kind == "one") {
         for effect in &scored.truth.effects {
@@ -228,20 +272,52 @@ pub fn table(results: &[Scored]) -> String {
             quantile(&seconds, 1.0)
         );
     }
+    text.push_str(&confusions(results));
     for scored in results.iter().filter(|r| r.outcome != Outcome::Right) {
         let _ = writeln!(text, "{}", line(scored));
     }
     text
 }
 
+/// The confusion matrix without its zeros: what was hidden, what was said, how often.
+fn confusions(results: &[Scored]) -> String {
+    let mut counts: BTreeMap<(String, String), usize> = BTreeMap::new();
+    for scored in results {
+        let mut said: Vec<&str> = scored
+            .verdict
+            .effects
+            .iter()
+            .map(|e| e.effect.as_str())
+            .collect();
+        said.sort_unstable();
+        let said = match scored.verdict.verdict.as_str() {
+            "named" => said.join(" + "),
+            "ambiguous" => format!("one of several, such as {}", said.join(" + ")),
+            "" => "refused".into(),
+            other => other.to_string(),
+        };
+        *counts.entry((hidden(&scored.truth), said)).or_default() += 1;
+    }
+    let mut text = String::from("\nhidden -> said: cases\n");
+    for ((hidden, said), count) in counts {
+        let _ = writeln!(text, "{hidden} -> {said}: {count}");
+    }
+    text
+}
+
+/// Names of what was hidden.
+fn hidden(truth: &Truth) -> String {
+    let mut names: Vec<&str> = truth.effects.iter().map(|e| e.effect.as_str()).collect();
+    names.sort_unstable();
+    if names.is_empty() {
+        "nothing".into()
+    } else {
+        names.join(" + ")
+    }
+}
+
 /// One case in one line: what was hidden and what was said.
 pub fn line(scored: &Scored) -> String {
-    let hidden: Vec<String> = scored
-        .truth
-        .effects
-        .iter()
-        .map(|e| e.effect.clone())
-        .collect();
     let named: Vec<&str> = scored
         .verdict
         .effects
@@ -249,14 +325,10 @@ pub fn line(scored: &Scored) -> String {
         .map(|e| e.effect.as_str())
         .collect();
     format!(
-        "seed {} {:?}: hidden {} {}(strength {:.2}, {:?}), said {} {named:?} {:?}",
+        "seed {} {:?}: hidden {} {}(strength {:.2}, {:?}{}), said {} {named:?} {:?}",
         scored.seed,
         scored.outcome,
-        if hidden.is_empty() {
-            "nothing".into()
-        } else {
-            hidden.join(" + ")
-        },
+        hidden(&scored.truth),
         scored
             .truth
             .outside
@@ -265,6 +337,11 @@ pub fn line(scored: &Scored) -> String {
             .unwrap_or_default(),
         scored.truth.strength.unwrap_or(0.0),
         scored.truth.excitation,
+        if scored.truth.usual_form {
+            ""
+        } else {
+            ", another form"
+        },
         if scored.verdict.verdict.is_empty() {
             &scored.sentence
         } else {

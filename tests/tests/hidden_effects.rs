@@ -51,8 +51,9 @@ fn hidden_effects_are_found_and_nothing_where_nothing_is() {
         two: 3,
         nothing: 3,
         outside: 4,
-        mismatch: 0.01,
-        noise: 1.0,
+        mismatch: vec![0.01],
+        noise: vec![1.0],
+        verbose: false,
     };
     let results = run_all(&plan, |_| {});
     let report = table(&results);

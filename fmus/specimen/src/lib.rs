@@ -89,6 +89,7 @@ impl Component for Specimen {
             parameter("specimen_second_mode.damping_ratio", s.effects.second_mode_damping_ratio, "Damping ratio of it", "1").min(0.0);
             parameter("specimen_degradation.loss", s.effects.degradation_loss, "Share of the stiffness lost with the largest drift so far; 0 is off", "1").max(1.0);
             parameter("specimen_degradation.degradation_drift", s.effects.degradation_drift, "Drift at which 1 - 1/e of it is lost", "m" => "in").min(1e-6);
+            parameter("specimen_degradation.form", s.effects.degradation_form, "c of the share lost, 1 - (1 + c drift/degradation_drift)^(-1/c); 0 is exponential, -1 a straight line", "1");
             parameter("specimen_uplift.uplift_displacement", s.effects.uplift_displacement, "Drift beyond which the spring is softer, without a loop; 0 is off", "m" => "in").min(0.0);
             parameter("specimen_uplift.post_uplift_ratio", s.effects.uplift_post_ratio, "Stiffness beyond it over stiffness below", "1");
             parameter("specimen_absent.absent", s.absent, "1: nothing stands on the table; 0 is off", "1").min(0.0).max(1.0);
@@ -115,14 +116,21 @@ impl Component for Specimen {
     }
 
     fn allow_model_exchange(&self) -> ComponentResult {
-        if self.effects.is_active() {
-            return Err(
-                "an effect is on (such as specimen_yielding): its memory and its inner \
-                        steps need co-simulation"
-                    .into(),
-            );
+        let effects = &self.effects;
+        let needing = [
+            ("specimen_yielding", effects.yield_displacement),
+            ("specimen_second_mode", effects.second_mode_frequency),
+            ("specimen_degradation", effects.degradation_loss),
+            ("specimen_absent", self.absent),
+        ];
+        match needing.into_iter().find(|(_, size)| *size != 0.0) {
+            Some((effect, _)) => Err(format!(
+                "{effect} is on: drift and drift_velocity do not tell all of it, which needs \
+                 co-simulation"
+            )
+            .into()),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn update_outputs(&mut self, _time: f64) {

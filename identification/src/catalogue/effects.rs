@@ -4,7 +4,7 @@
 use plant::identified_rig::IdentifiedRig;
 use plant::units::{INCH, LBF, LBF_S_PER_INCH, LBF_S2_PER_INCH};
 
-use super::entry::{Apply, candidate, delay, inverse, positive, shape, signed, size};
+use super::entry::{Apply, candidate, delay, inverse, positive, relative, shape, signed, size};
 use crate::diagnosis::{Candidate, Scale};
 
 /// Every candidate with what it does to the rig. `peak_command` (V) is the largest command of the
@@ -16,8 +16,8 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
             "m/s",
             Scale::Logarithmic,
             0.1 * INCH,
-            0.1,
-            (0.01 * INCH, 1.0 * INCH),
+            0.5,
+            (0.005 * INCH, 1.0 * INCH),
         )
     };
     let per_in3 = LBF / INCH.powi(3);
@@ -39,11 +39,7 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
             |rig: &mut IdentifiedRig, p: &[f64]| rig.effects.valve.dead_band = p[0],
         ),
         (
-            candidate(
-                "valve_flow_gain",
-                vec![signed("relative_change", "1", 0.05, 0.25)],
-                &[&[0.0]],
-            ),
+            candidate("valve_flow_gain", vec![relative(0.05, 0.25)], &[&[0.0]]),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.effects.valve.flow_gain = p[0],
         ),
         (
@@ -64,7 +60,7 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                         "1",
                         Scale::Logarithmic,
                         0.7,
-                        0.1,
+                        0.15,
                         (0.3, 1.5),
                     ),
                 ],
@@ -125,14 +121,20 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                         0.2,
                         (0.1, 2.0),
                     ),
-                    shape("form", "1", Scale::Linear(1.0), -1.0, 1.0, (-3.0, 3.0)),
+                    shape("form", "1", Scale::Linear(1.0), 0.0, 1.0, (-3.0, 2.5)),
+                    shape("floor", "1", Scale::Linear(1.0), 0.15, 0.1, (0.0, 0.4)),
                 ],
-                &[&[0.15, 0.5, -1.0], &[0.4, 0.5, -1.0]],
+                &[
+                    &[0.15, 0.5, 0.0, 0.1],
+                    &[0.4, 0.5, -1.0, 0.1],
+                    &[0.4, 0.5, 1.0, 0.1],
+                ],
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| {
                 rig.effects.hydraulics.droop_loss = p[0];
                 rig.effects.hydraulics.droop_time = p[1];
-                rig.effects.hydraulics.droop_form = if p[2].abs() < 1e-3 { 1e-3 } else { p[2] };
+                rig.effects.hydraulics.droop_form = if p[2].abs() < 1e-6 { 1e-6 } else { p[2] };
+                rig.effects.hydraulics.droop_floor = p[3];
             },
         ),
         (
@@ -163,18 +165,27 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                         0.7,
                         (0.1 * INCH, 3.0 * INCH),
                     ),
+                    shape(
+                        "stribeck_exponent",
+                        "1",
+                        Scale::Logarithmic,
+                        2.0,
+                        0.4,
+                        (0.4, 5.0),
+                    ),
                     transition(),
                 ],
                 &[
-                    &[1.0 * LBF, 1.0 * LBF, 0.3 * INCH, 0.1 * INCH],
-                    &[1.0 * LBF, 2.0 * LBF, 1.0 * INCH, 0.1 * INCH],
+                    &[1.0 * LBF, 1.0 * LBF, 0.3 * INCH, 2.0, 0.1 * INCH],
+                    &[1.0 * LBF, 2.0 * LBF, 1.0 * INCH, 2.0, 0.1 * INCH],
                 ],
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| {
                 rig.effects.friction.coulomb_force = p[0];
                 rig.effects.friction.stribeck_force = p[1];
                 rig.effects.friction.stribeck_velocity = p[2];
-                rig.effects.friction.transition_velocity = p[3];
+                rig.effects.friction.stribeck_exponent = p[3];
+                rig.effects.friction.transition_velocity = p[4];
             },
         ),
         (

@@ -50,8 +50,20 @@ pub(super) fn signed(
     weak: f64,
     strong: f64,
 ) -> EffectParameter {
-    let most = (4.0 * strong).min(if unit == "1" { 0.9 } else { f64::MAX });
+    let most = 4.0 * strong;
     size(name, unit, Scale::Linear(weak), weak, (-most, most))
+}
+
+/// A relative change that may have either sign.
+pub(super) fn relative(weak: f64, strong: f64) -> EffectParameter {
+    let most = (4.0 * strong).min(0.9);
+    size(
+        "relative_change",
+        "1",
+        Scale::Factor(weak),
+        weak,
+        (-most, 4.0 * strong),
+    )
 }
 
 /// A size that has one sign, from zero.

@@ -9,6 +9,7 @@ pub use effects::catalogue;
 pub use entry::Apply;
 
 use plant::identified_rig::IdentifiedRig;
+use plant::shake_table::ShakeTable;
 
 use crate::case::{CHANNELS, Nominal};
 use crate::diagnosis::{Candidate, Point, RigModel};
@@ -63,6 +64,22 @@ pub const NUISANCE: [&str; 15] = [
     "specimen.stiffness",
 ];
 
+/// The parameters of `rig` in the order of [`NUISANCE`], SI; without a specimen the first twelve.
+pub fn nominal_parameters(rig: &IdentifiedRig) -> Vec<f64> {
+    let ShakeTable { actuator, table } = rig.shake_table;
+    let mut values = Vec::with_capacity(NUISANCE.len());
+    values.extend(actuator.denominator);
+    values.extend(actuator.voltage_to_force);
+    values.extend(actuator.velocity_to_force);
+    values.extend([table.mass, table.damping, table.stiffness]);
+    values.extend(
+        rig.specimen
+            .iter()
+            .flat_map(|s| [s.mass, s.damping, s.stiffness]),
+    );
+    values
+}
+
 impl ShakeTableModel {
     /// The model for `nominal` and `records`; `noise` as in [`Nominal::noise`], infinite where a
     /// channel is missing.
@@ -92,10 +109,11 @@ impl ShakeTableModel {
         }
     }
 
-    /// The nominal rig with `nuisance` (in standard deviations) and no effects.
+    /// The nominal rig with `nuisance` (in standard deviations of the parameters' logarithms, so that
+    /// factors add up) and no effects.
     pub fn rig_without_effects(&self, nuisance: &[f64]) -> IdentifiedRig {
         let mut rig = self.nominal;
-        let mut factors = nuisance.iter().map(|p| 1.0 + self.uncertainty * p);
+        let mut factors = nuisance.iter().map(|p| (self.uncertainty * p).exp());
         let mut scale = |value: &mut f64| *value *= factors.next().unwrap_or(1.0);
         let actuator = &mut rig.shake_table.actuator;
         actuator.denominator.iter_mut().for_each(&mut scale);

@@ -3,7 +3,7 @@
 use plant::identified_rig::IdentifiedRig;
 use plant::units::{INCH, LBF};
 
-use super::entry::{Apply, candidate, delay, inverse, positive, shape, signed, size};
+use super::entry::{Apply, candidate, delay, inverse, positive, relative, shape, signed, size};
 use crate::diagnosis::{Candidate, Scale};
 
 /// Entries with what they do to the rig; `period` is the sampling period in s.
@@ -18,11 +18,7 @@ pub(super) fn entries(period: f64) -> Vec<(Candidate, Apply)> {
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.accelerometer_bias = p[0],
         ),
         (
-            candidate(
-                "accelerometer_scale",
-                vec![signed("relative_change", "1", 0.03, 0.2)],
-                &[&[0.0]],
-            ),
+            candidate("accelerometer_scale", vec![relative(0.03, 0.2)], &[&[0.0]]),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.accelerometer_scale = p[0],
         ),
         (
@@ -42,11 +38,7 @@ pub(super) fn entries(period: f64) -> Vec<(Candidate, Apply)> {
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.accelerometer_delay = p[0],
         ),
         (
-            candidate(
-                "displacement_scale",
-                vec![signed("relative_change", "1", 0.03, 0.15)],
-                &[&[0.0]],
-            ),
+            candidate("displacement_scale", vec![relative(0.03, 0.15)], &[&[0.0]]),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.displacement_scale = p[0],
         ),
         (
@@ -58,11 +50,7 @@ pub(super) fn entries(period: f64) -> Vec<(Candidate, Apply)> {
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.displacement_lag = p[0],
         ),
         (
-            candidate(
-                "load_cell_scale",
-                vec![signed("relative_change", "1", 0.03, 0.2)],
-                &[&[0.0]],
-            ),
+            candidate("load_cell_scale", vec![relative(0.03, 0.2)], &[&[0.0]]),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.sensors.load_cell_scale = p[0],
         ),
         (
@@ -103,10 +91,10 @@ pub(super) fn entries(period: f64) -> Vec<(Candidate, Apply)> {
                         "1",
                         Scale::Linear(0.01),
                         0.05,
-                        1.0,
+                        4.0,
                         (-0.1, 0.5),
                     ),
-                    shape("exponent", "1", Scale::Logarithmic, 3.0, 0.07, (0.8, 8.0)),
+                    shape("exponent", "1", Scale::Logarithmic, 3.0, 0.35, (0.8, 12.0)),
                 ],
                 &[
                     &[0.4 * INCH, 0.05, 3.0],
@@ -123,7 +111,7 @@ pub(super) fn entries(period: f64) -> Vec<(Candidate, Apply)> {
         (
             candidate(
                 "specimen_stiffness",
-                vec![signed("relative_change", "1", 0.06, 0.35)],
+                vec![relative(0.06, 0.35)],
                 &[&[0.0], &[0.25], &[-0.25]],
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| rig.effects.specimen.stiffness_change = p[0],
@@ -134,7 +122,7 @@ pub(super) fn entries(period: f64) -> Vec<(Candidate, Apply)> {
                 vec![size(
                     "relative_change",
                     "1",
-                    Scale::Linear(0.5),
+                    Scale::Factor(0.5),
                     0.5,
                     (-0.95, 12.0),
                 )],
@@ -152,7 +140,7 @@ pub(super) fn entries(period: f64) -> Vec<(Candidate, Apply)> {
                         "1",
                         Scale::Logarithmic,
                         0.03,
-                        0.1,
+                        0.4,
                         (0.005, 0.2),
                     ),
                 ],
@@ -176,12 +164,19 @@ pub(super) fn entries(period: f64) -> Vec<(Candidate, Apply)> {
                         1.0,
                         (0.05 * INCH, 20.0 * INCH),
                     ),
+                    shape("form", "1", Scale::Linear(1.0), 0.0, 1.0, (-2.0, 3.0)),
                 ],
-                &[&[0.15, 0.5 * INCH], &[0.3, 1.0 * INCH]],
+                &[
+                    &[0.15, 0.8 * INCH, 0.0],
+                    &[0.3, 0.8 * INCH, 0.0],
+                    &[0.3, 0.8 * INCH, -1.0],
+                    &[0.3, 0.8 * INCH, 1.0],
+                ],
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| {
                 rig.effects.specimen.degradation_loss = p[0];
                 rig.effects.specimen.degradation_drift = p[1];
+                rig.effects.specimen.degradation_form = if p[2].abs() < 1e-6 { 0.0 } else { p[2] };
             },
         ),
         (

@@ -8,6 +8,8 @@ use super::model::{Point, RigModel};
 const DIFFERENCE: f64 = 1e-3;
 /// No nuisance moves farther than this many standard deviations in one step.
 const LONGEST_STEP: f64 = 4.0;
+/// Expected gains below this may be outweighed by the predictor's change along the step.
+const WITHIN_GAINS_REACH: f64 = 1e3;
 
 /// A model at a point with its residuals on the records it was fitted to.
 #[derive(Debug, Clone)]
@@ -84,14 +86,14 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Derivatives of the residuals at `fit` by the coordinates in `which` (nuisance first, then the
-/// effects').
+/// effects'), with the gain of `predictor`.
 fn columns<M: RigModel>(
     model: &M,
+    predictor: &M::Predictor,
     fit: &Fit,
     records: &[usize],
     which: impl Iterator<Item = usize>,
 ) -> Option<Vec<Vec<f64>>> {
-    let predictor = model.predictor(&fit.point)?;
     let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
     let difference = |coordinate: usize, size: f64| {
         let mut step = vec![0.0; count];
@@ -100,7 +102,7 @@ fn columns<M: RigModel>(
         if moved == fit.point {
             return None;
         }
-        let mut column = residuals(model, &predictor, &moved, records)?;
+        let mut column = residuals(model, predictor, &moved, records)?;
         for (c, r) in column.iter_mut().zip(&fit.residuals) {
             *c = (*c - r) / size;
         }
@@ -123,7 +125,8 @@ impl Jacobian {
     /// All coordinates of `fit`.
     pub fn at<M: RigModel>(model: &M, fit: &Fit, records: &[usize]) -> Option<Self> {
         let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
-        let columns = columns(model, fit, records, 0..count)?;
+        let predictor = model.predictor(&fit.point)?;
+        let columns = columns(model, &predictor, fit, records, 0..count)?;
         let mut gram = DMatrix::zeros(count, count);
         for i in 0..count {
             for j in 0..=i {
@@ -202,7 +205,8 @@ pub fn fit<M: RigModel>(
     // to begin with would stop them.
     let mut damping = 0.0f64;
     for _ in 0..iterations {
-        let fresh = columns(model, &best, records, held..count)?;
+        let predictor = model.predictor(&best.point)?;
+        let fresh = columns(model, &predictor, &best, records, held..count)?;
         let mut hessian = DMatrix::zeros(count, count);
         hessian
             .view_mut((0, 0), (held, held))
@@ -220,8 +224,12 @@ pub fn fit<M: RigModel>(
             }
         }
         add_priors(model, &best.point, &mut hessian, &mut gradient);
-        let before = best.cost;
+        let mut gained = 0.0;
         let mut expected = 0.0;
+        // The cost with the gain held, which is what the derivatives are of.
+        let held_cost =
+            |fit: &Fit| squares(&fit.residuals) + fit.point.prior_cost(model.candidates());
+        let before = held_cost(&best);
         for _ in 0..5 {
             let mut damped = hessian.clone();
             for i in 0..count {
@@ -237,19 +245,27 @@ pub fn fit<M: RigModel>(
                 step *= LONGEST_STEP / longest;
             }
             let moved = best.point.moved(step.as_slice(), model.candidates());
-            match evaluate(model, &moved, records) {
-                Some(next) if next.cost < best.cost => {
+            if let Some(next) = evaluate(model, &moved, records) {
+                gained = best.cost - next.cost;
+                if gained <= 0.0 && expected < WITHIN_GAINS_REACH {
+                    // Near the optimum the gain's own dependence on the point can outweigh the
+                    // step: judge with the gain held.
+                    gained = residuals(model, &predictor, &moved, records).map_or(0.0, |held| {
+                        before - squares(&held) - moved.prior_cost(model.candidates())
+                    });
+                }
+                if gained > 0.0 {
                     best = next;
                     damping = if damping < 1e-5 { 0.0 } else { damping * 0.03 };
                     break;
                 }
-                _ => damping = (damping * 30.0).max(1e-5),
             }
+            damping = (damping * 30.0).max(1e-5);
             if expected < 0.05 {
                 break;
             }
         }
-        if before - best.cost < 0.02 + 1e-6 * (best.cost - before).abs() || expected < 0.02 {
+        if gained < 0.02 || expected < 0.02 {
             break;
         }
     }
@@ -267,10 +283,12 @@ pub fn polish<M: RigModel>(
     let mut jacobian = Jacobian::at(model, &best, records)?;
     for _ in 0..rounds {
         let next = fit(model, &best.point, records, &jacobian, 3)?;
-        let gain = best.cost - next.cost;
+        let gain = (best.cost - next.cost).abs();
+        // A fit that is far from noise need not be exact.
+        let excess = (squares(&next.residuals) - next.residuals.len() as f64).max(0.0);
         best = next;
         jacobian = Jacobian::at(model, &best, records)?;
-        if gain < 0.1 {
+        if gain < 0.1 + 0.01 * excess {
             break;
         }
     }

@@ -66,6 +66,9 @@ pub struct Point {
 pub enum Scale {
     /// The value itself over a unit.
     Linear(f64),
+    /// The logarithm of one plus the value, over a unit: a change by a factor, which then adds to
+    /// that of an uncertain parameter.
+    Factor(f64),
     /// The value's logarithm.
     Logarithmic,
     /// One over the value, in units of one over this; zero is off.
@@ -77,6 +80,7 @@ impl Scale {
     pub fn to_internal(self, value: f64) -> f64 {
         match self {
             Self::Linear(unit) => value / unit,
+            Self::Factor(unit) => value.ln_1p() / unit,
             Self::Logarithmic => value.ln(),
             Self::Inverse(unit) => unit / value,
         }
@@ -86,6 +90,7 @@ impl Scale {
     pub fn to_value(self, internal: f64) -> f64 {
         match self {
             Self::Linear(unit) => internal * unit,
+            Self::Factor(unit) => (internal * unit).exp_m1(),
             Self::Logarithmic => internal.exp(),
             Self::Inverse(unit) => unit / internal,
         }
@@ -95,6 +100,7 @@ impl Scale {
     pub fn slope(self, internal: f64) -> f64 {
         match self {
             Self::Linear(unit) => unit,
+            Self::Factor(unit) => unit * (internal * unit).exp(),
             Self::Logarithmic => internal.exp(),
             Self::Inverse(unit) => unit / (internal * internal),
         }
@@ -170,7 +176,9 @@ impl Candidate {
         pairs
             .map(|(p, &value)| {
                 let (full, shrinks) = match (p.role, p.scale) {
-                    (Role::Size { weak }, Scale::Linear(_)) => (p.scale.to_internal(weak), true),
+                    (Role::Size { weak }, Scale::Linear(_) | Scale::Factor(_)) => {
+                        (p.scale.to_internal(weak), true)
+                    }
                     (Role::Size { weak }, Scale::Inverse(_)) => {
                         // Not past the bound where the effect is off.
                         (p.scale.to_internal(weak.max(0.9 * p.bounds.1)), false)

@@ -18,6 +18,14 @@ const HOPEFUL: f64 = 2.0;
 /// Effects in one model.
 const MOST_EFFECTS: usize = 3;
 
+/// Excess over noise, in that of the best, beyond which a set of effects leaves the race.
+const BEHIND: f64 = 6.0;
+/// And what a short fit may still gain.
+const NOISE_OF_A_RACE: f64 = 1e4;
+
+/// Rounds of a fit at most; curved valleys take many.
+pub(super) const ROUNDS: usize = 12;
+
 /// A fitted model with its derivatives.
 pub struct Hypothesis {
     /// The fit.
@@ -77,7 +85,7 @@ pub fn matters(candidates: &[Candidate], point: &Point) -> bool {
                 };
                 let value = p.scale.to_value(q);
                 Some(match p.scale {
-                    Scale::Linear(_) => value.abs() / weak,
+                    Scale::Linear(_) | Scale::Factor(_) => value.abs() / weak,
                     Scale::Logarithmic | Scale::Inverse(_) => weak / value,
                 })
             });
@@ -109,8 +117,8 @@ pub struct Search<'a, M: RigModel> {
 }
 
 impl<M: RigModel> Search<'_, M> {
-    fn hypothesis(&self, start: &Fit, rounds: usize) -> Option<Hypothesis> {
-        let (fit, jacobian) = polish(self.model, start, &self.records, rounds)?;
+    fn hypothesis(&self, start: &Fit) -> Option<Hypothesis> {
+        let (fit, jacobian) = polish(self.model, start, &self.records, ROUNDS)?;
         let score = fit.cost + price(self.model.candidates(), &fit.point);
         Some(Hypothesis {
             fit,
@@ -147,7 +155,7 @@ impl<M: RigModel> Search<'_, M> {
             effects: Vec::new(),
         };
         let start = evaluate(self.model, &origin, &self.records)?;
-        self.hypothesis(&start, 6)
+        self.hypothesis(&start)
     }
 
     /// Best extensions of `parents` by one more effect: short fits to the first record from every
@@ -211,6 +219,12 @@ impl<M: RigModel> Search<'_, M> {
             }
         }
         runners.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        // Sets that are far behind after the race are neither rivals nor worth extending.
+        let samples: usize = track.iter().map(|&r| self.model.residual_count(r)).sum();
+        let excess = |runner: &Runner| (runner.cost - samples as f64).max(0.0);
+        let farthest =
+            runners.first().map_or(0.0, |first| BEHIND * excess(first)) + NOISE_OF_A_RACE;
+        runners.retain(|runner| excess(runner) < farthest);
         let mut seen: Vec<Vec<usize>> = Vec::new();
         let mut best = Vec::new();
         for runner in runners {
@@ -221,7 +235,7 @@ impl<M: RigModel> Search<'_, M> {
             }
             seen.push(set);
             let start = evaluate(self.model, &runner.point, &self.records);
-            best.extend(start.and_then(|start| self.hypothesis(&start, 4)));
+            best.extend(start.and_then(|start| self.hypothesis(&start)));
             if best.len() == keep {
                 break;
             }
@@ -237,6 +251,7 @@ impl<M: RigModel> Search<'_, M> {
             return Vec::new();
         };
         let mut promising = Vec::new();
+        let mut tried = Vec::new();
         for (effect, candidate) in candidates.iter().enumerate() {
             if parent.fit.point.effects.iter().any(|(i, _)| *i == effect) {
                 continue;
@@ -248,6 +263,10 @@ impl<M: RigModel> Search<'_, M> {
                     let internal: Vec<f64> = off.iter().map(|at| at(share)).collect();
                     let mut point = parent.fit.point.clone();
                     point.effects.push((effect, internal));
+                    if tried.contains(&point.effects) {
+                        continue;
+                    }
+                    tried.push(point.effects.clone());
                     let with = residuals(self.model, &predictor, &point, &self.records);
                     let Some(with) = with else { continue };
                     let pairs = with.iter().zip(&parent.fit.residuals);
@@ -275,7 +294,7 @@ impl<M: RigModel> Search<'_, M> {
             }
             seen.push(effect);
             let short = fit(self.model, &point, &self.records, &parent.jacobian, 6);
-            best.extend(short.and_then(|short| self.hypothesis(&short, 3)));
+            best.extend(short.and_then(|short| self.hypothesis(&short)));
         }
         best.sort_by(|a, b| a.score.total_cmp(&b.score));
         best
@@ -357,7 +376,7 @@ impl<M: RigModel> Search<'_, M> {
                 let mut point = current.fit.point.clone();
                 point.effects.remove(i);
                 let start = evaluate(self.model, &point, &self.records)?;
-                self.hypothesis(&start, 4)
+                self.hypothesis(&start)
             });
             match without.min_by(|a, b| a.score.total_cmp(&b.score)) {
                 Some(smaller) if smaller.score <= current.score => {

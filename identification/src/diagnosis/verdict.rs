@@ -3,7 +3,7 @@
 use super::adequacy::{self, Test};
 use super::fit::{Fit, Jacobian, evaluate, polish};
 use super::model::{Point, RigModel, Role};
-use super::search::{Found, Hypothesis, RIVAL_WITHIN, Search};
+use super::search::{Found, Hypothesis, RIVAL_WITHIN, ROUNDS, Search};
 
 /// Largest deviate that noise alone may show among the few hundred tests.
 pub const LARGEST_DEVIATE: f64 = 5.6;
@@ -69,8 +69,12 @@ pub struct Judgement {
     pub alternatives: Vec<Vec<&'static str>>,
     /// Points of the rivals, in the order of `alternatives`.
     pub rival_points: Vec<Point>,
+    /// Standard errors of the nominal parameters, in their stated standard deviations.
+    pub nuisance_errors: Vec<f64>,
     /// The best model, fitted to the fitting records.
     pub best: Fit,
+    /// The best model fitted to all records, the held-out ones too, where it is adequate.
+    pub all: Fit,
     /// Tests of what is left over, strongest first.
     pub tests: Vec<Test>,
     /// Share of the nominal model's excess error that the best model explains.
@@ -171,8 +175,11 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
     // The held-out record is predicted with the fitted parameters for the gain; whether noise is
     // all that is left is asked of a fit to everything, free of the parameters' own errors.
     let joint = evaluate(model, &best.fit.point, &everything)
-        .and_then(|start| polish(model, &start, &everything, 4));
-    let joint_fit = joint.map_or_else(|| best.fit.clone(), |(fit, _)| fit);
+        .and_then(|start| polish(model, &start, &everything, ROUNDS));
+    let (joint_fit, joint_jacobian) = match joint {
+        Some((fit, jacobian)) => (fit, Some(jacobian)),
+        None => (best.fit.clone(), None),
+    };
     let mut tests = Vec::new();
     let mut rest = joint_fit.residuals.as_slice();
     for &record in &everything {
@@ -243,22 +250,34 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
         (true, true, true) => Verdict::Named,
         (true, true, false) => Verdict::Ambiguous,
     };
-    let mut effects = estimates(model, &best.fit, &best.jacobian);
-    for effect in &mut effects {
-        effect.confidence = 1.0 / weight;
-    }
     let excess = |square: f64| (square - 1.0).max(0.0);
     let share_explained = if excess(nominal_square) > 0.0 {
         1.0 - excess(best.mean_square()) / excess(nominal_square)
     } else {
         1.0
     };
+    // What is told of the effects rests on all records, as long as the model holds on them.
+    let (all, jacobian) = match joint_jacobian.filter(|_| adequate) {
+        Some(jacobian) => (joint_fit, jacobian),
+        None => (best.fit.clone(), best.jacobian),
+    };
+    let mut effects = estimates(model, &all, &jacobian);
+    let covariance = jacobian.covariance(model, &all);
+    let nuisance_errors = covariance.map_or_else(Vec::new, |c| {
+        let count = all.point.nuisance.len();
+        (0..count).map(|i| c[(i, i)].max(0.0).sqrt()).collect()
+    });
+    for effect in &mut effects {
+        effect.confidence = 1.0 / weight;
+    }
     Judgement {
         verdict,
         effects,
         alternatives,
         rival_points,
+        nuisance_errors,
         best: best.fit,
+        all,
         tests,
         share_explained,
     }

@@ -3,7 +3,7 @@
 use crate::ModelError;
 
 /// Coulomb friction with a breakaway bump at low speed, opposing the table's velocity:
-/// `(F_c + F_s exp(-(v/v_s)²)) tanh(v/v_0)`.
+/// `(F_c + F_s exp(-|v/v_s|^delta)) tanh(v/v_0)`.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FrictionEffects {
@@ -13,6 +13,8 @@ pub struct FrictionEffects {
     pub stribeck_force: f64,
     /// v_s, m/s.
     pub stribeck_velocity: f64,
+    /// delta.
+    pub stribeck_exponent: f64,
     /// v_0, over which the sign changes, m/s.
     pub transition_velocity: f64,
 }
@@ -23,6 +25,7 @@ impl Default for FrictionEffects {
             coulomb_force: 0.0,
             stribeck_force: 0.0,
             stribeck_velocity: 0.5 * crate::units::INCH,
+            stribeck_exponent: 2.0,
             transition_velocity: 0.05 * crate::units::INCH,
         }
     }
@@ -34,6 +37,7 @@ impl FrictionEffects {
         ModelError::require_finite("coulomb_force", self.coulomb_force)?;
         ModelError::require_finite("stribeck_force", self.stribeck_force)?;
         ModelError::require_positive("stribeck_velocity", self.stribeck_velocity)?;
+        ModelError::require_positive("stribeck_exponent", self.stribeck_exponent)?;
         ModelError::require_positive("transition_velocity", self.transition_velocity)
     }
 
@@ -51,8 +55,13 @@ impl FrictionEffects {
         }
         let mut force = self.coulomb_force;
         if self.stribeck_force != 0.0 {
-            let ratio = velocity / self.stribeck_velocity;
-            force += self.stribeck_force * (-ratio * ratio).exp();
+            let ratio = (velocity / self.stribeck_velocity).abs();
+            let power = if self.stribeck_exponent == 2.0 {
+                ratio * ratio
+            } else {
+                ratio.powf(self.stribeck_exponent)
+            };
+            force += self.stribeck_force * (-power).exp();
         }
         force * tanh(velocity / self.transition_velocity)
     }

@@ -15,6 +15,8 @@ pub struct HydraulicEffects {
     /// Form of the droop: flow times `(1 - c L m)^(1/c)`; 1 is a straight line, -1 is
     /// `1/(1 + L m)`.
     pub droop_form: f64,
+    /// Share of the flow that the droop leaves at least.
+    pub droop_floor: f64,
     /// Flow lost in proportion to force, V/N.
     pub leakage: f64,
     /// Flow lost in proportion to the rate of force, V s/N.
@@ -28,6 +30,7 @@ impl Default for HydraulicEffects {
             droop_loss: 0.0,
             droop_time: 0.5,
             droop_form: 1.0,
+            droop_floor: 0.0,
             leakage: 0.0,
             compliance: 0.0,
         }
@@ -41,6 +44,7 @@ impl HydraulicEffects {
         ModelError::require_finite("droop_loss", self.droop_loss)?;
         ModelError::require_positive("droop_time", self.droop_time)?;
         ModelError::require_finite("droop_form", self.droop_form)?;
+        ModelError::require_non_negative("droop_floor", self.droop_floor)?;
         ModelError::require_finite("leakage", self.leakage)?;
         ModelError::require_finite("compliance", self.compliance)
     }
@@ -67,13 +71,14 @@ impl HydraulicEffects {
         }
         if self.droop_loss != 0.0 {
             let loss = self.droop_loss * demand;
-            u *= if self.droop_form == 1.0 {
-                (1.0 - loss).max(0.0)
+            let left = if self.droop_form == 1.0 {
+                1.0 - loss
             } else {
                 (1.0 - self.droop_form * loss)
                     .max(0.0)
                     .powf(1.0 / self.droop_form)
             };
+            u *= left.max(self.droop_floor);
         }
         u - self.leakage * force
     }

@@ -27,10 +27,13 @@ pub struct SpecimenEffects {
     pub second_mode_mass_share: f64,
     /// Its damping ratio.
     pub second_mode_damping_ratio: f64,
-    /// Stiffness lost with the largest drift so far: `k (1 - loss (1 - exp(-d_max/d_0)))`.
+    /// Stiffness lost with the largest drift so far: `k (1 - loss share)`, where the share is
+    /// `1 - (1 + c d_max/d_0)^(-1/c)`, which for c = 0 is `1 - exp(-d_max/d_0)`.
     pub degradation_loss: f64,
     /// d_0, m.
     pub degradation_drift: f64,
+    /// c: -1 is a straight line up to d_0, 1 a hyperbola.
+    pub degradation_form: f64,
     /// Drift beyond which the spring is softer, m; 0 is never.
     pub uplift_displacement: f64,
     /// Stiffness beyond it over stiffness below.
@@ -52,6 +55,7 @@ impl Default for SpecimenEffects {
             second_mode_damping_ratio: 0.02,
             degradation_loss: 0.0,
             degradation_drift: crate::units::INCH,
+            degradation_form: 0.0,
             uplift_displacement: 0.0,
             uplift_post_ratio: 0.3,
         }
@@ -75,6 +79,7 @@ impl SpecimenEffects {
         )?;
         ModelError::require_finite("degradation_loss", self.degradation_loss)?;
         ModelError::require_positive("degradation_drift", self.degradation_drift)?;
+        ModelError::require_finite("degradation_form", self.degradation_form)?;
         ModelError::require_non_negative("uplift_displacement", self.uplift_displacement)?;
         ModelError::require_finite("uplift_post_ratio", self.uplift_post_ratio)
     }
@@ -107,8 +112,14 @@ impl SpecimenEffects {
             effective += (1.0 - self.yield_post_ratio) * (z - drift);
         }
         if self.degradation_loss != 0.0 {
-            let share = 1.0 - (-peak.max(drift.abs()) / self.degradation_drift).exp();
-            effective *= 1.0 - self.degradation_loss * share;
+            let ratio = peak.max(drift.abs()) / self.degradation_drift;
+            let c = self.degradation_form;
+            let kept = if c == 0.0 {
+                (-ratio).exp()
+            } else {
+                (1.0 + c * ratio).max(0.0).powf(-1.0 / c)
+            };
+            effective *= 1.0 - self.degradation_loss * (1.0 - kept);
         }
         effective * (1.0 + self.stiffness_change)
     }

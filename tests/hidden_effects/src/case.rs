@@ -10,6 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::catalogue::{CATALOGUE, Effect, Entry};
 use crate::excitation::{EXCITATIONS, Excitation};
+use crate::form::Form;
 use crate::hidden::Hidden;
 use crate::law::Law;
 use crate::outside::Outside;
@@ -84,6 +85,10 @@ pub struct Case {
 
 /// Standard deviations of displacement, acceleration, force, specimen acceleration, voltage.
 const NOISE: [f64; 5] = [0.0005, 1.5, 0.3, 1.0, 0.0005];
+/// Unseen voltage beside the command in standard deviations of the recorder's noise, and its
+/// corner in Hz, as the practice records have them.
+const DISTURBANCE: f64 = 8.0;
+const DISTURBANCE_CORNER: f64 = 30.0;
 const HEADER: &str = "time [s],valve_command [V],displacement [in],acceleration [in/s^2],\
     actuator_force [lbf],specimen_acceleration [in/s^2],reference [in]";
 
@@ -95,8 +100,7 @@ impl Case {
         let plant = NOMINAL.perturbed(|| settings.mismatch * gauss(&mut normal));
         let noise = NOISE.map(|n| n * settings.noise);
         let mut hidden = Hidden {
-            friction_width: rng.random_range(0.02..0.1),
-            mains_phase: rng.random_range(0.0..std::f64::consts::TAU),
+            form: Form::draw(&mut rng),
             ..Hidden::default()
         };
         let entry = |name: &str| CATALOGUE.iter().find(|e| e.name == name).copied();
@@ -190,6 +194,7 @@ impl Case {
                 })
                 .or(hidden.outside.map(|_| strength)),
             outside: hidden.outside.map(|(kind, _)| format!("{kind:?}")),
+            usual_form: hidden.form.usual,
         };
         Self {
             records,
@@ -303,6 +308,9 @@ fn play(
     let at = |k: usize| reference[k.min(n - 1)];
     let mut rig = Rig::new(*plant, hidden);
     let mut law = Law::default();
+    // The valve adds a coloured voltage to what it is told, eight times the recorder's noise.
+    let corner = (-std::f64::consts::TAU * DISTURBANCE_CORNER / RATE).exp();
+    let mut disturbance = 0.0;
     (0..n)
         .map(|k| {
             let before = at(k.saturating_sub(1));
@@ -314,7 +322,9 @@ fn play(
             let f = true_values.f + noise[2] * gauss(rng);
             let s = true_values.s + noise[3] * gauss(rng);
             let u = law.command([at(k), rate, curvature], x, a);
-            rig.advance(u);
+            let fresh = DISTURBANCE * noise[4] * (1.0 - corner * corner).sqrt();
+            disturbance = corner * disturbance + fresh * gauss(rng);
+            rig.advance(u, disturbance);
             [
                 k as f64 / RATE,
                 u + noise[4] * gauss(rng),

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Excitation {
-    /// Many sines of random phase, 0.15 to 12 Hz.
+    /// Odd multiples of 0.1 Hz up to 15 Hz of random phase, a quarter of them left out.
     Multisine,
     /// Filtered noise under an envelope.
     Earthquake,
@@ -34,17 +34,12 @@ impl Excitation {
         let time = |k: usize| k as f64 / rate;
         let mut reference: Vec<f64> = match self {
             Self::Multisine => {
-                let slope: f64 = rng.random_range(0.55..0.85);
-                let lines: Vec<(f64, f64, f64)> = (0..60)
-                    .map(|i| {
-                        let frequency = 0.15 * (12.0f64 / 0.15).powf(f64::from(i) / 59.0);
-                        let cycles = (frequency * duration).round().max(1.0);
-                        let frequency = cycles / duration;
-                        (
-                            frequency,
-                            frequency.powf(-slope),
-                            rng.random_range(0.0..TAU),
-                        )
+                let lines: Vec<(f64, f64, f64)> = (0..75)
+                    .filter_map(|i| {
+                        let frequency = 0.1 * f64::from(2 * i + 1);
+                        let amplitude = 1.0 / (1.0 + (frequency / 1.2).powi(2));
+                        let phase = rng.random_range(0.0..TAU);
+                        (!rng.random_bool(0.25)).then_some((frequency, amplitude, phase))
                     })
                     .collect();
                 (0..n)

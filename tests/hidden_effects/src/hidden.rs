@@ -1,6 +1,7 @@
 //! What is hidden in a rig.
 
 use crate::catalogue::Effect;
+use crate::form::Form;
 use crate::outside::Outside;
 
 /// What is hidden, ready to simulate; neutral by default.
@@ -10,10 +11,8 @@ pub struct Hidden {
     pub effects: Vec<Effect>,
     /// Something outside the catalogue and its size.
     pub outside: Option<(Outside, f64)>,
-    /// Width of the friction's sign function, in/s; unknown to the laboratory.
-    pub friction_width: f64,
-    /// Phase of the mains, rad.
-    pub mains_phase: f64,
+    /// Details of their forms, unknown to the laboratory.
+    pub form: Form,
 }
 
 impl Hidden {

@@ -7,6 +7,7 @@
 pub mod case;
 pub mod catalogue;
 pub mod excitation;
+pub mod form;
 pub mod hidden;
 pub mod law;
 pub mod outside;

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::form::{Degradation, Droop};
 use crate::hidden::Hidden;
 use crate::outside::Outside;
 use crate::plant::Plant;
@@ -55,6 +56,7 @@ pub struct Rig {
     hidden: Hidden,
     state: State,
     time: f64,
+    disturbance: f64,
     play: f64,
     spring_play: f64,
     largest_drift: f64,
@@ -81,6 +83,7 @@ impl Rig {
             hidden,
             state: [0.0; STATES],
             time: 0.0,
+            disturbance: 0.0,
             play: 0.0,
             spring_play: 0.0,
             largest_drift: 0.0,
@@ -112,7 +115,7 @@ impl Rig {
         let mut a = heard * (1.0 + h.value("accelerometer_scale"))
             + h.value("accelerometer_bias")
             + GRAVITY * h.value("accelerometer_tilt") * self.state[X];
-        a += h.value("mains_hum") * (TAU * 60.0 * self.time + h.mains_phase).sin();
+        a += h.value("mains_hum") * (TAU * 60.0 * self.time + h.form.mains_phase).sin();
         let mut f =
             forces.actuator * (1.0 + h.value("load_cell_scale")) + h.value("load_cell_bias");
         f += h.outside(Outside::LoadCellCrosstalk).unwrap_or(0.0) * table;
@@ -124,8 +127,11 @@ impl Rig {
         }
     }
 
-    /// Advances one sample with `command` held.
-    pub fn advance(&mut self, command: f64) {
+    /// Advances one sample with `command` held and an unseen voltage `disturbance` beside it.
+    pub fn advance(&mut self, command: f64, disturbance: f64) {
+        let before_play = self.hidden.form.disturbed_before_play;
+        let command = command + if before_play { disturbance } else { 0.0 };
+        self.disturbance = if before_play { 0.0 } else { disturbance };
         for _ in 0..SUBSTEPS {
             self.commands.push(command);
             let u = self.flow_command();
@@ -185,6 +191,10 @@ impl Rig {
 
     /// The command after delay and play: what drives the spool.
     fn flow_command(&self) -> f64 {
+        self.disturbance + self.played_command()
+    }
+
+    fn played_command(&self) -> f64 {
         if self.hidden.holds("valve_hysteresis") {
             let width = self.hidden.value("valve_hysteresis");
             let command = self.delayed_command();
@@ -210,7 +220,12 @@ impl Rig {
         }
         u *= 1.0 + h.value("valve_flow_gain");
         u *= 1.0 + h.value("valve_asymmetric_gain") * u.signum();
-        u *= (1.0 - h.value("supply_pressure_droop") * demand).max(0.1);
+        let loss = h.value("supply_pressure_droop") * demand;
+        u *= match h.form.droop {
+            Droop::Hyperbola => 1.0 / (1.0 + loss),
+            Droop::Line => (1.0 - loss).max(h.form.droop_floor),
+            Droop::Exponential => (-loss).exp(),
+        };
         if let Some(drift) = h.outside(Outside::WarmingOil) {
             u *= 1.0 + drift * (self.time / 20.0 - 0.3);
         }
@@ -239,10 +254,10 @@ impl Rig {
         if let Some(frequency) = lag {
             let omega = TAU * frequency;
             d[SPOOL] = s[SPOOL_RATE];
-            d[SPOOL_RATE] =
-                omega * omega * (spool_command - s[SPOOL]) - 1.4 * omega * s[SPOOL_RATE];
+            d[SPOOL_RATE] = omega
+                * (omega * (spool_command - s[SPOOL]) - 2.0 * h.form.spool_damping * s[SPOOL_RATE]);
         }
-        d[DEMAND] = (spool.abs() - s[DEMAND]) / 0.5;
+        d[DEMAND] = (spool.abs() - s[DEMAND]) / h.form.droop_time;
         let mut flow = self.flow(spool, s[DEMAND], actuator);
         flow -= h.value("internal_leakage") * actuator;
         let companion = |d: &mut State, start: usize, input: f64| {
@@ -267,12 +282,17 @@ impl Rig {
 
         // Table and foundation.
         let v = s[V];
-        let sign = (v / h.friction_width.max(1e-9)).tanh();
+        let sign = (v / h.form.friction_width).tanh();
         let mut friction = h.value("coulomb_friction");
         if let (Some(coulomb), Some(bump)) =
             (h.get("stribeck_friction", 0), h.get("stribeck_friction", 1))
         {
-            friction += coulomb + bump * (-(v / 0.5) * (v / 0.5)).exp();
+            friction += coulomb
+                + bump
+                    * (-(v / h.form.stribeck_velocity)
+                        .abs()
+                        .powf(h.form.stribeck_exponent))
+                    .exp();
         }
         if let Some(rise) = h.outside(Outside::PositionDependentFriction) {
             friction += rise * s[X] * s[X];
@@ -297,8 +317,9 @@ impl Rig {
         let absolute = (inner + on_table) / mass;
         let mut foundation = 0.0;
         if let Some(frequency) = h.get("foundation_compliance", 0) {
-            let (m, omega) = (12.0 * p.table[0], TAU * frequency);
-            foundation = -inner / m - omega * omega * s[Y] - 0.1 * omega * s[YV];
+            let (m, omega) = (h.form.foundation_mass * p.table[0], TAU * frequency);
+            foundation =
+                -inner / m - omega * omega * s[Y] - 2.0 * h.form.foundation_damping * omega * s[YV];
             d[Y] = s[YV];
             d[YV] = foundation;
         }
@@ -313,7 +334,7 @@ impl Rig {
             .map_or(0.0, |f| TAU * f * (s[X] - s[LAGGED_X]));
 
         let specimen_acceleration = if h.holds("specimen_absent") {
-            0.0
+            h.form.absent_share * absolute
         } else {
             let main = self.specimen_masses().0;
             let acceleration = (on_second - restoring) / main;
@@ -356,20 +377,32 @@ impl Rig {
         let c = self.plant.specimen[1] * (1.0 + h.value("specimen_damping"));
         if let Some(loss) = h.get("specimen_degradation", 0) {
             let largest = self.largest_drift.max(drift.abs());
-            k *= 1.0 - loss * (1.0 - (-largest / 0.8).exp());
+            let ratio = largest / h.form.degradation_drift;
+            k *= 1.0
+                - loss
+                    * match h.form.degradation {
+                        Degradation::Exponential => 1.0 - (-ratio).exp(),
+                        Degradation::Hyperbola => ratio / (1.0 + ratio),
+                        Degradation::Line => ratio.min(1.0),
+                    };
         }
         let mut elastic = k * drift;
         if let Some(uplift) = h.get("specimen_uplift", 0) {
-            elastic = k * (drift.clamp(-uplift, uplift) + 0.2 * outside_band(drift, uplift));
+            elastic = k
+                * (drift.clamp(-uplift, uplift)
+                    + h.form.uplift_ratio * outside_band(drift, uplift));
         }
         if let Some(slack) = h.outside(Outside::SpecimenSlack) {
             elastic = k * (0.3 * drift.clamp(-slack, slack) + outside_band(drift, slack));
         }
         if let Some(yielding) = h.get("specimen_yielding", 0) {
             let z = s[HYSTERETIC];
-            let shape = 0.5 * (1.0 + (z * rate).signum()) * (z.abs() / yielding).powf(1.5);
+            let shape = 0.5
+                * (1.0 + (z * rate).signum())
+                * (z.abs() / yielding).powf(h.form.yield_exponent);
             derivative[HYSTERETIC] = rate * (1.0 - shape);
-            elastic = k * (0.05 * drift + 0.95 * z);
+            let ratio = h.form.yield_ratio;
+            elastic = k * (ratio * drift + (1.0 - ratio) * z);
         }
         if let Some(force) = h.outside(Outside::SpecimenFriction) {
             // An elastic-perfectly plastic slider beside the columns.
@@ -384,8 +417,8 @@ impl Rig {
         let second = self.specimen_masses().1;
         let mut on_second = 0.0;
         if let Some(frequency) = h.get("specimen_second_mode", 0) {
-            let omega = TAU * frequency;
-            on_second = second * (omega * omega * s[D2] + 0.1 * omega * s[D2V]);
+            let (omega, damping) = (TAU * frequency, h.form.second_mode_damping);
+            on_second = second * omega * (omega * s[D2] + 2.0 * damping * s[D2V]);
         }
         (restoring, on_second)
     }
@@ -429,7 +462,7 @@ mod tests {
         let (omega, ratio) = (TAU, 0.05f64);
         let damped = omega * (1.0 - ratio * ratio).sqrt();
         for k in 1..=2000 {
-            rig.advance(0.0);
+            rig.advance(0.0, 0.0);
             let t = f64::from(k) / RATE;
             let expected = (-ratio * omega * t).exp()
                 * ((damped * t).cos() + ratio * omega / damped * (damped * t).sin());
@@ -459,7 +492,7 @@ mod tests {
                 sums[0] += f * phase.sin() / 500.0;
                 sums[1] += f * phase.cos() / 500.0;
             }
-            rig.advance(phase.sin());
+            rig.advance(phase.sin(), 0.0);
         }
         let w = TAU * frequency;
         let (nr, ni) = (403.3 - 3430.0 * w * w, 3.86e4 * w);

@@ -24,6 +24,9 @@ pub struct Truth {
     /// Which effect outside the catalogue.
     #[serde(default)]
     pub outside: Option<String>,
+    /// False where details of the effects' forms are not the usual ones.
+    #[serde(default)]
+    pub usual_form: bool,
 }
 
 /// A hidden effect.
@@ -214,6 +217,7 @@ mod tests {
             excitation: vec![],
             strength: None,
             outside: None,
+            usual_form: true,
         }
     }
 

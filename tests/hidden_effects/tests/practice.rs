@@ -76,7 +76,7 @@ fn the_nominal_rig_follows_the_records_within_the_mismatch() {
                 errors[i] += (row[i + 2] - simulated).powi(2);
                 sizes[i] += row[i + 2].powi(2);
             }
-            rig.advance(law.command(derivatives(&reference, k), now.x, now.a));
+            rig.advance(law.command(derivatives(&reference, k), now.x, now.a), 0.0);
         }
         for (i, channel) in ["x", "a", "F", "as"].into_iter().enumerate() {
             let relative = (errors[i] / sizes[i]).sqrt();
