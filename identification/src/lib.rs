@@ -23,6 +23,7 @@ pub mod rig_model;
 mod rig_setup;
 mod rig_start;
 pub mod rigs;
+pub mod specimen_file;
 pub mod state_variable_filter;
 pub mod subspace;
 pub mod transfer_function;
