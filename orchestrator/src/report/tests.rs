@@ -79,19 +79,7 @@ fn gallery() -> Report {
             heading: "Loops".into(),
             text: vec!["One & all.".into()],
             notes: vec!["a < b".into()],
-            bars: vec![Bars {
-                title: "Gain".into(),
-                groups: vec![BarGroup {
-                    label: "force <b>".into(),
-                    bars: vec![Bar {
-                        name: "before".into(),
-                        value: 4.8,
-                        interval: Some([4.5, 5.1]),
-                        colour: 2,
-                    }],
-                }],
-                mark: Some((1.0, "noise floor".into())),
-            }],
+            bars: Vec::new(),
             tables: vec![Table {
                 caption: "Margins".into(),
                 columns: vec!["loop".into(), "crossover".into(), "stroke".into()],
