@@ -125,6 +125,22 @@ impl Units {
         length: 1.0,
         force: 1.0,
     };
+
+    /// The set of a name; `file` is what messages call the file.
+    ///
+    /// # Errors
+    /// Names other than the two known sets.
+    pub fn named(units: &str, file: &str) -> Result<Self, IdentificationError> {
+        match units {
+            INCH_POUND => Ok(Self::INCH_POUND),
+            SI | "SI" => Ok(Self::SI),
+            other => Err(IdentificationError::ModelFile {
+                path: file.to_string(),
+                what: format!("units = \"{other}\""),
+                expected: "\"inch, lbf, second, volt\" or \"metre, newton, second, volt\"",
+            }),
+        }
+    }
 }
 
 impl ModelFile {
@@ -219,15 +235,7 @@ impl ModelFile {
     /// # Errors
     /// Units other than the two known sets.
     pub fn units(&self, name: &str) -> Result<Units, IdentificationError> {
-        match self.units.as_str() {
-            INCH_POUND => Ok(Units::INCH_POUND),
-            SI | "SI" => Ok(Units::SI),
-            other => Err(IdentificationError::ModelFile {
-                path: name.to_string(),
-                what: format!("units = \"{other}\""),
-                expected: "\"inch, lbf, second, volt\" or \"metre, newton, second, volt\"",
-            }),
-        }
+        Units::named(&self.units, name)
     }
 
     /// The table in SI.

@@ -7,7 +7,6 @@ use std::env;
 use std::process::ExitCode;
 
 use acceptance::hidden_suite::{Plan, line, run_all, table};
-use hidden_effects::Outcome;
 
 fn main() -> ExitCode {
     let mut plan = Plan {
@@ -48,9 +47,7 @@ fn main() -> ExitCode {
     }
     println!("{plan:?}");
     let results = run_all(&plan, |scored| {
-        if scored.outcome != Outcome::Right {
-            eprintln!("{}", line(scored));
-        }
+        eprintln!("{}, {:.1} s, {:?}", line(scored), scored.seconds, scored.errors);
     });
     println!("{}", table(&results));
     ExitCode::SUCCESS

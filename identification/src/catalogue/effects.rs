@@ -253,15 +253,29 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                         "1",
                         Scale::Logarithmic,
                         0.05,
-                        0.1,
+                        0.25,
                         (0.01, 0.3),
                     ),
+                    shape(
+                        "mass_ratio",
+                        "1",
+                        Scale::Logarithmic,
+                        12.0,
+                        0.1,
+                        (4.0, 40.0),
+                    ),
                 ],
-                &[&[7.0, 0.05], &[9.5, 0.05], &[13.0, 0.05], &[17.0, 0.05]],
+                &[
+                    &[7.0, 0.05, 12.0],
+                    &[9.5, 0.05, 12.0],
+                    &[13.0, 0.05, 12.0],
+                    &[17.0, 0.05, 12.0],
+                ],
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| {
                 rig.effects.foundation.frequency = p[0];
                 rig.effects.foundation.damping_ratio = p[1];
+                rig.effects.foundation.mass_ratio = p[2];
             },
         ),
     ];

@@ -265,3 +265,108 @@ impl RigModel for ShakeTableModel {
             .is_ok_and(|sampled| predictor.innovations(&sampled, signals, out))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::diagnosis::{Judgement, judge};
+    use plant::shake_table::ShakeTable;
+    use plant::specimen::LinearSpecimen;
+
+    /// Records of `rig` under a small proportional controller on random references.
+    fn model(rig: &IdentifiedRig, seed: u64) -> ShakeTableModel {
+        let nominal = Nominal {
+            sample_rate: 500.0,
+            shake_table: ShakeTable::default(),
+            specimen: Some(LinearSpecimen::default()),
+            controller: None,
+            noise: [1.3e-5, 0.04, 1.3, 0.025],
+            command_noise: 5e-4,
+            uncertainty: 0.01,
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = move || -> f64 { StandardNormal.sample(&mut random) };
+        let period = 1.0 / nominal.sample_rate;
+        let sampled = rig.sample(period, 2).unwrap();
+        let disturbance = Disturbance::beside_command(nominal.command_noise, period);
+        let records = ["identification", "validation"].map(|name| {
+            let mut state = Default::default();
+            let (mut reference, mut slow, mut unseen) = (0.0, 0.0, 0.0);
+            let mut signals = Signals {
+                command: Vec::new(),
+                channels: Vec::new(),
+            };
+            for k in 0..4000 {
+                slow += 0.01 * (0.15 * normal() - slow);
+                reference += 0.02 * (slow - reference);
+                let mut channels = sampled.measure(&mut state, f64::from(k) * period);
+                for (value, noise) in channels.iter_mut().zip(nominal.noise) {
+                    *value += noise * normal();
+                }
+                let command = 240.0 * (reference - channels[0]);
+                signals.command.push(command);
+                signals.channels.push(channels);
+                let fresh = disturbance.sigma * (1.0 - disturbance.phi.powi(2)).sqrt();
+                unseen = disturbance.phi * unseen + fresh * normal();
+                sampled.step_disturbed(&mut state, command, unseen);
+            }
+            ModelRecord {
+                name: name.into(),
+                signals,
+                with_effects: true,
+            }
+        });
+        ShakeTableModel::new(&nominal, nominal.noise, records.into())
+    }
+
+    fn said(judgement: &Judgement) -> (crate::diagnosis::Verdict, Vec<&'static str>) {
+        let mut names: Vec<_> = judgement.effects.iter().map(|e| e.effect).collect();
+        names.sort_unstable();
+        (judgement.verdict, names)
+    }
+
+    #[test]
+    fn order_and_labels_of_the_catalogue_change_no_verdict() {
+        let mut rig = IdentifiedRig {
+            specimen: Some(LinearSpecimen::default()),
+            ..Default::default()
+        };
+        for hidden in [vec![], vec!["load_cell_bias", "valve_dead_band"]] {
+            rig.effects.valve.dead_band = f64::from(hidden.contains(&"valve_dead_band")) * 0.12;
+            rig.sensors.load_cell_bias = f64::from(hidden.contains(&"load_cell_bias")) * 8.0;
+            let model = model(&rig, 31);
+            let straight = judge(&model, &[0], &[1], false).unwrap();
+            assert_eq!(said(&straight).1, hidden);
+
+            let mut turned = model.clone();
+            turned.candidates.reverse();
+            turned.apply.reverse();
+            turned.candidates.rotate_left(7);
+            turned.apply.rotate_left(7);
+            assert_eq!(
+                said(&judge(&turned, &[0], &[1], false).unwrap()),
+                said(&straight)
+            );
+
+            // Labels: every effect takes the name of its mirror image in the catalogue.
+            let names: Vec<&'static str> = model.candidates.iter().map(|c| c.effect).collect();
+            let mirror = |name: &str| {
+                let place = names.iter().position(|n| *n == name).unwrap();
+                names[names.len() - 1 - place]
+            };
+            let mut relabelled = model.clone();
+            for candidate in &mut relabelled.candidates {
+                candidate.effect = mirror(candidate.effect);
+                candidate.contains = candidate.contains.map(mirror);
+            }
+            let judgement = judge(&relabelled, &[0], &[1], false).unwrap();
+            let mut expected: Vec<_> = hidden.iter().map(|name| mirror(name)).collect();
+            expected.sort_unstable();
+            assert_eq!(said(&judgement), (straight.verdict, expected));
+        }
+    }
+}

@@ -279,16 +279,27 @@ pub fn polish<M: RigModel>(
     records: &[usize],
     rounds: usize,
 ) -> Option<(Fit, Jacobian)> {
+    polish_to(model, start, records, rounds, 0.0)
+}
+
+/// As [`polish`]; a fit that is far from noise is settled when a round gains less than `share` of
+/// what is left above noise.
+pub(super) fn polish_to<M: RigModel>(
+    model: &M,
+    start: &Fit,
+    records: &[usize],
+    rounds: usize,
+    share: f64,
+) -> Option<(Fit, Jacobian)> {
     let mut best = start.clone();
     let mut jacobian = Jacobian::at(model, &best, records)?;
     for _ in 0..rounds {
         let next = fit(model, &best.point, records, &jacobian, 3)?;
         let gain = (best.cost - next.cost).abs();
-        // A fit that is far from noise need not be exact.
         let excess = (squares(&next.residuals) - next.residuals.len() as f64).max(0.0);
         best = next;
         jacobian = Jacobian::at(model, &best, records)?;
-        if gain < 0.1 + 0.01 * excess {
+        if gain < 0.1 + share * excess {
             break;
         }
     }

@@ -1,6 +1,6 @@
 //! The search for the set of effects: forward with a beam, then backward.
 
-use super::fit::{Fit, Jacobian, evaluate, fit, polish, residuals};
+use super::fit::{Fit, Jacobian, evaluate, fit, polish_to, residuals};
 use super::model::{Candidate, Point, RigModel, Role, Scale};
 
 /// What an effect must earn, in units of `2 log` likelihood, before it is named.
@@ -25,6 +25,8 @@ const NOISE_OF_A_RACE: f64 = 1e4;
 
 /// Rounds of a fit at most; curved valleys take many.
 pub(super) const ROUNDS: usize = 12;
+/// Share of the excess over noise that one more round must gain.
+pub(super) const SETTLED: f64 = 0.01;
 
 /// A fitted model with its derivatives.
 pub struct Hypothesis {
@@ -118,7 +120,7 @@ pub struct Search<'a, M: RigModel> {
 
 impl<M: RigModel> Search<'_, M> {
     fn hypothesis(&self, start: &Fit) -> Option<Hypothesis> {
-        let (fit, jacobian) = polish(self.model, start, &self.records, ROUNDS)?;
+        let (fit, jacobian) = polish_to(self.model, start, &self.records, ROUNDS, SETTLED)?;
         let score = fit.cost + price(self.model.candidates(), &fit.point);
         Some(Hypothesis {
             fit,

@@ -12,14 +12,17 @@ use super::gain::{Gain, gain};
 use super::relations::{Relation, misfit, relations};
 use super::sentence::sentence;
 use super::verdict::{NamedEffect, Verdict, judge};
-use super::{Point, Test};
-use crate::case::{CHANNELS, Case, CaseError, Nominal, Record, blind_spot, problems};
+use super::{Point, Role, Test};
+use crate::case::{CHANNELS, Case, CaseError, Nominal, Record, blind_spot, noise_ratios, problems};
 use crate::catalogue::{ModelRecord, NUISANCE, ShakeTableModel, nominal_parameters};
 use crate::predictor::{Predictor, Signals};
 
 /// R5 fires, and the recorded command is used, where it misses the law by more than this many
 /// standard deviations of its noise.
 const LAW_HOLDS_WITHIN: f64 = 4.0;
+
+/// A channel whose noise is this many times what is stated is said to be loud.
+const LOUD: f64 = 2.0;
 
 /// The parameter set that the FMUs of table, specimen and instrumentation take, SI.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -215,7 +218,11 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     };
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
     let signals = &model.records[held_out].signals;
-    let judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
+    let mut judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
+    for note in at_their_ends(&model, &judgement.best.point) {
+        judgement.verdict = Verdict::Unexplained;
+        notes.push(note);
+    }
     let after = prediction(&model, &judgement.best.point, held_out).ok_or_else(lost)?;
     let gain = gain(
         signals,
@@ -253,6 +260,16 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
              one rig?"
                 .into(),
         );
+    }
+    if judgement.verdict == Verdict::Unexplained {
+        let ratios = noise_ratios(&case.identification, &case.nominal);
+        for (channel, ratio) in CHANNELS.iter().zip(ratios) {
+            if let Some(ratio) = ratio.filter(|ratio| *ratio > LOUD) {
+                notes.push(format!(
+                    "the noise of `{channel}` is {ratio:.1} times what nominal.toml states"
+                ));
+            }
+        }
     }
     let standard_errors = effects
         .iter()
@@ -316,6 +333,30 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
             after: after.1,
         },
     })
+}
+
+/// Effects whose size ran to the end of what is tried: no cause, but a nominal model of another rig.
+fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (index, internal) in &point.effects {
+        let candidate = &super::RigModel::candidates(model)[*index];
+        for (parameter, value) in candidate.parameters.iter().zip(candidate.values(internal)) {
+            let (low, high) = parameter.bounds;
+            let near = |end: f64| (value - end).abs() < 1e-3 * end.abs();
+            if matches!(parameter.role, Role::Size { .. }) && (near(low) || near(high)) {
+                let unit = Some(parameter.unit).filter(|unit| *unit != "1");
+                notes.push(format!(
+                    "{}.{} ran to the end of what is plausible, {value:.3}{}{}: does nominal.toml \
+                     belong to this rig?",
+                    candidate.effect,
+                    parameter.name,
+                    unit.map_or("", |_| " "),
+                    unit.unwrap_or_default()
+                ));
+            }
+        }
+    }
+    notes
 }
 
 /// The mains as amplitude and phase instead of two components.

@@ -1,9 +1,9 @@
 //! From a search to a verdict: is the best model adequate, and does anything rival it?
 
 use super::adequacy::{self, Test};
-use super::fit::{Fit, Jacobian, evaluate, polish};
+use super::fit::{Fit, Jacobian, evaluate, polish_to};
 use super::model::{Point, RigModel, Role};
-use super::search::{Found, Hypothesis, RIVAL_WITHIN, ROUNDS, Search};
+use super::search::{Found, Hypothesis, RIVAL_WITHIN, ROUNDS, SETTLED, Search};
 
 /// Largest deviate that noise alone may show among the few hundred tests.
 pub const LARGEST_DEVIATE: f64 = 5.6;
@@ -175,7 +175,7 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
     // The held-out record is predicted with the fitted parameters for the gain; whether noise is
     // all that is left is asked of a fit to everything, free of the parameters' own errors.
     let joint = evaluate(model, &best.fit.point, &everything)
-        .and_then(|start| polish(model, &start, &everything, ROUNDS));
+        .and_then(|start| polish_to(model, &start, &everything, ROUNDS, SETTLED));
     let (joint_fit, joint_jacobian) = match joint {
         Some((fit, jacobian)) => (fit, Some(jacobian)),
         None => (best.fit.clone(), None),

@@ -34,20 +34,26 @@ impl Rig for CyclicMaterial {
     }
 
     fn effects(&self) -> Vec<Effect> {
-        let backstress = |name, recovery: f64| {
+        let backstress = |name, recovery: f64, spread, starts: &[&[f64]]| {
             effect(
                 name,
                 vec![
                     size("hardening", "Pa", 1e8, (0.0, 1e12)),
-                    shape("recovery", "1", recovery, 0.8),
+                    shape("recovery", "1", recovery, spread),
                 ],
                 &[0.0, recovery],
-                &[&[1e9, recovery], &[1e10, recovery]],
+                starts,
             )
         };
         vec![
-            backstress("slow_backstress", 20.0),
-            backstress("fast_backstress", 800.0),
+            backstress(
+                "second_backstress",
+                200.0,
+                1.2,
+                &[&[1e9, 20.0], &[1e10, 200.0], &[5e10, 1000.0]],
+            ),
+            // A third one that hardly recovers.
+            backstress("lasting_backstress", 5.0, 0.5, &[&[1e9, 5.0]]),
             // R = Q (1 - e^{-b p}), p the plastic path (Voce 1948).
             effect(
                 "isotropic_hardening",
@@ -103,9 +109,9 @@ impl Rig for CyclicMaterial {
                 &[0.0],
                 &[&[2e-12], &[8e-12]],
             ),
-            // Strain recorded late by a part of a sample, or stress.
+            // Stress recorded late by a part of a sample, or strain.
             effect(
-                "strain_late",
+                "stress_late",
                 vec![size("samples", "1", 0.05, (-2.0, 2.0))],
                 &[0.0],
                 &[&[0.3], &[-0.3]],
@@ -155,20 +161,14 @@ impl Rig for CyclicMaterial {
             path: 0.0,
         };
         let last = strain.len() - 1;
-        let at = |k: usize| {
-            let place = (k as f64 + late).clamp(0.0, last as f64);
-            let before = place as usize;
-            let share = place - before as f64;
-            strain[before] * (1.0 - share) + strain[(before + 1).min(last)] * share
-        };
         let mut now = first;
         let mut direction = 0.0f64;
         let mut k = 0;
         while k <= last {
             // Where the strain was interpolated, only the reading behind it is known.
-            let interpolated = late == 0.0 && series.between.get(k) == Some(&true);
+            let interpolated = series.between.get(k) == Some(&true);
             let reading = if interpolated { k + 1 } else { k };
-            let next = at(reading);
+            let next = strain[reading];
             if next != now {
                 let turn = (next - now).signum();
                 let peak = direction * amplitude;
@@ -192,6 +192,15 @@ impl Rig for CyclicMaterial {
             }
             out[reading] = state.stress;
             k = reading + 1;
+        }
+        if late != 0.0 {
+            let shown = out.to_vec();
+            for (k, stress) in out.iter_mut().enumerate() {
+                let place = (k as f64 - late).clamp(0.0, last as f64);
+                let before = place as usize;
+                let share = place - before as f64;
+                *stress = shown[before] * (1.0 - share) + shown[(before + 1).min(last)] * share;
+            }
         }
     }
 }
@@ -272,5 +281,54 @@ impl Steel {
         }
         self.path += plastic;
         self.stress = trial - side * modulus * plastic;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stress(strain: &[f64], amplitude: f64, compliance: f64) -> Vec<f64> {
+        let series = Series::new("path", 1.0, vec![strain.to_vec()], vec![0.0; strain.len()]);
+        let effects: Vec<f64> = CyclicMaterial
+            .effects()
+            .iter()
+            .flat_map(|effect| {
+                if effect.candidate.effect == "frame_compliance" {
+                    vec![compliance]
+                } else {
+                    effect.off.clone()
+                }
+            })
+            .collect();
+        // Perfectly plastic at 400 MPa.
+        let nominal = [2e11, 4e8, 0.0, 1.0, amplitude];
+        let mut out = vec![0.0; strain.len()];
+        CyclicMaterial.simulate(&series, &nominal, &effects, &mut out);
+        out
+    }
+
+    #[test]
+    fn a_turn_between_readings_reaches_the_amplitude_and_its_sample_lies_half_way() {
+        // From 1.95 % on to 2 % and back to 1.8 %: half of that path is 0.075 % behind the turn.
+        let strain = [0.0, 0.0195, 0.01875, 0.018];
+        let out = stress(&strain, 0.02, 0.0);
+        assert!((out[1] - 4e8).abs() < 1.0);
+        assert!((out[2] - (4e8 - 2e11 * 7.5e-4)).abs() < 1e6, "{}", out[2]);
+        assert!(out[3].abs() < 1e6, "{}", out[3]);
+        // Without a known amplitude the readings are all there is.
+        let plain = stress(&strain, 0.0, 0.0);
+        assert!((plain[3] - 1e8).abs() < 1e6, "{}", plain[3]);
+    }
+
+    #[test]
+    fn a_compliant_frame_moves_the_sample_that_was_interpolated() {
+        // Back from 4e8 Pa by 0.4 % strain to -4e8 Pa at 0.4 %, then 0.2 % of plastic strain. With
+        // compliance C the path is 0.004 + C 8e8 Pa, then 0.002; its half lies in the elastic leg.
+        let strain = [0.0, 0.018, 0.015, 0.012];
+        let [stiff, soft] = [0.0, 5e-12].map(|c| stress(&strain, 0.0, c)[2]);
+        let expected = |c: f64| 4e8 - 2e11 * 0.5 * (0.006 + 8e8 * c) / (1.0 + 2e11 * c);
+        assert!((stiff - expected(0.0)).abs() < 1e6, "{stiff}");
+        assert!((soft - expected(5e-12)).abs() < 1e6, "{soft}");
     }
 }

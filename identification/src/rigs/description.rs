@@ -427,3 +427,28 @@ impl Description {
         Ok(Series::new(&name, step, columns, output))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_half_way_between_two_readings_are_told_from_readings() {
+        let between = half_way(&[0.0, 1.0, 2.0, 4.0, 6.0, 6.5, 9.0, 9.0], 9.0);
+        assert_eq!(
+            between,
+            [false, true, false, true, false, false, false, false]
+        );
+    }
+
+    #[test]
+    fn rows_that_repeat_are_read_once() {
+        let mut columns = vec![
+            vec![0.0, 1.0, 1.0, 1.0, 2.0, 2.0 + 1e-14],
+            vec![0.0, 5.0, 5.0, 6.0, 7.0, 7.0],
+        ];
+        read_repeats_once(&mut columns);
+        assert_eq!(columns[0], [0.0, 1.0, 1.0, 2.0]);
+        assert_eq!(columns[1], [0.0, 5.0, 6.0, 7.0]);
+    }
+}

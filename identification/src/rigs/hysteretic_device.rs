@@ -252,3 +252,51 @@ impl Rig for HystereticDevice {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn asymmetry_fades_with_the_greatest_excursion() {
+        // Slides to 10 mm, back to -5 mm and again to 8 mm: the level keeps that of 10 mm.
+        let path = [0.0, 0.010, -0.005, 0.008];
+        let steps = 1000;
+        let displacement: Vec<f64> = path
+            .windows(2)
+            .flat_map(|p| (0..steps).map(|k| p[0] + (p[1] - p[0]) * f64::from(k) / 1000.0))
+            .chain([0.008])
+            .collect();
+        let n = displacement.len();
+        let series = Series::new(
+            "slides",
+            1e-3,
+            vec![displacement, vec![0.0; n]],
+            vec![0.0; n],
+        );
+        let effects: Vec<f64> = HystereticDevice
+            .effects()
+            .iter()
+            .flat_map(|effect| match effect.candidate.effect {
+                "asymmetric_coulomb_friction" => vec![-0.3],
+                "excursion_memory" => vec![50.0],
+                _ => effect.off.clone(),
+            })
+            .collect();
+        let mut out = vec![0.0; n];
+        HystereticDevice.simulate(&series, &[1e4, 1e8], &effects, &mut out);
+        let fade = |excursion: f64| 0.3 * (-50.0 * excursion).exp();
+        for (place, force) in [
+            (500, 1e4 * (1.0 - fade(0.005))),
+            (1000, 1e4 * (1.0 - fade(0.010))),
+            (2000, -1e4 * (1.0 + fade(0.010))),
+            (n - 1, 1e4 * (1.0 - fade(0.010))),
+        ] {
+            assert!(
+                (out[place] - force).abs() < 30.0,
+                "{place}: {} {force}",
+                out[place]
+            );
+        }
+    }
+}

@@ -38,6 +38,8 @@ pub struct Bar {
     pub colour: usize,
 }
 
+/// Bars that reach this many times the mark are drawn on a logarithmic scale.
+const FAR: f64 = 30.0;
 const WIDTH: f64 = 1060.0;
 const LEFT: f64 = 190.0;
 const RIGHT: f64 = 110.0;
@@ -57,7 +59,17 @@ pub(super) fn svg(bars: &Bars) -> String {
         .map(far)
         .filter(|v| v.is_finite())
         .fold(mark, f64::max);
-    let x = |value: f64| LEFT + value.max(0.0) / most.max(1e-300) * (WIDTH - LEFT - RIGHT);
+    let length = WIDTH - LEFT - RIGHT;
+    let least = 0.1 * mark;
+    let logarithmic = mark > 0.0 && most > FAR * mark;
+    let x = |value: f64| {
+        let share = if logarithmic {
+            (value / least).ln() / (most / least).ln()
+        } else {
+            value / most.max(1e-300)
+        };
+        LEFT + share.max(0.0) * length
+    };
     let mut body = String::new();
     let mut y = TOP;
     for group in &bars.groups {
@@ -134,6 +146,13 @@ pub(super) fn svg(bars: &Bars) -> String {
             escaped(&bar.name)
         );
         at += 40.0 + 7.0 * bar.name.chars().count() as f64;
+    }
+    if logarithmic {
+        let _ = writeln!(
+            legend,
+            "<text x=\"{at:.0}\" y=\"{:.1}\" style=\"fill:var(--soft)\">logarithmic</text>",
+            y + 14.5
+        );
     }
     let height = y + 24.0;
     format!(

@@ -72,6 +72,15 @@ pub struct Record {
     pub rows: Vec<[f64; 7]>,
 }
 
+impl Record {
+    /// True when the command is hardly ever at its limit of 10 V.
+    fn is_under_control(&self) -> bool {
+        let clipped = self.rows.iter().filter(|row| row[1].abs() > 9.9).count();
+        let finite = self.rows.iter().flatten().all(|value| value.is_finite());
+        finite && 100 * clipped < self.rows.len()
+    }
+}
+
 /// A case with its truth.
 #[derive(Debug, Clone)]
 pub struct Case {
@@ -93,8 +102,21 @@ const HEADER: &str = "time [s],valve_command [V],displacement [in],acceleration 
     actuator_force [lbf],specimen_acceleration [in/s^2],reference [in]";
 
 impl Case {
-    /// Draws a case; the same seed and settings give the same case.
+    /// Draws a case; the same seed and settings give the same case. A rig that its effects put out
+    /// of control is no case: another one is drawn.
     pub fn draw(seed: u64, settings: &Settings) -> Self {
+        let mut attempt = seed;
+        loop {
+            let mut case = Self::attempt(attempt, settings);
+            if case.records.iter().all(Record::is_under_control) {
+                case.truth.case = format!("seed-{seed}");
+                return case;
+            }
+            attempt = attempt.wrapping_add(1 << 40);
+        }
+    }
+
+    fn attempt(seed: u64, settings: &Settings) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = ChaCha8Rng::seed_from_u64(seed ^ 0x9e37_79b9_7f4a_7c15);
         let plant = NOMINAL.perturbed(|| settings.mismatch * gauss(&mut normal));

@@ -13,8 +13,9 @@ pub enum Outside {
     PositionDependentFriction,
     /// Flow gain that falls smoothly with the command's size (a wrong form of saturation).
     SoftValve,
-    /// Dead band on one side of null only (a wrong form of the dead band).
-    OneSidedDeadBand,
+    /// Spool with underlap: twice the gain near null (a wrong form of the dead band). A dead band
+    /// on one side only would be no outsider: it is an overlap with an offset.
+    UnderlappedSpool,
     /// Spring that acts beyond a gap on one side (a wrong form of stiffness).
     OneSidedStop,
     /// Free play between piston and table spring.
@@ -42,7 +43,7 @@ pub const OUTSIDE: [Outside; 14] = [
     Outside::QuadraticDrag,
     Outside::PositionDependentFriction,
     Outside::SoftValve,
-    Outside::OneSidedDeadBand,
+    Outside::UnderlappedSpool,
     Outside::OneSidedStop,
     Outside::SpringPlay,
     Outside::ParasiticOscillator,
@@ -62,7 +63,7 @@ impl Outside {
             Self::QuadraticDrag => (0.01, 0.1),
             Self::PositionDependentFriction => (1.0, 8.0),
             Self::SoftValve => (0.02, 0.15),
-            Self::OneSidedDeadBand => (0.08, 0.4),
+            Self::UnderlappedSpool => (0.04, 0.2),
             Self::OneSidedStop => (8.0, 60.0),
             Self::SpringPlay => (0.02, 0.12),
             Self::ParasiticOscillator => (0.04, 0.2),

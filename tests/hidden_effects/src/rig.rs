@@ -212,8 +212,8 @@ impl Rig {
         }
         u += h.value("valve_null_bias");
         u = outside_band(u, h.value("valve_dead_band"));
-        if let Some(width) = h.outside(Outside::OneSidedDeadBand) {
-            u = if u > 0.0 { (u - width).max(0.0) } else { u };
+        if let Some(width) = h.outside(Outside::UnderlappedSpool) {
+            u += u.clamp(-width, width);
         }
         if let Some(curve) = h.outside(Outside::SoftValve) {
             u /= 1.0 + curve * u.abs();

@@ -1,6 +1,7 @@
 //! `diagnose`: what the nominal model of a case gets wrong, why, and what knowing it brings.
 
 pub mod co_simulation;
+mod health;
 mod page;
 mod pictures;
 mod text;
@@ -11,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use identification::case::{Case, CaseError};
+use identification::case::{CHANNELS, Case, CaseError};
 use identification::diagnosis::NamedEffect;
 use identification::diagnosis::shake_table::{self, Diagnosis};
 use serde::Serialize;
@@ -23,6 +24,7 @@ use crate::report;
 use crate::results::Results;
 use crate::system::model::component_of;
 use co_simulation::{Comparison, RigFmus};
+pub use health::RelationReport;
 
 /// File with the extended model, in the folder of `--out`.
 pub const EXTENDED_MODEL: &str = "extended_model.toml";
@@ -54,8 +56,8 @@ pub struct DiagnosisReport {
     pub extended_fmu: Option<PathBuf>,
     /// All FMUs of the extended model.
     pub extended_fmus: Vec<PathBuf>,
-    /// Errors of the relations R1 to R5 in units of the sensors' noise, nominal model.
-    pub relations: BTreeMap<&'static str, f64>,
+    /// The relations R1 to R5 on the identification record.
+    pub relations: BTreeMap<&'static str, RelationReport>,
     /// Traces left over, strongest first, as normal deviates.
     pub remaining: Vec<(String, f64)>,
     /// Share of the nominal model's excess error that the effects explain.
@@ -136,11 +138,7 @@ impl DiagnosisReport {
             extended_model: None,
             extended_fmu: None,
             extended_fmus: Vec::new(),
-            relations: diagnosis
-                .relations
-                .iter()
-                .map(|relation| (relation.name, relation.ratio))
-                .collect(),
+            relations: BTreeMap::new(),
             remaining: diagnosis
                 .remaining
                 .iter()
@@ -187,11 +185,12 @@ pub fn diagnose(case: &Path, folder: &Path) -> Result<DiagnosisReport, Error> {
     })?;
     let diagnosis = shake_table::diagnose(&read, false).map_err(|e| fail(case, e.to_string()))?;
     let mut report = DiagnosisReport::new(&diagnosis);
+    report.relations = health::relations(&read, &diagnosis);
     let model = ExtendedModel::new(&diagnosis.extended_model, &diagnosis.modelled);
     if report.effects.is_empty() && !diagnosis.modelled.is_empty() {
         let names: Vec<&str> = diagnosis.modelled.iter().map(|e| e.effect).collect();
         report.notes.push(format!(
-            "the extended model holds {}, which helps and is not the cause",
+            "in the extended model for the help they are, not as the cause: {}",
             names.join(" and ")
         ));
     }
@@ -274,6 +273,12 @@ fn in_closed_loop(
     let law = case.nominal.controller.ok_or("the case states no law")?;
     if record.reference.len() != record.len() {
         return Err("the validation record has no column `reference`".into());
+    }
+    if let Some(missing) = [0, 1].into_iter().find(|&i| record.channels[i].is_empty()) {
+        return Err(format!(
+            "without `{}` nothing tells whether the stated law made the command (R5)",
+            CHANNELS[missing]
+        ));
     }
     // The law's command is used wherever it explains the recorded one.
     if diagnosis.validation.signals.command == record.valve_command {

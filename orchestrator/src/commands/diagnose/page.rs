@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use identification::case::{Case, Nominal};
+use identification::case::Case;
 use identification::diagnosis::shake_table::Diagnosis;
 
 use super::co_simulation::Comparison;
@@ -37,7 +37,7 @@ pub(super) fn page(
     if let Some(found) = comparison {
         sections.push(closed_loop(case, found));
     }
-    sections.push(relations(case, report, diagnosis));
+    sections.push(relations(report));
     sections.extend(errors(case, diagnosis));
     sections.push(extended(case, model));
     Report {
@@ -169,8 +169,7 @@ fn gain(report: &DiagnosisReport, diagnosis: &Diagnosis) -> Section {
         heading: "What it brings".into(),
         text: vec![format!(
             "Errors on the validation record, which was not fitted, in units of what the sensors' \
-             noise leaves a perfect model. Whiskers: 95 % interval from a moving-block bootstrap. \
-             Overall {}.",
+             noise leaves a perfect model. Whiskers: 95 % interval from a moving-block bootstrap. {}.",
             text::share(&report.gain)
         )],
         bars: vec![bars("One step ahead", &report.gain, interval)],
@@ -191,9 +190,9 @@ fn closed_loop(case: &Case, found: &Comparison) -> Section {
              the validation record under the laboratory's own law; the rig is unstable without its \
              controller, so that only in closed loop a whole record can be compared. The noise \
              floor is what the sensors' noise alone makes of the extended FMUs, in the readings \
-             and through the loop."
+             and through the loop; a rig whose valve is disturbed besides lies a little above it."
                 .into(),
-            format!("Overall {}.", text::share(&found.gain)),
+            format!("{}.", text::share(&found.gain)),
         ],
         bars: vec![bars("Whole record, co-simulated", &found.gain, |_| None)],
         tables: vec![table(
@@ -206,52 +205,31 @@ fn closed_loop(case: &Case, found: &Comparison) -> Section {
     }
 }
 
-fn relations(case: &Case, report: &DiagnosisReport, diagnosis: &Diagnosis) -> Section {
-    let estimated = Nominal {
-        shake_table: diagnosis.extended_model.shake_table,
-        specimen: diagnosis.extended_model.specimen,
-        ..case.nominal.clone()
-    };
-    let estimated =
-        identification::diagnosis::relations::relations(&case.identification, &estimated);
-    let rows = report.relations.iter().map(|(name, ratio)| {
-        let after = estimated.iter().find(|relation| relation.name == *name);
-        let after = after.map_or(*ratio, |relation| relation.ratio);
-        let about = match name.get(..2) {
+fn relations(report: &DiagnosisReport) -> Section {
+    let rows = text::relations(report).into_iter().map(|mut row| {
+        let about = match row[0].get(..2) {
             Some("R1") => "command and velocity against force: valve, oil, load cell",
             Some("R2") => "force against inertia, damping, stiffness: friction, payload, sensors",
             Some("R3") => "table's against specimen's acceleration: the specimen",
             Some("R4") => "acceleration against displacement: these two sensors, foundation",
             _ => "recorded command against the stated law: the controller",
         };
-        vec![
-            (*name).to_string(),
-            significant(*ratio, 3),
-            significant(after, 3),
-            text::word(*ratio, after).to_string(),
-            about.to_string(),
-        ]
+        row.push(about.to_string());
+        row
     });
+    let mut columns = text::RELATIONS.to_vec();
+    columns.push("what it joins, and what breaks it");
     Section {
         heading: "Where the nominal model is wrong".into(),
         text: vec![
-            "Five relations that hold on a healthy rig, checked on the identification record in \
-             units of what the sensors' noise makes of them: with the nominal parameters, and with \
-             those that were estimated along within their stated uncertainty. What is broken even \
-             then is broken by an effect (or by one that it shows through)."
+            "Five relations of a healthy rig on the identification record, their errors in units \
+             of the sensors' noise: with the nominal parameters, with those that were estimated \
+             along within their stated uncertainty, and what the same figure is on a simulated \
+             healthy rig. An effect breaks the relations that it acts in, and others through the \
+             sensor or the motion that they share."
                 .into(),
         ],
-        tables: vec![table(
-            "",
-            &[
-                "relation",
-                "nominal parameters",
-                "re-estimated",
-                "",
-                "what it joins, and what breaks it",
-            ],
-            rows.collect(),
-        )],
+        tables: vec![table("", &columns, rows.collect())],
         ..Section::default()
     }
 }

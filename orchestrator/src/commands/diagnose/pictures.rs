@@ -106,10 +106,10 @@ pub(super) fn errors(case: &Case, diagnosis: &Diagnosis) -> Errors {
         let drift: Vec<f64> = acceleration
             .map(|a| -specimen.mass * a / specimen.stiffness)
             .collect();
-        if drift.iter().any(|d| *d != 0.0) {
-            states.push(("drift of the specimen", Units::DISPLACEMENT, drift));
-        }
+        states.push(("drift of the specimen", Units::DISPLACEMENT, drift));
     }
+    // A missing channel is no state.
+    states.retain(|(_, _, values)| values.iter().any(|value| *value != 0.0));
     let y = || Axis::linear("error, noise floors", Units::NONE);
     let [mut time, mut spectra] = [Vec::new(), Vec::new()];
     let mut ranked: Vec<(f64, Panel)> = Vec::new();

@@ -71,7 +71,8 @@ pub(super) fn channels(gain: &GainReport) -> Vec<Vec<String>> {
 /// How much of the error is gone, with its interval.
 pub(super) fn share(gain: &GainReport) -> String {
     let [low, high] = gain.interval_95.map(|share| 100.0 * share);
-    format!("error gone: {low:.0} to {high:.0} % (95 % interval, block bootstrap)")
+    let decimals = usize::from(high - low < 2.0);
+    format!("Of the error {low:.decimals$} to {high:.decimals$} % is gone (95 %, block bootstrap)")
 }
 
 /// What else the reader should know, a line each.
@@ -84,23 +85,52 @@ pub(super) fn remarks(report: &DiagnosisReport) -> Vec<String> {
     if let Some(experiment) = &report.separating_experiment {
         lines.push(format!("what would separate them: {experiment}"));
     }
-    for (what, deviate) in &report.remaining {
+    lines.extend(report.notes.iter().cloned());
+    // The strongest traces tell enough; diagnosis.json has them all.
+    for (what, deviate) in report.remaining.iter().take(5) {
         lines.push(format!(
             "left over: {what} ({deviate:.1} standard deviations)"
         ));
     }
-    lines.extend(report.notes.iter().cloned());
     lines
 }
 
-/// Words for a relation's errors in units of its noise, with the nominal parameters and with the
-/// re-estimated ones, which leave what only an effect can be.
-pub(super) fn word(nominal: f64, estimated: f64) -> &'static str {
-    match (nominal < 1.3, estimated < 1.3) {
-        (_, false) => "broken",
-        (false, true) => "within the parameters' uncertainty",
-        (true, true) => "holds",
-    }
+/// Columns of [`relations`].
+pub(super) const RELATIONS: [&str; 5] = [
+    "relation",
+    "nominal",
+    "re-estimated",
+    "healthy rig",
+    "state",
+];
+
+/// The relations with a word each: how they are with the nominal parameters, and with re-estimated
+/// ones, against a healthy rig.
+pub(super) fn relations(report: &DiagnosisReport) -> Vec<Vec<String>> {
+    let holds = |ratio: f64, healthy: f64| ratio < 1.3 * healthy;
+    let relations = report.relations.iter();
+    relations
+        .map(|(name, relation)| {
+            let healthy = relation.healthy;
+            let word = healthy.map_or("", |healthy| {
+                match (
+                    holds(relation.nominal, healthy),
+                    holds(relation.estimated, healthy),
+                ) {
+                    (_, false) => "broken",
+                    (false, true) => "within the parameters' uncertainty",
+                    (true, true) => "holds",
+                }
+            });
+            vec![
+                (*name).to_string(),
+                significant(relation.nominal, 3),
+                significant(relation.estimated, 3),
+                healthy.map_or("-".into(), |healthy| significant(healthy, 3)),
+                word.to_string(),
+            ]
+        })
+        .collect()
 }
 
 fn headed(columns: &[&str], rows: Vec<Vec<String>>) -> String {
@@ -127,16 +157,9 @@ pub(super) fn text(report: &DiagnosisReport) -> String {
             share(gain)
         );
     }
-    let relations = report
-        .relations
-        .iter()
-        .map(|(name, ratio)| vec![(*name).to_string(), significant(*ratio, 3)]);
     text += &format!(
-        "\n{}",
-        headed(
-            &["relation, nominal model", "times the noise"],
-            relations.collect()
-        )
+        "\nrelations on the identification record, errors in units of the noise\n{}",
+        headed(&RELATIONS, relations(report))
     );
     let remarks = remarks(report);
     if !remarks.is_empty() {
