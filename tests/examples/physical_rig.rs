@@ -73,7 +73,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sines = [0.1, 0.5, 2.0].map(|volts| {
         let values = answer(&rig, 2.0, |t| volts * (TAU * 2.0 * t).cos());
         let per_volt: Vec<f64> = values.iter().map(|x| x / volts).collect();
-        Series::history(&format!("{volts} V, per volt"), PERIOD, &per_volt)
+        Series::history(&format!("{volts} V"), PERIOD, &per_volt)
     });
     let motion = motion::built_in(1, &Options::default())?;
     let run = NativeRig::laboratory(1).play(&motion);
@@ -93,10 +93,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let panels = vec![
         frequency_responses(),
         histories("Steps of the valve command", steps.into()),
-        histories(
-            "Sines of 2 Hz: friction and stiction at low level",
-            sines.into(),
-        ),
+        histories("Sines of 2 Hz, per volt", sines.into()),
         specimen,
     ];
     let Some(file) = std::env::args().nth(1) else {
