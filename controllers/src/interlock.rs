@@ -25,8 +25,16 @@ pub struct Interlock {
     pub acceleration_limit: f64,
     /// Largest force of the actuator, N.
     pub force_limit: f64,
-    /// Largest difference between reference and measured displacement, m.
+    /// Largest distance of the measured displacement from what the reference lately was, m.
     pub tracking_limit: f64,
+    /// How lately, s: both ends of the reference's range return to its present value with this time
+    /// constant, so that a table that follows late is not taken for one that does not follow.
+    pub tracking_time: f64,
+    /// Largest way that the controller's command goes per second, to and fro, V/s, as a mean over
+    /// [`activity_time`](Self::activity_time).
+    pub activity_limit: f64,
+    /// Time constant of that mean, s.
+    pub activity_time: f64,
     /// Commands from this magnitude on count as saturated, V.
     pub saturation_level: f64,
     /// Longest time in saturation, s.
@@ -43,8 +51,11 @@ pub struct Interlock {
     pub heartbeat_samples: u32,
     /// A specimen's accelerometer that stays below this magnitude is silent, m/s²; 0 for no check.
     pub specimen_silence: f64,
-    /// The table moves when its acceleration exceeds this magnitude, m/s².
+    /// The table moves when its acceleration exceeds this magnitude, m/s², and ...
     pub specimen_table_motion: f64,
+    /// ... the mean of its speed over [`activity_time`](Self::activity_time) this one, m/s: a
+    /// chattering table accelerates without moving its specimen.
+    pub specimen_table_velocity: f64,
     /// A specimen that answered before and is silent while the table moves for this long (counted
     /// without interruption of the silence) is lost, s.
     pub specimen_silence_time: f64,
@@ -84,11 +95,13 @@ pub enum Trip {
     Stop = 11,
     /// The specimen does not answer to the table any more.
     SpecimenLost = 12,
+    /// The command chatters.
+    Activity = 13,
 }
 
 impl Trip {
     /// All causes, in the order of their numbers.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::None,
         Self::NotFinite,
         Self::Stale,
@@ -102,6 +115,7 @@ impl Trip {
         Self::Saturation,
         Self::Stop,
         Self::SpecimenLost,
+        Self::Activity,
     ];
 
     /// The cause in words.
@@ -120,6 +134,7 @@ impl Trip {
             Self::Saturation => "the valve command was saturated for too long",
             Self::Stop => "the operator pressed stop",
             Self::SpecimenLost => "the specimen does not answer to the table any more",
+            Self::Activity => "the valve command chatters or the loop oscillates",
         }
     }
 }
@@ -142,10 +157,17 @@ pub struct InterlockMemory {
     /// Whether there was a sample.
     started: bool,
     saturated: f64,
+    /// Mean magnitude of the command's rate, V/s.
+    activity: f64,
+    last_request: f64,
+    /// What the reference lately was, least and largest, m.
+    range: [f64; 2],
     last: [f64; 5],
     last_reference: f64,
     repeats: [u32; 5],
     travel: [f64; 5],
+    /// Mean speed of the table, m/s.
+    speed: f64,
     specimen_answered: bool,
     silent: f64,
     heartbeat: i32,
@@ -177,13 +199,20 @@ pub struct InterlockInput {
 impl Interlock {
     /// Limits for the laboratory's rig, assumed except for the stroke (±1.5 in), the valve's range
     /// (10 V) and the capacity of the actuator (1.1 kip, Section 2.3.1).
+    ///
+    /// The table may be a tenth of its stroke away from what the reference was within about 0.1 s,
+    /// three times the lag of the slowest displacement loop. The command may go as far in a second as
+    /// that of a sine of 20 Hz, the upper edge of the band of the motions, with 3.1 V: 250 V.
     pub fn laboratory() -> Self {
         Self {
             displacement_limit: STROKE - 0.1 * INCH,
             velocity_limit: 40.0 * INCH,
             acceleration_limit: 3.5 * G,
             force_limit: 1000.0 * LBF,
-            tracking_limit: 1.0 * INCH,
+            tracking_limit: 0.1 * STROKE,
+            tracking_time: 0.1,
+            activity_limit: 250.0,
+            activity_time: 0.1,
             saturation_level: 0.99 * VALVE_LIMIT,
             saturation_time: 0.1,
             ramp_time: 0.02,
@@ -193,6 +222,7 @@ impl Interlock {
             heartbeat_samples: 0,
             specimen_silence: 0.0,
             specimen_table_motion: 0.05 * G,
+            specimen_table_velocity: 1.0 * INCH,
             specimen_silence_time: 0.1,
             memory: InterlockMemory {
                 fade: 1.0,
@@ -238,17 +268,50 @@ impl Interlock {
     /// on its columns answers a moving table within a fraction of its period, and rings on after it.
     fn misses_the_specimen(&mut self, input: &InterlockInput, period: f64) -> bool {
         let m = &mut self.memory;
-        if self.specimen_silence == 0.0 {
+        let speed = input.measured.velocity.abs();
+        if self.specimen_silence == 0.0 || !speed.is_finite() {
             return false;
         }
+        m.speed += period / (period + self.activity_time) * (speed - m.speed);
         let answer = input.specimen_acceleration.abs();
         if answer >= self.specimen_silence {
             m.specimen_answered |= answer >= 3.0 * self.specimen_silence;
             m.silent = 0.0;
-        } else if input.measured.acceleration.abs() >= self.specimen_table_motion {
+        } else if input.measured.acceleration.abs() >= self.specimen_table_motion
+            && m.speed >= self.specimen_table_velocity
+        {
             m.silent += period;
         }
         m.specimen_answered && m.silent >= self.specimen_silence_time - 1e-9
+    }
+
+    /// Distance of the measured displacement from the range in which the reference lately was, m.
+    fn tracking_error(&mut self, input: &InterlockInput, period: f64) -> f64 {
+        let (x, wanted) = (input.measured.displacement, input.reference_displacement);
+        let weight = period / (period + self.tracking_time);
+        let m = &mut self.memory;
+        if !wanted.is_finite() {
+            return 0.0;
+        }
+        if !m.started {
+            m.range = [wanted; 2];
+        }
+        let [least, largest] = m.range.map(|end| end + weight * (wanted - end));
+        m.range = [least.min(wanted), largest.max(wanted)];
+        (m.range[0] - x).max(x - m.range[1])
+    }
+
+    /// Whether the controller's command changes faster than any motion asks for.
+    fn chatters(&mut self, request: f64, period: f64) -> bool {
+        let m = &mut self.memory;
+        if !request.is_finite() {
+            return false;
+        }
+        let last = if m.started { m.last_request } else { request };
+        m.last_request = request;
+        let rate = (request - last) / period;
+        m.activity += period / (period + self.activity_time) * (rate.abs() - m.activity);
+        m.activity > self.activity_limit
     }
 
     fn misses_beats(&mut self, heartbeat: i32) -> bool {
@@ -280,6 +343,8 @@ impl Interlock {
         let stale = self.counts_stale(input);
         let silent = self.misses_beats(input.heartbeat);
         let lost = self.misses_the_specimen(input, period);
+        let error = self.tracking_error(input, period);
+        let chatters = self.chatters(input.valve_command, period);
         let m = &mut self.memory;
         if input.valve_command.abs() >= self.saturation_level {
             m.saturated += period;
@@ -288,7 +353,6 @@ impl Interlock {
         }
         let saturated = m.saturated > self.saturation_time + 1e-9;
         m.started = true;
-        let error = y.displacement - input.reference_displacement;
         let checks = [
             (numbers.iter().any(|n| !n.is_finite()), Trip::NotFinite),
             (input.stop, Trip::Stop),
@@ -308,7 +372,8 @@ impl Interlock {
                 Trip::Acceleration,
             ),
             (input.measured_force.abs() > self.force_limit, Trip::Force),
-            (error.abs() > self.tracking_limit, Trip::TrackingError),
+            (chatters, Trip::Activity),
+            (error > self.tracking_limit, Trip::TrackingError),
             (saturated, Trip::Saturation),
             (lost, Trip::SpecimenLost),
         ];
@@ -336,11 +401,15 @@ impl Controller for Interlock {
             ("acceleration_limit", self.acceleration_limit),
             ("force_limit", self.force_limit),
             ("tracking_limit", self.tracking_limit),
+            ("tracking_time", self.tracking_time),
+            ("activity_limit", self.activity_limit),
+            ("activity_time", self.activity_time),
             ("saturation_level", self.saturation_level),
             ("saturation_time", self.saturation_time),
             ("ramp_time", self.ramp_time),
             ("stale_travel", self.stale_travel),
             ("specimen_table_motion", self.specimen_table_motion),
+            ("specimen_table_velocity", self.specimen_table_velocity),
             ("specimen_silence_time", self.specimen_silence_time),
         ] {
             ModelError::require_positive(name, value)?;

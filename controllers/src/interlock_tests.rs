@@ -50,7 +50,7 @@ fn a_healthy_run_passes_through_untouched() {
 #[test]
 fn every_cause_trips_at_its_sample_ramps_without_a_jump_and_stays() {
     type Disturb = fn(&mut InterlockInput);
-    let cases: [(Trip, u32, Disturb); 11] = [
+    let cases: [(Trip, u32, Disturb); 12] = [
         (Trip::NotFinite, 0, |i| i.valve_command = f64::NAN),
         (Trip::NotFinite, 0, |i| {
             i.measured.acceleration = f64::INFINITY
@@ -70,8 +70,13 @@ fn every_cause_trips_at_its_sample_ramps_without_a_jump_and_stays() {
             i.measured.acceleration = -4.0 * G
         }),
         (Trip::Force, 0, |i| i.measured_force = 1001.0 * LBF),
+        // The reference rises: the upper end of its range is its present value.
         (Trip::TrackingError, 0, |i| {
-            i.reference_displacement += 1.05 * INCH
+            i.measured.displacement = i.reference_displacement + 0.16 * INCH
+        }),
+        // Each change of 14 V adds 14 V / 0.102 s = 137 V/s to the mean; the first one is smaller.
+        (Trip::Activity, 2, |i| {
+            i.valve_command = if i.heartbeat % 2 == 0 { 7.0 } else { -7.0 };
         }),
         // 0.1 s of saturation are allowed: 50 samples, the next one trips.
         (Trip::Saturation, 50, |i| i.valve_command = 10.0),
@@ -107,6 +112,71 @@ fn every_cause_trips_at_its_sample_ramps_without_a_jump_and_stays() {
             );
         }
     }
+}
+
+/// The first sample at which a command of 20 Hz with `amplitude` (V) trips, if any.
+fn trip_under_a_sine(amplitude: f64) -> Option<f64> {
+    let (interlock, _) = run(Interlock::laboratory(), 2000, |k, input| {
+        let phase = std::f64::consts::TAU * 20.0 * H * f64::from(k);
+        input.valve_command = amplitude * phase.sin();
+    });
+    let m = interlock.memory;
+    assert!(matches!(m.trip, Trip::None | Trip::Activity));
+    (m.trip == Trip::Activity).then_some(m.trip_time)
+}
+
+#[test]
+fn activity_is_the_way_of_the_command_per_second() {
+    // A sine of 20 Hz with 3.125 V goes 4 * 20 * 3.125 = 250 V in a second; the mean over 0.1 s
+    // swings by 3 %.
+    assert_eq!(trip_under_a_sine(2.9), None);
+    assert!(trip_under_a_sine(3.3).is_some());
+}
+
+#[test]
+fn a_table_that_lags_is_not_lost_and_one_that_stands_is() {
+    let motion = |t: f64| 1.2 * INCH * (6.0 * t).sin();
+    let follow = |x: fn(f64) -> f64| {
+        run(Interlock::laboratory(), 2000, move |k, input| {
+            let t = H * f64::from(k);
+            input.reference_displacement = motion(t);
+            input.measured = Motion {
+                displacement: 1.2 * INCH * x(t),
+                ..input.measured
+            };
+        })
+        .0
+        .memory
+    };
+    // 50 ms late at 7.2 in/s: 0.36 in behind.
+    assert_eq!(follow(|t| (6.0 * t - 0.3).max(0.0).sin()).trip, Trip::None);
+    // A table that stands trips while the reference goes out for the first time.
+    let stands = follow(|t| 1e-3 * (50.0 * t).sin());
+    assert_eq!(stands.trip, Trip::TrackingError);
+    assert!(stands.trip_time < 0.2, "{} s", stands.trip_time);
+}
+
+#[test]
+fn a_chattering_table_does_not_make_its_specimen_lost() {
+    let interlock = Interlock {
+        specimen_silence: 0.012 * G,
+        activity_limit: 1e9,
+        ..Interlock::laboratory()
+    };
+    let chatter = |speed: f64| {
+        move |k: u32, input: &mut InterlockInput| {
+            let sign = if k % 4 < 2 { 1.0 } else { -1.0 };
+            input.measured.acceleration = sign * 2.0 * G;
+            input.measured.velocity = sign * speed;
+            // It answers at first and is quiet from 0.2 s on.
+            let noise = 1e-3 * G * (1.7 * f64::from(k)).sin();
+            input.specimen_acceleration = if k < 100 { 0.1 * sign * G } else { noise };
+        }
+    };
+    assert_eq!(run(interlock, 400, chatter(0.02)).0.memory.trip, Trip::None);
+    let lost = run(interlock, 400, chatter(0.1)).0.memory;
+    assert_eq!(lost.trip, Trip::SpecimenLost);
+    assert!((lost.trip_time - 0.298).abs() < 1e-9, "{}", lost.trip_time);
 }
 
 #[test]

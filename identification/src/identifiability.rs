@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix};
 
-use crate::gauss_newton::Parameter;
+use crate::prediction::Parameter;
 use crate::rig_model::{DELAY, PHYSICAL, PHYSICAL_NAMES, RigModel, rig_from};
 
 /// What was found inseparable.

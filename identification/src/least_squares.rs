@@ -45,6 +45,27 @@ pub fn reduce(
 }
 
 impl Triangular {
+    /// From the products `[regressors, targets]' [regressors, targets]`, where these are so well
+    /// conditioned that squaring costs no more than half of the digits.
+    pub fn from_products(products: DMatrix<f64>, regressors: usize) -> Option<Self> {
+        const CONDITION: f64 = 1e-4;
+        let lengths: Vec<f64> = products.diagonal().iter().map(|d| d.sqrt()).collect();
+        let factor = products.cholesky()?.unpack().transpose();
+        let well = (0..factor.ncols()).all(|i| factor[(i, i)] > CONDITION * lengths[i]);
+        well.then_some(Self { regressors, factor })
+    }
+
+    /// Coefficients, regressors x targets, where no direction need be left out.
+    pub fn solve_directly(&self) -> Option<DMatrix<f64>> {
+        let n = self.regressors;
+        let targets = self.factor.ncols() - n;
+        let mut solution = self.factor.view((0, n), (n, targets)).into_owned();
+        let regressors = self.factor.view((0, 0), (n, n));
+        regressors
+            .solve_upper_triangular_mut(&mut solution)
+            .then_some(solution)
+    }
+
     /// The factor of the regressors alone, square.
     pub fn regressor_factor(&self) -> DMatrix<f64> {
         let n = self.regressors;

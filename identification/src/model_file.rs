@@ -3,8 +3,10 @@
 //!
 //! The layout is that of a nominal rig: `[actuator]` with the monic `denominator` of G1 and G2 and
 //! their numerators, `[table]`, `[specimen]`, in one consistent set of units that `units` names.
+//! A diagnosis adds the effects it found, `[effects.valve_dead_band]`, always in SI.
 //! Tables that are not known here are left alone.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use plant::actuator::IdentifiedActuator;
@@ -43,6 +45,10 @@ pub struct ModelFile {
     /// The specimen, if one stood on the table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub specimen: Option<BodySection>,
+    /// Effects of the catalogue that the rig has, each with its parameters as the FMUs name them
+    /// (`effect.parameter`), SI whatever `units` says.
+    #[serde(default, skip_serializing_if = "EffectSections::is_empty")]
+    pub effects: EffectSections,
     /// One standard deviation of the white noise of each channel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<toml::Table>,
@@ -54,6 +60,9 @@ pub struct ModelFile {
 fn inch_pound() -> String {
     INCH_POUND.to_string()
 }
+
+/// Parameters by effect and name.
+pub type EffectSections = BTreeMap<String, BTreeMap<String, f64>>;
 
 /// `F = G1(s) u + G2(s) dx/dt`, coefficients in descending powers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -91,6 +100,9 @@ pub struct StandardErrors {
     /// The delay's, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command_delay: Option<f64>,
+    /// The effects', SI.
+    #[serde(default, skip_serializing_if = "EffectSections::is_empty")]
+    pub effects: EffectSections,
 }
 
 /// Factors from a file's units to SI.
@@ -113,6 +125,22 @@ impl Units {
         length: 1.0,
         force: 1.0,
     };
+
+    /// The set of a name; `file` is what messages call the file.
+    ///
+    /// # Errors
+    /// Names other than the two known sets.
+    pub fn named(units: &str, file: &str) -> Result<Self, IdentificationError> {
+        match units {
+            INCH_POUND => Ok(Self::INCH_POUND),
+            SI | "SI" => Ok(Self::SI),
+            other => Err(IdentificationError::ModelFile {
+                path: file.to_string(),
+                what: format!("units = \"{other}\""),
+                expected: "\"inch, lbf, second, volt\" or \"metre, newton, second, volt\"",
+            }),
+        }
+    }
 }
 
 impl ModelFile {
@@ -207,15 +235,7 @@ impl ModelFile {
     /// # Errors
     /// Units other than the two known sets.
     pub fn units(&self, name: &str) -> Result<Units, IdentificationError> {
-        match self.units.as_str() {
-            INCH_POUND => Ok(Units::INCH_POUND),
-            SI | "SI" => Ok(Units::SI),
-            other => Err(IdentificationError::ModelFile {
-                path: name.to_string(),
-                what: format!("units = \"{other}\""),
-                expected: "\"inch, lbf, second, volt\" or \"metre, newton, second, volt\"",
-            }),
-        }
+        Units::named(&self.units, name)
     }
 
     /// The table in SI.
@@ -332,8 +352,10 @@ impl ModelFile {
             specimen: rig
                 .specimen
                 .map(|s| Self::body_section([s.mass, s.damping, s.stiffness], units)),
+            effects: EffectSections::new(),
             noise: Some(noise),
             standard_errors: Some(StandardErrors {
+                effects: EffectSections::new(),
                 actuator: found.identifiable.then_some(actuator_errors),
                 table: Self::body_section(three(MASS), units),
                 specimen: rig

@@ -15,7 +15,7 @@ use plant::shake_table::ShakeTable;
 use plant::specimen::LinearSpecimen;
 use plant::table::Table;
 
-use crate::gauss_newton::{Innovations, PredictionModel};
+use crate::prediction::{self, PredictionModel};
 
 /// Number of outputs.
 pub const OUTPUTS: usize = 4;
@@ -132,20 +132,28 @@ pub struct RigModel {
     pub experiments: Vec<Experiment>,
 }
 
-/// The predictor of one experiment.
+/// Rows of a column of the transition, one more than states: even, for the vector unit.
+const ROWS_PADDED: usize = STATES + 1;
+/// What the next state is made of: this one, the measured outputs, two samples of the command.
+const COLUMNS: usize = STATES + OUTPUTS + 2;
+
+/// The predictor of one experiment: `x+ = (A - K C) x + K (y - offset) + B u`, the correction
+/// folded into the transition.
+#[derive(Clone)]
 pub struct Predictor {
-    /// Transition.
-    a: SMatrix<f64, STATES, STATES>,
-    /// The command of this sample, that of the sample before, and of two before.
-    b: [SVector<f64, STATES>; 2],
-    /// Whole samples of delay.
+    transition: [[f64; ROWS_PADDED]; COLUMNS],
+    output: [[f64; OUTPUTS]; STATES],
+    /// Whole samples of delay; the command of the sample before counts too.
     delay: usize,
-    gain: SMatrix<f64, STATES, OUTPUTS>,
-    c: SMatrix<f64, OUTPUTS, STATES>,
-    offset: SVector<f64, OUTPUTS>,
-    start: SVector<f64, STATES>,
-    /// Covariance of the errors.
-    pub covariance: SMatrix<f64, OUTPUTS, OUTPUTS>,
+    offset: [f64; OUTPUTS],
+    state: [f64; ROWS_PADDED],
+    covariance: SMatrix<f64, OUTPUTS, OUTPUTS>,
+}
+
+impl prediction::Predictor<OUTPUTS> for Predictor {
+    fn covariance(&self) -> SMatrix<f64, OUTPUTS, OUTPUTS> {
+        self.covariance
+    }
 }
 
 impl RigModel {
@@ -161,7 +169,7 @@ impl RigModel {
     }
 
     /// The predictor of an experiment; `None` where no steady one exists.
-    pub fn predictor(&self, experiment: usize, parameters: &[f64]) -> Option<Predictor> {
+    fn steady_predictor(&self, experiment: usize, parameters: &[f64]) -> Option<Predictor> {
         let data = &self.experiments[experiment];
         let own = &parameters[self.nuisance(experiment)..][..NUISANCE];
         let (payload, rest) = own.split_first()?;
@@ -217,8 +225,6 @@ impl RigModel {
             [held, SVector::zeros()]
         };
 
-        let offset = SVector::<f64, OUTPUTS>::from_fn(|i, _| rest[i]);
-        let start = SVector::<f64, STATES>::from_fn(|i, _| rest[OUTPUTS + i]);
         let log_noise = &rest[OUTPUTS + STATES..];
         let variance = |i: usize| (2.0 * log_noise[i]).exp();
         let command = DMatrix::from_fn(STATES, 1, |i, _| sampled.b[(i, 0)] * data.command_scale);
@@ -239,14 +245,18 @@ impl RigModel {
         let covariance = c * p * c.transpose() + noise;
         let covariance = (covariance + covariance.transpose()) * 0.5;
         let gain = a * p * c.transpose() * covariance.try_inverse()?;
+        let closed = a - gain * c;
+        let column = |own: &[f64]| std::array::from_fn(|i| own.get(i).copied().unwrap_or(0.0));
         Some(Predictor {
-            a,
-            b,
+            transition: std::array::from_fn(|j| match j {
+                0..STATES => column(closed.column(j).as_slice()),
+                _ if j < STATES + OUTPUTS => column(gain.column(j - STATES).as_slice()),
+                _ => column(b[j - STATES - OUTPUTS].as_slice()),
+            }),
+            output: std::array::from_fn(|j| std::array::from_fn(|i| c[(i, j)])),
             delay,
-            gain,
-            c,
-            offset,
-            start,
+            offset: std::array::from_fn(|i| rest[i]),
+            state: column(&rest[OUTPUTS..OUTPUTS + STATES]),
             covariance,
         })
     }
@@ -275,7 +285,7 @@ impl RigModel {
         parameters: &[f64],
     ) -> Option<Vec<Vec<f64>>> {
         let data = &self.experiments[experiment];
-        let errors = self.innovations(experiment, parameters)?.errors;
+        let errors = self.errors(experiment, parameters)?;
         Some(
             (0..OUTPUTS)
                 .map(|i| {
@@ -288,40 +298,57 @@ impl RigModel {
 }
 
 impl PredictionModel<OUTPUTS> for RigModel {
+    type Predictor = Predictor;
+
     fn experiments(&self) -> usize {
         self.experiments.len()
     }
 
-    fn innovations(&self, experiment: usize, parameters: &[f64]) -> Option<Innovations<OUTPUTS>> {
-        let Predictor {
-            a,
-            b,
-            delay,
-            gain,
-            c,
-            offset,
-            start,
-            covariance,
-        } = self.predictor(experiment, parameters)?;
+    fn samples(&self, experiment: usize) -> usize {
+        self.experiments[experiment].outputs.len()
+    }
+
+    fn predictor(&self, experiment: usize, parameters: &[f64]) -> Option<Predictor> {
+        self.steady_predictor(experiment, parameters)
+    }
+
+    fn predict(
+        &self,
+        experiment: usize,
+        predictor: &mut Predictor,
+        first: usize,
+        errors: &mut [SVector<f64, OUTPUTS>],
+    ) {
         let data = &self.experiments[experiment];
-        // x+ = (A - K C) x + K (y - offset) + B u: the correction folded into the transition.
-        let closed = a - gain * c;
-        let mut state = start;
-        let mut errors = Vec::with_capacity(data.outputs.len());
         let at = |k: usize, back: usize| data.command[k.saturating_sub(back)];
-        let earlier = b[1].amax() > 0.0;
-        for (k, measured) in data.outputs.iter().enumerate() {
-            let y = measured - offset;
-            errors.push(y - c * state);
-            let mut next = closed * state + gain * y + b[0] * at(k, delay);
-            if earlier {
-                next += b[1] * at(k, delay + 1);
+        let delay = predictor.delay;
+        let (transition, output) = (&predictor.transition, &predictor.output);
+        let mut state = predictor.state;
+        for (k, error) in (first..).zip(errors) {
+            let measured: [f64; OUTPUTS] =
+                std::array::from_fn(|i| data.outputs[k][i] - predictor.offset[i]);
+            let mut rest = measured;
+            let mut next = [0.0; ROWS_PADDED];
+            let inputs = [at(k, delay), at(k, delay + 1)];
+            for (column, value) in transition[STATES..]
+                .iter()
+                .zip(measured.iter().chain(&inputs))
+            {
+                for i in 0..ROWS_PADDED {
+                    next[i] += column[i] * value;
+                }
             }
+            for j in 0..STATES {
+                for i in 0..ROWS_PADDED {
+                    next[i] += transition[j][i] * state[j];
+                }
+                for i in 0..OUTPUTS {
+                    rest[i] -= output[j][i] * state[j];
+                }
+            }
+            *error = SVector::from(rest);
             state = next;
         }
-        state
-            .iter()
-            .all(|value| value.is_finite())
-            .then_some(Innovations { errors, covariance })
+        predictor.state = state;
     }
 }

@@ -13,7 +13,7 @@ use plant::linear::DiscreteStateSpace;
 
 use crate::IdentificationError;
 use crate::data::mean_and_deviation;
-use crate::least_squares::reduce;
+use crate::least_squares::{Triangular, reduce};
 
 /// What to fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,18 +101,26 @@ pub fn identify(
         }
     };
     let rows = samples - past;
-    let triangular = reduce(rows, regressors, p, |k, row| {
-        fill_past(k + past, row);
-        if options.feedthrough {
-            for i in 0..m {
-                row[width + i] = channels[i][k + past];
-            }
+    let through = if options.feedthrough { m } else { 0 };
+    let products = lagged_products(channels, past, m, through);
+    let direct = Triangular::from_products(products, regressors)
+        .and_then(|own| own.solve_directly().map(|solution| (own, solution)));
+    let (triangular, coefficients) = match direct {
+        Some(both) => both,
+        None => {
+            let triangular = reduce(rows, regressors, p, |k, row| {
+                fill_past(k + past, row);
+                for i in 0..through {
+                    row[width + i] = channels[i][k + past];
+                }
+                for i in 0..p {
+                    row[regressors + i] = channels[m + i][k + past];
+                }
+            });
+            let (coefficients, _) = triangular.solve(RANK)?;
+            (triangular, coefficients)
         }
-        for i in 0..p {
-            row[regressors + i] = channels[m + i][k + past];
-        }
-    });
-    let (coefficients, _) = triangular.solve(RANK)?;
+    };
 
     // Rows of the observability matrix times the reachability matrix of the predictor: row block
     // i sees the past through C A~^(i) ..., which are the predictor's coefficients moved by i.
@@ -167,7 +175,6 @@ pub fn identify(
     }
 
     // y = C x + D u, then x+ = A x + B u + K e.
-    let through = if options.feedthrough { m } else { 0 };
     let output_rows = reduce(rows, order + through, p, |k, row| {
         row[..order].copy_from_slice(states.column(k).as_slice());
         for j in 0..through {
@@ -205,6 +212,70 @@ pub fn identify(
         singular_values,
         predictions,
     ))
+}
+
+/// Products of the columns of the regression with each other, summed over the samples from `past`
+/// on: the past of all channels (sample k - 1 first), `through` inputs of the sample, its outputs.
+///
+/// A column is the one before, a sample later: each product follows from the one up and left by
+/// its two ends, so only the products with the first block are summed over all samples.
+fn lagged_products(
+    channels: &[Vec<f64>],
+    past: usize,
+    inputs: usize,
+    through: usize,
+) -> DMatrix<f64> {
+    let count = channels.len();
+    let samples = channels[0].len();
+    let at = |lag: usize, channel: usize| -> Option<usize> {
+        match (lag, channel < inputs) {
+            (0, true) => (channel < through).then_some(past * count + channel),
+            (0, false) => Some(past * count + through + channel - inputs),
+            _ => Some((lag - 1) * count + channel),
+        }
+    };
+    let size = past * count + through + count - inputs;
+    let mut products = DMatrix::zeros(size, size);
+    for (a, left) in channels.iter().enumerate() {
+        for (b, right) in channels.iter().enumerate() {
+            for apart in 0..=past {
+                let ahead = &left[past..samples];
+                let behind = &right[past - apart..samples - apart];
+                let mut sum = dot(ahead, behind);
+                for i in 0..=past - apart {
+                    let j = i + apart;
+                    if i > 0 {
+                        // The window of k - i begins and ends a sample earlier.
+                        sum += left[past - i] * right[past - j]
+                            - left[samples - i] * right[samples - j];
+                    }
+                    if let (Some(row), Some(column)) = (at(i, a), at(j, b)) {
+                        products[(row, column)] = sum;
+                        products[(column, row)] = sum;
+                    }
+                }
+            }
+        }
+    }
+    products
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let mut sums = [0.0; LANES];
+    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = a
+        .remainder()
+        .iter()
+        .zip(b.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in a.zip(b) {
+        for i in 0..LANES {
+            sums[i] += x[i] * y[i];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 /// The order after which the singular values fall most, by ratio.

@@ -6,8 +6,9 @@ use nalgebra::{SMatrix, SVector};
 use crate::IdentificationError;
 use crate::continuous::delay_by_correlation;
 use crate::data::mean_and_deviation;
-use crate::gauss_newton::{self, FINE, Innovations, Parameter, PredictionModel};
+use crate::gauss_newton::{self, FINE, Search};
 use crate::instrumental_variables::{poles, refine_open_loop, simulate};
+use crate::prediction::{Parameter, PredictionModel, Predictor};
 use crate::state_variable_filter::Between;
 
 /// What to fit.
@@ -104,26 +105,51 @@ fn delayed(input: &[f64], samples: f64) -> Vec<f64> {
         .collect()
 }
 
+/// The errors of a whole simulation, and the logarithm of their size.
+#[derive(Clone)]
+struct Simulated {
+    errors: Vec<f64>,
+    log_noise: f64,
+}
+
+impl Predictor<1> for Simulated {
+    fn covariance(&self) -> SMatrix<f64, 1, 1> {
+        SMatrix::<f64, 1, 1>::new((2.0 * self.log_noise).exp())
+    }
+}
+
 impl PredictionModel<1> for OutputError<'_> {
+    type Predictor = Simulated;
+
     fn experiments(&self) -> usize {
         1
     }
 
-    fn innovations(&self, _: usize, p: &[f64]) -> Option<Innovations<1>> {
+    fn samples(&self, _: usize) -> usize {
+        self.output.len()
+    }
+
+    fn predictor(&self, _: usize, p: &[f64]) -> Option<Simulated> {
         let model = self.simulate(p);
-        let errors: Vec<_> = self
-            .output
-            .iter()
-            .zip(&model)
-            .map(|(y, m)| SVector::<f64, 1>::new((y - m) / self.size))
-            .collect();
-        errors
-            .iter()
-            .all(|e| e[0].is_finite())
-            .then(|| Innovations {
-                errors,
-                covariance: SMatrix::<f64, 1, 1>::new((2.0 * p[p.len() - 1]).exp()),
-            })
+        let pairs = self.output.iter().zip(&model);
+        let errors: Vec<f64> = pairs.map(|(y, m)| (y - m) / self.size).collect();
+        let finite = errors.iter().all(|e| e.is_finite());
+        finite.then_some(Simulated {
+            errors,
+            log_noise: p[p.len() - 1],
+        })
+    }
+
+    fn predict(
+        &self,
+        _: usize,
+        simulated: &mut Simulated,
+        first: usize,
+        errors: &mut [SVector<f64, 1>],
+    ) {
+        for (error, own) in errors.iter_mut().zip(&simulated.errors[first..]) {
+            error[0] = *own;
+        }
     }
 }
 
@@ -193,7 +219,7 @@ pub fn identify(
     noise.bounds = (1e-9f64.ln(), 10f64.ln());
     noise.largest_step = 1.5;
     parameters.push(noise);
-    let found = gauss_newton::fit(&model, &parameters, FINE)?;
+    let found = gauss_newton::fit(&model, &parameters, Search::within(FINE))?;
     let p = &found.parameters;
     let mut denominator = vec![1.0];
     denominator.extend(&p[zeros + 1..zeros + 1 + order]);

@@ -5,7 +5,7 @@
 //! Fig 2-10, the displacement is simulated from the measured force, with initial state and offset
 //! fitted on the stretch itself.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, dmatrix};
 use plant::linear::StateSpace;
 use plant::rig::Rig;
 
@@ -45,7 +45,7 @@ pub(crate) fn fits(whole: &RigModel, fitted: &RigModel, parameters: &[f64]) -> V
         let predictions = whole.one_step_predictions(index, parameters);
         for i in (0..OUTPUTS).filter(|&i| data.measured[i]) {
             let simulated = match i {
-                0 => table(&rig, &channels),
+                0 => table(&rig, &channels, data.measured[3]),
                 _ => held.as_ref().map(|outputs| outputs[i][first..].to_vec()),
             };
             let measured = channels.outputs[i].clone();
@@ -128,23 +128,38 @@ fn simulate(system: &StateSpace, input: &[f64], measured: &[f64], period: f64) -
     model.iter().all(|value| value.is_finite()).then_some(model)
 }
 
-/// Displacement from force and specimen acceleration (Fig 2-10).
-fn table(rig: &Rig, channels: &Channels) -> Option<Vec<f64>> {
+/// Displacement from force, and from the specimen's acceleration where it was measured (Fig 2-10).
+fn table(rig: &Rig, channels: &Channels, carried: bool) -> Option<Vec<f64>> {
     let table = rig.shake_table.table;
-    let specimen = rig.specimen.map_or(0.0, |specimen| specimen.mass);
+    let measured_mass = rig.specimen.filter(|_| carried).map_or(0.0, |own| own.mass);
     let force: Vec<f64> = channels.outputs[2]
         .iter()
         .zip(&channels.outputs[3])
-        .map(|(force, carried)| force - specimen * carried)
+        .map(|(force, acceleration)| force - measured_mass * acceleration)
         .collect();
-    let system = StateSpace {
-        a: nalgebra::dmatrix![
-            0.0, 1.0;
-            -table.stiffness / table.mass, -table.damping / table.mass
-        ],
-        b: nalgebra::dmatrix![0.0; 1.0 / table.mass],
-        c: nalgebra::dmatrix![1.0, 0.0],
-        d: DMatrix::zeros(1, 1),
+    let (m, c, k) = (table.mass, table.damping, table.stiffness);
+    let system = match rig.specimen.filter(|_| !carried) {
+        None => StateSpace {
+            a: dmatrix![0.0, 1.0; -k / m, -c / m],
+            b: dmatrix![0.0; 1.0 / m],
+            c: dmatrix![1.0, 0.0],
+            d: DMatrix::zeros(1, 1),
+        },
+        // Table, then the specimen's drift, whose mass times acceleration is -(ks d + cs d').
+        Some(own) => {
+            let (ms, cs, ks) = (own.mass, own.damping, own.stiffness);
+            StateSpace {
+                a: dmatrix![
+                    0.0, 1.0, 0.0, 0.0;
+                    -k / m, -c / m, ks / m, cs / m;
+                    0.0, 0.0, 0.0, 1.0;
+                    k / m, c / m, -ks / m - ks / ms, -cs / m - cs / ms
+                ],
+                b: dmatrix![0.0; 1.0 / m; 0.0; -1.0 / m],
+                c: dmatrix![1.0, 0.0, 0.0, 0.0],
+                d: DMatrix::zeros(1, 1),
+            }
+        }
     };
     simulate(&system, &force, &channels.outputs[0], channels.period)
 }

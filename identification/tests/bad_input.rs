@@ -153,6 +153,102 @@ fn a_clipped_sensor_is_named() {
 }
 
 #[test]
+fn a_sensor_that_stands_at_its_end_is_clipped_and_not_frozen() {
+    let mut case = healthy();
+    for a in &mut case.validation.channels[0] {
+        *a = a.clamp(-0.001, 0.001);
+    }
+    let error = refused(&case);
+    assert!(
+        error.contains("validation: `displacement` is clipped"),
+        "{error}"
+    );
+}
+
+#[test]
+fn dropped_samples_that_were_filled_are_named() {
+    let mut case = healthy();
+    for start in [400, 900, 1400] {
+        for k in start..start + 4 {
+            for channel in &mut case.identification.channels {
+                channel[k] = channel[start - 1];
+            }
+        }
+    }
+    let error = refused(&case);
+    assert!(
+        error.contains("identification: 12 samples repeat the one before in all channels"),
+        "{error}"
+    );
+}
+
+#[test]
+fn without_displacement_the_rest_is_used() {
+    let mut case = healthy();
+    for record in [&mut case.identification, &mut case.validation] {
+        record.channels[0].clear();
+    }
+    let diagnosis = diagnose(&case, false).unwrap();
+    assert!(
+        diagnosis
+            .notes
+            .iter()
+            .any(|n| n.contains("`displacement` is missing")),
+        "{:?}",
+        diagnosis.notes
+    );
+    assert!(
+        diagnosis
+            .relations
+            .iter()
+            .all(|r| !r.name.starts_with("R4"))
+    );
+    let names: Vec<_> = diagnosis.effects.iter().map(|e| e.effect).collect();
+    assert!(
+        names.is_empty() || names == ["valve_dead_band"],
+        "{names:?}"
+    );
+}
+
+#[test]
+fn a_valve_ten_times_as_weak_as_nominal_is_another_rig_and_no_effect() {
+    let mut case = healthy();
+    for b in &mut case.nominal.shake_table.actuator.voltage_to_force {
+        *b *= 20.0;
+    }
+    match diagnose(&case, false) {
+        Ok(diagnosis) => {
+            assert_eq!(diagnosis.verdict, Verdict::Unexplained);
+            assert!(
+                diagnosis
+                    .notes
+                    .iter()
+                    .any(|n| n.contains("belong to this rig")),
+                "{:?}",
+                diagnosis.notes
+            );
+        }
+        Err(error) => assert!(error.to_string().contains("belong"), "{error}"),
+    }
+}
+
+#[test]
+fn noise_beyond_what_is_stated_is_named_and_no_effect() {
+    let mut case = healthy();
+    case.nominal.noise[1] /= 8.0;
+    let diagnosis = diagnose(&case, false).unwrap();
+    assert_eq!(diagnosis.verdict, Verdict::Unexplained);
+    assert!(
+        diagnosis
+            .notes
+            .iter()
+            .any(|n| n.starts_with("the noise of `acceleration` is") && n.contains("nominal.toml")),
+        "{:?}",
+        diagnosis.notes
+    );
+}
+
+#[test]
 fn a_frozen_sensor_is_named() {
     let mut case = healthy();
     case.validation.channels[2][500..900].fill(1.0);
@@ -242,7 +338,7 @@ fn a_column_without_unit_is_named() {
     );
     let error = Record::parse("r", "time [s],displacement [lbf]\n0,1\n").unwrap_err();
     assert!(
-        error.contains("`lbf` does not measure what `m` does"),
+        error.contains("unit \"lbf\" (kg m s^-2) does not fit \"m\" (m)"),
         "{error}"
     );
     let error = Record::parse("r", "time [s],displacement [in]\n0,1\n0.002,x\n").unwrap_err();

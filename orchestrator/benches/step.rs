@@ -1,6 +1,7 @@
 //! Three-variable control of the table with its specimen: through the FMUs of either version, and
-//! the same three components without FMI. 20 s of motion over the time of a run is the factor over
-//! real time.
+//! the same three components without FMI; then the physical rig with yielding specimen, sensors and
+//! interlock under each controller. 20 s of motion over the time of a run is the factor over real time.
+//! Loading and initializing the FMUs is not timed, nor is reading the motion.
 
 #![allow(
     clippy::unwrap_used,
@@ -88,5 +89,28 @@ fn three_variable(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, three_variable);
+fn physical_rig(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("physical rig with yielding specimen, 20 s");
+    group.sample_size(10);
+    group.throughput(Throughput::Elements(10_000));
+    for system in ["three-variable", "sliding-mode", "mpc"] {
+        let request = Request {
+            plant: "servohydraulic".into(),
+            specimen: "yielding".into(),
+            duration_s: Some(20.0),
+            ..Request::built_in(system)
+        };
+        let prepared = prepare(&request).unwrap();
+        group.bench_function(system, |bencher| {
+            bencher.iter_batched(
+                || prepared.simulation(Algorithm::GaussSeidel).unwrap(),
+                |simulation| simulation.run(prepared.samples, Pace::Fastest, &mut |_| {}),
+                BatchSize::PerIteration,
+            );
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, three_variable, physical_rig);
 criterion_main!(benches);

@@ -72,7 +72,7 @@ impl Results {
         Self::begin(folder).map(drop)
     }
 
-    /// Writes a file.
+    /// Writes a file; `name` may have folders in it.
     ///
     /// # Errors
     /// A disk that is full, and the like.
@@ -82,7 +82,9 @@ impl Results {
         content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
     ) -> Result<(), ResultsError> {
         let written = || {
-            let mut file = BufWriter::new(File::create(self.staging.path().join(name))?);
+            let place = self.staging.path().join(name);
+            fs::create_dir_all(place.parent().unwrap_or(&place))?;
+            let mut file = BufWriter::new(File::create(place)?);
             content(&mut file)?;
             file.flush()
         };
@@ -114,6 +116,11 @@ impl Results {
         let mut files = Vec::new();
         for name in &self.names {
             let file = self.folder.join(name);
+            let below = file.parent().unwrap_or(&self.folder);
+            fs::create_dir_all(below).map_err(|source| ResultsError::Folder {
+                folder: below.to_path_buf(),
+                source,
+            })?;
             fs::rename(self.staging.path().join(name), &file).map_err(|source| {
                 ResultsError::File {
                     file: file.clone(),

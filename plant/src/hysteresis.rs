@@ -143,11 +143,7 @@ impl BoucWen {
         let (z, work) = (state.z, state.work.max(0.0));
         let strength = 1.0 + self.strength_degradation * work;
         let stiffness = 1.0 + self.stiffness_degradation * work;
-        let power = if z == 0.0 {
-            0.0
-        } else {
-            z.abs().powf(self.sharpness)
-        };
+        let power = self.power(z.abs());
         let sign = if velocity * z >= 0.0 { 1.0 } else { -1.0 };
         let elastic = 1.0 - strength * power * (self.gamma + self.beta * sign);
         let mut rate = speed * elastic / stiffness;
@@ -158,6 +154,16 @@ impl BoucWen {
         Hysteresis {
             z: rate,
             work: (1.0 - self.post_yield_ratio) * z * speed,
+        }
+    }
+
+    /// `ratio^n`. The usual sharpnesses have a root where a power would take longer than the rest.
+    fn power(&self, ratio: f64) -> f64 {
+        match self.sharpness {
+            1.0 => ratio,
+            1.5 => ratio * ratio.sqrt(),
+            2.0 => ratio * ratio,
+            n => ratio.powf(n),
         }
     }
 

@@ -84,7 +84,8 @@ pub struct Instrumentation {
     pub actuator_force: Channel,
     /// Acceleration of the specimen.
     pub specimen_acceleration: Channel,
-    /// Pitch of the table per displacement, rad/m: the accelerometer reads `g tilt x` besides.
+    /// Pitch of the table per displacement, rad/m: the accelerometer reads `g tilt x` besides,
+    /// neither scaled nor late by its own channel (as [`crate::identified_rig`] has it).
     pub accelerometer_tilt: f64,
     /// Lateness of all channels together, s.
     pub delay: f64,
@@ -133,6 +134,7 @@ pub struct InstrumentationState {
     /// Last readings, repeated by a frozen sensor.
     reading: [f64; 4],
     velocity_delay: ChannelState,
+    tilt_delay: ChannelState,
     samples: u64,
 }
 
@@ -240,15 +242,25 @@ impl Instrumentation {
         period: f64,
     ) -> Measured {
         let time = state.samples as f64 * period;
-        let tilted = motion.acceleration + G * self.accelerometer_tilt * motion.displacement;
+        let late = state
+            .tilt_delay
+            .delayed(motion.displacement, self.delay / period);
         let truth = [
             motion.displacement,
-            tilted,
+            motion.acceleration,
             motion.actuator_force,
             motion.specimen_acceleration,
         ];
         let first = state.samples == 0;
-        for (i, channel) in self.channels().into_iter().enumerate() {
+        let mut accelerometer = self.acceleration;
+        accelerometer.bias += G * self.accelerometer_tilt * late;
+        let channels = [
+            &self.displacement,
+            &accelerometer,
+            &self.actuator_force,
+            &self.specimen_acceleration,
+        ];
+        for (i, channel) in channels.into_iter().enumerate() {
             let failed = i == self.fault_channel && time >= self.fault_time - 1e-9;
             let noise = Noise {
                 seed: self.seed,
@@ -393,6 +405,49 @@ mod tests {
             let expected = t.acceleration + 0.02 / INCH * t.displacement * G;
             assert!((m.acceleration - expected).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn sensor_effects_show_what_they_show_on_the_identified_rig() {
+        let effects = SensorEffects {
+            accelerometer_bias: 0.3,
+            accelerometer_scale: 0.1,
+            accelerometer_tilt: 0.9,
+            accelerometer_delay: 2.5 * PERIOD,
+            hum_amplitude: 0.2,
+            displacement_scale: -0.05,
+            load_cell_scale: 0.08,
+            load_cell_bias: 4.0,
+            ..SensorEffects::default()
+        };
+        let rig = crate::identified_rig::IdentifiedRig {
+            sensors: effects,
+            ..Default::default()
+        };
+        let sampled = rig.sample(PERIOD, 4).unwrap();
+        let sensors = Instrumentation::default().with_effects(&effects);
+        let filter = sensors.velocity_filter(PERIOD).unwrap();
+        let mut of_rig = crate::identified_rig::IdentifiedRigState::default();
+        let mut state = InstrumentationState::default();
+        let mut largest: f64 = 0.0;
+        for k in 0..500 {
+            let now = sampled.motion(&of_rig);
+            let truth = TrueMotion {
+                displacement: now.displacement,
+                acceleration: now.acceleration,
+                actuator_force: now.actuator_force,
+                ..TrueMotion::default()
+            };
+            let got = sensors.sample(&mut state, &filter, &truth, PERIOD);
+            let time = PERIOD * f64::from(k);
+            let expected = sampled.measure(&mut of_rig, time);
+            assert!((got.displacement - expected[0]).abs() < 1e-15);
+            assert!((got.acceleration - expected[1]).abs() < 1e-12, "at {k}");
+            assert!((got.actuator_force - expected[2]).abs() < 1e-10);
+            largest = largest.max(now.displacement.abs());
+            sampled.step(&mut of_rig, (TAU * 2.0 * time).sin());
+        }
+        assert!(largest > 1e-3);
     }
 
     #[test]

@@ -1,8 +1,10 @@
-//! Draws the physical rig: `cargo run --release -p acceptance --example physical_rig [FILE.html]`
-//! writes its frequency response beside the identified plant's, its answers to steps and sines, and
-//! the specimen's hysteresis under the built-in motion (compare Fig 4-6).
+//! Draws the pictures of `docs/physical-rig.md`: `cargo run --release -p acceptance --example
+//! physical_rig` writes the rig's frequency response beside the identified plant's, its answers to
+//! steps and sines, and the specimen's hysteresis under the built-in motion (compare Fig 4-6); with
+//! a FILE.html they become a page instead.
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
 use acceptance::native_rig::{NativeRig, PERIOD};
 use nalgebra::Complex;
@@ -10,7 +12,7 @@ use plant::linear::log_space;
 use plant::servo_hydraulic::{ServoHydraulicInput, ServoHydraulicTable};
 use plant::shake_table::ShakeTable;
 use shakebench::motion::{self, Options};
-use shakebench::report::{Abscissa, Axis, Panel, Report, Section, Series, Style, Units, html};
+use shakebench::report::{Abscissa, Axis, Panel, Report, Section, Series, Style, Units, html, svg};
 
 /// Displacement of the rig without specimen under `command` (V at s), m.
 fn answer(rig: &ServoHydraulicTable, duration: f64, command: impl Fn(f64) -> f64) -> Vec<f64> {
@@ -63,9 +65,6 @@ fn frequency_responses() -> Panel {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let file = std::env::args()
-        .nth(1)
-        .unwrap_or_else(|| "physical-rig.html".into());
     let rig = ServoHydraulicTable::default();
     let steps = [0.05, 0.1, 0.2, 0.4].map(|volts| {
         let values = answer(&rig, 0.5, |t| if t < 0.05 { 0.0 } else { volts });
@@ -74,7 +73,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sines = [0.1, 0.5, 2.0].map(|volts| {
         let values = answer(&rig, 2.0, |t| volts * (TAU * 2.0 * t).cos());
         let per_volt: Vec<f64> = values.iter().map(|x| x / volts).collect();
-        Series::history(&format!("{volts} V, per volt"), PERIOD, &per_volt)
+        Series::history(&format!("{volts} V"), PERIOD, &per_volt)
     });
     let motion = motion::built_in(1, &Options::default())?;
     let run = NativeRig::laboratory(1).play(&motion);
@@ -91,24 +90,32 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .styled(Style::Path),
         ],
     };
+    let panels = vec![
+        frequency_responses(),
+        histories("Steps of the valve command", steps.into()),
+        histories("Sines of 2 Hz, per volt", sines.into()),
+        specimen,
+    ];
+    let Some(file) = std::env::args().nth(1) else {
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+        let names = ["response", "steps", "sines", "hysteresis"];
+        for (name, panel) in names.into_iter().zip(&panels) {
+            let file = docs.join(format!("physical_rig_{name}.svg"));
+            std::fs::write(&file, svg(panel))?;
+            println!("written: {}", file.display());
+        }
+        return Ok(());
+    };
     let report = Report {
         title: "The physical rig".into(),
         summary: "Servo-hydraulic table from first principles with its yielding specimen.".into(),
         sections: vec![Section {
-            panels: vec![
-                frequency_responses(),
-                histories("Steps of the valve command", steps.into()),
-                histories(
-                    "Sines of 2 Hz: friction and stiction at low level",
-                    sines.into(),
-                ),
-                specimen,
-            ],
+            panels,
             ..Section::default()
         }],
         ..Report::default()
     };
     std::fs::write(&file, html(&report)?)?;
-    println!("{file}");
+    println!("written: {file}");
     Ok(())
 }

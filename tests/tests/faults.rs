@@ -95,7 +95,6 @@ fn a_failed_controller_brings_the_valve_to_null_in_32_ms() {
 #[test]
 fn a_lost_supply_brings_the_valve_to_null_in_a_second_of_motion() {
     let mut rig = laboratory();
-    rig.interlock.tracking_limit = 0.4 * INCH;
     rig.injected = Injected::SupplyLost(AT);
     let run = rig.play(&motion());
     let causes = [Trip::TrackingError, Trip::Saturation, Trip::Acceleration];

@@ -2,9 +2,10 @@
 
 mod identify_data;
 
+use identification::data::Recording;
 use identification::rig::{Options, RigIdentification, identify};
-use identification::rig_model::PHYSICAL_NAMES;
-use identify_data::Test;
+use identification::rig_model::{DELAY, PHYSICAL_NAMES};
+use identify_data::{PERIOD, Test};
 use nalgebra::Complex;
 use plant::shake_table::ShakeTable;
 use plant::specimen::LinearSpecimen;
@@ -156,7 +157,8 @@ fn ninety_five_per_cent_intervals_hold_the_truth_in_90_to_99_of_100() {
             ..Test::default()
         }
         .record();
-        let found = identify(&[recording], Options::default()).unwrap();
+        let found = identify(&[recording], Options::default())
+            .unwrap_or_else(|error| panic!("seed {}: {error}", 1000 + seed));
         for (i, want) in truth.iter().enumerate() {
             let error = (found.physical[i] - want).abs();
             held[i] += u64::from(error < 1.96 * found.standard_error[i]);
@@ -173,5 +175,88 @@ fn ninety_five_per_cent_intervals_hold_the_truth_in_90_to_99_of_100() {
     let slack = 3.0 * (count as f64 * 0.95 * 0.05).sqrt();
     for (name, held) in PHYSICAL_NAMES.iter().zip(&held) {
         assert!(*held as f64 > expected - slack, "{name}: {held} of {count}");
+    }
+}
+
+#[test]
+fn a_late_command_is_found_with_its_delay() {
+    // Parts of a sample, whole samples and both; the shortest stand beside no delay at all.
+    for (delay, seed) in [
+        (0.0003, 2),
+        (0.001, 3),
+        (0.004, 4),
+        (0.0053, 5),
+        (0.007, 2),
+        (0.012, 7),
+    ] {
+        let recording = Test {
+            delay,
+            seed,
+            duration: 40.0,
+            ..Test::default()
+        }
+        .record();
+        let found = identify(&[recording], Options::default()).unwrap();
+        let (got, error) = (found.physical[DELAY], found.standard_error[DELAY]);
+        let response = response_error(&found, 0.1, 30.0);
+        println!("{delay}: {got:.7} s, standard error {error:.1e}, responses {response:.1e}");
+        assert!(
+            (got - delay).abs() < 5.0 * error && error < 2e-6,
+            "{got} {error}"
+        );
+        // The largest is in the notch of G2 near 3.7 Hz.
+        let grid: Vec<f64> = plant::linear::log_space(0.1, 30.0, 100);
+        let [g1, g2] = found.response_error(&grid);
+        assert!(response < 4.0 * g1.max(g2), "{response} {g1} {g2}");
+        assert!(g1 < 0.01 && g2 < 0.04, "{g1} {g2}");
+        assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+    }
+}
+
+#[test]
+fn a_punctual_command_has_no_delay() {
+    let found = identify(
+        &[Test {
+            duration: 40.0,
+            seed: 8,
+            ..Test::default()
+        }
+        .record()],
+        Options::default(),
+    )
+    .unwrap();
+    assert_eq!(
+        (found.physical[DELAY], found.standard_error[DELAY]),
+        (0.0, 0.0)
+    );
+}
+
+#[test]
+fn a_known_specimen_stands_for_its_sensor() {
+    let recording = Test::default().record();
+    let columns = recording
+        .names()
+        .filter(|name| *name != "specimen_acceleration")
+        .map(|name| (name.to_string(), recording.channel(name).unwrap().to_vec()))
+        .collect();
+    let unsensed = Recording::new("test", PERIOD, columns).unwrap();
+    let known = Options {
+        specimen: Some(LinearSpecimen::appendix_a()),
+        ..Options::default()
+    };
+    for recording in [unsensed, recording] {
+        let found = identify(&[recording], known).unwrap();
+        assert!(found.identifiable && found.specimen);
+        let rig = ShakeTable::default();
+        let actuator = pole_error(&found.actuator_poles(), &rig.actuator.g1().poles());
+        let table = pole_error(&found.table_poles(), &rig.table.transfer_function().poles());
+        let response = response_error(&found, 0.1, 30.0);
+        println!("poles {actuator:.1e} {table:.1e}, responses {response:.1e}");
+        assert!(actuator < 0.02 && table < 0.02 && response < 0.02);
+        for fit in &found.fits {
+            assert!(fit.simulated > 98.5, "{} {}", fit.channel, fit.simulated);
+        }
+        assert_eq!(found.rig().specimen, Some(LinearSpecimen::appendix_a()));
+        assert!(found.warnings.is_empty(), "{:?}", found.warnings);
     }
 }

@@ -132,40 +132,60 @@ fn the_press_has_delay_and_unequal_areas() {
 }
 
 #[test]
-fn the_damper_has_asymmetric_friction_and_free_play() {
+fn the_damper_has_asymmetric_friction_free_play_and_a_memory() {
     let Some(three) = report("friction_damper") else {
         return;
     };
-    names(&three, &["asymmetric_coulomb_friction", "free_play"]);
+    names(
+        &three,
+        &[
+            "asymmetric_coulomb_friction",
+            "free_play",
+            "excursion_memory",
+        ],
+    );
+    assert_eq!(three.verdict, "named");
     assert!(
-        three.as_described.extended_error < 0.125,
+        three.as_described.extended_error < 0.11,
         "{}",
         three.as_described.extended_error
     );
+    // What the sines of 1 Hz tell and what that of 0.5 Hz tells by itself are the same memory.
+    let here = value(&three.as_described, "excursion_memory", "decay");
+    let there = value(&three.swapped, "excursion_memory", "decay");
+    assert!((here - there).abs() < 10.0, "{here} {there}");
     let Some(two) = report("friction_damper_one_inch") else {
         return;
     };
     names(&two, &["asymmetric_coulomb_friction", "free_play"]);
     assert!(
-        two.as_described.extended_error < 0.12,
+        two.as_described.extended_error < 0.11,
         "{}",
         two.as_described.extended_error
     );
 }
 
 #[test]
-fn the_coupon_is_not_the_same_in_both_halves_and_the_report_says_so() {
+fn the_coupon_hardens_and_its_halves_differ() {
     let Some(report) = report("steel_coupon") else {
         return;
     };
-    assert!(!report.not_confirmed.is_empty());
-    assert_ne!(report.verdict, "named");
-    assert!(report.as_described.extended_error < report.as_described.refitted_error);
     assert!(
-        report.as_described.fitted_error < 0.06,
+        report.as_described.extended_error < 0.05,
         "{}",
-        report.as_described.fitted_error
+        report.as_described.extended_error
     );
+    assert!(report.as_described.gain_interval.0 > 0.0);
+    names(&report, &["second_backstress"]);
+    let [here, there] = [&report.as_described, &report.swapped]
+        .map(|part| value(part, "second_backstress", "recovery"));
+    assert!((here / there).ln().abs() < 0.4, "{here} {there}");
+    // The plateau and most of the hardening are over in the later half: the report says that these
+    // causes are not the same on both.
+    for gone in ["isotropic_hardening", "initial_softening"] {
+        assert!(report.not_confirmed.iter().any(|name| name == gone));
+    }
+    assert_ne!(report.verdict, "named");
 }
 
 #[test]
@@ -242,4 +262,106 @@ fn a_delay_put_on_the_damper_is_found() {
     });
     println!("  {less} s, {more} s");
     assert!((more - less - 31.0 / 1024.0).abs() < 0.004, "{less} {more}");
+}
+
+#[test]
+fn misalignment_put_on_the_drive_is_found() {
+    let Some((description, measurement)) = rig("positioning_drive") else {
+        return;
+    };
+    // The loop pays for friction that grows along the travel with voltage, not with position.
+    const SLOPE: f64 = 1.5;
+    let misaligned = changed(&measurement, |s, k| {
+        let reference = &s.inputs[0];
+        let (before, after) = (k.saturating_sub(1), (k + 1).min(reference.len() - 1));
+        let speed = reference[after] - reference[before];
+        let side = if speed.abs() > 1e-6 {
+            speed.signum()
+        } else {
+            0.0
+        };
+        s.output[k] + 20.39 * SLOPE * (s.inputs[0][k] - s.middle) * side / 35.15065
+    });
+    let after = diagnose(&description, &misaligned, false).unwrap();
+    print(&after);
+    names(
+        &after,
+        &["asymmetric_friction", "position_dependent_friction"],
+    );
+    let slope = value(&after.as_described, "position_dependent_friction", "slope");
+    assert!((1.0..1.8).contains(&slope), "{slope}");
+}
+
+/// What the model of `report` puts out with `effect` on top at `values`, less what it puts out
+/// without.
+fn put_on_top(
+    description: &Description,
+    series: &Series,
+    report: &Report,
+    effect: &str,
+    values: &[f64],
+) -> Vec<f64> {
+    let rig = description.rig().unwrap();
+    let mut nominal: Vec<f64> = description
+        .nominal(rig.as_ref())
+        .unwrap()
+        .iter()
+        .map(|(value, _)| *value)
+        .collect();
+    for (place, (name, _)) in rig.parameters().iter().enumerate() {
+        let fitted = &report.as_described.parameters;
+        if let Some(p) = fitted.iter().find(|p| p.name == *name) {
+            nominal[place] = p.value;
+        }
+    }
+    let output = |with: bool| {
+        let mut parameters = Vec::new();
+        for known in rig.effects() {
+            let name = known.candidate.effect;
+            let found = report.as_described.effects.iter();
+            match found.into_iter().find(|e| e.effect == name) {
+                _ if with && name == effect => parameters.extend_from_slice(values),
+                Some(e) => parameters.extend(e.parameters.iter().map(|p| p.value)),
+                None => parameters.extend(&known.off),
+            }
+        }
+        let mut out = vec![0.0; series.output.len()];
+        rig.simulate(series, &nominal, &parameters, &mut out);
+        out
+    };
+    let without = output(false);
+    output(true)
+        .iter()
+        .zip(&without)
+        .map(|(w, o)| w - o)
+        .collect()
+}
+
+#[test]
+fn a_strength_differential_put_on_the_coupon_is_found() {
+    let Some((description, measurement)) = rig("steel_coupon") else {
+        return;
+    };
+    let before = diagnose(&description, &measurement, false).unwrap();
+    assert!(
+        !before
+            .named
+            .iter()
+            .any(|name| name == "strength_differential"),
+        "{:?}",
+        before.named
+    );
+    let more = put_on_top(
+        &description,
+        &measurement.series[0],
+        &before,
+        "strength_differential",
+        &[0.15],
+    );
+    let stronger = changed(&measurement, |s, k| s.output[k] + more[k]);
+    let after = diagnose(&description, &stronger, false).unwrap();
+    print(&after);
+    names(&after, &["strength_differential"]);
+    let found = value(&after.as_described, "strength_differential", "asymmetry");
+    assert!((0.10..0.20).contains(&found), "{found}");
 }

@@ -103,6 +103,7 @@ fn runs_that_leave_the_stroke_are_stopped_before_the_stop() {
                     velocity_limit: 10.0,
                     acceleration_limit: 1e6,
                     force_limit: 1e6,
+                    activity_limit: 1e9,
                     saturation_time: 1e3,
                     ..rig.interlock
                 },

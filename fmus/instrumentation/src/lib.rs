@@ -159,6 +159,7 @@ impl Component for Instrumentation {
             parameter("accelerometer_tilt.tilt", s.sensors.accelerometer_tilt, "Pitch of the table per displacement", "rad/m" => "rad/in");
             parameter("delay", s.sensors.delay, "Lateness of all channels together", "s").min(0.0);
             parameter("velocity_lag", s.sensors.velocity_lag, "Lag of the differentiated velocity", "s").min(0.0);
+            parameter("seed", s.seed, "Seed of the noise").min(0.0);
             parameter("fault_time", s.sensors.fault_time, "When the fault occurs", "s");
         };
         variables.extend([

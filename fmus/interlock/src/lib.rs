@@ -85,7 +85,10 @@ impl Component for Interlock {
             parameter("velocity_limit", s.law.velocity_limit, "Largest velocity", "m/s" => "in/s");
             parameter("acceleration_limit", s.law.acceleration_limit, "Largest acceleration", "m/s2" => "g");
             parameter("force_limit", s.law.force_limit, "Largest force", "N" => "lbf");
-            parameter("tracking_limit", s.law.tracking_limit, "Largest difference between reference and displacement", "m" => "in");
+            parameter("tracking_limit", s.law.tracking_limit, "Largest distance of the measured displacement from what the reference lately was", "m" => "in");
+            parameter("tracking_time", s.law.tracking_time, "How lately: time constant of the reference's range", "s");
+            parameter("activity_limit", s.law.activity_limit, "Largest way of the controller's command per second, to and fro", "V/s");
+            parameter("activity_time", s.law.activity_time, "Time constant of that mean", "s");
             parameter("saturation_level", s.law.saturation_level, "Commands from here on count as saturated", "V");
             parameter("saturation_time", s.law.saturation_time, "Longest time in saturation", "s");
             parameter("ramp_time", s.law.ramp_time, "Time from a trip to the valve at null", "s");
@@ -94,7 +97,8 @@ impl Component for Interlock {
             parameter("stale_travel", s.law.stale_travel, "... while the reference travels this far", "m" => "in");
             parameter("heartbeat_samples", s.heartbeat_samples, "Samples after which the heartbeat must have changed, 0 without one").min(0.0);
             parameter("specimen_silence", s.law.specimen_silence, "The specimen is silent below this acceleration, 0 for no check", "m/s2" => "g");
-            parameter("specimen_table_motion", s.law.specimen_table_motion, "The table moves above this acceleration", "m/s2" => "g");
+            parameter("specimen_table_motion", s.law.specimen_table_motion, "The table moves above this acceleration ...", "m/s2" => "g");
+            parameter("specimen_table_velocity", s.law.specimen_table_velocity, "... and its mean speed this one", "m/s" => "in/s");
             parameter("specimen_silence_time", s.law.specimen_silence_time, "Time of the moving table in which a specimen must not be silent", "s");
         }
     }

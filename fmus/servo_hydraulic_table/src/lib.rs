@@ -7,7 +7,8 @@ use fmu_kit::{
     Event, Variable,
 };
 use plant::servo_hydraulic::{
-    INNER_STEP, ServoHydraulicInput, ServoHydraulicState, ServoHydraulicTable as Rig,
+    ExtendedServoHydraulicState, ExtendedServoHydraulicTable as Rig, INNER_STEP,
+    ServoHydraulicInput, ServoHydraulicState,
 };
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ServoHydraulicTable {
     rig: Rig,
-    state: ServoHydraulicState,
+    state: ExtendedServoHydraulicState,
+    /// Step on which the memory of a late command is built, s; 0 before the first one.
+    period: f64,
     rates: ServoHydraulicState,
     valve_command: f64,
     specimen_force: f64,
@@ -35,6 +38,7 @@ impl Default for ServoHydraulicTable {
         Self {
             rig,
             state: rig.rest(),
+            period: 0.0,
             rates: ServoHydraulicState::default(),
             valve_command: 0.0,
             specimen_force: 0.0,
@@ -87,9 +91,9 @@ impl Component for ServoHydraulicTable {
                 .discrete().nominal(10.0);
             input("specimen_force", s.specimen_force, "Force of the specimen on the table", "N" => "lbf")
                 .nominal(400.0);
-            output("displacement", s.state.displacement, "Displacement of the table", "m" => "in")
+            output("displacement", s.state.table.displacement, "Displacement of the table", "m" => "in")
                 .nominal(0.0381);
-            output("velocity", s.state.velocity, "Velocity of the table", "m/s" => "in/s")
+            output("velocity", s.state.table.velocity, "Velocity of the table", "m/s" => "in/s")
                 .nominal(0.5).derivative_of("displacement");
             output("acceleration", s.rates.velocity, "Absolute acceleration of the table", "m/s2" => "g")
                 .nominal(10.0).derivative_of("velocity")
@@ -97,56 +101,61 @@ impl Component for ServoHydraulicTable {
                 .initially_depends_on(&["specimen_force", "table_mass", "added_payload"]);
             output("actuator_force", s.actuator_force, "Force of the actuator on the table", "N" => "lbf")
                 .nominal(400.0).depends_on(&MOTION, Dependent).depends_on(&OIL, Dependent);
-            output("supply_pressure", s.state.supply_pressure, "Pressure of the supply", "Pa" => "psi")
+            output("supply_pressure", s.state.table.supply_pressure, "Pressure of the supply", "Pa" => "psi")
                 .nominal(2e7).initially_depends_on(&VALVE);
             parameter("estimate_error", s.estimate_error, "Estimate the error of every step");
-            parameter("pump_pressure", s.rig.supply.pressure, "Pressure at which the pump stops delivering", "Pa" => "psi");
-            parameter("pump_gain", s.rig.supply.pump_gain, "Pump flow per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
-            parameter("pump_limit", s.rig.supply.pump_limit, "Largest flow of the pump", "m3/s" => "in3/s");
-            parameter("accumulator_gas_volume", s.rig.supply.gas_volume, "Gas volume of the accumulator at the pump's pressure", "m3" => "in3");
-            parameter("polytropic_exponent", s.rig.supply.polytropic_exponent, "Polytropic exponent of the gas");
+            parameter("pump_pressure", s.rig.table.supply.pressure, "Pressure at which the pump stops delivering", "Pa" => "psi");
+            parameter("pump_gain", s.rig.table.supply.pump_gain, "Pump flow per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
+            parameter("pump_limit", s.rig.table.supply.pump_limit, "Largest flow of the pump", "m3/s" => "in3/s");
+            parameter("accumulator_gas_volume", s.rig.table.supply.gas_volume, "Gas volume of the accumulator at the pump's pressure", "m3" => "in3");
+            parameter("polytropic_exponent", s.rig.table.supply.polytropic_exponent, "Polytropic exponent of the gas");
+            parameter("command_delay.delay", s.rig.command_delay, "Pure delay of the command, at most 30 steps; 0 is off", "s" => "ms").min(0.0);
+            parameter("valve_hysteresis.half_width", s.rig.hysteresis, "Half width of the play between command and spool; 0 is off", "V").min(0.0);
+            parameter("foundation_compliance.frequency", s.rig.foundation.frequency, "Natural frequency of the reaction mass, relative to which the piston moves; 0 is rigid", "Hz").min(0.0);
+            parameter("foundation_compliance.mass_ratio", s.rig.foundation.mass_ratio, "Reaction mass in masses of the table", "1").min(1e-3);
+            parameter("foundation_compliance.damping_ratio", s.rig.foundation.damping_ratio, "Damping ratio of the reaction mass", "1").min(0.0);
             parameter("supply_loss_time", s.supply_loss_time, "Fault: the supply is lost from this time on", "s");
-            parameter("supply_drain_time", s.rig.supply.drain_time, "Time constant at which a lost supply drains", "s");
-            parameter("valve_frequency", s.rig.valve.frequency, "Natural frequency of the spool", "Hz");
-            parameter("valve_damping_ratio", s.rig.valve.damping_ratio, "Damping ratio of the spool");
-            parameter("spool_travel_limit", s.rig.valve.travel_limit, "Travel limit of the spool", "V");
-            parameter("valve_overlap", s.rig.valve.overlap, "Overlap of the edges (dead band, half width)", "V");
-            parameter("valve_null_bias", s.rig.valve.null_bias, "Position of the spool at zero command", "V");
-            parameter("flow_coefficient", s.rig.valve.flow_coefficient, "Flow through an edge per volt and root of pressure, m3/(s V sqrt(Pa))");
-            parameter("valve_asymmetry", s.rig.valve.asymmetry, "q of the flow gains 1 + q and 1 - q");
-            parameter("null_leakage", s.rig.valve.null_leakage, "Laminar flow past a closed edge", "m3/(s.Pa)" => "in3/(s.psi)");
-            parameter("piston_area", s.rig.cylinder.area, "Area of the piston", "m2" => "in2");
-            parameter("oil_volume", s.rig.cylinder.volume, "Volume of both chambers with hoses", "m3" => "in3");
-            parameter("bulk_modulus", s.rig.cylinder.bulk_modulus, "Effective bulk modulus", "Pa" => "psi");
-            parameter("piston_leakage", s.rig.cylinder.leakage, "Leakage past the piston", "m3/(s.Pa)" => "in3/(s.psi)");
-            parameter("make_up_flow", s.rig.cylinder.make_up, "Flow of the anti-cavitation valves per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
-            parameter("coulomb_friction", s.rig.friction.coulomb, "Coulomb friction of the seals", "N" => "lbf");
-            parameter("static_friction", s.rig.friction.static_force, "Static friction of the seals", "N" => "lbf");
-            parameter("stribeck_velocity", s.rig.friction.stribeck_velocity, "Stribeck velocity", "m/s" => "in/s");
-            parameter("seal_viscous_friction", s.rig.friction.viscous, "Viscous friction of the seals", "N.s/m" => "lbf.s/in");
-            parameter("seal_stiffness", s.rig.friction.stiffness, "Stiffness of the seals before they slide", "N/m" => "lbf/in");
-            parameter("presliding_damping", s.rig.friction.presliding_damping, "Damping of the seals at rest", "N.s/m" => "lbf.s/in");
-            parameter("stroke", s.rig.stops.stroke, "Distance of the hard stops from the middle", "m" => "in");
-            parameter("cushion_length", s.rig.stops.cushion_length, "Length of the cushions", "m" => "in");
-            parameter("cushion_damping", s.rig.stops.cushion_damping, "Damping of a cushion at its end", "N.s/m" => "lbf.s/in");
-            parameter("stop_stiffness", s.rig.stops.stiffness, "Stiffness of the hard stops", "N/m" => "lbf/in");
-            parameter("stop_loss", s.rig.stops.loss, "Loss of the hard stops", "s/m" => "s/in");
-            parameter("table_mass", s.rig.table.mass, "Mass of the table", "kg" => "lbf.s2/in");
-            parameter("table_damping", s.rig.table.damping, "Viscous damping of the table", "N.s/m" => "lbf.s/in");
-            parameter("table_stiffness", s.rig.table.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
-            parameter("added_payload", s.rig.added_payload, "Mass on the table that a model does not know of", "kg" => "lbf.s2/in");
-            parameter("cubic_stiffness", s.rig.cubic_stiffness, "Factor of an additional force with the cube of the displacement", "N/m3" => "lbf/in3");
+            parameter("supply_drain_time", s.rig.table.supply.drain_time, "Time constant at which a lost supply drains", "s");
+            parameter("valve_frequency", s.rig.table.valve.frequency, "Natural frequency of the spool", "Hz");
+            parameter("valve_damping_ratio", s.rig.table.valve.damping_ratio, "Damping ratio of the spool");
+            parameter("spool_travel_limit", s.rig.table.valve.travel_limit, "Travel limit of the spool", "V");
+            parameter("valve_overlap", s.rig.table.valve.overlap, "Overlap of the edges (dead band, half width)", "V");
+            parameter("valve_null_bias", s.rig.table.valve.null_bias, "Position of the spool at zero command", "V");
+            parameter("flow_coefficient", s.rig.table.valve.flow_coefficient, "Flow through an edge per volt and root of pressure, m3/(s V sqrt(Pa))");
+            parameter("valve_asymmetry", s.rig.table.valve.asymmetry, "q of the flow gains 1 + q and 1 - q");
+            parameter("null_leakage", s.rig.table.valve.null_leakage, "Laminar flow past a closed edge", "m3/(s.Pa)" => "in3/(s.psi)");
+            parameter("piston_area", s.rig.table.cylinder.area, "Area of the piston", "m2" => "in2");
+            parameter("oil_volume", s.rig.table.cylinder.volume, "Volume of both chambers with hoses", "m3" => "in3");
+            parameter("bulk_modulus", s.rig.table.cylinder.bulk_modulus, "Effective bulk modulus", "Pa" => "psi");
+            parameter("piston_leakage", s.rig.table.cylinder.leakage, "Leakage past the piston", "m3/(s.Pa)" => "in3/(s.psi)");
+            parameter("make_up_flow", s.rig.table.cylinder.make_up, "Flow of the anti-cavitation valves per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
+            parameter("coulomb_friction", s.rig.table.friction.coulomb, "Coulomb friction of the seals", "N" => "lbf");
+            parameter("static_friction", s.rig.table.friction.static_force, "Static friction of the seals", "N" => "lbf");
+            parameter("stribeck_velocity", s.rig.table.friction.stribeck_velocity, "Stribeck velocity", "m/s" => "in/s");
+            parameter("seal_viscous_friction", s.rig.table.friction.viscous, "Viscous friction of the seals", "N.s/m" => "lbf.s/in");
+            parameter("seal_stiffness", s.rig.table.friction.stiffness, "Stiffness of the seals before they slide", "N/m" => "lbf/in");
+            parameter("presliding_damping", s.rig.table.friction.presliding_damping, "Damping of the seals at rest", "N.s/m" => "lbf.s/in");
+            parameter("stroke", s.rig.table.stops.stroke, "Distance of the hard stops from the middle", "m" => "in");
+            parameter("cushion_length", s.rig.table.stops.cushion_length, "Length of the cushions", "m" => "in");
+            parameter("cushion_damping", s.rig.table.stops.cushion_damping, "Damping of a cushion at its end", "N.s/m" => "lbf.s/in");
+            parameter("stop_stiffness", s.rig.table.stops.stiffness, "Stiffness of the hard stops", "N/m" => "lbf/in");
+            parameter("stop_loss", s.rig.table.stops.loss, "Loss of the hard stops", "s/m" => "s/in");
+            parameter("table_mass", s.rig.table.table.mass, "Mass of the table", "kg" => "lbf.s2/in");
+            parameter("table_damping", s.rig.table.table.damping, "Viscous damping of the table", "N.s/m" => "lbf.s/in");
+            parameter("table_stiffness", s.rig.table.table.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
+            parameter("added_payload", s.rig.table.added_payload, "Mass on the table that a model does not know of", "kg" => "lbf.s2/in");
+            parameter("cubic_stiffness", s.rig.table.cubic_stiffness, "Factor of an additional force with the cube of the displacement", "N/m3" => "lbf/in3");
             local("stop_hit", s.stop_hit, "Whether a hard stop is touched");
             local("displacement_error", s.displacement_error, "Estimated error of the displacement made in the last step, if asked for", "m" => "in")
                 .discrete().nominal(1e-6);
-            local("spool", s.state.spool, "Position of the spool", "V").nominal(10.0);
-            local("spool_velocity", s.state.spool_velocity, "Velocity of the spool", "V/s")
+            local("spool", s.state.table.spool, "Position of the spool", "V").nominal(10.0);
+            local("spool_velocity", s.state.table.spool_velocity, "Velocity of the spool", "V/s")
                 .nominal(1e3).derivative_of("spool");
-            local("pressure_a", s.state.pressures[0], "Pressure of chamber A, which extends the rod", "Pa" => "psi")
+            local("pressure_a", s.state.table.pressures[0], "Pressure of chamber A, which extends the rod", "Pa" => "psi")
                 .nominal(1e7).initially_depends_on(&VALVE);
-            local("pressure_b", s.state.pressures[1], "Pressure of chamber B", "Pa" => "psi")
+            local("pressure_b", s.state.table.pressures[1], "Pressure of chamber B", "Pa" => "psi")
                 .nominal(1e7).initially_depends_on(&VALVE);
-            local("seal_deflection", s.state.seal_deflection, "Deflection of the seals", "m" => "in")
+            local("seal_deflection", s.state.table.seal_deflection, "Deflection of the seals", "m" => "in")
                 .nominal(2e-5);
             local("der(spool_velocity)", s.rates.spool_velocity, "Acceleration of the spool", "V/s2")
                 .derivative_of("spool_velocity")
@@ -168,29 +177,55 @@ impl Component for ServoHydraulicTable {
 
     fn initialize(&mut self) -> ComponentResult {
         self.rig.validate()?;
+        self.rig.validate_delay(Self::STEP_SIZE)?;
+        if let Some(effect) = self.rig.active_effect().filter(|_| self.estimate_error) {
+            return Err(format!("estimate_error is on, expected off with {effect}").into());
+        }
         self.state = self.rig.rest();
+        self.period = 0.0;
         self.displacement_error = 0.0;
         self.stop_hit = false;
         Ok(())
     }
 
+    fn allow_model_exchange(&self) -> ComponentResult {
+        self.rig.active_effect().map_or(Ok(()), |effect| {
+            Err(format!(
+                "{effect} is on: the continuous states do not tell all of it, which needs \
+                 co-simulation"
+            )
+            .into())
+        })
+    }
+
     fn update_outputs(&mut self, time: f64) {
-        self.actuator_force = self.rig.actuator_force(&self.state);
-        self.rates = self.rig.derivatives(&self.state, &self.input(time));
-        self.stop_hit = self.rig.stops.is_hit(self.state.displacement);
+        let table = &self.rig.table;
+        self.actuator_force = table.actuator_force(&self.state.table);
+        self.rates = table.derivatives(&self.state.table, &self.input(time));
+        self.stop_hit = table.stops.is_hit(self.state.table.displacement);
     }
 
     fn step(&mut self, time: f64, step_size: f64) -> ComponentResult {
         let input = self.input(time);
-        if self.estimate_error {
+        if self.rig.active_effect().is_some() {
+            if self.period != step_size && self.rig.command_delay > 0.0 {
+                self.rig.validate_delay(step_size)?;
+                if self.period != 0.0 {
+                    return Err("command_delay.delay needs steps of one length".into());
+                }
+            }
+            self.period = step_size;
+            self.rig.advance(&mut self.state, &input, step_size);
+        } else if self.estimate_error {
+            let table = &self.rig.table;
             let (next, error) =
-                self.rig
-                    .advance_with_error(&self.state, &input, step_size, INNER_STEP);
-            (self.state, self.displacement_error) = (next, error.displacement);
+                table.advance_with_error(&self.state.table, &input, step_size, INNER_STEP);
+            (self.state.table, self.displacement_error) = (next, error.displacement);
         } else {
-            self.state = self.rig.advance(&self.state, &input, step_size);
+            self.state.table = self.rig.table.advance(&self.state.table, &input, step_size);
         }
-        if self.state.displacement.is_finite() && self.state.supply_pressure.is_finite() {
+        let state = &self.state.table;
+        if state.displacement.is_finite() && state.supply_pressure.is_finite() {
             return Ok(());
         }
         Err(format!(

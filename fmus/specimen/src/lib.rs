@@ -116,14 +116,21 @@ impl Component for Specimen {
     }
 
     fn allow_model_exchange(&self) -> ComponentResult {
-        if self.effects.is_active() {
-            return Err(
-                "an effect is on (such as specimen_yielding): its memory and its inner \
-                        steps need co-simulation"
-                    .into(),
-            );
+        let effects = &self.effects;
+        let needing = [
+            ("specimen_yielding", effects.yield_displacement),
+            ("specimen_second_mode", effects.second_mode_frequency),
+            ("specimen_degradation", effects.degradation_loss),
+            ("specimen_absent", self.absent),
+        ];
+        match needing.into_iter().find(|(_, size)| *size != 0.0) {
+            Some((effect, _)) => Err(format!(
+                "{effect} is on: drift and drift_velocity do not tell all of it, which needs \
+                 co-simulation"
+            )
+            .into()),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn update_outputs(&mut self, _time: f64) {

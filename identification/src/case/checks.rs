@@ -9,6 +9,8 @@ const SHORTEST: usize = 500;
 const LEAST_EXCITATION: f64 = 8.0;
 /// Equal readings in a row, at the channel's extreme, that betray a clipped sensor.
 const CLIPPED_RUN: usize = 4;
+/// Samples that may repeat the one before in every channel by chance (converters have steps).
+const MOST_REPEATED: usize = 5;
 /// Equal readings in a row that betray a frozen one.
 const FROZEN_RUN: usize = 50;
 
@@ -53,6 +55,9 @@ pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
         found.extend(readings(name, channel, values));
     }
     found.extend(readings(name, "valve_command", &record.valve_command));
+    if found.is_empty() {
+        found.extend(held(record));
+    }
     if let Some(limit) = nominal.controller.map(|law| law.limit) {
         let at_limit = record
             .valve_command
@@ -132,13 +137,14 @@ fn readings(name: &str, channel: &str, values: &[f64]) -> Vec<String> {
             continue;
         }
         let value = values[k - 1];
-        if run >= FROZEN_RUN {
+        let is_extreme = (value == low || value == high) && high > low;
+        if run >= FROZEN_RUN && !is_extreme {
             found.push(format!(
                 "{name}: `{channel}` is frozen at {value:.4e} for {run} samples from sample {start}"
             ));
             return found;
         }
-        if run >= CLIPPED_RUN && (value == low || value == high) {
+        if run >= CLIPPED_RUN && is_extreme {
             clipped += run;
         }
         (run, start) = (1, k);
@@ -150,6 +156,42 @@ fn readings(name: &str, channel: &str, values: &[f64]) -> Vec<String> {
         ));
     }
     found
+}
+
+/// Samples that repeat the one before in every channel: dropped ones that the acquisition filled.
+fn held(record: &Record) -> Option<String> {
+    let channels: Vec<&Vec<f64>> = record.channels.iter().filter(|c| !c.is_empty()).collect();
+    let repeats = |k: &usize| {
+        channels
+            .iter()
+            .all(|channel| channel[*k] == channel[*k - 1])
+    };
+    let repeated: Vec<usize> = (1..record.len()).filter(repeats).collect();
+    let first = *repeated.first()?;
+    (repeated.len() > MOST_REPEATED).then(|| {
+        format!(
+            "{}: {} samples repeat the one before in all channels, the first after {:.4} s: \
+             dropped samples that were filled",
+            record.name,
+            repeated.len(),
+            record.time[first]
+        )
+    })
+}
+
+/// How much louder than stated the noise of each channel is, from differences that leave next to
+/// nothing of the motion; none where the channel is missing.
+pub fn noise_ratios(record: &Record, nominal: &Nominal) -> [Option<f64>; 4] {
+    std::array::from_fn(|i| {
+        let channel = &record.channels[i];
+        let n = channel.len().checked_sub(4).filter(|n| *n > 0)?;
+        let sum: f64 = channel
+            .windows(5)
+            .map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).powi(2))
+            .sum();
+        // Fourth differences of white noise have 70 times its variance.
+        Some((sum / (70.0 * n as f64)).sqrt() / nominal.noise[i])
+    })
 }
 
 /// Standard deviation.

@@ -3,12 +3,10 @@
 mod checks;
 mod nominal;
 mod record;
-mod units;
 
-pub use checks::{blind_spot, deviation, problems};
+pub use checks::{blind_spot, deviation, noise_ratios, problems};
 pub use nominal::{ControlLaw, Nominal};
 pub use record::{CHANNELS, Record};
-pub use units::factor_to;
 
 use std::path::{Path, PathBuf};
 

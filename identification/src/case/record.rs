@@ -1,6 +1,6 @@
 //! One record: columns with units, in any order.
 
-use super::units::factor_to;
+use crate::units::convert;
 
 /// Columns of a record, SI.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +63,7 @@ impl Record {
             if place[column].is_some() {
                 return Err(format!("column `{label}` stands twice"));
             }
-            factor[column] = factor_to(unit, COLUMNS[column].1)
+            factor[column] = convert(1.0, unit, COLUMNS[column].1)
                 .map_err(|reason| format!("column `{label}`: {reason}"))?;
             place[column] = Some(index);
         }

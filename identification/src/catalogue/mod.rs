@@ -9,6 +9,7 @@ pub use effects::catalogue;
 pub use entry::Apply;
 
 use plant::identified_rig::IdentifiedRig;
+use plant::shake_table::ShakeTable;
 
 use crate::case::{CHANNELS, Nominal};
 use crate::diagnosis::{Candidate, Point, RigModel};
@@ -62,6 +63,22 @@ pub const NUISANCE: [&str; 15] = [
     "specimen.damping",
     "specimen.stiffness",
 ];
+
+/// The parameters of `rig` in the order of [`NUISANCE`], SI; without a specimen the first twelve.
+pub fn nominal_parameters(rig: &IdentifiedRig) -> Vec<f64> {
+    let ShakeTable { actuator, table } = rig.shake_table;
+    let mut values = Vec::with_capacity(NUISANCE.len());
+    values.extend(actuator.denominator);
+    values.extend(actuator.voltage_to_force);
+    values.extend(actuator.velocity_to_force);
+    values.extend([table.mass, table.damping, table.stiffness]);
+    values.extend(
+        rig.specimen
+            .iter()
+            .flat_map(|s| [s.mass, s.damping, s.stiffness]),
+    );
+    values
+}
 
 impl ShakeTableModel {
     /// The model for `nominal` and `records`; `noise` as in [`Nominal::noise`], infinite where a

@@ -43,6 +43,8 @@ pub struct ChannelGain {
     pub after: f64,
     /// NRMSE of a perfect model.
     pub floor: f64,
+    /// 95 % intervals of `before` and `after` from a moving-block bootstrap.
+    pub intervals_95: [[f64; 2]; 2],
 }
 
 /// Compares two predictions of `signals`: whitened innovations with the predictor that made them.
@@ -77,6 +79,10 @@ pub fn gain(
             before: rms(&squares_before, i),
             after: rms(&squares_after, i),
             floor: floor[i] / scale[i],
+            intervals_95: [&squares_before, &squares_after].map(|rows| {
+                let sums = running(rows.iter().map(|row| row[i]));
+                bootstrap([&sums], |[mean]| mean.sqrt())
+            }),
         })
         .collect();
     let overall = |value: fn(&ChannelGain) -> f64| {
@@ -87,14 +93,11 @@ pub fn gain(
         let count = n * live.len().max(1) as f64;
         (whitened.iter().map(|r| r * r).sum::<f64>() / count).sqrt()
     };
-    let sums = |rows: &[[f64; 4]]| -> Vec<f64> {
-        let mut total = 0.0;
-        std::iter::once(0.0)
-            .chain(rows.iter().map(|row| {
-                total += live.iter().map(|&i| row[i]).sum::<f64>();
-                total
-            }))
-            .collect()
+    let sums = |rows: &[[f64; 4]]| {
+        running(
+            rows.iter()
+                .map(|row| live.iter().map(|&i| row[i]).sum::<f64>()),
+        )
     };
     Gain {
         before_nrmse: overall(|c| c.before),
@@ -102,34 +105,59 @@ pub fn gain(
         noise_floor_nrmse: overall(|c| c.floor),
         before_ratio: whitened_rms(before.1),
         after_ratio: whitened_rms(after.1),
-        interval_95: bootstrap(&sums(&squares_before), &sums(&squares_after)),
+        interval_95: share_gone(&sums(&squares_before), &sums(&squares_after)),
         channels,
     }
 }
 
+/// Running sums of `values`, the first is zero.
+pub fn running(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut total = 0.0;
+    std::iter::once(0.0)
+        .chain(values.map(|value| {
+            total += value;
+            total
+        }))
+        .collect()
+}
+
 /// 95 % interval of `1 - sqrt(after/before)` from running sums of squares.
-fn bootstrap(before: &[f64], after: &[f64]) -> [f64; 2] {
-    let n = before.len().saturating_sub(1);
-    let block = BLOCK.min(n / 2).max(1);
+pub fn share_gone(before: &[f64], after: &[f64]) -> [f64; 2] {
+    bootstrap([before, after], |[b, a]| {
+        1.0 - (a / b.max(f64::MIN_POSITIVE)).sqrt()
+    })
+}
+
+/// 95 % interval of a `statistic` of means, from the [`running`] sums of what they are means of:
+/// moving-block bootstrap over the samples.
+pub fn bootstrap<const N: usize>(
+    sums: [&[f64]; N],
+    statistic: impl Fn([f64; N]) -> f64,
+) -> [f64; 2] {
+    let n = sums.iter().map(|s| s.len()).min().unwrap_or(0);
+    let n = n.saturating_sub(1);
     if n < 4 {
         return [0.0, 0.0];
     }
+    let block = BLOCK.min(n / 2).max(1);
+    let blocks = n.div_ceil(block);
     let mut random = ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED);
-    let mut shares: Vec<f64> = (0..RESAMPLES)
+    let mut values: Vec<f64> = (0..RESAMPLES)
         .map(|_| {
-            let (mut b, mut a) = (0.0, 0.0);
-            for _ in 0..n.div_ceil(block) {
+            let mut means = [0.0; N];
+            for _ in 0..blocks {
                 let start = random.random_range(0..=n - block);
-                b += before[start + block] - before[start];
-                a += after[start + block] - after[start];
+                for (mean, sums) in means.iter_mut().zip(&sums) {
+                    *mean += (sums[start + block] - sums[start]) / (blocks * block) as f64;
+                }
             }
-            1.0 - (a / b.max(f64::MIN_POSITIVE)).sqrt()
+            statistic(means)
         })
         .collect();
-    shares.sort_by(f64::total_cmp);
+    values.sort_by(f64::total_cmp);
     [
-        shares[RESAMPLES / 40],
-        shares[RESAMPLES - 1 - RESAMPLES / 40],
+        values[RESAMPLES / 40],
+        values[RESAMPLES - 1 - RESAMPLES / 40],
     ]
 }
 
@@ -149,7 +177,7 @@ mod tests {
                 })
                 .collect()
         };
-        let [low, high] = bootstrap(&sums(4.0), &sums(1.0));
+        let [low, high] = share_gone(&sums(4.0), &sums(1.0));
         assert!(
             low <= 0.5 && 0.5 <= high && high - low < 0.05,
             "{low} {high}"

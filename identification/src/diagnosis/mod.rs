@@ -7,6 +7,7 @@ pub mod gain;
 mod model;
 pub mod relations;
 mod search;
+mod sentence;
 pub mod shake_table;
 mod verdict;
 
@@ -14,4 +15,5 @@ pub use adequacy::Test;
 pub use fit::{Fit, Jacobian, evaluate, fit, polish};
 pub use model::{Candidate, EffectParameter, Point, RigModel, Role, Scale};
 pub use search::{Found, Hypothesis, Search};
+pub use sentence::{amount, laboratory_unit, said};
 pub use verdict::{Estimate, Judgement, NamedEffect, Verdict, judge};

@@ -75,9 +75,12 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
     // Differences are taken before the window, which would leak low frequencies into them.
     let difference = |at: &dyn Fn(&[f64], usize) -> f64| {
         let x = &record.channels[0];
+        if x.len() != n || n < 3 {
+            return None;
+        }
         let inner = |k: usize| k.clamp(1, n.saturating_sub(2).max(1));
         let values: Vec<f64> = (0..n).map(|k| at(x, inner(k))).collect();
-        spectrum(if x.len() == n && n > 2 { &values } else { &[] })
+        spectrum(&values)
     };
     let velocity = difference(&|x, k| (x[k + 1] - x[k - 1]) / (2.0 * period));
     let second = difference(&|x, k| (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (period * period));

@@ -10,15 +10,19 @@ use plant::units::INCH;
 use super::experiment;
 use super::gain::{Gain, gain};
 use super::relations::{Relation, misfit, relations};
+use super::sentence::sentence;
 use super::verdict::{NamedEffect, Verdict, judge};
-use super::{Point, Test};
-use crate::case::{CHANNELS, Case, CaseError, Nominal, Record, blind_spot, problems};
-use crate::catalogue::{ModelRecord, ShakeTableModel};
+use super::{Point, Role, Test};
+use crate::case::{CHANNELS, Case, CaseError, Nominal, Record, blind_spot, noise_ratios, problems};
+use crate::catalogue::{ModelRecord, NUISANCE, ShakeTableModel, nominal_parameters};
 use crate::predictor::{Predictor, Signals};
 
 /// R5 fires, and the recorded command is used, where it misses the law by more than this many
 /// standard deviations of its noise.
 const LAW_HOLDS_WITHIN: f64 = 4.0;
+
+/// A channel whose noise is this many times what is stated is said to be loud.
+const LOUD: f64 = 2.0;
 
 /// The parameter set that the FMUs of table, specimen and instrumentation take, SI.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -31,7 +35,8 @@ pub struct ExtendedModel {
     pub effects: Effects,
     /// The sensors' effects found.
     pub sensors: SensorEffects,
-    /// Standard errors of the effects' parameters, `effect.parameter`, SI.
+    /// Standard errors, SI: of the effects' parameters as `effect.parameter`, of the nominal ones
+    /// by their names in [`NUISANCE`].
     pub standard_errors: BTreeMap<String, f64>,
 }
 
@@ -52,6 +57,8 @@ pub struct Diagnosis {
     pub gain: Gain,
     /// The extended model.
     pub extended_model: ExtendedModel,
+    /// The effects in it: [`Self::effects`], and under `Unexplained` those that only help.
+    pub modelled: Vec<NamedEffect>,
     /// The five relations on the identification record, nominal model.
     pub relations: Vec<Relation>,
     /// Traces left over, strongest first.
@@ -211,7 +218,11 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     };
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
     let signals = &model.records[held_out].signals;
-    let judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
+    let mut judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
+    for note in at_their_ends(&model, &judgement.best.point) {
+        judgement.verdict = Verdict::Unexplained;
+        notes.push(note);
+    }
     let after = prediction(&model, &judgement.best.point, held_out).ok_or_else(lost)?;
     let gain = gain(
         signals,
@@ -250,6 +261,16 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
                 .into(),
         );
     }
+    if judgement.verdict == Verdict::Unexplained {
+        let ratios = noise_ratios(&case.identification, &case.nominal);
+        for (channel, ratio) in CHANNELS.iter().zip(ratios) {
+            if let Some(ratio) = ratio.filter(|ratio| *ratio > LOUD) {
+                notes.push(format!(
+                    "the noise of `{channel}` is {ratio:.1} times what nominal.toml states"
+                ));
+            }
+        }
+    }
     let standard_errors = effects
         .iter()
         .flat_map(|e| {
@@ -257,6 +278,16 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
                 .iter()
                 .map(|p| (format!("{}.{}", e.effect, p.name), p.standard_error))
         })
+        .chain(
+            nominal_parameters(&model.nominal)
+                .into_iter()
+                .zip(&judgement.nuisance_errors)
+                .zip(NUISANCE)
+                .map(|((value, error), name)| {
+                    let error = value.abs() * model.uncertainty * error;
+                    (name.to_string(), error)
+                }),
+        )
         .filter(|(_, error)| error.is_finite())
         .collect();
     let sentence = sentence(
@@ -273,8 +304,9 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
         effects: if judgement.verdict == Verdict::Unexplained {
             Vec::new()
         } else {
-            effects
+            effects.clone()
         },
+        modelled: effects,
         alternatives: judgement.alternatives,
         separating_experiment,
         gain,
@@ -303,6 +335,30 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     })
 }
 
+/// Effects whose size ran to the end of what is tried: no cause, but a nominal model of another rig.
+fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (index, internal) in &point.effects {
+        let candidate = &super::RigModel::candidates(model)[*index];
+        for (parameter, value) in candidate.parameters.iter().zip(candidate.values(internal)) {
+            let (low, high) = parameter.bounds;
+            let near = |end: f64| (value - end).abs() < 1e-3 * end.abs();
+            if matches!(parameter.role, Role::Size { .. }) && (near(low) || near(high)) {
+                let unit = Some(parameter.unit).filter(|unit| *unit != "1");
+                notes.push(format!(
+                    "{}.{} ran to the end of what is plausible, {value:.3}{}{}: does nominal.toml \
+                     belong to this rig?",
+                    candidate.effect,
+                    parameter.name,
+                    unit.map_or("", |_| " "),
+                    unit.unwrap_or_default()
+                ));
+            }
+        }
+    }
+    notes
+}
+
 /// The mains as amplitude and phase instead of two components.
 fn readable(mut effects: Vec<NamedEffect>) -> Vec<NamedEffect> {
     for effect in &mut effects {
@@ -319,97 +375,4 @@ fn readable(mut effects: Vec<NamedEffect>) -> Vec<NamedEffect> {
         }
     }
     effects
-}
-
-/// How an effect is said.
-fn phrase(effect: &str) -> String {
-    effect.replace('_', " ")
-}
-
-fn sentence(
-    verdict: Verdict,
-    effects: &[NamedEffect],
-    alternatives: &[Vec<&'static str>],
-    gain: &Gain,
-    tests: &[Test],
-    share: f64,
-) -> String {
-    let described: Vec<String> = effects
-        .iter()
-        .map(|e| {
-            let sizes: Vec<String> = e
-                .parameters
-                .iter()
-                .filter(|p| !p.is_shape)
-                .map(|p| {
-                    let unit = if p.unit == "1" { "" } else { p.unit };
-                    format!(
-                        "{} {:.4} +- {:.4} {unit}",
-                        phrase(&p.name),
-                        Significant(p.value),
-                        Significant(p.standard_error)
-                    )
-                    .trim_end()
-                    .to_string()
-                })
-                .collect();
-            if sizes.is_empty() {
-                phrase(e.effect)
-            } else {
-                format!("{} ({})", phrase(e.effect), sizes.join(", "))
-            }
-        })
-        .collect();
-    let falls = format!(
-        "the error on the unseen record falls from {:.1} to {:.2} times the noise floor",
-        gain.before_ratio, gain.after_ratio
-    );
-    match verdict {
-        Verdict::Adequate => format!(
-            "The nominal model is adequate: within its stated uncertainty the error on the unseen \
-             record is {:.2} times the noise floor.",
-            gain.after_ratio
-        ),
-        Verdict::Named => format!("The rig has {}; with it {falls}.", described.join(" and ")),
-        Verdict::Ambiguous => {
-            let sets: Vec<String> = alternatives
-                .iter()
-                .map(|set| {
-                    set.iter()
-                        .map(|e| phrase(e))
-                        .collect::<Vec<_>>()
-                        .join(" and ")
-                })
-                .collect();
-            format!(
-                "The rig has {}, or as likely {}; with it {falls}.",
-                described.join(" and "),
-                sets.join(", or ")
-            )
-        }
-        Verdict::Unexplained => format!(
-            "Something is there that no effect of the catalogue explains: the best of them takes \
-             {:.0} % of the excess error; what is left shows most in \"{}\".",
-            100.0 * share.clamp(0.0, 1.0),
-            tests.first().map_or("nothing", |test| test.what.as_str())
-        ),
-    }
-}
-
-/// A number with as many digits as its precision asks.
-struct Significant(f64);
-
-impl std::fmt::Display for Significant {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let digits = f.precision().unwrap_or(4) as i32;
-        if self.0 == 0.0 || !self.0.is_finite() {
-            return write!(f, "{}", self.0);
-        }
-        let order = self.0.abs().log10().floor() as i32;
-        if (-4..5).contains(&order) {
-            write!(f, "{:.*}", (digits - 1 - order).max(0) as usize, self.0)
-        } else {
-            write!(f, "{:.*e}", (digits - 1).max(0) as usize, self.0)
-        }
-    }
 }

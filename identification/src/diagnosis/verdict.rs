@@ -69,6 +69,8 @@ pub struct Judgement {
     pub alternatives: Vec<Vec<&'static str>>,
     /// Points of the rivals, in the order of `alternatives`.
     pub rival_points: Vec<Point>,
+    /// Standard errors of the nominal parameters, in their stated standard deviations.
+    pub nuisance_errors: Vec<f64>,
     /// The best model, fitted to the fitting records.
     pub best: Fit,
     /// The best model fitted to all records, the held-out ones too, where it is adequate.
@@ -254,27 +256,32 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
         (true, true, true) => Verdict::Named,
         (true, true, false) => Verdict::Ambiguous,
     };
-    // What is told of the effects rests on all records, as long as the model holds on them.
-    let jacobian = joint_jacobian.as_ref().filter(|_| adequate);
-    let all = match jacobian {
-        Some(_) => joint_fit,
-        None => best.fit.clone(),
-    };
-    let mut effects = estimates(model, &all, jacobian.unwrap_or(&best.jacobian));
-    for effect in &mut effects {
-        effect.confidence = 1.0 / weight;
-    }
     let excess = |square: f64| (square - 1.0).max(0.0);
     let share_explained = if excess(nominal_square) > 0.0 {
         1.0 - excess(best.mean_square()) / excess(nominal_square)
     } else {
         1.0
     };
+    // What is told of the effects rests on all records, as long as the model holds on them.
+    let (all, jacobian) = match joint_jacobian.filter(|_| adequate) {
+        Some(jacobian) => (joint_fit, jacobian),
+        None => (best.fit.clone(), best.jacobian),
+    };
+    let mut effects = estimates(model, &all, &jacobian);
+    let covariance = jacobian.covariance(model, &all);
+    let nuisance_errors = covariance.map_or_else(Vec::new, |c| {
+        let count = all.point.nuisance.len();
+        (0..count).map(|i| c[(i, i)].max(0.0).sqrt()).collect()
+    });
+    for effect in &mut effects {
+        effect.confidence = 1.0 / weight;
+    }
     Judgement {
         verdict,
         effects,
         alternatives,
         rival_points,
+        nuisance_errors,
         best: best.fit,
         all,
         tests,

@@ -2,6 +2,9 @@
 //!
 //! Nominal: `σ' = E (ε' - ε_p')`, yield at `|σ - Σα| = σ_y + R`, `α_i' = C_i ε_p' - γ_i α_i |ε_p'|`
 //! with one backstress (Armstrong and Frederick 1966; Chaboche, Int. J. Plasticity 2, 1986).
+//!
+//! The strain may be sampled so coarsely that turns of a test of known amplitude lie between two
+//! samples; it then ran on to `strain_amplitude` (0: not known, the samples are all there is).
 
 use super::{Effect, Named, Rig, Series, effect, shape, size};
 
@@ -26,25 +29,31 @@ impl Rig for CyclicMaterial {
             ("yield_stress", "Pa"),
             ("hardening", "Pa"),
             ("recovery", "1"),
+            ("strain_amplitude", "1"),
         ]
     }
 
     fn effects(&self) -> Vec<Effect> {
-        let backstress = |name, recovery: f64| {
+        let backstress = |name, recovery: f64, spread, starts: &[&[f64]]| {
             effect(
                 name,
                 vec![
                     size("hardening", "Pa", 1e8, (0.0, 1e12)),
-                    shape("recovery", "1", recovery, 0.8),
+                    shape("recovery", "1", recovery, spread),
                 ],
                 &[0.0, recovery],
-                &[&[1e9, recovery], &[1e10, recovery]],
+                starts,
             )
         };
         vec![
-            backstress("slow_backstress", 20.0),
-            backstress("middle_backstress", 200.0),
-            backstress("fast_backstress", 1000.0),
+            backstress(
+                "second_backstress",
+                200.0,
+                1.2,
+                &[&[1e9, 20.0], &[1e10, 200.0], &[5e10, 1000.0]],
+            ),
+            // A third one that hardly recovers.
+            backstress("lasting_backstress", 5.0, 0.5, &[&[1e9, 5.0]]),
             // R = Q (1 - e^{-b p}), p the plastic path (Voce 1948).
             effect(
                 "isotropic_hardening",
@@ -54,6 +63,14 @@ impl Rig for CyclicMaterial {
                 ],
                 &[0.0, 10.0],
                 &[&[5e7, 10.0], &[-3e7, 10.0]],
+            ),
+            // R goes on with the plastic path, H p, where the first term is full (Voce 1948 as
+            // extended by Palm, Trans. ASME 71, 1949).
+            effect(
+                "lasting_hardening",
+                vec![size("slope", "Pa", 3e6, (-1e9, 1e9))],
+                &[0.0],
+                &[&[1e7], &[-1e7]],
             ),
             // Yield plateau: a further R that falls within the first strain (Q < 0).
             effect(
@@ -83,17 +100,18 @@ impl Rig for CyclicMaterial {
                 &[0.0],
                 &[&[0.02], &[-0.02]],
             ),
-            // Sampling of the strain misses the turns: between two samples it ran on to the
-            // amplitude of the test.
+            // A frame of compliance C between grips and drive: it is ε + C σ that runs evenly between
+            // two readings, not the strain (Lemaitre and Chaboche, Mechanics of Solid Materials,
+            // 1990, section 3.2). It tells where interpolated samples of the strain were.
             effect(
-                "missed_turns",
-                vec![size("amplitude", "1", 2e-4, (0.0, 0.2))],
+                "frame_compliance",
+                vec![size("compliance", "1/Pa", 5e-13, (0.0, 1e-10))],
                 &[0.0],
-                &[&[0.005], &[0.01], &[0.02], &[0.0201], &[0.04]],
+                &[&[2e-12], &[8e-12]],
             ),
-            // Strain recorded late by a part of a sample, or stress.
+            // Stress recorded late by a part of a sample, or strain.
             effect(
-                "strain_late",
+                "stress_late",
                 vec![size("samples", "1", 0.05, (-2.0, 2.0))],
                 &[0.0],
                 &[&[0.3], &[-0.3]],
@@ -103,22 +121,21 @@ impl Rig for CyclicMaterial {
 
     fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
         let (
-            &[modulus, yield_stress, hardening, recovery],
+            &[modulus, yield_stress, hardening, recovery, amplitude],
             &[
                 slow,
                 slow_recovery,
-                middle,
-                middle_recovery,
                 fast,
                 fast_recovery,
                 saturation,
                 rate,
+                lasting,
                 drop,
                 drop_rate,
                 degradation,
                 degradation_rate,
                 differential,
-                amplitude,
+                compliance,
                 late,
             ],
         ) = (nominal, effects)
@@ -133,55 +150,72 @@ impl Rig for CyclicMaterial {
             backstresses: [
                 (hardening, recovery),
                 (slow, slow_recovery),
-                (middle, middle_recovery),
                 (fast, fast_recovery),
             ],
             isotropic: [(saturation, rate), (-drop, drop_rate)],
+            lasting,
             degradation: (degradation, degradation_rate),
             differential,
             stress: 0.0,
-            back: [0.0; 4],
+            back: [0.0; 3],
             path: 0.0,
         };
         let last = strain.len() - 1;
-        let at = |k: usize| {
-            let place = (k as f64 + late).clamp(0.0, last as f64);
-            let before = place as usize;
-            let share = place - before as f64;
-            strain[before] * (1.0 - share) + strain[(before + 1).min(last)] * share
-        };
         let mut now = first;
         let mut direction = 0.0f64;
-        for (k, stress) in out.iter_mut().enumerate() {
-            let next = at(k);
+        let mut k = 0;
+        while k <= last {
+            // Where the strain was interpolated, only the reading behind it is known.
+            let interpolated = series.between.get(k) == Some(&true);
+            let reading = if interpolated { k + 1 } else { k };
+            let next = strain[reading];
             if next != now {
                 let turn = (next - now).signum();
-                if turn * direction < 0.0 && amplitude > 0.0 {
-                    let peak = direction * amplitude;
-                    // Only a sample near the amplitude is a turn of the test.
-                    if (peak - now) * direction > 0.0 && now * direction > 0.5 * amplitude {
-                        state.strain_by(peak - now);
-                        now = peak;
+                let peak = direction * amplitude;
+                // Only a sample near the amplitude is a turn of the test.
+                let missed = turn * direction < 0.0
+                    && (peak - now) * direction > 0.0
+                    && now * direction > 0.5 * amplitude;
+                let legs = [if missed { peak } else { now }, next];
+                if interpolated {
+                    let mut ahead = state;
+                    let path = ahead.walk(now, legs, compliance, f64::INFINITY).0;
+                    out[k] = state.walk(now, legs, compliance, 0.5 * path).1;
+                } else {
+                    for leg in legs {
+                        state.strain_by(leg - now);
+                        now = leg;
                     }
                 }
                 direction = turn;
-                state.strain_by(next - now);
                 now = next;
             }
-            *stress = state.stress;
+            out[reading] = state.stress;
+            k = reading + 1;
+        }
+        if late != 0.0 {
+            let shown = out.to_vec();
+            for (k, stress) in out.iter_mut().enumerate() {
+                let place = (k as f64 - late).clamp(0.0, last as f64);
+                let before = place as usize;
+                let share = place - before as f64;
+                *stress = shown[before] * (1.0 - share) + shown[(before + 1).min(last)] * share;
+            }
         }
     }
 }
 
+#[derive(Clone, Copy)]
 struct Steel {
     modulus: f64,
     yield_stress: f64,
-    backstresses: [(f64, f64); 4],
+    backstresses: [(f64, f64); 3],
     isotropic: [(f64, f64); 2],
+    lasting: f64,
     degradation: (f64, f64),
     differential: f64,
     stress: f64,
-    back: [f64; 4],
+    back: [f64; 3],
     path: f64,
 }
 
@@ -194,14 +228,35 @@ impl Steel {
         }
     }
 
+    /// Strains along `legs` from `now`: length of the path of `ε + C σ`, and the stress at `place`
+    /// on it.
+    fn walk(&mut self, now: f64, legs: [f64; 2], compliance: f64, place: f64) -> (f64, f64) {
+        let (mut path, mut from, mut shown) = (0.0, now, None);
+        for leg in legs {
+            let count = ((leg - from).abs() / SUBSTEP).ceil().min(1e4);
+            let strain = (leg - from) / count.max(1.0);
+            for _ in 0..count as usize {
+                let before = self.stress;
+                self.step(strain);
+                let moved = (strain + compliance * (self.stress - before)).abs();
+                if shown.is_none() && path + moved >= place {
+                    shown = Some(before + (place - path) / moved * (self.stress - before));
+                }
+                path += moved;
+            }
+            from = leg;
+        }
+        (path, shown.unwrap_or(self.stress))
+    }
+
     fn step(&mut self, strain: f64) {
         let (share, share_rate) = self.degradation;
         let modulus = self.modulus * (1.0 - share * (1.0 - (-share_rate * self.path).exp()));
         let back: f64 = self.back.iter().sum();
         let trial = self.stress + modulus * strain;
         let side = (trial - back).signum();
-        let mut radius = self.yield_stress;
-        let mut slope = 0.0;
+        let mut radius = self.yield_stress + self.lasting * self.path;
+        let mut slope = self.lasting;
         for (limit, rate) in self.isotropic {
             let left = (-rate * self.path).exp();
             radius += limit * (1.0 - left);
@@ -226,5 +281,54 @@ impl Steel {
         }
         self.path += plastic;
         self.stress = trial - side * modulus * plastic;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stress(strain: &[f64], amplitude: f64, compliance: f64) -> Vec<f64> {
+        let series = Series::new("path", 1.0, vec![strain.to_vec()], vec![0.0; strain.len()]);
+        let effects: Vec<f64> = CyclicMaterial
+            .effects()
+            .iter()
+            .flat_map(|effect| {
+                if effect.candidate.effect == "frame_compliance" {
+                    vec![compliance]
+                } else {
+                    effect.off.clone()
+                }
+            })
+            .collect();
+        // Perfectly plastic at 400 MPa.
+        let nominal = [2e11, 4e8, 0.0, 1.0, amplitude];
+        let mut out = vec![0.0; strain.len()];
+        CyclicMaterial.simulate(&series, &nominal, &effects, &mut out);
+        out
+    }
+
+    #[test]
+    fn a_turn_between_readings_reaches_the_amplitude_and_its_sample_lies_half_way() {
+        // From 1.95 % on to 2 % and back to 1.8 %: half of that path is 0.075 % behind the turn.
+        let strain = [0.0, 0.0195, 0.01875, 0.018];
+        let out = stress(&strain, 0.02, 0.0);
+        assert!((out[1] - 4e8).abs() < 1.0);
+        assert!((out[2] - (4e8 - 2e11 * 7.5e-4)).abs() < 1e6, "{}", out[2]);
+        assert!(out[3].abs() < 1e6, "{}", out[3]);
+        // Without a known amplitude the readings are all there is.
+        let plain = stress(&strain, 0.0, 0.0);
+        assert!((plain[3] - 1e8).abs() < 1e6, "{}", plain[3]);
+    }
+
+    #[test]
+    fn a_compliant_frame_moves_the_sample_that_was_interpolated() {
+        // Back from 4e8 Pa by 0.4 % strain to -4e8 Pa at 0.4 %, then 0.2 % of plastic strain. With
+        // compliance C the path is 0.004 + C 8e8 Pa, then 0.002; its half lies in the elastic leg.
+        let strain = [0.0, 0.018, 0.015, 0.012];
+        let [stiff, soft] = [0.0, 5e-12].map(|c| stress(&strain, 0.0, c)[2]);
+        let expected = |c: f64| 4e8 - 2e11 * 0.5 * (0.006 + 8e8 * c) / (1.0 + 2e11 * c);
+        assert!((stiff - expected(0.0)).abs() < 1e6, "{stiff}");
+        assert!((soft - expected(5e-12)).abs() < 1e6, "{soft}");
     }
 }

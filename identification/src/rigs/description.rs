@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::{KINDS, Named, Rig, of_kind};
-use crate::case::factor_to;
+use crate::units::convert;
 
 /// A set of measurements of one rig.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -110,6 +110,9 @@ pub struct Series {
     pub output: Vec<f64>,
     /// The first input without what a median of five samples takes out.
     pub cleaned: Vec<f64>,
+    /// True where the first input lies half way between its neighbours to rounding: such a sample
+    /// was interpolated, not measured.
+    pub between: Vec<bool>,
     /// Middle of the first input's range.
     pub middle: f64,
     /// True where a sample is left out.
@@ -133,12 +136,45 @@ impl Series {
             name: name.to_owned(),
             step,
             cleaned: median_of_five(first),
+            between: half_way(first, high - low),
             middle: 0.5 * (low + high),
             left_out: vec![false; output.len()],
             inputs,
             output,
         }
     }
+}
+
+/// Rows without a time are points of a path, where a row that repeats the one before to rounding
+/// says nothing new.
+fn read_repeats_once(columns: &mut [Vec<f64>]) {
+    let rows = columns.first().map_or(0, Vec::len);
+    let near: Vec<f64> = columns
+        .iter()
+        .map(|column| 1e-10 * column.iter().fold(0.0, |size: f64, c| size.max(c.abs())))
+        .collect();
+    let new: Vec<bool> = (0..rows)
+        .map(|k| {
+            let mut pairs = columns.iter().zip(&near);
+            k == 0 || pairs.any(|(column, near)| (column[k] - column[k - 1]).abs() > *near)
+        })
+        .collect();
+    for column in columns {
+        let mut keep = new.iter();
+        column.retain(|_| keep.next() == Some(&true));
+    }
+}
+
+/// Single samples half way between two that differ.
+fn half_way(values: &[f64], range: f64) -> Vec<bool> {
+    let mut between = vec![false; values.len()];
+    for (k, v) in values.windows(3).enumerate() {
+        let step = v[2] - v[0];
+        between[k + 1] = !between[k]
+            && (v[1] - v[0] - 0.5 * step).abs() < 1e-10 * range
+            && step.abs() > 1e-10 * range;
+    }
+    between
 }
 
 fn median_of_five(values: &[f64]) -> Vec<f64> {
@@ -182,8 +218,8 @@ impl Description {
         quantity: &Quantity,
         si: &str,
     ) -> Result<(f64, f64), DescriptionError> {
-        let factor =
-            factor_to(&quantity.unit, si).map_err(|why| self.wrong(format!("`{what}`: {why}")))?;
+        let factor = convert(1.0, &quantity.unit, si)
+            .map_err(|why| self.wrong(format!("`{what}`: {why}")))?;
         if !quantity.value.is_finite() || quantity.plus_minus.is_nan() || quantity.plus_minus < 0.0
         {
             return Err(self.wrong(format!(
@@ -320,7 +356,7 @@ impl Description {
             let column = self.columns.get(*name).ok_or_else(|| {
                 self.wrong(format!("`columns.{name}` is missing: a column in {si}"))
             })?;
-            let factor = factor_to(&column.unit, si)
+            let factor = convert(1.0, &column.unit, si)
                 .map_err(|why| self.wrong(format!("`columns.{name}`: {why}")))?;
             let place = header
                 .iter()
@@ -354,6 +390,9 @@ impl Description {
             }
         }
         let time = if timed { columns.pop() } else { None };
+        if time.is_none() {
+            read_repeats_once(&mut columns);
+        }
         let output = columns.pop().unwrap_or_default();
         if output.len() < 128 {
             return Err(data(
@@ -386,5 +425,30 @@ impl Description {
             .file_stem()
             .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         Ok(Series::new(&name, step, columns, output))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_half_way_between_two_readings_are_told_from_readings() {
+        let between = half_way(&[0.0, 1.0, 2.0, 4.0, 6.0, 6.5, 9.0, 9.0], 9.0);
+        assert_eq!(
+            between,
+            [false, true, false, true, false, false, false, false]
+        );
+    }
+
+    #[test]
+    fn rows_that_repeat_are_read_once() {
+        let mut columns = vec![
+            vec![0.0, 1.0, 1.0, 1.0, 2.0, 2.0 + 1e-14],
+            vec![0.0, 5.0, 5.0, 6.0, 7.0, 7.0],
+        ];
+        read_repeats_once(&mut columns);
+        assert_eq!(columns[0], [0.0, 1.0, 1.0, 2.0]);
+        assert_eq!(columns[1], [0.0, 5.0, 6.0, 7.0]);
     }
 }

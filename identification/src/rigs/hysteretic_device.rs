@@ -53,6 +53,22 @@ impl Rig for HystereticDevice {
                 &[0.0],
                 &[&[0.1], &[-0.1]],
             ),
+            // Asymmetry a e^{-c X}, X the greatest excursion so far: a surface, like the rubber of
+            // Mullins (Rubber Chem. Technol. 42, 1969), remembers how far it was driven.
+            effect(
+                "excursion_memory",
+                vec![size("decay", "1/m", 5.0, (-100.0, 500.0))],
+                &[0.0],
+                &[&[20.0], &[-10.0]],
+            ),
+            // k (1 + h |f| / F): contact that stiffens as more of it bears (Popov, Contact Mechanics
+            // and Friction, 2010, chapter 5).
+            effect(
+                "hardening_stiffness",
+                vec![size("hardening", "1", 0.05, (0.0, 20.0))],
+                &[0.0],
+                &[&[0.5], &[2.0]],
+            ),
             // Rounded transition: k (1 - r |f / F|^n) with exponent n.
             effect(
                 "rounded_transition",
@@ -124,6 +140,8 @@ impl Rig for HystereticDevice {
             gap,
             unloading,
             stiffness_asymmetry,
+            decay,
+            hardening,
             rounding,
             exponent,
             softness,
@@ -155,11 +173,15 @@ impl Rig for HystereticDevice {
             let after = (before + 1).min(values.len() - 1);
             values[before] * (1.0 - share) + values[after] * share
         };
-        let mut position = x.first().copied().unwrap_or(0.0);
+        let rest = x.first().copied().unwrap_or(0.0);
+        let mut position = rest;
+        let mut greatest = 0.0f64;
         for (k, y) in out.iter_mut().enumerate() {
             let (now, speed) = (at(x, k), at(v, k));
             let mut move_left = now - position;
             position = now;
+            greatest = greatest.max((now - rest).abs());
+            let asymmetry = asymmetry * (-decay * greatest).exp();
             let mut level = 1.0 + rate * speed.abs();
             if excess != 0.0 {
                 level += excess * (-speed.abs() / slow).exp();
@@ -186,16 +208,17 @@ impl Rig for HystereticDevice {
                     travelled = if direction > 0.0 { gap } else { 0.0 };
                 }
                 let side = if loose { direction } else { force.signum() };
-                let k_side = stiffness * (1.0 + side * stiffness_asymmetry);
+                let limit = level * (1.0 + side * asymmetry).max(0.05);
+                let bearing = (force.abs() / limit).min(1.0);
+                let k_side =
+                    stiffness * (1.0 + side * stiffness_asymmetry) * (1.0 + hardening * bearing);
                 if side * direction > 0.0 {
-                    let limit = level * (1.0 + side * asymmetry);
-                    let share = (force.abs() / limit).min(1.0);
                     let mut k_now = k_side;
                     if rounding > 0.0 {
-                        k_now *= 1.0 - rounding * share.powf(exponent);
+                        k_now *= 1.0 - rounding * bearing.powf(exponent);
                     }
                     if softness > 0.0 {
-                        k_now *= 1.0 - softness * (-share / contact).exp();
+                        k_now *= 1.0 - softness * (-bearing / contact).exp();
                     }
                     force += k_now * move_left;
                     if force.abs() > limit {
@@ -226,6 +249,54 @@ impl Rig for HystereticDevice {
             } else {
                 *y = total;
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn asymmetry_fades_with_the_greatest_excursion() {
+        // Slides to 10 mm, back to -5 mm and again to 8 mm: the level keeps that of 10 mm.
+        let path = [0.0, 0.010, -0.005, 0.008];
+        let steps = 1000;
+        let displacement: Vec<f64> = path
+            .windows(2)
+            .flat_map(|p| (0..steps).map(|k| p[0] + (p[1] - p[0]) * f64::from(k) / 1000.0))
+            .chain([0.008])
+            .collect();
+        let n = displacement.len();
+        let series = Series::new(
+            "slides",
+            1e-3,
+            vec![displacement, vec![0.0; n]],
+            vec![0.0; n],
+        );
+        let effects: Vec<f64> = HystereticDevice
+            .effects()
+            .iter()
+            .flat_map(|effect| match effect.candidate.effect {
+                "asymmetric_coulomb_friction" => vec![-0.3],
+                "excursion_memory" => vec![50.0],
+                _ => effect.off.clone(),
+            })
+            .collect();
+        let mut out = vec![0.0; n];
+        HystereticDevice.simulate(&series, &[1e4, 1e8], &effects, &mut out);
+        let fade = |excursion: f64| 0.3 * (-50.0 * excursion).exp();
+        for (place, force) in [
+            (500, 1e4 * (1.0 - fade(0.005))),
+            (1000, 1e4 * (1.0 - fade(0.010))),
+            (2000, -1e4 * (1.0 + fade(0.010))),
+            (n - 1, 1e4 * (1.0 - fade(0.010))),
+        ] {
+            assert!(
+                (out[place] - force).abs() < 30.0,
+                "{place}: {} {force}",
+                out[place]
+            );
         }
     }
 }

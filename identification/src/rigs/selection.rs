@@ -155,13 +155,19 @@ fn compare(before: &[Vec<f64>; 2], after: &[Vec<f64>; 2]) -> Inside {
     }
 }
 
-/// The extensions of `base` by one effect that fit best.
-fn extensions(measured: &Measured<'_>, base: &Model, record: usize) -> Option<Vec<(usize, Model)>> {
+/// The extensions of `base` by one of `among` that fit best.
+fn extensions(
+    measured: &Measured<'_>,
+    base: &Model,
+    among: &[usize],
+    record: usize,
+) -> Option<Vec<(usize, Model)>> {
     let rig = measured.with_scale(scale_of(base));
     let start = evaluate(&rig, &base.point, &[record])?;
     let jacobian = Jacobian::at(&rig, &start, &[record])?;
     let mut quick: Vec<(usize, Fit)> = Vec::new();
-    for (effect, candidate) in rig.candidates().iter().enumerate() {
+    for &effect in among {
+        let candidate = &rig.candidates()[effect];
         let held =
             |i: usize| i == effect || candidate.look_alikes.contains(&rig.candidates()[i].effect);
         if base.point.effects.iter().any(|(i, _)| held(*i)) {
@@ -192,6 +198,20 @@ fn extensions(measured: &Measured<'_>, base: &Model, record: usize) -> Option<Ve
     )
 }
 
+/// Whether `rival` in the place of the effect that `without` lacks gains nearly what that gains.
+fn replaces(
+    measured: &Measured<'_>,
+    part: Selection,
+    rival: usize,
+    without: &Model,
+    current: &Model,
+) -> Option<bool> {
+    let (_, replaced) = extensions(measured, without, &[rival], part as usize)?.pop()?;
+    let before = crossed(measured, part, without)?;
+    let gain = |model: &Model| Some(compare(&before, &crossed(measured, part, model)?).gain);
+    Some(gain(&replaced)? > RIVAL * gain(current)?)
+}
+
 /// Finds the effects that `part` asks for.
 pub fn select(measured: &Measured<'_>, part: Selection, verbose: bool) -> Option<Selected> {
     let record = part as usize;
@@ -212,10 +232,11 @@ pub fn select(measured: &Measured<'_>, part: Selection, verbose: bool) -> Option
     let scale = (power * correlation_time(&errors)).sqrt();
     let nominal = settle(measured, &origin, scale, record, 6)?;
     let mut current = nominal.clone();
-    let mut rivals = Vec::new();
+    let mut rivals: Vec<Rival> = Vec::new();
+    let all: Vec<usize> = (0..measured.candidates().len()).collect();
     while current.point.effects.len() < MOST_EFFECTS {
         let before = crossed(measured, part, &current)?;
-        let mut tried: Vec<(Inside, usize, Model)> = extensions(measured, &current, record)?
+        let mut tried: Vec<(Inside, usize, Model)> = extensions(measured, &current, &all, record)?
             .into_iter()
             .filter_map(|(effect, model)| {
                 let after = crossed(measured, part, &model)?;
@@ -278,8 +299,14 @@ pub fn select(measured: &Measured<'_>, part: Selection, verbose: bool) -> Option
             }
         }
     };
-    let held = |effect: usize| current.point.effects.iter().any(|(i, _)| *i == effect);
-    rivals.retain(|rival| held(rival.against) && !held(rival.effect));
+    // What came near while other effects were still missing may be far behind at the end.
+    let place = |effect: usize| current.point.effects.iter().position(|(i, _)| *i == effect);
+    rivals.retain(|rival| match (place(rival.against), place(rival.effect)) {
+        (Some(i), None) => {
+            replaces(measured, part, rival.effect, &without[i], &current).unwrap_or(false)
+        }
+        _ => false,
+    });
     let rig = measured.with_scale(scale_of(&current));
     let last = evaluate(&rig, &current.point, &[record])?;
     let covariance =

@@ -12,7 +12,7 @@ use super::compare_tables;
 use crate::error::Error;
 use crate::experiment::{Request, prepare};
 use crate::fmu::FmiVersion;
-use crate::master::Algorithm;
+use crate::master::{Algorithm, Ended};
 use crate::metrics;
 use crate::motion;
 use crate::system::built_in;
@@ -60,6 +60,30 @@ pub(super) struct Row {
     pub(super) peak_displacement_m: Option<f64>,
     /// `complete`, `interlock` or `failed`.
     pub(super) ended: &'static str,
+    /// Why it ended early.
+    pub(super) ended_because: Option<String>,
+    /// When it was stopped, s.
+    pub(super) ended_s: Option<f64>,
+    /// For the plots, of the first motion only.
+    #[serde(skip)]
+    pub(super) history: Option<History>,
+}
+
+impl Row {
+    pub(super) fn is_complete(&self) -> bool {
+        self.ended == "complete"
+    }
+}
+
+/// How far the table was from its reference, a value a sample.
+#[derive(Debug, Clone)]
+pub(super) struct History {
+    /// Sample time, s.
+    pub(super) dt: f64,
+    /// m.
+    pub(super) displacement_error: Vec<f64>,
+    /// m/s².
+    pub(super) acceleration_error: Vec<f64>,
 }
 
 /// What is played.
@@ -97,8 +121,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     let rows: Result<Vec<Row>, Error> = requests
         .par_iter()
-        .map(|request| {
-            let row = run(request);
+        .enumerate()
+        .map(|(place, request)| {
+            let is_first = place.is_multiple_of(played.len().max(1));
+            let row = run(request, is_first);
             bar.inc(1);
             row
         })
@@ -133,11 +159,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             println!("  {}", file.display());
         }
     }
-    let failed: Vec<&Row> = rows.iter().filter(|row| row.ended != "complete").collect();
+    let failed: Vec<&Row> = rows.iter().filter(|row| !row.is_complete()).collect();
     for row in &failed {
         eprintln!(
-            "error: {} on {} ended early ({})",
-            row.controller, row.record, row.ended
+            "error: {} on {} ended early ({}): {}",
+            row.controller,
+            row.record,
+            row.ended,
+            row.ended_because.as_deref().unwrap_or_default()
         );
     }
     Ok(if failed.is_empty() {
@@ -244,12 +273,24 @@ fn request(arguments: &Arguments, controller: &str, played: &Played) -> Request 
     }
 }
 
-fn run(request: &Request) -> Result<Row, Error> {
+fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {
     let prepared = prepare(request)?;
     let outcome = prepared.run(request.algorithm)?;
     let column = |name: &str| outcome.record.column(&format!("table.{name}"));
-    let tracking = column("displacement").zip(column("acceleration"));
-    let tracking = tracking.and_then(|(x, a)| metrics::tracking(&prepared.motion, &x, &a).ok());
+    let motion = &prepared.motion;
+    let histories = column("displacement").zip(column("acceleration"));
+    let tracking = histories
+        .as_ref()
+        .and_then(|(x, a)| metrics::tracking(motion, x, a).ok());
+    let difference = |got: &[f64], wanted: &[f64]| {
+        let pairs = got.iter().zip(wanted);
+        pairs.map(|(got, wanted)| got - wanted).collect()
+    };
+    let history = histories.filter(|_| keep_history).map(|(x, a)| History {
+        dt: motion.dt,
+        displacement_error: difference(&x, &motion.displacement),
+        acceleration_error: difference(&a, &motion.acceleration),
+    });
     Ok(Row {
         record: prepared.motion.name.clone(),
         controller: request.system.clone(),
@@ -257,5 +298,11 @@ fn run(request: &Request) -> Result<Row, Error> {
         frequency_domain_percent: tracking.map(|t| t.frequency_domain_percent),
         peak_displacement_m: tracking.map(|t| t.peak_displacement),
         ended: outcome.ended.word(),
+        ended_because: match &outcome.ended {
+            Ended::Complete => None,
+            ended => Some(ended.story()),
+        },
+        ended_s: outcome.ended.time(),
+        history,
     })
 }

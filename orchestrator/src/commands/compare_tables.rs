@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::compare::Row;
+use super::compare::{History, Row};
 use super::table::aligned;
 use crate::error::Error;
-use crate::report::{self, Cell, Report, Section};
+use crate::report::{self, Axis, Cell, Panel, Report, Section, Series, Units};
 
 /// A record of the thesis: how a file of it is recognised, its title, and the printed errors, loop
 /// shaping, sliding mode (Table 4-1) and model predictive control (Table 5-2), in frequency and
@@ -103,11 +103,13 @@ pub(super) struct Words {
 pub(super) struct Median {
     time_domain_percent: Option<f64>,
     frequency_domain_percent: Option<f64>,
+    /// Runs that were stopped or failed; they count as worse than any other.
+    ended_early: usize,
 }
 
 type Measure = fn(&Row) -> Option<f64>;
 
-/// Medians of each controller over the motions.
+/// Medians of each controller over the motions; none where half of the runs ended early.
 pub(super) fn medians(rows: &[Row], controllers: &[String]) -> BTreeMap<String, Median> {
     let of = |controller: &str, measure: Measure| median(&column(rows, controller, measure));
     controllers
@@ -116,6 +118,7 @@ pub(super) fn medians(rows: &[Row], controllers: &[String]) -> BTreeMap<String, 
             let median = Median {
                 time_domain_percent: of(controller, |row| row.time_domain_percent),
                 frequency_domain_percent: of(controller, |row| row.frequency_domain_percent),
+                ended_early: ended_early(rows, controller),
             };
             (controller.clone(), median)
         })
@@ -177,7 +180,14 @@ fn words(
             let theirs = known
                 .zip(place(controller))
                 .map(|(printed, at)| values(printed)[at]);
-            line.push(cell(ours.next().and_then(measure), theirs));
+            let ours = ours.next();
+            line.push(match ours {
+                Some(row) if !row.is_complete() => match row.ended_s {
+                    Some(time) => format!("stopped at {time:.1} s"),
+                    None => "failed".to_string(),
+                },
+                _ => cell(ours.and_then(measure), theirs),
+            });
         }
         lines.push(line);
     }
@@ -241,6 +251,8 @@ pub(super) fn write(
                     .into(),
             ],
             tables: tables.iter().map(Words::table).collect(),
+            notes: early(rows),
+            panels: panels(rows),
             ..Section::default()
         }],
         footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
@@ -261,33 +273,88 @@ pub(super) fn write(
     Ok(files)
 }
 
+/// A line for each run that ended early.
+fn early(rows: &[Row]) -> Vec<String> {
+    let early = rows.iter().filter(|row| !row.is_complete());
+    early
+        .map(|row| {
+            format!(
+                "{} on {} ended early and counts as worse than any other: {}",
+                row.controller,
+                row.record,
+                row.ended_because.as_deref().unwrap_or(row.ended)
+            )
+        })
+        .collect()
+}
+
+/// Errors over time on the first motion, a line for each controller.
+fn panels(rows: &[Row]) -> Vec<Panel> {
+    let kept: Vec<(&Row, &History)> = rows
+        .iter()
+        .filter_map(|row| Some((row, row.history.as_ref()?)))
+        .collect();
+    let Some((first, _)) = kept.first() else {
+        return Vec::new();
+    };
+    let panel = |what: &str, units: Units, values: fn(&History) -> &[f64]| Panel {
+        title: format!("{what} error on {}", first.record),
+        x: Axis::linear("time", Units::TIME),
+        y: Axis::linear("table less reference", units),
+        series: kept
+            .iter()
+            .map(|(row, history)| Series::history(&row.controller, history.dt, values(history)))
+            .collect(),
+    };
+    vec![
+        panel("Displacement", Units::DISPLACEMENT, |h| {
+            &h.displacement_error
+        }),
+        panel("Acceleration", Units::ACCELERATION, |h| {
+            &h.acceleration_error
+        }),
+    ]
+}
+
 fn known(record: &str) -> Option<&'static Printed> {
     let name = record.to_lowercase();
     PRINTED.iter().find(|printed| name.contains(printed.file))
 }
 
+/// Values of a controller; a run that ended early counts as infinitely bad.
 fn column(rows: &[Row], controller: &str, measure: Measure) -> Vec<f64> {
     let own = rows.iter().filter(|row| row.controller == controller);
-    own.filter_map(measure).collect()
+    own.filter_map(|row| match row.is_complete() {
+        true => measure(row),
+        false => Some(f64::INFINITY),
+    })
+    .collect()
+}
+
+fn ended_early(rows: &[Row], controller: &str) -> usize {
+    let own = rows.iter().filter(|row| row.controller == controller);
+    own.filter(|row| !row.is_complete()).count()
 }
 
 fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let middle = sorted.len() / 2;
-    match sorted.len() {
-        0 => None,
-        length if length % 2 == 1 => Some(sorted[middle]),
-        _ => Some(0.5 * (sorted[middle - 1] + sorted[middle])),
-    }
+    let median = match sorted.len() {
+        0 => return None,
+        length if length % 2 == 1 => sorted[middle],
+        _ => 0.5 * (sorted[middle - 1] + sorted[middle]),
+    };
+    median.is_finite().then_some(median)
 }
 
-/// Of a sample (over n - 1), as in Table 4-1.
+/// Of a sample (over n - 1), as in Table 4-1; none where a run ended early.
 fn deviation(values: &[f64]) -> Option<f64> {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let sum: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    (values.len() > 1).then(|| (sum / (count - 1.0)).sqrt())
+    let variance = sum / (count - 1.0);
+    (values.len() > 1 && variance.is_finite()).then(|| variance.sqrt())
 }
 
 #[cfg(test)]
@@ -304,6 +371,37 @@ mod tests {
         }
         let frequency: Vec<f64> = PRINTED.iter().map(|p| p.frequency[0]).collect();
         assert!((median(&frequency).unwrap() - 0.63).abs() < 1e-9);
+    }
+
+    #[test]
+    fn runs_that_ended_early_count_as_worse_than_any_other() {
+        let row = |percent: f64, ended: &'static str| Row {
+            record: "any".into(),
+            controller: "mpc".into(),
+            time_domain_percent: Some(percent),
+            frequency_domain_percent: Some(percent),
+            peak_displacement_m: None,
+            ended,
+            ended_because: None,
+            ended_s: Some(3.21),
+            history: None,
+        };
+        let mut rows = vec![
+            row(0.1, "interlock"),
+            row(2.0, "complete"),
+            row(3.0, "complete"),
+        ];
+        let controllers = ["mpc".to_string()];
+        let median = |rows: &[Row]| medians(rows, &controllers)["mpc"].time_domain_percent;
+        assert_eq!(median(&rows), Some(3.0));
+        assert!(
+            tables(&rows, &controllers)[0]
+                .text()
+                .contains("stopped at 3.2 s")
+        );
+        rows[1].ended = "failed";
+        assert_eq!(median(&rows), None);
+        assert_eq!(medians(&rows, &controllers)["mpc"].ended_early, 2);
     }
 
     #[test]

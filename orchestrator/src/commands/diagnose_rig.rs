@@ -55,11 +55,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let mut value = contract(&report);
     value["wall_s"] = begun.elapsed().as_secs_f64().into();
     if let Some(folder) = out {
-        let path = folder.join("diagnosis.json");
-        value["extended_model"] = path.display().to_string().into();
+        let model = folder.join(diagnose::EXTENDED_MODEL);
+        value["extended_model"] = model.display().to_string().into();
         std::fs::create_dir_all(folder)
-            .and_then(|()| std::fs::write(&path, format!("{value:#}\n")))
-            .map_err(|error| fault(&path, error))?;
+            .and_then(|()| std::fs::write(&model, extended_model(&report)))
+            .map_err(|error| fault(&model, error))?;
+        let path = folder.join(diagnose::DIAGNOSIS);
+        std::fs::write(&path, format!("{value:#}\n")).map_err(|error| fault(&path, error))?;
         for (name, panel) in pictures(&description, &measurement, &report).map_err(fail)? {
             let path = folder.join(name);
             std::fs::write(&path, svg(&panel)).map_err(|error| fault(&path, error))?;
@@ -78,6 +80,32 @@ fn fault(path: &Path, error: impl std::fmt::Display) -> Error {
         path: path.into(),
         reason: error.to_string(),
     }
+}
+
+/// The refitted parameters and the effects, each in the form that a description's `[nominal]` has.
+fn extended_model(report: &Report) -> String {
+    let part = &report.as_described;
+    let line = |p: &rigs::Value| {
+        // The debug form always has a point or an exponent: a TOML float.
+        format!(
+            "{} = {{ value = {:?}, plus_minus = {:?}, unit = \"{}\" }}\n",
+            p.name, p.value, p.standard_error, p.unit
+        )
+    };
+    let section = |name: &str, values: &[rigs::Value]| {
+        let lines: String = values.iter().map(line).collect();
+        format!("\n[{name}]\n{lines}")
+    };
+    let mut text = format!(
+        "# What the data say of this rig: value and standard error, SI.\nname = {}\nkind = \"{}\"\n",
+        toml::Value::from(report.name.clone()),
+        report.kind
+    );
+    text += &section("nominal", &part.parameters);
+    for effect in &part.effects {
+        text += &section(&format!("effects.{}", effect.effect), &effect.parameters);
+    }
+    text
 }
 
 /// The fields that scripts read from every diagnosis, and `rig` with everything.
@@ -118,6 +146,7 @@ fn contract(report: &Report) -> serde_json::Value {
             "after_nrmse": part.extended_error,
             "noise_floor_nrmse": null,
             "interval_95": [part.gain_interval.0, part.gain_interval.1],
+            "interval_of": "share of the refitted model's squared error that the effects take away",
             "record": "left out",
         },
         "unexplained_share": report.unexplained,
@@ -238,7 +267,11 @@ fn pictures(
     let step = series.step * every as f64;
     let over_time = Panel {
         title: format!("{}: error of {output} on the data left out", report.name),
-        x: Axis::linear("time", Units::TIME),
+        x: if description.columns.contains_key("time") {
+            Axis::linear("time", Units::TIME)
+        } else {
+            Axis::linear("sample", Units::NONE)
+        },
         y: Axis::linear("measured - simulated", units(si)),
         series: vec![
             Series::history("nominal", step, &thin(&nominal_errors)).coloured(2),
@@ -257,7 +290,7 @@ fn pictures(
                 .coloured(colour)
         };
         Panel {
-            title: format!("{}: {output} over {input}, {}", report.name, series.name),
+            title: format!("{}, {}", report.name, series.name),
             x: Axis::linear(input, units(input_si)),
             y: Axis::linear(output, units(si)),
             series: vec![

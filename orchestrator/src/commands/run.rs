@@ -127,7 +127,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 
     let plan = (request.algorithm, *step, *samples);
     let manifest = Manifest::new(&request, system, motion, plan, &outcome.record);
-    let summary = summary::Summary::new(&request, &prepared, &outcome);
+    let summary = summary::Summary::new(&request, &prepared, &outcome, &manifest);
     let files = summary::write(&folder, &prepared, &outcome, &summary, &manifest)?;
     for line in &summary.warnings {
         eprintln!("warning: {line}");

@@ -1,5 +1,6 @@
 //! The figures and files of a run.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -29,6 +30,8 @@ pub struct Summary {
     real_time_factor: f64,
     ended: &'static str,
     ended_because: Option<String>,
+    /// Seeds of random components (such as sensors' noise), by instance.
+    seeds: BTreeMap<String, serde_json::Value>,
     tracking: Option<TrackingSummary>,
     /// What the user should know.
     pub(super) warnings: Vec<String>,
@@ -56,7 +59,12 @@ struct TrackingSummary {
 
 impl Summary {
     /// Measures a run.
-    pub(super) fn new(request: &Request, prepared: &Prepared, outcome: &Outcome) -> Self {
+    pub(super) fn new(
+        request: &Request,
+        prepared: &Prepared,
+        outcome: &Outcome,
+        manifest: &Manifest,
+    ) -> Self {
         let Prepared { system, motion, .. } = prepared;
         let mut warnings: Vec<String> = outcome
             .messages
@@ -111,6 +119,14 @@ impl Summary {
                 Ended::Complete => None,
                 ended => Some(ended.story()),
             },
+            seeds: manifest
+                .components
+                .iter()
+                .filter_map(|(name, part)| {
+                    let (seed, _) = part.parameters.get("seed")?;
+                    Some((name.clone(), seed.clone()))
+                })
+                .collect(),
             tracking: figures.map(|tracking| TrackingSummary {
                 time_domain_percent: tracking.time_domain_percent,
                 frequency_domain_percent: tracking.frequency_domain_percent,
@@ -129,6 +145,9 @@ impl Summary {
         let mut text = format!("{} on {}\n", self.system, self.motion.name);
         for note in &motion.notes {
             text += &format!("  {note}\n");
+        }
+        for (name, seed) in &self.seeds {
+            text += &format!("  seed of the noise of `{name}`: {seed}\n");
         }
         text += &format!(
             "\n{} steps of {} ms (FMI {}, {}), {} times real time, {}\n\n",

@@ -68,11 +68,12 @@ impl Action {
                     return Ok(());
                 }
                 part.inputs.transfer(signals, &part.instance)?;
-                if at.calls {
-                    part.step(at.time, every as f64 * at.step)?;
+                if !at.calls {
+                    return Ok(part.outputs.read(signals, &part.instance)?);
                 }
+                part.step(at.time, every as f64 * at.step)?;
                 if part.failure.is_none() {
-                    part.outputs.read(signals, &part.instance)?;
+                    part.read(signals)?;
                 }
             }
             Self::Iterate {

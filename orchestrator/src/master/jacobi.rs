@@ -18,8 +18,8 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
         part.step(time, ticks as f64 * step)?;
     }
     // A sampled component's outputs are seen by the others at the next tick.
-    for part in parts.iter().filter(|part| part.failure.is_none()) {
-        part.outputs.read(&mut simulation.signals, &part.instance)?;
+    for part in parts.iter_mut().filter(|part| part.failure.is_none()) {
+        part.read(&mut simulation.signals)?;
     }
     Ok(())
 }

@@ -120,6 +120,15 @@ impl Part {
         Ok(())
     }
 
+    /// Reads its outputs into the signals; a failure that may be is kept instead of given.
+    fn read(&mut self, signals: &mut [f64]) -> Result<(), MasterError> {
+        match self.outputs.read(signals, &self.instance) {
+            Err(error) if self.may_fail => self.failure = Some(error.into()),
+            done => done?,
+        }
+        Ok(())
+    }
+
     fn is_due(&self, tick: usize) -> bool {
         self.every.is_none_or(|every| tick.is_multiple_of(every))
     }

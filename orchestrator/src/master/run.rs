@@ -42,6 +42,14 @@ impl Ended {
         }
     }
 
+    /// When the run was stopped before its end, s.
+    pub fn time(&self) -> Option<f64> {
+        match self {
+            Self::Interlock { time, .. } | Self::Stopped { time, .. } => Some(*time),
+            Self::Complete | Self::Failed(_) => None,
+        }
+    }
+
     /// What happened, for people.
     pub fn story(&self) -> String {
         match self {

@@ -32,6 +32,8 @@ struct OutputGroup {
     kind: Kind,
     references: Vec<u32>,
     first: usize,
+    /// What was read, until all of it is known to be good.
+    values: Vec<f64>,
 }
 
 impl Inputs {
@@ -95,6 +97,7 @@ impl Outputs {
     pub(super) fn add(&mut self, kind: &Kind, references: Vec<u32>, first: usize) {
         self.0.push(OutputGroup {
             kind: kind.clone(),
+            values: vec![0.0; references.len()],
             references,
             first,
         });
@@ -105,11 +108,13 @@ impl Outputs {
         self.0.extend(other.0.iter().cloned());
     }
 
-    /// Reads the outputs into the signals.
-    pub(super) fn read(&self, signals: &mut [f64], instance: &Instance) -> Outcome {
+    /// Reads the outputs into the signals, which keep their values where the instance fails.
+    pub(super) fn read(&mut self, signals: &mut [f64], instance: &Instance) -> Outcome {
+        for group in &mut self.0 {
+            instance.get(&group.kind, &group.references, &mut group.values)?;
+        }
         for group in &self.0 {
-            let values = &mut signals[group.first..group.first + group.references.len()];
-            instance.get(&group.kind, &group.references, values)?;
+            signals[group.first..group.first + group.values.len()].copy_from_slice(&group.values);
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use minijinja::{AutoEscape, Environment, Value, context};
 
 use super::chart_data::json_for_script;
 use super::number::significant;
-use super::{Cell, Report, Section, Table};
+use super::{Cell, Report, Section, Table, bars};
 
 const TEMPLATE: &str = include_str!("assets/report.html");
 const STYLE: &str = include_str!("assets/report.css");
@@ -62,11 +62,17 @@ fn section(section: &Section, next_panel: &mut usize) -> Value {
             context! { number, title => panel.title.as_str() }
         })
         .collect();
+    let bars: Vec<_> = section
+        .bars
+        .iter()
+        .map(|one| context! { title => one.title.as_str(), svg => bars::svg(one) })
+        .collect();
     let tables: Vec<_> = section.tables.iter().map(table).collect();
     context! {
         heading => section.heading.as_str(),
         text => section.text.clone(),
         notes => section.notes.clone(),
+        bars,
         tables,
         panels,
     }

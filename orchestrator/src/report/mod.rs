@@ -4,6 +4,7 @@
 //! A [`Report`] is plain data; [`html`] renders it, [`svg`] renders one [`Panel`]. [`run`] makes
 //! the report of a run; comparisons, designs, identification and diagnosis fill the same data.
 
+mod bars;
 mod chart_data;
 mod html;
 mod number;
@@ -13,6 +14,7 @@ mod svg;
 use std::borrow::Cow;
 use std::sync::Arc;
 
+pub use bars::{Bar, BarGroup, Bars};
 pub use html::html;
 pub use run::{Run, run};
 pub use svg::svg;
@@ -54,6 +56,8 @@ pub struct Section {
     pub text: Vec<String>,
     /// A list.
     pub notes: Vec<String>,
+    /// Bars, above the tables.
+    pub bars: Vec<Bars>,
     /// Tables.
     pub tables: Vec<Table>,
     /// Plots.

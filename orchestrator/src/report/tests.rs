@@ -79,6 +79,7 @@ fn gallery() -> Report {
             heading: "Loops".into(),
             text: vec!["One & all.".into()],
             notes: vec!["a < b".into()],
+            bars: Vec::new(),
             tables: vec![Table {
                 caption: "Margins".into(),
                 columns: vec!["loop".into(), "crossover".into(), "stroke".into()],

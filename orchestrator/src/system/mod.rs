@@ -7,7 +7,7 @@ mod connection;
 mod error;
 mod file;
 mod graph;
-mod model;
+pub mod model;
 pub mod tuning;
 mod value;
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use identification::model_file::ModelFile;
 use plant::actuator::PublishedActuator;
 use plant::shake_table::ShakeTable;
+use plant::specimen::LinearSpecimen;
 use plant::table::Table;
 
 use super::{Value, hint};
@@ -19,7 +20,8 @@ const PUBLISHED: [(&str, PublishedActuator); 3] = [
 
 /// The parameters that the model `name` gives to a component, as position and value; paths are
 /// relative to `directory`. A published model is one of `ShakeTable`; a file gives its actuator
-/// and table to `ShakeTable` and its specimen to `Specimen`.
+/// and table to `ShakeTable` and its specimen to `Specimen`, and the effects in it to the
+/// component that has them.
 ///
 /// # Errors
 /// An unknown name, a model that must not be simulated (with the reason), a file at fault, a
@@ -60,11 +62,15 @@ pub(super) fn parameters(
 fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>, String> {
     let name = path.display().to_string();
     let file = ModelFile::read(path).map_err(|error| error.to_string())?;
-    let is_table = component.position("actuator_a2").is_some();
-    let values = if is_table {
+    let own = COMPONENTS
+        .into_iter()
+        .find(|(_, mark)| component.position(mark).is_some())
+        .map_or("", |(component, _)| component);
+    let mut values: Vec<(&str, f64)> = Vec::new();
+    if own == "ShakeTable" {
         let rig = file.shake_table(&name).map_err(|error| error.to_string())?;
-        shake_table_values(&rig).to_vec()
-    } else {
+        values.extend(shake_table_values(&rig));
+    } else if own != "Instrumentation" {
         let specimen = file.specimen(&name).map_err(|error| error.to_string())?;
         let specimen = specimen.ok_or_else(|| {
             format!(
@@ -72,22 +78,72 @@ fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>
                 component.model_name
             )
         })?;
-        vec![
-            ("mass", specimen.mass),
-            ("damping", specimen.damping),
-            ("stiffness", specimen.stiffness),
-        ]
-    };
-    place(&values, component).ok_or_else(|| {
+        values.extend(specimen_values(&specimen));
+    }
+    let mut placed = place(&values, component).ok_or_else(|| {
         format!(
-            "{name}: a model of ShakeTable and Specimen, not of {}",
+            "{name}: a model of ShakeTable, Specimen and Instrumentation, not of {}",
             component.model_name
         )
-    })
+    })?;
+    for (effect, parameters) in &file.effects {
+        if component_of(effect) != own {
+            continue;
+        }
+        for (parameter, value) in parameters {
+            let parameter = format!("{effect}.{parameter}");
+            let known = component
+                .of(Causality::Parameter)
+                .map(|index| component.variables[index].name.as_str());
+            let position = parameter_position(component, &parameter).ok_or_else(|| {
+                format!(
+                    "{name}: [effects.{effect}]: {} has no parameter `{parameter}`{}",
+                    component.model_name,
+                    hint(&parameter, known)
+                )
+            })?;
+            placed.push((position, Value::Number(*value)));
+        }
+    }
+    if placed.is_empty() {
+        return Err(format!(
+            "{name}: it says nothing of {}",
+            component.model_name
+        ));
+    }
+    Ok(placed)
+}
+
+/// Components that a model file speaks of, each with a parameter that only it has.
+const COMPONENTS: [(&str, &str); 3] = [
+    ("ShakeTable", "actuator_a2"),
+    ("Specimen", "specimen_absent.absent"),
+    ("Instrumentation", "load_cell_bias.offset"),
+];
+
+/// The component that has the parameters of an effect of the catalogue.
+pub fn component_of(effect: &str) -> &'static str {
+    const SENSORS: [&str; 4] = ["accelerometer_", "displacement_", "load_cell_", "mains_"];
+    if effect.starts_with("specimen_") {
+        "Specimen"
+    } else if SENSORS.iter().any(|sensor| effect.starts_with(sensor)) {
+        "Instrumentation"
+    } else {
+        "ShakeTable"
+    }
+}
+
+/// The parameters of the FMU `Specimen`, SI.
+pub fn specimen_values(specimen: &LinearSpecimen) -> [(&'static str, f64); 3] {
+    [
+        ("mass", specimen.mass),
+        ("damping", specimen.damping),
+        ("stiffness", specimen.stiffness),
+    ]
 }
 
 /// The parameters of the FMU `ShakeTable`, SI.
-pub(super) fn shake_table_values(rig: &ShakeTable) -> [(&'static str, f64); 12] {
+pub fn shake_table_values(rig: &ShakeTable) -> [(&'static str, f64); 12] {
     let ShakeTable { actuator, table } = rig;
     let [a2, a1, a0] = actuator.denominator;
     let [b2, b1, b0] = actuator.voltage_to_force;
@@ -108,15 +164,16 @@ pub(super) fn shake_table_values(rig: &ShakeTable) -> [(&'static str, f64); 12] 
     ]
 }
 
+fn parameter_position(component: &Description, name: &str) -> Option<usize> {
+    component
+        .of(Causality::Parameter)
+        .find(|&index| component.variables[index].name == name)
+}
+
 /// Positions of the parameters, or nothing where the component lacks one.
 fn place(values: &[(&str, f64)], component: &Description) -> Option<Vec<(usize, Value)>> {
-    let position = |name: &str| {
-        component
-            .of(Causality::Parameter)
-            .find(|&index| component.variables[index].name == name)
-    };
     values
         .iter()
-        .map(|&(name, value)| Some((position(name)?, Value::Number(value))))
+        .map(|&(name, value)| Some((parameter_position(component, name)?, Value::Number(value))))
         .collect()
 }

@@ -7,17 +7,17 @@
 //! - displacement PID and loop shaping: the printed controller, its gain changed so that the
 //!   displacement gain is that of three-variable control (half the gain at which the loop
 //!   oscillates);
-//! - force loop under sliding mode: the printed one, its gain changed by the ratio of the plants'
-//!   gains from valve to force and by `FORCE_PART`; lambda and K are `RATE_PART` of
-//!   [`rate_by_rule`] for the loop without that part. Both parts were found by running the rig: with
-//!   the whole gain the noise of the sensors and the late measurements make it oscillate;
+//! - force loop, lambda and K of sliding mode: [`Hierarchy::tuned`], the largest gain that leaves the
+//!   whole hierarchy a margin of 6 dB on the linearised rig;
 //! - sliding mode and model predictive control have the fitted model as theirs and know the delay;
 //!   the latter also knows the sensors' noise and weighs outputs in units of stroke, 20 in/s and 1 g.
 
-use controllers::allocation::ControlAllocation;
-use controllers::sliding_mode::{force_loop, rate_by_rule};
+use std::sync::OnceLock;
+
+use controllers::pid::Pid;
+use controllers::sliding_mode::DISPLACEMENT_INTEGRAL_LEAK;
+use controllers::sliding_mode_tuning::{Hierarchy, SlidingModeTuning};
 use controllers::three_variable::ThreeVariableGains;
-use plant::rig::Rig;
 use plant::servo_hydraulic::ServoHydraulicTable;
 use plant::shake_table::ShakeTable;
 use plant::specimens::YieldingSpecimen;
@@ -63,7 +63,9 @@ pub(super) fn apply(
         None if !is_physical => return Ok(()),
         _ => {}
     }
-    let rules = Rules::new().map_err(|error| error.to_string())?;
+    static RULES: OnceLock<Result<Rules, String>> = OnceLock::new();
+    let rules = RULES.get_or_init(|| Rules::new().map_err(|error| error.to_string()));
+    let rules = rules.as_ref().map_err(Clone::clone)?;
     let mut late_references = Vec::new();
     for (name, component) in &mut file.components {
         match component.fmu.as_str() {
@@ -112,10 +114,7 @@ struct Rules {
     gains: ThreeVariableGains,
     /// Displacement gain over the printed one.
     displacement: f64,
-    /// Force gain over the printed one.
-    force: f64,
-    /// lambda and K, 1/s.
-    rate: f64,
+    sliding: SlidingModeTuning,
 }
 
 fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
@@ -136,32 +135,34 @@ fn set_count(component: &mut ComponentFile, values: &[(&str, usize)]) {
 
 impl Rules {
     fn new() -> Result<Self, plant::ModelError> {
-        let model = ServoHydraulicTable::default().fitted()?;
+        let table = ServoHydraulicTable::default();
+        let model = table.fitted()?;
         let gains = ThreeVariableGains::tuned(&model, DELAY, SAMPLING_PERIOD)?;
-        let printed = controllers::pid::Pid::equation_3_6();
-        let identified = ShakeTable::default();
-        let gain = |rig: &ShakeTable| response(rig, FORCE_FREQUENCY);
-        let force = gain(&identified) / gain(&model);
-        let allocation = ControlAllocation::default();
-        let mut law = force_loop(&allocation);
-        law.proportional *= force;
-        law.integral *= force;
-        let rig = Rig {
-            shake_table: model,
-            specimen: None,
-        };
-        let rate = rate_by_rule(&rig, &law, allocation.force_share, SAMPLING_PERIOD)?;
+        let printed = Pid::equation_3_6();
+        let displacement = gains.proportional / printed.proportional;
+        let sliding = Hierarchy {
+            rig: &table.linearised(),
+            model: &model,
+            displacement: Pid {
+                proportional: gains.proportional,
+                integral: printed.integral * displacement,
+                integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
+                ..printed
+            },
+            delay: DELAY,
+            period: SAMPLING_PERIOD,
+        }
+        .tuned()?;
         Ok(Self {
             model,
             gains,
-            displacement: gains.proportional / printed.proportional,
-            force: FORCE_PART * force,
-            rate: RATE_PART * rate,
+            displacement,
+            sliding,
         })
     }
 
     fn displacement_pid(&self, component: &mut ComponentFile) {
-        let printed = controllers::pid::Pid::equation_3_6();
+        let printed = Pid::equation_3_6();
         set(
             component,
             &[
@@ -195,27 +196,24 @@ impl Rules {
     }
 
     fn force_pid(&self, component: &mut ComponentFile) {
-        let printed = controllers::pid::Pid::equation_3_7();
+        let force = &self.sliding.force;
         set(
             component,
             &[
-                ("proportional_gain", printed.proportional * self.force),
-                ("integral_gain", printed.integral * self.force),
+                ("proportional_gain", force.proportional),
+                ("integral_gain", force.integral),
             ],
         );
     }
 
     fn sliding_mode(&self, component: &mut ComponentFile, specimen: &str) {
         self.model(component);
-        let (displacement, force) = (
-            controllers::pid::Pid::equation_3_6(),
-            controllers::pid::Pid::equation_3_7(),
-        );
+        let (displacement, force) = (Pid::equation_3_6(), &self.sliding.force);
         set(
             component,
             &[
-                ("surface_rate", self.rate),
-                ("reaching_rate", self.rate),
+                ("surface_rate", self.sliding.rate),
+                ("reaching_rate", self.sliding.rate),
                 (
                     "displacement_loop_proportional_gain",
                     displacement.proportional * self.displacement,
@@ -224,11 +222,8 @@ impl Rules {
                     "displacement_loop_integral_gain",
                     displacement.integral * self.displacement,
                 ),
-                (
-                    "force_loop_proportional_gain",
-                    force.proportional * self.force,
-                ),
-                ("force_loop_integral_gain", force.integral * self.force),
+                ("force_loop_proportional_gain", force.proportional),
+                ("force_loop_integral_gain", force.integral),
             ],
         );
         if specimen == "yielding" {
@@ -266,21 +261,4 @@ impl Rules {
     fn model(&self, component: &mut ComponentFile) {
         set(component, &shake_table_values(&self.model));
     }
-}
-
-/// Part of the force loop's gain that sensor noise and late measurements leave.
-const FORCE_PART: f64 = 0.2;
-/// Part of the rate that the weaker force loop can follow.
-const RATE_PART: f64 = 0.35;
-
-/// Where the plants' gains from valve to force are compared, Hz: the middle of the motions' band on
-/// a logarithmic scale.
-const FORCE_FREQUENCY: f64 = 2.2;
-
-/// Magnitude from valve command to actuator force, N/V.
-fn response(rig: &ShakeTable, frequency: f64) -> f64 {
-    let s = nalgebra::Complex::new(0.0, std::f64::consts::TAU * frequency);
-    rig.state_space()
-        .evaluate(s)
-        .map_or(1.0, |outputs| outputs[(3, 0)].norm())
 }

@@ -7,6 +7,7 @@ mod contract;
 mod diagnosis;
 mod failures;
 mod motions;
+mod physical_rig;
 mod systems;
 
 use std::path::Path;

@@ -7,6 +7,7 @@
 
 mod cylinder;
 mod energy;
+mod extended;
 mod fitted;
 mod friction;
 mod linearisation;
@@ -17,6 +18,7 @@ mod valve;
 
 pub use cylinder::Cylinder;
 pub use energy::{Powers, StoredEnergy};
+pub use extended::{ExtendedServoHydraulicState, ExtendedServoHydraulicTable};
 pub use friction::SealFriction;
 pub use rig::{ServoHydraulicRig, ServoHydraulicRigState};
 pub use stops::Stops;

@@ -30,8 +30,8 @@ pub struct Test {
     pub band: (f64, f64),
     /// Seed of reference and noise.
     pub seed: u64,
-    /// Whole samples by which the command acts late.
-    pub delay: usize,
+    /// Time by which the command acts late, s.
+    pub delay: f64,
 }
 
 impl Default for Test {
@@ -44,7 +44,7 @@ impl Default for Test {
             noise: 0.01,
             band: (0.02, 30.0),
             seed: 1,
-            delay: 0,
+            delay: 0.0,
         }
     }
 }
@@ -95,7 +95,11 @@ impl Test {
             shake_table,
             specimen: self.specimen,
         };
-        let system = rig.state_space().sample(PERIOD);
+        // Of each sample the first part is still under the command before.
+        let whole = (self.delay / PERIOD + 1e-9).floor();
+        let part = (self.delay - whole * PERIOD).max(0.0);
+        let early = rig.state_space().sample(part);
+        let system = rig.state_space().sample(PERIOD - part);
         let mut state = nalgebra::DVector::zeros(7);
         let mut law = ThreeVariableControl::table_3_2();
         let mut recorded = vec![Vec::new(); 6];
@@ -122,9 +126,12 @@ impl Test {
             for i in 0..5 {
                 recorded[i + 1].push(measured[i]);
             }
-            let count = recorded[0].len();
-            let acting = recorded[0][(count - 1).saturating_sub(self.delay)];
-            state = system.advance(&state, &dvector![acting]);
+            let latest = recorded[0].len() - 1;
+            let acting = |late: usize| dvector![recorded[0][latest.saturating_sub(late)]];
+            if part > 0.0 {
+                state = early.advance(&state, &acting(whole as usize + 1));
+            }
+            state = system.advance(&state, &acting(whole as usize));
         }
         recorded
     }

@@ -1,22 +1,35 @@
 //! `diagnose`: what the nominal model of a case gets wrong, why, and what knowing it brings.
 
+pub mod co_simulation;
+mod health;
 mod page;
+mod pictures;
+mod text;
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use identification::case::{Case, CaseError};
+use identification::case::{CHANNELS, Case, CaseError};
+use identification::diagnosis::NamedEffect;
 use identification::diagnosis::shake_table::{self, Diagnosis};
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::extended_model::ExtendedModel;
+use crate::pack::{self, FmiVersion, PackedFmu};
 use crate::report;
 use crate::results::Results;
+use crate::system::model::component_of;
+use co_simulation::{Comparison, RigFmus};
+pub use health::RelationReport;
 
 /// File with the extended model, in the folder of `--out`.
 pub const EXTENDED_MODEL: &str = "extended_model.toml";
+/// File with the JSON object, in the folder of `--out`.
+pub const DIAGNOSIS: &str = "diagnosis.json";
 /// File with the report, in the folder of `--out`.
 pub const REPORT: &str = "report.html";
 
@@ -33,14 +46,18 @@ pub struct DiagnosisReport {
     pub alternatives: Vec<Vec<&'static str>>,
     /// The experiment that would tell the first rival apart.
     pub separating_experiment: Option<String>,
-    /// What the extended model brings.
+    /// What the extended model brings, one step ahead.
     pub gain: GainReport,
+    /// The same in closed-loop co-simulation through the FMUs.
+    pub co_simulation: Option<GainReport>,
     /// Where the extended model was written.
     pub extended_model: Option<PathBuf>,
-    /// Where its FMU was written.
+    /// The FMU (3.0) with the first of the effects.
     pub extended_fmu: Option<PathBuf>,
-    /// Errors of the relations R1 to R5 in units of the sensors' noise, nominal model.
-    pub relations: BTreeMap<&'static str, f64>,
+    /// All FMUs of the extended model.
+    pub extended_fmus: Vec<PathBuf>,
+    /// The relations R1 to R5 on the identification record.
+    pub relations: BTreeMap<&'static str, RelationReport>,
     /// Traces left over, strongest first, as normal deviates.
     pub remaining: Vec<(String, f64)>,
     /// Share of the nominal model's excess error that the effects explain.
@@ -73,10 +90,10 @@ pub struct ParameterReport {
     pub standard_error: f64,
 }
 
-/// The gain in [`DiagnosisReport`].
+/// A gain in [`DiagnosisReport`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GainReport {
-    /// Root mean square over the channels of their one-step errors over their variation, nominal.
+    /// Root mean square over the channels of their errors over their variation, nominal.
     pub before_nrmse: f64,
     /// The same for the extended model.
     pub after_nrmse: f64,
@@ -86,7 +103,7 @@ pub struct GainReport {
     pub interval_95: [f64; 2],
     /// The record, which was not fitted.
     pub record: &'static str,
-    /// Whitened error before, in units of the noise floor.
+    /// Error before, in units of the noise floor.
     pub before_ratio: f64,
     /// And after.
     pub after_ratio: f64,
@@ -95,31 +112,12 @@ pub struct GainReport {
 }
 
 impl DiagnosisReport {
-    fn new(diagnosis: &Diagnosis, extended_model: Option<PathBuf>, wall_s: f64) -> Self {
+    fn new(diagnosis: &Diagnosis) -> Self {
         let gain = &diagnosis.gain;
         Self {
             sentence: diagnosis.sentence.clone(),
             verdict: diagnosis.verdict.word(),
-            effects: diagnosis
-                .effects
-                .iter()
-                .map(|effect| EffectReport {
-                    effect: effect.effect,
-                    parameters: effect
-                        .parameters
-                        .iter()
-                        .map(|p| {
-                            let report = ParameterReport {
-                                value: p.value,
-                                unit: p.unit,
-                                standard_error: p.standard_error,
-                            };
-                            (p.name.clone(), report)
-                        })
-                        .collect(),
-                    confidence: effect.confidence,
-                })
-                .collect(),
+            effects: diagnosis.effects.iter().map(effect).collect(),
             alternatives: diagnosis.alternatives.clone(),
             separating_experiment: diagnosis.separating_experiment.clone(),
             gain: GainReport {
@@ -136,13 +134,11 @@ impl DiagnosisReport {
                     .map(|c| (c.channel, [c.before, c.after, c.floor]))
                     .collect(),
             },
-            extended_model,
+            co_simulation: None,
+            extended_model: None,
             extended_fmu: None,
-            relations: diagnosis
-                .relations
-                .iter()
-                .map(|relation| (relation.name, relation.ratio))
-                .collect(),
+            extended_fmus: Vec::new(),
+            relations: BTreeMap::new(),
             remaining: diagnosis
                 .remaining
                 .iter()
@@ -150,48 +146,169 @@ impl DiagnosisReport {
                 .collect(),
             share_explained: diagnosis.share_explained,
             notes: diagnosis.notes.clone(),
-            wall_s,
+            wall_s: 0.0,
         }
     }
 }
 
-/// Diagnoses the case in folder `case`; with `out`, writes the extended model and the HTML report
-/// there, all or nothing.
+fn effect(named: &NamedEffect) -> EffectReport {
+    let parameters = named.parameters.iter().map(|p| {
+        let report = ParameterReport {
+            value: p.value,
+            unit: p.unit,
+            standard_error: p.standard_error,
+        };
+        (p.name.clone(), report)
+    });
+    EffectReport {
+        effect: named.effect,
+        parameters: parameters.collect(),
+        confidence: named.confidence,
+    }
+}
+
+/// Diagnoses the case in folder `case` and writes the extended model, its FMUs, the JSON object and
+/// the report into `folder`, all or nothing.
 ///
 /// # Errors
 /// A case that cannot be read, records that would mislead, a folder that cannot be written.
-pub fn diagnose(case: &Path, out: Option<&Path>) -> Result<DiagnosisReport, Error> {
+pub fn diagnose(case: &Path, folder: &Path) -> Result<DiagnosisReport, Error> {
     let begun = Instant::now();
     let fail = |path: &Path, reason: String| Error::File {
         path: path.into(),
         reason,
     };
-    if let Some(folder) = out {
-        Results::check(folder)?;
-    }
+    Results::check(folder)?;
     let read = Case::read(case).map_err(|error| match error {
         CaseError::File { file, reason } => Error::File { path: file, reason },
         other => fail(case, other.to_string()),
     })?;
     let diagnosis = shake_table::diagnose(&read, false).map_err(|e| fail(case, e.to_string()))?;
-    let extended_model = out.map(|folder| folder.join(EXTENDED_MODEL));
-    let wall = begun.elapsed().as_secs_f64();
-    let report = DiagnosisReport::new(&diagnosis, extended_model, wall);
-    if let Some(folder) = out {
-        let model = toml::to_string(&diagnosis.extended_model)
-            .map_err(|error| fail(&folder.join(EXTENDED_MODEL), error.to_string()))?;
-        let page = report::html(&page::page(
-            &case.display().to_string(),
-            &report,
-            &diagnosis,
-        ))
-        .map_err(|error| fail(&folder.join(REPORT), error.to_string()))?;
-        let mut results = Results::begin(folder)?;
-        results.write_text(EXTENDED_MODEL, &model)?;
-        results.write_text(REPORT, &page)?;
-        results.finish()?;
+    let mut report = DiagnosisReport::new(&diagnosis);
+    report.relations = health::relations(&read, &diagnosis);
+    let model = ExtendedModel::new(&diagnosis.extended_model, &diagnosis.modelled);
+    if report.effects.is_empty() && !diagnosis.modelled.is_empty() {
+        let names: Vec<&str> = diagnosis.modelled.iter().map(|e| e.effect).collect();
+        report.notes.push(format!(
+            "in the extended model for the help they are, not as the cause: {}",
+            names.join(" and ")
+        ));
     }
+    let model_path = folder.join(EXTENDED_MODEL);
+    let model_text = model
+        .toml()
+        .map_err(|error| fail(&model_path, error.to_string()))?;
+    report.extended_model = Some(model_path);
+    let mut results = Results::begin(folder)?;
+    results.write_text(EXTENDED_MODEL, &model_text)?;
+    let mut comparison = None;
+    match fmus(&model, &mut results, folder) {
+        Ok((built, _staged)) => {
+            let home = |fmu: &&(PackedFmu, PathBuf)| {
+                let first = diagnosis.modelled.first();
+                let component = first.map_or("ShakeTable", |named| component_of(named.effect));
+                fmu.0.version == FmiVersion::Three && fmu.0.name == component
+            };
+            report.extended_fmu = built.iter().find(home).map(|fmu| fmu.1.clone());
+            match in_closed_loop(&read, &diagnosis, &built) {
+                Ok(found) => comparison = Some(found),
+                Err(reason) => report
+                    .notes
+                    .push(format!("not co-simulated in closed loop: {reason}")),
+            }
+            report.extended_fmus = built.into_iter().map(|fmu| fmu.1).collect();
+        }
+        Err(error) => report
+            .notes
+            .push(format!("no FMUs of the extended model: {error}")),
+    }
+    report.co_simulation = comparison.as_ref().map(|found| found.gain.clone());
+    report.wall_s = begun.elapsed().as_secs_f64();
+    let page = page::page(
+        case,
+        &read,
+        &report,
+        &diagnosis,
+        &model,
+        comparison.as_ref(),
+    );
+    let page = report::html(&page).map_err(|e| fail(&folder.join(REPORT), e.to_string()))?;
+    results.write_text(REPORT, &page)?;
+    results.write_text(DIAGNOSIS, &format!("{:#}\n", serde_json::json!(report)))?;
+    results.finish()?;
     Ok(report)
+}
+
+/// The FMUs of the extended model with the places they will have, and the folder where they are
+/// until then.
+type Built = (Vec<(PackedFmu, PathBuf)>, tempfile::TempDir);
+
+fn fmus(model: &ExtendedModel, results: &mut Results, folder: &Path) -> Result<Built, Error> {
+    let staged = tempfile::tempdir().map_err(|error| Error::File {
+        path: std::env::temp_dir(),
+        reason: error.to_string(),
+    })?;
+    let originals = pack::all_fmus()?;
+    let written = model.write_fmus(originals, staged.path())?;
+    let mut built = Vec::new();
+    for fmu in written {
+        let name = format!("{}/{}.fmu", fmu.version.folder(), fmu.name);
+        let content = std::fs::read(&fmu.path).map_err(|error| Error::File {
+            path: fmu.path.clone(),
+            reason: error.to_string(),
+        })?;
+        results.write(&name, |file| file.write_all(&content))?;
+        built.push((fmu, folder.join(name)));
+    }
+    Ok((built, staged))
+}
+
+/// The validation record against both rigs in closed loop; a sentence where that cannot be had.
+fn in_closed_loop(
+    case: &Case,
+    diagnosis: &Diagnosis,
+    extended: &[(PackedFmu, PathBuf)],
+) -> Result<Comparison, String> {
+    let record = &case.validation;
+    let law = case.nominal.controller.ok_or("the case states no law")?;
+    if record.reference.len() != record.len() {
+        return Err("the validation record has no column `reference`".into());
+    }
+    if let Some(missing) = [0, 1].into_iter().find(|&i| record.channels[i].is_empty()) {
+        return Err(format!(
+            "without `{}` nothing tells whether the stated law made the command (R5)",
+            CHANNELS[missing]
+        ));
+    }
+    // The law's command is used wherever it explains the recorded one.
+    if diagnosis.validation.signals.command == record.valve_command {
+        return Err("the stated law did not make the recorded command (R5)".into());
+    }
+    let originals = pack::all_fmus().map_err(|error| error.to_string())?;
+    let original = |name: &str| {
+        let mut all = originals.iter();
+        all.find(|fmu| fmu.version == FmiVersion::Three && fmu.name == name)
+            .map(|fmu| fmu.path.clone())
+            .ok_or_else(|| format!("there is no component `{name}`"))
+    };
+    let changed = |name: &str| {
+        let mut all = extended.iter();
+        let found = all.find(|(fmu, _)| fmu.version == FmiVersion::Three && fmu.name == name);
+        found.map_or_else(|| original(name), |(fmu, _)| Ok(fmu.path.clone()))
+    };
+    let rig = |file: &dyn Fn(&str) -> Result<PathBuf, String>| -> Result<RigFmus, String> {
+        Ok(RigFmus {
+            table: (file("ShakeTable")?, Vec::new()),
+            specimen: match case.nominal.specimen {
+                Some(_) => Some((file("Specimen")?, Vec::new())),
+                None => None,
+            },
+            sensors: file("Instrumentation")?,
+            control: file("ThreeVariableControl")?,
+        })
+    };
+    let before = rig(&original)?.nominal(&case.nominal);
+    co_simulation::compare(record, &case.nominal, &law, &before, &rig(&changed)?)
 }
 
 /// Diagnoses a case, writes its files and prints what was found.
@@ -207,14 +324,17 @@ pub fn execute(case: &Path, out: Option<&Path>, json: bool) -> Result<ExitCode, 
         },
         Path::to_path_buf,
     );
-    let report = diagnose(case, Some(&folder))?;
+    let report = diagnose(case, &folder)?;
     if json {
         println!("{}", serde_json::json!(report));
     } else {
-        print!("{}", page::text(&report));
+        print!("{}", text::text(&report));
         println!("\nwritten ({:.1} s):", report.wall_s);
-        for file in [EXTENDED_MODEL, REPORT] {
+        for file in [REPORT, DIAGNOSIS, EXTENDED_MODEL] {
             println!("  {}", folder.join(file).display());
+        }
+        for fmu in &report.extended_fmus {
+            println!("  {}", fmu.display());
         }
     }
     Ok(ExitCode::SUCCESS)

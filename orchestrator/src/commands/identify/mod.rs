@@ -12,6 +12,7 @@ use clap::Args;
 use identification::data::Recording;
 use identification::model_file::ModelFile;
 use identification::rig::{self, Options, RigIdentification};
+use identification::specimen_file;
 use serde::Serialize;
 
 use crate::error::Error;
@@ -34,6 +35,10 @@ pub struct Arguments {
     /// Part of each recording that is fitted before the rest validates it
     #[arg(long, value_name = "PART", default_value_t = 0.75)]
     fit_part: f64,
+    /// Known specimen, held: TOML with [specimen] mass, damping, stiffness and units. One recording
+    /// with it is enough; `specimen_acceleration` may then be missing
+    #[arg(long, value_name = "FILE")]
+    specimen: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -77,8 +82,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         warnings.extend(findings.iter().map(ToString::to_string));
         recordings.extend(long_enough(pieces, &mut warnings));
     }
+    let specimen = match &arguments.specimen {
+        Some(path) => Some(specimen_file::read(path)?),
+        None => None,
+    };
     let options = Options {
         fit_part: arguments.fit_part,
+        specimen,
         ..Options::default()
     };
     let found = rig::identify(&recordings, options)?;

@@ -6,7 +6,7 @@ use super::grammar::Scaled;
 use super::{Dimension, INCH, POUND_FORCE, STANDARD_GRAVITY};
 
 /// The name nearest to `name`, when one is near enough to be worth suggesting.
-pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted = name.to_lowercase();
     known
         .into_iter()

@@ -17,14 +17,8 @@ use std::fmt;
 use thiserror::Error;
 
 use grammar::Parser;
-pub(crate) use names::nearest;
-
-/// Standard gravity, m/s^2.
-pub const STANDARD_GRAVITY: f64 = 9.80665;
-/// One inch, m.
-pub const INCH: f64 = 0.0254;
-/// One pound-force, N.
-pub const POUND_FORCE: f64 = 4.448_221_615_260_5;
+pub use names::nearest;
+pub use plant::units::{G as STANDARD_GRAVITY, INCH, LBF as POUND_FORCE};
 
 /// What is wrong with a unit, or with a number that carries one.
 #[derive(Debug, Clone, PartialEq, Error)]

@@ -1,0 +1,305 @@
+//! The gain in closed loop: the FMUs of the nominal and of the extended rig play the reference of
+//! the validation record under the laboratory's own control law (R5), and are held against what
+//! was measured. The rig is unstable without its controller, so that nothing else would compare
+//! models over a whole record.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use identification::case::{CHANNELS, ControlLaw, Nominal, Record};
+use identification::diagnosis::gain::{running, share_gone};
+
+use super::GainReport;
+use crate::fmu::Fmu;
+use crate::master::{Algorithm, Ended, Pace, Simulation};
+use crate::motion::Motion;
+use crate::system::model::{shake_table_values, specimen_values};
+use crate::system::{SystemFile, assemble};
+
+/// Coupling steps of table and specimen in a sample, the finest that the rig's delays allow (they
+/// last at most thirty steps).
+const STEPS_A_SAMPLE: [f64; 3] = [4.0, 2.0, 1.0];
+/// Runs with the sensors' noise that the floor is the mean of.
+const SEEDS: [i32; 4] = [1, 2, 3, 4];
+
+/// The sensors' readings of [`CHANNELS`], SI.
+pub type Channels = [Vec<f64>; 4];
+
+/// FMUs of a rig, each with the parameters that are set on top of its start values.
+#[derive(Debug, Clone, Default)]
+pub struct RigFmus {
+    /// `ShakeTable`.
+    pub table: (PathBuf, Vec<(&'static str, f64)>),
+    /// `Specimen`, if one is meant to stand on the table.
+    pub specimen: Option<(PathBuf, Vec<(&'static str, f64)>)>,
+    /// `Instrumentation`.
+    pub sensors: PathBuf,
+    /// `ThreeVariableControl`.
+    pub control: PathBuf,
+}
+
+impl RigFmus {
+    /// The same FMUs with the parameters of the nominal model.
+    #[must_use]
+    pub fn nominal(mut self, nominal: &Nominal) -> Self {
+        self.table.1 = shake_table_values(&nominal.shake_table).to_vec();
+        if let (Some(own), Some(specimen)) = (&mut self.specimen, &nominal.specimen) {
+            own.1 = specimen_values(specimen).to_vec();
+        }
+        self
+    }
+}
+
+/// What a rig measures while its law follows `reference` (m), sampled every `period` s; with
+/// `noise` (one standard deviation of each channel, and a seed) as its sensors add it.
+///
+/// # Errors
+/// A law that the component cannot express, FMUs at fault, a run that ends early: a sentence.
+pub fn play(
+    rig: &RigFmus,
+    law: &ControlLaw,
+    reference: &[f64],
+    period: f64,
+    noise: Option<([f64; 4], i32)>,
+) -> Result<Channels, String> {
+    let text = system(rig, law, period, noise)?;
+    let file = SystemFile::parse("closed loop", &text).map_err(|e| e.to_string())?;
+    let mut library = |path: &str| -> Result<Arc<Fmu>, Box<dyn std::error::Error>> {
+        Ok(Fmu::open(Path::new(path))?)
+    };
+    let system = assemble(&file, &[], &mut library).map_err(|e| e.to_string())?;
+    let motion = motion(reference, period);
+    let run = |steps: f64| {
+        let simulation = Simulation::new(&system, &motion, Algorithm::GaussSeidel, period / steps);
+        let outcome =
+            simulation
+                .map_err(|e| e.to_string())?
+                .run(reference.len(), Pace::Fastest, &mut |_| {});
+        match outcome.ended {
+            Ended::Complete => Ok(outcome),
+            other => Err(other.story()),
+        }
+    };
+    let mut outcome = Err(String::new());
+    for steps in STEPS_A_SAMPLE {
+        outcome = run(steps);
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    let outcome = outcome?;
+    let column = |name: &str| {
+        let name = format!("sensors.{name}");
+        let column = outcome.record.column(&name);
+        column.ok_or_else(|| format!("`{name}` was not recorded"))
+    };
+    Ok([
+        column("measured_displacement")?,
+        column("measured_acceleration")?,
+        column("measured_force")?,
+        column("measured_specimen_acceleration")?,
+    ])
+}
+
+/// The reference with its derivatives as the law takes them: central differences.
+fn motion(reference: &[f64], period: f64) -> Motion {
+    let last = reference.len().saturating_sub(1);
+    let around = |k: usize| {
+        let (behind, ahead) = (k.saturating_sub(1), (k + 1).min(last));
+        (reference[behind], reference[k], reference[ahead])
+    };
+    let velocity = |k| {
+        let (behind, _, ahead) = around(k);
+        (ahead - behind) / (2.0 * period)
+    };
+    let acceleration = |k| {
+        let (behind, here, ahead) = around(k);
+        (ahead - 2.0 * here + behind) / (period * period)
+    };
+    Motion {
+        name: "validation".into(),
+        dt: period,
+        displacement: reference.to_vec(),
+        velocity: (0..reference.len()).map(velocity).collect(),
+        acceleration: (0..reference.len()).map(acceleration).collect(),
+        notes: Vec::new(),
+        seed: None,
+    }
+}
+
+/// The closed loop as a system file.
+fn system(
+    rig: &RigFmus,
+    law: &ControlLaw,
+    period: f64,
+    noise: Option<([f64; 4], i32)>,
+) -> Result<String, String> {
+    let share = law.velocity_filter;
+    if !(share > 0.0 && share <= 1.0) {
+        return Err(format!(
+            "controller.velocity_filter = {share}, expected more than 0 and at most 1"
+        ));
+    }
+    let mut sensors = vec![("velocity_lag", period * (1.0 - share) / share)];
+    if let Some((noise, _)) = noise {
+        let names = [
+            "displacement_noise",
+            "acceleration_noise",
+            "actuator_force_noise",
+            "specimen_acceleration_noise",
+        ];
+        let finite = names.into_iter().zip(noise).filter(|(_, n)| n.is_finite());
+        sensors.extend(finite);
+    }
+    // The component feeds back the errors of velocity and acceleration, the law the motion itself.
+    let control = [
+        ("proportional_gain", law.proportional),
+        ("integral_gain", law.integral),
+        ("velocity_feedback_gain", law.velocity_feedback),
+        ("acceleration_feedback_gain", law.acceleration_feedback),
+        ("displacement_feedforward_gain", 0.0),
+        (
+            "velocity_feedforward_gain",
+            law.velocity_feedforward - law.velocity_feedback,
+        ),
+        (
+            "acceleration_feedforward_gain",
+            law.acceleration_feedforward - law.acceleration_feedback,
+        ),
+        ("valve_limit", law.limit),
+    ];
+    let component = |name: &str, fmu: &Path, head: &str, parameters: &[(&str, f64)]| {
+        let fmu = toml::Value::from(fmu.display().to_string());
+        let mut text = format!("[components.{name}]\nfmu = {fmu}\n{head}");
+        text += &format!("[components.{name}.parameters]\n");
+        for (parameter, value) in parameters {
+            // The debug form always has a point or an exponent: a TOML float.
+            text += &format!("\"{parameter}\" = {value:?}\n");
+        }
+        text
+    };
+    let sampled = format!("period = \"{period} s\"\n");
+    let mut text = String::from("connections = [\n");
+    for quantity in ["displacement", "velocity", "acceleration"] {
+        text += &format!(
+            "\"reference.{quantity} -> control.reference_{quantity}\",\n\
+             \"sensors.measured_{quantity} -> control.measured_{quantity}\",\n\
+             \"table.{quantity} -> sensors.{quantity}\",\n"
+        );
+    }
+    text += "\"table.actuator_force -> sensors.actuator_force\",\n\
+             \"control.valve_command -> table.valve_command\",\n";
+    if rig.specimen.is_some() {
+        text += "\"table.acceleration -> specimen.table_acceleration\",\n\
+                 \"specimen.force -> table.specimen_force\",\n\
+                 \"specimen.acceleration -> sensors.specimen_acceleration\",\n";
+    }
+    text += "]\n";
+    text += &component("table", &rig.table.0, "", &rig.table.1);
+    text += &component("sensors", &rig.sensors, &sampled, &sensors);
+    if let Some((_, seed)) = noise {
+        text += &format!("seed = {seed}\n");
+    }
+    text += &component("control", &rig.control, &sampled, &control);
+    match &rig.specimen {
+        Some((fmu, parameters)) => text += &component("specimen", fmu, "", parameters),
+        None => {
+            text += "[components.table.inputs]\nspecimen_force = 0.0\n\
+                     [components.sensors.inputs]\nspecimen_acceleration = 0.0\n";
+        }
+    }
+    Ok(text)
+}
+
+/// What the co-simulated models make of a record.
+#[derive(Debug, Clone)]
+pub(super) struct Comparison {
+    /// Readings of the nominal FMUs.
+    pub before: Channels,
+    /// Readings of the extended FMUs.
+    pub after: Channels,
+    /// Deviation that the sensors' noise makes by itself, through the loop and in the readings.
+    pub floor: [f64; 4],
+    /// The figures.
+    pub gain: GainReport,
+}
+
+/// Plays the reference of `record` through the FMUs of both rigs and holds them against it.
+///
+/// # Errors
+/// As [`play`].
+pub(super) fn compare(
+    record: &Record,
+    nominal: &Nominal,
+    law: &ControlLaw,
+    before: &RigFmus,
+    after: &RigFmus,
+) -> Result<Comparison, String> {
+    let period = 1.0 / nominal.sample_rate;
+    let played = |rig: &RigFmus, noise| play(rig, law, &record.reference, period, noise);
+    let (before, after) = (played(before, None)?, {
+        let clean = played(after, None)?;
+        let mut floor = [0.0; 4];
+        for seed in SEEDS {
+            let noisy = played(after, Some((nominal.noise, seed)))?;
+            for (sum, (noisy, clean)) in floor.iter_mut().zip(noisy.iter().zip(&clean)) {
+                *sum += mean_square(noisy, clean) / SEEDS.len() as f64;
+            }
+        }
+        (clean, floor.map(f64::sqrt))
+    });
+    let (after, floor) = after;
+    let gain = gain(record, &before, &after, &floor);
+    Ok(Comparison {
+        before,
+        after,
+        floor,
+        gain,
+    })
+}
+
+fn mean_square(a: &[f64], b: &[f64]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+    sum / a.len().min(b.len()).max(1) as f64
+}
+
+fn gain(record: &Record, before: &Channels, after: &Channels, floor: &[f64; 4]) -> GainReport {
+    let live: Vec<usize> = (0..4)
+        .filter(|&i| !record.channels[i].is_empty() && floor[i] > 0.0)
+        .collect();
+    let scale = |i: usize| {
+        let deviation = identification::case::deviation(&record.channels[i]);
+        deviation.max(f64::MIN_POSITIVE)
+    };
+    let rms = |simulated: &Channels, i: usize| -> f64 {
+        mean_square(&record.channels[i], &simulated[i]).sqrt()
+    };
+    let channels = live
+        .iter()
+        .map(|&i| {
+            let errors = [rms(before, i), rms(after, i), floor[i]];
+            (CHANNELS[i], errors.map(|error| error / scale(i)))
+        })
+        .collect();
+    let overall = |of: &dyn Fn(usize) -> f64| {
+        let sum: f64 = live.iter().map(|&i| of(i).powi(2)).sum();
+        (sum / live.len().max(1) as f64).sqrt()
+    };
+    // Running sums of the squared error over all channels, in units of their floors.
+    let sums = |simulated: &Channels| -> Vec<f64> {
+        running((0..record.len()).map(|k| {
+            let error = |&i: &usize| (record.channels[i][k] - simulated[i][k]) / floor[i];
+            live.iter().map(|i| error(i).powi(2)).sum::<f64>()
+        }))
+    };
+    GainReport {
+        before_nrmse: overall(&|i| rms(before, i) / scale(i)),
+        after_nrmse: overall(&|i| rms(after, i) / scale(i)),
+        noise_floor_nrmse: overall(&|i| floor[i] / scale(i)),
+        interval_95: share_gone(&sums(before), &sums(after)),
+        record: "validation",
+        before_ratio: overall(&|i| rms(before, i) / floor[i]),
+        after_ratio: overall(&|i| rms(after, i) / floor[i]),
+        channels,
+    }
+}

@@ -1,0 +1,100 @@
+//! The relations R1 to R5 against what they are on a healthy rig.
+
+use std::collections::BTreeMap;
+
+use identification::case::{Case, Nominal, Record};
+use identification::diagnosis::relations;
+use identification::diagnosis::shake_table::Diagnosis;
+use identification::predictor::Disturbance;
+use plant::identified_rig::{IdentifiedRig, IdentifiedRigState};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::Serialize;
+
+/// Seed of the noise on the simulated healthy rig.
+const SEED: u64 = 20_170_401;
+
+/// A relation's error in units of the sensors' noise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RelationReport {
+    /// With the nominal parameters.
+    pub nominal: f64,
+    /// With the parameters that were estimated along, without the effects.
+    pub estimated: f64,
+    /// On a simulated rig of these parameters without effects, under the same reference; none
+    /// where the case states no law or reference. Above one where a record's ends and the unseen
+    /// voltage count.
+    pub healthy: Option<f64>,
+}
+
+/// The relations on the identification record.
+pub(super) fn relations(
+    case: &Case,
+    diagnosis: &Diagnosis,
+) -> BTreeMap<&'static str, RelationReport> {
+    let estimated = Nominal {
+        shake_table: diagnosis.extended_model.shake_table,
+        specimen: diagnosis.extended_model.specimen,
+        ..case.nominal.clone()
+    };
+    let after = relations::relations(&case.identification, &estimated);
+    let healthy = healthy(&case.identification, &estimated)
+        .map(|record| relations::relations(&record, &estimated));
+    let all = diagnosis.relations.iter().map(|relation| {
+        let find = |all: &[relations::Relation]| {
+            let mut all = all.iter();
+            all.find(|other| other.name == relation.name)
+                .map(|other| other.ratio)
+        };
+        let report = RelationReport {
+            nominal: relation.ratio,
+            estimated: find(&after).unwrap_or(relation.ratio),
+            healthy: healthy.as_deref().and_then(find),
+        };
+        (relation.name, report)
+    });
+    all.collect()
+}
+
+/// What a rig of these parameters without effects would record in place of `record`.
+fn healthy(record: &Record, nominal: &Nominal) -> Option<Record> {
+    let law = nominal.controller?;
+    if record.reference.len() != record.len() {
+        return None;
+    }
+    let period = 1.0 / nominal.sample_rate;
+    let rig = IdentifiedRig {
+        shake_table: nominal.shake_table,
+        specimen: nominal.specimen,
+        ..IdentifiedRig::default()
+    };
+    let sampled = rig.sample(period, 1).ok()?;
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let mut normal = move || -> f64 { StandardNormal.sample(&mut random) };
+    let unseen = Disturbance::beside_command(nominal.command_noise, period);
+    let drive = unseen.sigma * (1.0 - unseen.phi * unseen.phi).sqrt();
+    let (mut state, mut control) = (IdentifiedRigState::default(), law.start(period));
+    let mut voltage = 0.0;
+    let mut simulated = Record {
+        channels: Default::default(),
+        valve_command: Vec::new(),
+        ..record.clone()
+    };
+    for k in 0..record.len() {
+        let readings = sampled.measure(&mut state, period * k as f64);
+        let mut measured = [0.0; 4];
+        for i in 0..4 {
+            measured[i] = readings[i] + nominal.noise[i] * normal();
+            if !record.channels[i].is_empty() {
+                simulated.channels[i].push(measured[i]);
+            }
+        }
+        let command = control.command(&record.reference, k, measured[0], measured[1]);
+        let recorded = command + nominal.command_noise * normal();
+        simulated.valve_command.push(recorded);
+        voltage = unseen.phi * voltage + drive * normal();
+        sampled.step_disturbed(&mut state, command, voltage);
+    }
+    Some(simulated)
+}

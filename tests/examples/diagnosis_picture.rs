@@ -1,0 +1,39 @@
+//! Makes the case of `docs/diagnosis-walkthrough.md`, diagnoses it and pictures the report as
+//! `docs/diagnosis-report.png`.
+//!
+//! `cargo run --release -p acceptance --example diagnosis_picture`; the picture needs a Chromium,
+//! named by CHROMIUM where it is not called `chromium`.
+
+use std::path::Path;
+use std::process::Command;
+
+use hidden_effects::case::{Case, Kind, Settings};
+use shakebench::commands::diagnose::{REPORT, diagnose};
+
+/// Seed of the case.
+const SEED: u64 = 7;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let folder = root.canonicalize()?.join("target/diagnosis-walkthrough");
+    let case = folder.join(format!("cases/case-{SEED:05}"));
+    Case::draw(SEED, &Settings::new(Kind::This("valve_dead_band"))).write(&case)?;
+    let report = diagnose(&case, &folder.join("results"))?;
+    println!("{}", report.sentence);
+    let page = folder.join("results").join(REPORT);
+    let picture = root.join("docs/diagnosis-report.png");
+    let browser = std::env::var("CHROMIUM").unwrap_or_else(|_| "chromium".into());
+    let status = Command::new(&browser)
+        .args(["--headless", "--no-sandbox", "--disable-gpu"])
+        .args(["--hide-scrollbars", "--virtual-time-budget=4000"])
+        .arg("--window-size=1200,1245")
+        .arg(format!("--screenshot={}", picture.display()))
+        .arg(format!("file://{}", page.display()))
+        .status()
+        .map_err(|error| format!("{browser}: {error}"))?;
+    if !status.success() {
+        return Err(format!("{browser}: {status}").into());
+    }
+    println!("written: {}", picture.display());
+    Ok(())
+}
