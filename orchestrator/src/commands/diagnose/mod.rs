@@ -210,7 +210,7 @@ pub fn diagnose(case: &Path, folder: &Path) -> Result<DiagnosisReport, Error> {
             let home = |fmu: &&(PackedFmu, PathBuf)| {
                 let first = diagnosis.modelled.first();
                 let component = first.map_or("ShakeTable", |named| component_of(named.effect));
-                fmu.0.version == FmiVersion::Three && fmu.0.name == component
+                fmu.0.version == FmiVersion::V3 && fmu.0.name == component
             };
             report.extended_fmu = built.iter().find(home).map(|fmu| fmu.1.clone());
             match in_closed_loop(&read, &diagnosis, &built) {
@@ -290,13 +290,13 @@ fn in_closed_loop(
     let originals = pack::all_fmus().map_err(|error| error.to_string())?;
     let original = |name: &str| {
         let mut all = originals.iter();
-        all.find(|fmu| fmu.version == FmiVersion::Three && fmu.name == name)
+        all.find(|fmu| fmu.version == FmiVersion::V3 && fmu.name == name)
             .map(|fmu| fmu.path.clone())
             .ok_or_else(|| format!("there is no component `{name}`"))
     };
     let changed = |name: &str| {
         let mut all = extended.iter();
-        let found = all.find(|(fmu, _)| fmu.version == FmiVersion::Three && fmu.name == name);
+        let found = all.find(|(fmu, _)| fmu.version == FmiVersion::V3 && fmu.name == name);
         found.map_or_else(|| original(name), |(fmu, _)| Ok(fmu.path.clone()))
     };
     let rig = |file: &dyn Fn(&str) -> Result<PathBuf, String>| -> Result<RigFmus, String> {
