@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{build, compare, design, diagnose_rig, identify, info, run};
+use crate::commands::{build, compare, design, diagnose_rig, identify, info, report, run};
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -35,6 +35,8 @@ enum Command {
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
     Info(info::Arguments),
+    /// Write the HTML report of a run, a comparison or a diagnosis again
+    Report(report::Arguments),
     /// Run a system on a motion
     Run(Box<run::Arguments>),
 }
@@ -49,6 +51,7 @@ pub fn main() -> ExitCode {
         Some(Command::Diagnose(arguments)) => diagnose_rig::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
+        Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
     };
     done.unwrap_or_else(|error| {

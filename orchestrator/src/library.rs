@@ -50,13 +50,9 @@ impl FmuLibrary {
     }
 
     fn component(&self, name: &str) -> Result<PathBuf, Box<dyn Error>> {
-        let version = match self.version {
-            FmiVersion::V2 => pack::FmiVersion::Two,
-            FmiVersion::V3 => pack::FmiVersion::Three,
-        };
         let packed: Vec<_> = pack::all_fmus()?
             .iter()
-            .filter(|fmu| fmu.version == version)
+            .filter(|fmu| fmu.version == self.version)
             .collect();
         let found = packed.iter().find(|fmu| fmu.name == name);
         let found = found.ok_or_else(|| {

@@ -38,7 +38,7 @@ pub enum MetricsError {
 }
 
 /// Figures of tracking, SI units where not named otherwise.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tracking {
     /// `100 rms(a_ref - a) / max|a_ref|` over the motion as played, %.
     pub time_domain_percent: f64,
@@ -47,18 +47,30 @@ pub struct Tracking {
     /// `100 rms(x_ref - x) / max|x_ref|`, %.
     pub displacement_percent: f64,
     /// Largest displacement of the table, m.
+    #[serde(rename = "peak_displacement_m")]
     pub peak_displacement: f64,
     /// Largest displacement error, m.
+    #[serde(rename = "peak_displacement_error_m")]
     pub peak_displacement_error: f64,
     /// Largest acceleration of the table, m/s^2.
+    #[serde(rename = "peak_acceleration_m_s2")]
     pub peak_acceleration: f64,
     /// Largest acceleration error, m/s^2.
+    #[serde(rename = "peak_acceleration_error_m_s2")]
     pub peak_acceleration_error: f64,
     /// Correlation coefficient of the two accelerations as they stand.
+    #[serde(deserialize_with = "nan_if_null")]
     pub correlation: f64,
     /// Time by which the table's acceleration lags the reference, s, from the largest
     /// cross-correlation within half a second; negative when it leads.
+    #[serde(rename = "delay_s")]
     pub delay: f64,
+}
+
+/// JSON has no NaN, which the correlation with a table at rest is.
+fn nan_if_null<'de, D: serde::Deserializer<'de>>(json: D) -> Result<f64, D::Error> {
+    let number: Option<f64> = serde::Deserialize::deserialize(json)?;
+    Ok(number.unwrap_or(f64::NAN))
 }
 
 /// Compares the table's motion with the reference, sample by sample. A run that ended early is

@@ -16,42 +16,9 @@ use std::{
 use thiserror::Error;
 
 use crate::component_library::{ComponentLibrary, Descriptions};
+pub use crate::fmu::FmiVersion;
 pub use variant::{StartValue, write_variant};
 use workspace::Workspace;
-
-/// Version of the FMI standard.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum FmiVersion {
-    /// FMI 2.0.
-    Two,
-    /// FMI 3.0.
-    Three,
-}
-
-impl FmiVersion {
-    /// Both versions.
-    pub const ALL: [Self; 2] = [Self::Two, Self::Three];
-
-    /// The folder of this version: `fmi2` or `fmi3`.
-    pub fn folder(self) -> &'static str {
-        match self {
-            Self::Two => "fmi2",
-            Self::Three => "fmi3",
-        }
-    }
-
-    /// The folder inside an FMU that holds the library for this machine.
-    pub fn binaries(self) -> String {
-        let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
-        match (self, os, arch) {
-            (Self::Two, "linux", "x86_64") => "binaries/linux64".into(),
-            (Self::Two, "windows", "x86_64") => "binaries/win64".into(),
-            (Self::Two, "macos", "x86_64") => "binaries/darwin64".into(),
-            (_, "macos", arch) => format!("binaries/{arch}-darwin"),
-            (_, os, arch) => format!("binaries/{arch}-{os}"),
-        }
-    }
-}
 
 /// An FMU that was packed.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -135,7 +135,7 @@ fn measure(fmu: &PackedFmu) -> Result<(), Box<dyn std::error::Error>> {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     for fmu in all_fmus()?
         .iter()
-        .filter(|fmu| fmu.version == FmiVersion::Three)
+        .filter(|fmu| fmu.version == FmiVersion::V3)
     {
         measure(fmu)?;
     }

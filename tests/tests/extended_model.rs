@@ -134,7 +134,7 @@ fn rms(a: &[f64], b: &[f64]) -> f64 {
 
 fn file(fmus: &[PackedFmu], name: &str) -> Option<PathBuf> {
     let mut all = fmus.iter();
-    all.find(|fmu| fmu.name == name && fmu.version == pack::FmiVersion::Three)
+    all.find(|fmu| fmu.name == name && fmu.version == pack::FmiVersion::V3)
         .map(|fmu| fmu.path.clone())
 }
 

@@ -52,7 +52,7 @@ fn ecos_steps_every_fmu() {
 
 #[test]
 fn libcosim_steps_every_fmu_of_version_2_without_a_warning() {
-    let report = gate("libcosim_gate.py", &paths(|f| f.version == FmiVersion::Two));
+    let report = gate("libcosim_gate.py", &paths(|f| f.version == FmiVersion::V2));
     // The strictest reader of model descriptions: its log is silent unless something is odd.
     assert!(!report.contains("FMI Library"), "{report}");
 }
@@ -127,8 +127,8 @@ fn problems(version: FmiVersion, description: &Path) -> Vec<String> {
     use fmi_rs::model_description::{fmi2, fmi3};
     let _alone = PARSER.lock();
     let problems = match version {
-        FmiVersion::Two => fmi2::ModelDescription::from_path(description).map(|d| d.validate()),
-        FmiVersion::Three => fmi3::ModelDescription::from_path(description).map(|d| d.validate()),
+        FmiVersion::V2 => fmi2::ModelDescription::from_path(description).map(|d| d.validate()),
+        FmiVersion::V3 => fmi3::ModelDescription::from_path(description).map(|d| d.validate()),
     };
     match problems {
         Ok(problems) => problems

@@ -52,8 +52,8 @@ fn same_components_give_the_same_bytes_and_are_not_written_again() {
 
     // One version alone.
     let third = tempfile::tempdir().unwrap();
-    let only = build_fmus(third.path(), &[FmiVersion::Three]).unwrap();
-    assert!(only.iter().all(|fmu| fmu.version == FmiVersion::Three));
+    let only = build_fmus(third.path(), &[FmiVersion::V3]).unwrap();
+    assert!(only.iter().all(|fmu| fmu.version == FmiVersion::V3));
     assert!(!third.path().join("fmi2").exists());
 }
 

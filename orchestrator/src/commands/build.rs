@@ -39,8 +39,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         None => pack::default_folder()?,
     };
     let versions: &[pack::FmiVersion] = match arguments.fmi {
-        Versions::Two => &[pack::FmiVersion::Two],
-        Versions::Three => &[pack::FmiVersion::Three],
+        Versions::Two => &[pack::FmiVersion::V2],
+        Versions::Three => &[pack::FmiVersion::V3],
         Versions::All => &pack::FmiVersion::ALL,
     };
     eprintln!("building the components (the first time takes a minute)...");

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::compare_tables;
 use crate::error::Error;
@@ -42,7 +42,7 @@ pub struct Arguments {
     /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
     #[arg(long, value_enum)]
     tuning: Option<Tuning>,
-    /// Folder for report.html and comparison.json [default: shakebench-results/comparison]
+    /// Folder for report.html, comparison.json and errors.csv [default: shakebench-results/comparison]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object
@@ -51,7 +51,7 @@ pub struct Arguments {
 }
 
 /// A run of the comparison.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Row {
     pub(super) record: String,
     pub(super) controller: String,
@@ -59,7 +59,7 @@ pub(super) struct Row {
     pub(super) frequency_domain_percent: Option<f64>,
     pub(super) peak_displacement_m: Option<f64>,
     /// `complete`, `interlock` or `failed`.
-    pub(super) ended: &'static str,
+    pub(super) ended: String,
     /// Why it ended early.
     pub(super) ended_because: Option<String>,
     /// When it was stopped, s.
@@ -142,7 +142,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let folder = arguments.out.clone();
     let folder = folder.unwrap_or_else(|| "shakebench-results/comparison".into());
     let tables = compare_tables::tables(&rows, &controllers);
-    let files = compare_tables::write(&folder, &tables, &rows, &controllers, &json)?;
+    let files = compare_tables::write(&folder, &rows, &controllers, &json)?;
     if arguments.json {
         println!("{json}");
     } else {
@@ -297,7 +297,7 @@ fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {
         time_domain_percent: tracking.map(|t| t.time_domain_percent),
         frequency_domain_percent: tracking.map(|t| t.frequency_domain_percent),
         peak_displacement_m: tracking.map(|t| t.peak_displacement),
-        ended: outcome.ended.word(),
+        ended: outcome.ended.word().to_string(),
         ended_because: match &outcome.ended {
             Ended::Complete => None,
             ended => Some(ended.story()),

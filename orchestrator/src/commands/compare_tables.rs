@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::compare::{History, Row};
 use super::table::aligned;
 use crate::error::Error;
 use crate::report::{self, Axis, Cell, Panel, Report, Section, Series, Units};
+use crate::results::Results;
 
 /// A record of the thesis: how a file of it is recognised, its title, and the printed errors, loop
 /// shaping, sliding mode (Table 4-1) and model predictive control (Table 5-2), in frequency and
@@ -92,6 +93,13 @@ const PRINTED: [Printed; 8] = [
 /// frequency, 0.65 there, is a misprint: the eight values give 0.63.
 const PRINTED_FREQUENCY: [[f64; 3]; 2] = [[0.65, 0.52, 0.19], [0.62, 0.42, 0.08]];
 const PRINTED_TIME: [[f64; 3]; 2] = [[13.19, 10.70, 4.76], [4.49, 4.14, 2.06]];
+
+/// File with the errors by run.
+pub(super) const COMPARISON: &str = "comparison.json";
+/// File with the errors over time.
+const ERRORS: &str = "errors.csv";
+/// Its columns, after the controller's name.
+const COLUMNS: [&str; 2] = ["displacement_error", "acceleration_error"];
 
 /// A table as words.
 pub(super) struct Words {
@@ -232,14 +240,22 @@ impl Words {
     }
 }
 
-/// Writes `report.html` and `comparison.json`; says where.
+/// Writes `report.html`, `comparison.json` and `errors.csv`; says where.
 pub(super) fn write(
     folder: &Path,
-    tables: &[Words],
     rows: &[Row],
     controllers: &[String],
     json: &serde_json::Value,
 ) -> Result<Vec<PathBuf>, Error> {
+    let page = page(folder, rows, controllers)?;
+    let mut results = Results::begin(folder)?;
+    results.write_text("report.html", &page)?;
+    results.write_text(COMPARISON, &json.to_string())?;
+    results.write_text(ERRORS, &errors(rows))?;
+    Ok(results.finish()?)
+}
+
+fn page(folder: &Path, rows: &[Row], controllers: &[String]) -> Result<String, Error> {
     let report = Report {
         title: "Comparison of controllers".into(),
         summary: format!("{} runs of {}.", rows.len(), controllers.join(", ")),
@@ -250,7 +266,7 @@ pub(super) fn write(
                  frequency, of the difference of the Fourier amplitudes up to 25 Hz."
                     .into(),
             ],
-            tables: tables.iter().map(Words::table).collect(),
+            tables: tables(rows, controllers).iter().map(Words::table).collect(),
             notes: early(rows),
             panels: panels(rows),
             ..Section::default()
@@ -258,19 +274,108 @@ pub(super) fn write(
         footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
         ..Report::default()
     };
-    let fault = |path: &Path, reason: String| Error::File {
+    report::html(&report).map_err(|error| Error::File {
+        path: folder.to_path_buf(),
+        reason: error.to_string(),
+    })
+}
+
+/// Errors over time on the first motion as CSV: `time`, then two columns a controller; a run that
+/// ended early leaves cells empty.
+fn errors(rows: &[Row]) -> String {
+    let kept: Vec<(&str, &History)> = rows
+        .iter()
+        .filter_map(|row| Some((row.controller.as_str(), row.history.as_ref()?)))
+        .collect();
+    let mut text = "time".to_string();
+    for (controller, _) in &kept {
+        text += &format!(",{controller}.{},{controller}.{}", COLUMNS[0], COLUMNS[1]);
+    }
+    text += "\n";
+    let dt = kept.first().map_or(0.0, |(_, history)| history.dt);
+    let lengths = kept
+        .iter()
+        .map(|(_, history)| history.displacement_error.len());
+    for sample in 0..lengths.max().unwrap_or(0) {
+        text += &(sample as f64 * dt).to_string();
+        for (_, history) in &kept {
+            for values in [&history.displacement_error, &history.acceleration_error] {
+                text += ",";
+                if let Some(value) = values.get(sample) {
+                    text += &value.to_string();
+                }
+            }
+        }
+        text += "\n";
+    }
+    text
+}
+
+/// The report of the comparison whose files lie in `folder`; without `errors.csv` it has no plots.
+///
+/// # Errors
+/// A file that cannot be read or is none of a comparison.
+pub(super) fn page_again(folder: &Path) -> Result<String, Error> {
+    #[derive(Deserialize)]
+    struct Comparison {
+        rows: Vec<Row>,
+    }
+    let path = folder.join(COMPARISON);
+    let fault = |reason: String| Error::File {
+        path: path.clone(),
+        reason,
+    };
+    let text = std::fs::read_to_string(&path).map_err(|error| fault(error.to_string()))?;
+    let Comparison { mut rows } = serde_json::from_str(&text)
+        .map_err(|error| fault(format!("not the JSON of a comparison: {error}")))?;
+    let mut controllers: Vec<String> = Vec::new();
+    for row in &rows {
+        if !controllers.contains(&row.controller) {
+            controllers.push(row.controller.clone());
+        }
+    }
+    let plots = folder.join(ERRORS);
+    if plots.is_file() {
+        for controller in &controllers {
+            let history = history(&plots, controller)?;
+            let mut own = rows.iter_mut().filter(|row| row.controller == *controller);
+            if let Some(first) = own.next() {
+                first.history = history;
+            }
+        }
+    }
+    page(folder, &rows, &controllers)
+}
+
+/// The columns of a controller in `errors.csv`; none where they are missing.
+fn history(path: &Path, controller: &str) -> Result<Option<History>, Error> {
+    let fault = |reason: String| Error::File {
         path: path.to_path_buf(),
         reason,
     };
-    let page = report::html(&report).map_err(|error| fault(folder, error.to_string()))?;
-    std::fs::create_dir_all(folder).map_err(|error| fault(folder, error.to_string()))?;
-    let mut files = Vec::new();
-    for (name, text) in [("report.html", page), ("comparison.json", json.to_string())] {
-        let path = folder.join(name);
-        std::fs::write(&path, text).map_err(|error| fault(&path, error.to_string()))?;
-        files.push(path);
+    let mut csv = csv::Reader::from_path(path).map_err(|error| fault(error.to_string()))?;
+    let names = csv.headers().map_err(|error| fault(error.to_string()))?;
+    let place = |column: &str| names.iter().position(|name| name == column);
+    let [Some(x), Some(a)] = COLUMNS.map(|column| place(&format!("{controller}.{column}"))) else {
+        return Ok(None);
+    };
+    let mut columns = [Vec::new(), Vec::new(), Vec::new()];
+    for (row, line) in csv.records().zip(2..) {
+        let row = row.map_err(|error| fault(error.to_string()))?;
+        for (column, at) in columns.iter_mut().zip([0, x, a]) {
+            let cell = row.get(at).unwrap_or_default();
+            if !cell.is_empty() {
+                let wrong = |_| fault(format!("line {line}: `{cell}` is no number"));
+                column.push(cell.parse::<f64>().map_err(wrong)?);
+            }
+        }
     }
-    Ok(files)
+    let [time, displacement_error, acceleration_error] = columns;
+    Ok(time.get(1).map(|dt| History {
+        dt: *dt,
+        displacement_error,
+        acceleration_error,
+    }))
 }
 
 /// A line for each run that ended early.
@@ -282,7 +387,7 @@ fn early(rows: &[Row]) -> Vec<String> {
                 "{} on {} ended early and counts as worse than any other: {}",
                 row.controller,
                 row.record,
-                row.ended_because.as_deref().unwrap_or(row.ended)
+                row.ended_because.as_deref().unwrap_or(&row.ended)
             )
         })
         .collect()
@@ -375,13 +480,13 @@ mod tests {
 
     #[test]
     fn runs_that_ended_early_count_as_worse_than_any_other() {
-        let row = |percent: f64, ended: &'static str| Row {
+        let row = |percent: f64, ended: &str| Row {
             record: "any".into(),
             controller: "mpc".into(),
             time_domain_percent: Some(percent),
             frequency_domain_percent: Some(percent),
             peak_displacement_m: None,
-            ended,
+            ended: ended.into(),
             ended_because: None,
             ended_s: Some(3.21),
             history: None,
@@ -399,7 +504,7 @@ mod tests {
                 .text()
                 .contains("stopped at 3.2 s")
         );
-        rows[1].ended = "failed";
+        rows[1].ended = "failed".into();
         assert_eq!(median(&rows), None);
         assert_eq!(medians(&rows, &controllers)["mpc"].ended_early, 2);
     }

@@ -9,6 +9,7 @@ pub mod diagnose;
 pub mod diagnose_rig;
 pub mod identify;
 pub mod info;
+pub mod report;
 pub mod run;
 mod summary;
 mod table;

@@ -3,22 +3,21 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::table::{aligned, significant};
 use crate::error::Error;
 use crate::experiment::{Prepared, Request};
 use crate::manifest::Manifest;
-use crate::master::{Ended, Outcome};
+use crate::master::{Ended, Outcome, Record};
 use crate::metrics::{self, Tracking};
 use crate::motion::Motion;
-use crate::report::{self, Cell};
-use crate::results::{Results, write_csv};
-use crate::system::{Source, System};
+use crate::report::{self, Cell, Whole};
+use crate::results::{Results, read_csv, write_csv};
 use crate::units::{INCH, STANDARD_GRAVITY};
 
 /// `summary.json` of a run, and what `--json` prints.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Summary {
     system: String,
     motion: MotionSummary,
@@ -28,33 +27,21 @@ pub struct Summary {
     algorithm: String,
     wall_s: f64,
     real_time_factor: f64,
-    ended: &'static str,
+    ended: String,
     ended_because: Option<String>,
     /// Seeds of random components (such as sensors' noise), by instance.
     seeds: BTreeMap<String, serde_json::Value>,
-    tracking: Option<TrackingSummary>,
+    tracking: Option<Tracking>,
     /// What the user should know.
     pub(super) warnings: Vec<String>,
-    #[serde(skip)]
-    figures: Option<Tracking>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct MotionSummary {
     name: String,
     duration_s: f64,
     pga_g: f64,
     peak_displacement_m: f64,
-}
-
-#[derive(Debug, Clone, Serialize)]
-struct TrackingSummary {
-    time_domain_percent: f64,
-    frequency_domain_percent: f64,
-    displacement_percent: f64,
-    peak_displacement_m: f64,
-    peak_acceleration_m_s2: f64,
-    delay_s: f64,
 }
 
 impl Summary {
@@ -71,7 +58,7 @@ impl Summary {
             .iter()
             .map(|line| format!("`{}` logged: {}", line.component, line.message.text))
             .collect();
-        let figures = Table::find(system).and_then(|table| {
+        let tracking = Table::find(manifest, &outcome.record).and_then(|table| {
             let displacement = outcome.record.column(&table.name("displacement"))?;
             let acceleration = outcome.record.column(&table.name("acceleration"))?;
             match metrics::tracking(motion, &displacement, &acceleration) {
@@ -82,7 +69,7 @@ impl Summary {
                 }
             }
         });
-        if let Some(tracking) = &figures
+        if let Some(tracking) = &tracking
             && tracking.peak_displacement > plant::units::STROKE
         {
             warnings.push(format!(
@@ -114,7 +101,7 @@ impl Summary {
             algorithm: request.algorithm.to_string(),
             wall_s: outcome.wall,
             real_time_factor: simulated / outcome.wall,
-            ended: outcome.ended.word(),
+            ended: outcome.ended.word().to_string(),
             ended_because: match &outcome.ended {
                 Ended::Complete => None,
                 ended => Some(ended.story()),
@@ -127,16 +114,8 @@ impl Summary {
                     Some((name.clone(), seed.clone()))
                 })
                 .collect(),
-            tracking: figures.map(|tracking| TrackingSummary {
-                time_domain_percent: tracking.time_domain_percent,
-                frequency_domain_percent: tracking.frequency_domain_percent,
-                displacement_percent: tracking.displacement_percent,
-                peak_displacement_m: tracking.peak_displacement,
-                peak_acceleration_m_s2: tracking.peak_acceleration,
-                delay_s: tracking.delay,
-            }),
+            tracking,
             warnings,
-            figures,
         }
     }
 
@@ -160,7 +139,7 @@ impl Summary {
             significant(self.real_time_factor, 2),
             self.ended,
         );
-        let Some(tracking) = &self.figures else {
+        let Some(tracking) = &self.tracking else {
             return text;
         };
         let row = |name: &str, cells: [String; 3]| {
@@ -217,38 +196,40 @@ impl Summary {
     }
 }
 
-/// The component that is the table: `table`, or the first with a displacement and an acceleration
-/// that takes a valve command.
+/// The component that is the table: `table`, or the first with a displacement, velocity and
+/// acceleration that takes a valve command.
 struct Table<'a> {
-    system: &'a System,
-    component: usize,
+    name: &'a str,
+    /// The output that drives the valve.
+    valve: Option<&'a str>,
 }
 
 impl<'a> Table<'a> {
-    fn find(system: &'a System) -> Option<Self> {
-        let moves = |component: usize| {
-            let description = &system.components[component].fmu.description;
-            let all = ["displacement", "velocity", "acceleration", "valve_command"];
-            all.iter().all(|name| description.variable(name).is_some())
+    fn find(manifest: &'a Manifest, record: &Record) -> Option<Self> {
+        let valve = |name: &str| {
+            let mut ends = manifest
+                .connections
+                .iter()
+                .filter_map(|c| c.split_once(" -> "));
+            ends.find(|(_, to)| to.strip_prefix(name) == Some(".valve_command"))
+                .map(|(from, _)| from)
         };
-        let count = system.components.len();
-        let named = (0..count).find(|&c| system.components[c].name == "table");
-        let component = named.or_else(|| (0..count).find(|&c| moves(c)))?;
-        Some(Self { system, component })
+        let moves = |name: &str| {
+            let mut outputs = ["displacement", "velocity", "acceleration"].into_iter();
+            outputs.all(|output| record.columns.contains(&format!("{name}.{output}")))
+                && valve(name).is_some()
+        };
+        let mut names = manifest.components.keys().map(String::as_str);
+        let name = match manifest.components.get_key_value("table") {
+            Some((name, _)) => name,
+            None => names.find(|name| moves(name))?,
+        };
+        let valve = valve(name).filter(|from| !from.starts_with("reference."));
+        Some(Self { name, valve })
     }
 
     fn name(&self, output: &str) -> String {
-        format!("{}.{output}", self.system.components[self.component].name)
-    }
-
-    /// The output that drives the valve.
-    fn valve(&self) -> Option<String> {
-        let description = &self.system.components[self.component].fmu.description;
-        let input = description.position("valve_command")?;
-        let connections = self.system.connections.iter();
-        let mut driving = connections.filter(|c| c.component == self.component && c.input == input);
-        let source = driving.next()?.source;
-        matches!(source, Source::Output { .. }).then(|| self.system.source_name(source))
+        format!("{}.{output}", self.name)
     }
 }
 
@@ -264,7 +245,8 @@ pub(super) fn write(
     results.write("results.csv", |file| write_csv(&outcome.record, file))?;
     results.write_text("summary.json", &json(summary))?;
     results.write_text("manifest.json", &json(manifest))?;
-    if let Some(page) = page(prepared, outcome, summary) {
+    let motion = &prepared.motion;
+    if let Some(page) = page(summary, manifest, motion, motion.into(), &outcome.record) {
         results.write_text("report.html", &page)?;
     }
     Ok(results.finish()?)
@@ -274,15 +256,17 @@ fn json(value: &impl Serialize) -> String {
     serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
 }
 
-fn page(prepared: &Prepared, outcome: &Outcome, summary: &Summary) -> Option<String> {
-    let table = Table::find(&prepared.system)?;
-    let column = |output| {
-        outcome
-            .record
-            .column(&table.name(output))
-            .unwrap_or_default()
-    };
-    let valve = table.valve().and_then(|name| outcome.record.column(&name));
+/// The report; none where there is no table.
+fn page(
+    summary: &Summary,
+    manifest: &Manifest,
+    motion: &Motion,
+    whole: Whole,
+    record: &Record,
+) -> Option<String> {
+    let table = Table::find(manifest, record)?;
+    let column = |output| record.column(&table.name(output)).unwrap_or_default();
+    let valve = table.valve.and_then(|name| record.column(name));
     let row = |name: &str, value: String| (name.to_string(), Cell::from(value));
     let mut settings = vec![
         row("FMI", summary.fmi.clone()),
@@ -296,27 +280,75 @@ fn page(prepared: &Prepared, outcome: &Outcome, summary: &Summary) -> Option<Str
             ),
         ),
     ];
-    for component in &prepared.system.components {
-        let fmu = &component.fmu;
+    for (name, component) in &manifest.components {
+        let file = component.fmu.file_name().unwrap_or_default();
+        let sum = component.sha256.get(..16).unwrap_or(&component.sha256);
         settings.push(row(
-            &component.name,
-            format!("{}, SHA-256 {}", fmu.file_name(), &fmu.sha256[..16]),
+            name,
+            format!("{}, SHA-256 {sum}", file.to_string_lossy()),
         ));
     }
     let run = report::Run {
-        system: &prepared.system.name,
-        motion: &prepared.motion,
+        system: &summary.system,
+        motion,
+        whole,
         displacement: &column("displacement"),
         velocity: &column("velocity"),
         acceleration: &column("acceleration"),
         valve_command: valve.as_deref(),
-        tracking: summary.figures.as_ref(),
-        ended: &outcome.ended.story(),
+        tracking: summary.tracking.as_ref(),
+        ended: summary.ended_because.as_deref().unwrap_or(&summary.ended),
         settings,
         footer: format!(
             "shakebench {}; repeat with: shakebench run --manifest manifest.json",
-            env!("CARGO_PKG_VERSION")
+            manifest.shakebench
         ),
     };
     report::html(&report::run(&run)).ok()
+}
+
+/// The report of the run whose files lie in `folder`; of a motion that was not played to its end, it
+/// draws what was played.
+///
+/// # Errors
+/// A file that is missing or is none of a run.
+pub(super) fn page_again(folder: &Path) -> Result<String, Error> {
+    let manifest = Manifest::read(&folder.join("manifest.json"))?;
+    let place = folder.join("summary.json");
+    let fault = |reason: String| Error::File {
+        path: place.clone(),
+        reason,
+    };
+    let text = std::fs::read_to_string(&place).map_err(|error| fault(error.to_string()))?;
+    let summary: Summary = serde_json::from_str(&text)
+        .map_err(|error| fault(format!("not the summary of a run: {error}")))?;
+    let place = folder.join("results.csv");
+    let record = read_csv(&place)?;
+    let column = |quantity| {
+        let name = format!("reference.{quantity}");
+        record.column(&name).ok_or_else(|| Error::File {
+            path: place.clone(),
+            reason: format!("not the results of a run: there is no column `{name}`"),
+        })
+    };
+    let motion = Motion {
+        name: manifest.motion.name.clone(),
+        dt: manifest.motion.dt_s,
+        displacement: column("displacement")?,
+        velocity: column("velocity")?,
+        acceleration: column("acceleration")?,
+        notes: manifest.motion.notes.clone(),
+        seed: manifest.motion.seed,
+    };
+    let whole = Whole {
+        duration: summary.motion.duration_s,
+        peak_displacement: summary.motion.peak_displacement_m,
+        peak_acceleration: summary.motion.pga_g * STANDARD_GRAVITY,
+    };
+    page(&summary, &manifest, &motion, whole, &record).ok_or_else(|| Error::File {
+        path: folder.to_path_buf(),
+        reason: "no component of the run is a table with displacement, velocity and acceleration, \
+                 which a report needs"
+            .into(),
+    })
 }

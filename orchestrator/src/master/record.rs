@@ -10,14 +10,14 @@ pub struct Record {
 
 impl Record {
     /// Makes room for so many rows, so that filling them allocates nothing.
-    pub(super) fn with_capacity(names: &[String], rows: usize) -> Self {
+    pub(crate) fn with_capacity(names: &[String], rows: usize) -> Self {
         let mut columns = vec!["time".to_string()];
         columns.extend_from_slice(names);
         let values = Vec::with_capacity(rows * columns.len());
         Self { columns, values }
     }
 
-    pub(super) fn push(&mut self, time: f64, signals: &[f64]) {
+    pub(crate) fn push(&mut self, time: f64, signals: &[f64]) {
         self.values.push(time);
         self.values.extend_from_slice(signals);
     }

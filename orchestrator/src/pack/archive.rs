@@ -23,8 +23,8 @@ pub(super) fn entries(
     licences: &[(String, Vec<u8>)],
 ) -> Vec<(String, Vec<u8>)> {
     let description = match version {
-        FmiVersion::Two => &descriptions.fmi2,
-        FmiVersion::Three => &descriptions.fmi3,
+        FmiVersion::V2 => &descriptions.fmi2,
+        FmiVersion::V3 => &descriptions.fmi3,
     };
     let library = format!(
         "{}/{}{}",

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 pub use bars::{Bar, BarGroup, Bars};
 pub use html::html;
-pub use run::{Run, run};
+pub use run::{Run, Whole, run};
 pub use svg::svg;
 
 use crate::units::{INCH, POUND_FORCE, STANDARD_GRAVITY};

@@ -4,14 +4,37 @@ use super::{Axis, Cell, Fact, Panel, Report, Section, Series, Table, Units};
 use crate::metrics::{HIGHEST_FREQUENCY, Tracking, fourier_amplitudes};
 use crate::motion::Motion;
 
+/// Size of a whole motion, also of one that was not played to its end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whole {
+    /// Time from the first to the last sample, s.
+    pub duration: f64,
+    /// Largest displacement, m.
+    pub peak_displacement: f64,
+    /// Largest acceleration, m/s^2.
+    pub peak_acceleration: f64,
+}
+
+impl From<&Motion> for Whole {
+    fn from(motion: &Motion) -> Self {
+        Self {
+            duration: motion.duration(),
+            peak_displacement: motion.peak_displacement(),
+            peak_acceleration: motion.peak_acceleration(),
+        }
+    }
+}
+
 /// What a run gives to its report; histories in SI units, a sample each as in the motion (fewer
 /// when the run ended early).
 #[derive(Debug, Clone)]
 pub struct Run<'a> {
     /// Name of the system, for example `three-variable`.
     pub system: &'a str,
-    /// What the table was asked to do.
+    /// What the table was asked to do, as far as it is known.
     pub motion: &'a Motion,
+    /// Its size as a whole.
+    pub whole: Whole,
     /// Displacement of the table, m.
     pub displacement: &'a [f64],
     /// Velocity of the table, m/s.
@@ -55,7 +78,7 @@ pub fn run(run: &Run) -> Report {
                 heading: "Tracking".to_string(),
                 tables: run
                     .tracking
-                    .map(|tracking| tracking_table(motion, tracking))
+                    .map(|tracking| tracking_table(run.whole, tracking))
                     .into_iter()
                     .collect(),
                 ..Section::default()
@@ -90,7 +113,6 @@ fn fact(label: &str, value: Cell, note: &str) -> Fact {
 }
 
 fn facts(run: &Run) -> Vec<Fact> {
-    let motion = run.motion;
     let mut facts = Vec::new();
     if let Some(tracking) = run.tracking {
         let percent = |value| Cell::Quantity(value, Units::PERCENT, 3);
@@ -112,18 +134,18 @@ fn facts(run: &Run) -> Vec<Fact> {
     }
     facts.push(fact(
         "Peak displacement",
-        Cell::Quantity(motion.peak_displacement(), Units::DISPLACEMENT, 3),
+        Cell::Quantity(run.whole.peak_displacement, Units::DISPLACEMENT, 3),
         "of the reference",
     ));
     facts.push(fact(
         "Peak acceleration",
-        Cell::Quantity(motion.peak_acceleration(), Units::ACCELERATION, 3),
+        Cell::Quantity(run.whole.peak_acceleration, Units::ACCELERATION, 3),
         "of the reference",
     ));
     facts
 }
 
-fn tracking_table(motion: &Motion, tracking: &Tracking) -> Table {
+fn tracking_table(whole: Whole, tracking: &Tracking) -> Table {
     let length = |value| Cell::Quantity(value, Units::DISPLACEMENT, 4);
     let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4);
     let percent = |value| Cell::Quantity(value, Units::PERCENT, 3);
@@ -136,14 +158,14 @@ fn tracking_table(motion: &Motion, tracking: &Tracking) -> Table {
         rows: vec![
             vec![
                 "displacement, peak".into(),
-                length(motion.peak_displacement()),
+                length(whole.peak_displacement),
                 length(tracking.peak_displacement),
                 length(tracking.peak_displacement_error),
                 percent(tracking.displacement_percent),
             ],
             vec![
                 "acceleration, peak".into(),
-                acceleration(motion.peak_acceleration()),
+                acceleration(whole.peak_acceleration),
                 acceleration(tracking.peak_acceleration),
                 acceleration(tracking.peak_acceleration_error),
                 percent(tracking.time_domain_percent),
@@ -252,7 +274,7 @@ fn settings(run: &Run) -> Section {
         vec!["motion".into(), motion.name.as_str().into()],
         vec![
             "duration".into(),
-            Cell::Quantity(motion.duration(), Units::TIME, 5),
+            Cell::Quantity(run.whole.duration, Units::TIME, 5),
         ],
         vec![
             "sample time".into(),

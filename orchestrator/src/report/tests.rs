@@ -32,6 +32,7 @@ fn run_report() -> Report {
     run(&Run {
         system: "three-variable",
         motion: &motion,
+        whole: (&motion).into(),
         displacement: &displacement,
         velocity: &velocity,
         acceleration: &acceleration,
@@ -244,6 +245,7 @@ fn a_long_run_stays_a_small_file() {
     let page = html(&run(&Run {
         system: "three-variable",
         motion: &motion,
+        whole: (&motion).into(),
         displacement: &displacement,
         velocity: &velocity,
         acceleration: &acceleration,

@@ -92,7 +92,7 @@ fn no_archive() {
 fn a_truncated_archive() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("table.fmu");
-    write(&path, &entries("ShakeTable", pack::FmiVersion::Three));
+    write(&path, &entries("ShakeTable", pack::FmiVersion::V3));
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     table_refused(folder.path(), &["not an FMU"]);
@@ -197,8 +197,8 @@ fn libraries_that_are_missing_or_for_another_machine() {
 #[test]
 fn a_token_that_does_not_fit() {
     for (version, attribute) in [
-        (pack::FmiVersion::Two, "guid=\"{"),
-        (pack::FmiVersion::Three, "instantiationToken=\"{"),
+        (pack::FmiVersion::V2, "guid=\"{"),
+        (pack::FmiVersion::V3, "instantiationToken=\"{"),
     ] {
         let said = complaint(version, |entries| {
             described(entries, attribute, &format!("{attribute}0"));
@@ -211,7 +211,7 @@ fn a_token_that_does_not_fit() {
 #[test]
 fn a_loop_of_direct_feedthrough_is_named_and_iterated_on_demand() {
     let folder = tempfile::tempdir().unwrap();
-    let mut entries = entries("Specimen", pack::FmiVersion::Three);
+    let mut entries = entries("Specimen", pack::FmiVersion::V3);
     // An output without a list of dependencies depends on every input.
     let description = entries
         .iter_mut()

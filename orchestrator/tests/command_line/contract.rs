@@ -131,7 +131,7 @@ fn a_manifest_repeats_a_run_to_the_bit_and_notices_a_difference() {
 #[test]
 fn every_command_has_help_with_an_example() {
     let folder = tempfile::tempdir().unwrap();
-    for command in ["build", "info", "run"] {
+    for command in ["build", "info", "report", "run"] {
         let output = shakebench(folder.path(), &[command, "--help"]);
         assert_eq!(output.status.code(), Some(0));
         let said = stdout(&output);

@@ -134,6 +134,22 @@ fn a_diagnosis_has_the_fields_of_the_contract_and_its_files() {
     assert_eq!(written, found);
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     assert!(page.contains("Errors against the state"));
+    // The page again: refused over the one with pictures, and without them from the JSON.
+    let output = shakebench(folder.path(), &["report", "out"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("pictures"), "{}", stderr(&output));
+    let page = folder.path().join("out/report.html");
+    fs::remove_file(&page).unwrap();
+    let output = shakebench(folder.path(), &["report", "out"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let page = fs::read_to_string(page).unwrap();
+    for words in [
+        found["sentence"].as_str().unwrap(),
+        "half_width",
+        "The same in closed loop",
+    ] {
+        assert!(page.contains(words), "`{words}` is not in the page");
+    }
 }
 
 #[test]

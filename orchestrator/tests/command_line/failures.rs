@@ -88,7 +88,7 @@ fn a_failing_component_ends_the_run_and_what_was_computed_is_saved() {
 #[test]
 fn without_a_fault_it_runs_to_its_end_with_values_of_every_type() {
     let folder = tempfile::tempdir().unwrap();
-    system(folder.path(), pack::FmiVersion::Two, "fault = \"none\"", "");
+    system(folder.path(), pack::FmiVersion::V2, "fault = \"none\"", "");
     let (_, rows) = run(folder.path(), 0, "complete");
     assert_eq!(rows, 1000);
     let results = fs::read_to_string(folder.path().join("out/results.csv")).unwrap();
@@ -110,12 +110,7 @@ fn without_a_fault_it_runs_to_its_end_with_values_of_every_type() {
 fn an_output_that_ends_the_run_is_named_with_its_time() {
     let folder = tempfile::tempdir().unwrap();
     let end = "end_when = \"watch.active\"\n end_after = \"0.1 s\"";
-    system(
-        folder.path(),
-        pack::FmiVersion::Three,
-        "fault = \"none\"",
-        end,
-    );
+    system(folder.path(), pack::FmiVersion::V3, "fault = \"none\"", end);
     let (said, rows) = run(folder.path(), 1, "interlock");
     assert!(
         said.contains("`watch.active` became true at 0.000 s"),
@@ -129,7 +124,7 @@ fn a_component_that_cannot_be_initialized_is_input_at_fault() {
     let folder = tempfile::tempdir().unwrap();
     system(
         folder.path(),
-        pack::FmiVersion::Three,
+        pack::FmiVersion::V3,
         "fault = \"refuse\"",
         "",
     );

@@ -8,6 +8,7 @@ mod diagnosis;
 mod failures;
 mod motions;
 mod physical_rig;
+mod reports;
 mod systems;
 
 use std::path::Path;

@@ -10,13 +10,13 @@ use plant::identified_rig::{IdentifiedRig, IdentifiedRigState};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Seed of the noise on the simulated healthy rig.
 const SEED: u64 = 20_170_401;
 
 /// A relation's error in units of the sensors' noise.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RelationReport {
     /// With the nominal parameters.
     pub nominal: f64,

@@ -15,7 +15,7 @@ use std::time::Instant;
 use identification::case::{CHANNELS, Case, CaseError};
 use identification::diagnosis::NamedEffect;
 use identification::diagnosis::shake_table::{self, Diagnosis};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::extended_model::ExtendedModel;
@@ -34,7 +34,7 @@ pub const DIAGNOSIS: &str = "diagnosis.json";
 pub const REPORT: &str = "report.html";
 
 /// The JSON object of `diagnose`; SI.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisReport {
     /// One sentence.
     pub sentence: String,
@@ -43,6 +43,7 @@ pub struct DiagnosisReport {
     /// The effects.
     pub effects: Vec<EffectReport>,
     /// Rival sets of effects.
+    #[serde(borrow)]
     pub alternatives: Vec<Vec<&'static str>>,
     /// The experiment that would tell the first rival apart.
     pub separating_experiment: Option<String>,
@@ -57,6 +58,7 @@ pub struct DiagnosisReport {
     /// All FMUs of the extended model.
     pub extended_fmus: Vec<PathBuf>,
     /// The relations R1 to R5 on the identification record.
+    #[serde(borrow)]
     pub relations: BTreeMap<&'static str, RelationReport>,
     /// Traces left over, strongest first, as normal deviates.
     pub remaining: Vec<(String, f64)>,
@@ -69,7 +71,7 @@ pub struct DiagnosisReport {
 }
 
 /// An effect in [`DiagnosisReport`].
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectReport {
     /// Its name in the catalogue.
     pub effect: &'static str,
@@ -80,7 +82,7 @@ pub struct EffectReport {
 }
 
 /// A parameter in [`EffectReport`].
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterReport {
     /// The estimate.
     pub value: f64,
@@ -91,7 +93,7 @@ pub struct ParameterReport {
 }
 
 /// A gain in [`DiagnosisReport`].
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GainReport {
     /// Root mean square over the channels of their errors over their variation, nominal.
     pub before_nrmse: f64,
@@ -108,6 +110,7 @@ pub struct GainReport {
     /// And after.
     pub after_ratio: f64,
     /// By channel: before, after, floor.
+    #[serde(borrow)]
     pub channels: BTreeMap<&'static str, [f64; 3]>,
 }
 
@@ -207,7 +210,7 @@ pub fn diagnose(case: &Path, folder: &Path) -> Result<DiagnosisReport, Error> {
             let home = |fmu: &&(PackedFmu, PathBuf)| {
                 let first = diagnosis.modelled.first();
                 let component = first.map_or("ShakeTable", |named| component_of(named.effect));
-                fmu.0.version == FmiVersion::Three && fmu.0.name == component
+                fmu.0.version == FmiVersion::V3 && fmu.0.name == component
             };
             report.extended_fmu = built.iter().find(home).map(|fmu| fmu.1.clone());
             match in_closed_loop(&read, &diagnosis, &built) {
@@ -287,13 +290,13 @@ fn in_closed_loop(
     let originals = pack::all_fmus().map_err(|error| error.to_string())?;
     let original = |name: &str| {
         let mut all = originals.iter();
-        all.find(|fmu| fmu.version == FmiVersion::Three && fmu.name == name)
+        all.find(|fmu| fmu.version == FmiVersion::V3 && fmu.name == name)
             .map(|fmu| fmu.path.clone())
             .ok_or_else(|| format!("there is no component `{name}`"))
     };
     let changed = |name: &str| {
         let mut all = extended.iter();
-        let found = all.find(|(fmu, _)| fmu.version == FmiVersion::Three && fmu.name == name);
+        let found = all.find(|(fmu, _)| fmu.version == FmiVersion::V3 && fmu.name == name);
         found.map_or_else(|| original(name), |(fmu, _)| Ok(fmu.path.clone()))
     };
     let rig = |file: &dyn Fn(&str) -> Result<PathBuf, String>| -> Result<RigFmus, String> {
@@ -309,6 +312,24 @@ fn in_closed_loop(
     };
     let before = rig(&original)?.nominal(&case.nominal);
     co_simulation::compare(record, &case.nominal, &law, &before, &rig(&changed)?)
+}
+
+/// The report of the diagnosis whose `diagnosis.json` lies in `folder`, without the pictures, which
+/// need the records.
+///
+/// # Errors
+/// A file that cannot be read or is none of a diagnosis.
+pub(super) fn page_again(folder: &Path) -> Result<String, Error> {
+    let path = folder.join(DIAGNOSIS);
+    let fault = |reason: String| Error::File {
+        path: path.clone(),
+        reason,
+    };
+    let text = std::fs::read_to_string(&path).map_err(|error| fault(error.to_string()))?;
+    // Its names are those of the catalogue, kept as long as the program runs.
+    let report = serde_json::from_str::<DiagnosisReport>(text.leak())
+        .map_err(|error| fault(format!("not the JSON of a diagnosis: {error}")))?;
+    report::html(&page::without_pictures(folder, &report)).map_err(|e| fault(e.to_string()))
 }
 
 /// Diagnoses a case, writes its files and prints what was found.

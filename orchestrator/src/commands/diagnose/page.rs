@@ -6,7 +6,7 @@ use identification::case::Case;
 use identification::diagnosis::shake_table::Diagnosis;
 
 use super::co_simulation::Comparison;
-use super::{DiagnosisReport, GainReport, pictures, text};
+use super::{DIAGNOSIS, DiagnosisReport, GainReport, pictures, text};
 use crate::commands::table::significant;
 use crate::extended_model::ExtendedModel;
 use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Report, Section, Table};
@@ -33,9 +33,12 @@ pub(super) fn page(
     comparison: Option<&Comparison>,
 ) -> Report {
     let name = place.file_name().unwrap_or(place.as_os_str());
-    let mut sections = vec![findings(report), gain(report, diagnosis)];
+    let mut sections = vec![findings(report), gain(report, Some(diagnosis))];
     if let Some(found) = comparison {
-        sections.push(closed_loop(case, found));
+        sections.push(Section {
+            panels: pictures::closed_loop(case, found),
+            ..closed_loop(&found.gain)
+        });
     }
     sections.push(relations(report));
     sections.extend(errors(case, diagnosis));
@@ -49,6 +52,33 @@ pub(super) fn page(
             "shakebench {} on {}",
             env!("CARGO_PKG_VERSION"),
             place.display()
+        ),
+    }
+}
+
+/// The report of what `diagnosis.json` in `folder` tells.
+pub(super) fn without_pictures(folder: &Path, report: &DiagnosisReport) -> Report {
+    let mut sections = vec![findings(report), gain(report, None)];
+    sections.extend(report.co_simulation.as_ref().map(closed_loop));
+    sections.push(relations(report));
+    sections.push(Section {
+        heading: "Errors and the extended model".into(),
+        text: vec![
+            "Their pictures and tables need the records of the case: `shakebench diagnose CASE` \
+             draws them. The extended model lies in extended_model.toml."
+                .into(),
+        ],
+        ..Section::default()
+    });
+    Report {
+        title: "Diagnosis".into(),
+        summary: report.sentence.clone(),
+        facts: facts(report),
+        sections,
+        footer: format!(
+            "shakebench {} on {DIAGNOSIS} in {}",
+            env!("CARGO_PKG_VERSION"),
+            folder.display()
         ),
     }
 }
@@ -158,9 +188,9 @@ fn bars(title: &str, gain: &GainReport, interval: impl Fn(&str) -> Option<[[f64;
     }
 }
 
-fn gain(report: &DiagnosisReport, diagnosis: &Diagnosis) -> Section {
+fn gain(report: &DiagnosisReport, diagnosis: Option<&Diagnosis>) -> Section {
     let interval = |channel: &str| {
-        let mut all = diagnosis.gain.channels.iter();
+        let mut all = diagnosis?.gain.channels.iter();
         let found = all.find(|one| one.channel == channel)?;
         let in_floors = |interval: [f64; 2]| interval.map(|end| end / found.floor);
         Some(found.intervals_95.map(in_floors))
@@ -169,7 +199,11 @@ fn gain(report: &DiagnosisReport, diagnosis: &Diagnosis) -> Section {
         heading: "What it brings".into(),
         text: vec![format!(
             "Errors on the validation record, which was not fitted, in units of what the sensors' \
-             noise leaves a perfect model. Whiskers: 95 % interval from a moving-block bootstrap. {}.",
+             noise leaves a perfect model. {}{}.",
+            match diagnosis {
+                Some(_) => "Whiskers: 95 % interval from a moving-block bootstrap. ",
+                None => "",
+            },
             text::share(&report.gain)
         )],
         bars: vec![bars("One step ahead", &report.gain, interval)],
@@ -182,7 +216,7 @@ fn gain(report: &DiagnosisReport, diagnosis: &Diagnosis) -> Section {
     }
 }
 
-fn closed_loop(case: &Case, found: &Comparison) -> Section {
+fn closed_loop(gain: &GainReport) -> Section {
     Section {
         heading: "The same in closed loop".into(),
         text: vec![
@@ -192,15 +226,14 @@ fn closed_loop(case: &Case, found: &Comparison) -> Section {
              floor is what the sensors' noise alone makes of the extended FMUs, in the readings \
              and through the loop; a rig whose valve is disturbed besides lies a little above it."
                 .into(),
-            format!("{}.", text::share(&found.gain)),
+            format!("{}.", text::share(gain)),
         ],
-        bars: vec![bars("Whole record, co-simulated", &found.gain, |_| None)],
+        bars: vec![bars("Whole record, co-simulated", gain, |_| None)],
         tables: vec![table(
             "NRMSE in closed-loop co-simulation, and in noise floors",
             &text::GAIN,
-            text::channels(&found.gain),
+            text::channels(gain),
         )],
-        panels: pictures::closed_loop(case, found),
         ..Section::default()
     }
 }

@@ -11,7 +11,9 @@ use std::path::Path;
 use super::FmuError;
 
 /// The version of the standard.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
 pub enum FmiVersion {
     /// FMI 2.0.
     #[serde(rename = "2.0")]
@@ -19,6 +21,31 @@ pub enum FmiVersion {
     /// FMI 3.0.
     #[serde(rename = "3.0")]
     V3,
+}
+
+impl FmiVersion {
+    /// Both versions.
+    pub const ALL: [Self; 2] = [Self::V2, Self::V3];
+
+    /// The folder of this version: `fmi2` or `fmi3`.
+    pub fn folder(self) -> &'static str {
+        match self {
+            Self::V2 => "fmi2",
+            Self::V3 => "fmi3",
+        }
+    }
+
+    /// The folder inside an FMU that holds the library for this machine.
+    pub fn binaries(self) -> String {
+        let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
+        match (self, os, arch) {
+            (Self::V2, "linux", "x86_64") => "binaries/linux64".into(),
+            (Self::V2, "windows", "x86_64") => "binaries/win64".into(),
+            (Self::V2, "macos", "x86_64") => "binaries/darwin64".into(),
+            (_, "macos", arch) => format!("binaries/{arch}-darwin"),
+            (_, os, arch) => format!("binaries/{arch}-{os}"),
+        }
+    }
 }
 
 impl fmt::Display for FmiVersion {

@@ -1,0 +1,69 @@
+//! `shakebench report`
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::{compare_tables, diagnose, summary};
+use crate::error::Error;
+use crate::results::Results;
+
+/// Options of `shakebench report`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    shakebench report shakebench-results/three-variable-synthetic-1")]
+pub struct Arguments {
+    /// Folder of a run, a comparison or a diagnosis
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Writes `report.html` again from the other files of a folder.
+///
+/// # Errors
+/// A folder without such files, or a file at fault; nothing is written then.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let folder = &arguments.folder;
+    let fault = |reason: &str| Error::File {
+        path: folder.clone(),
+        reason: reason.to_string(),
+    };
+    if !folder.is_dir() {
+        return Err(fault(
+            "is no folder; expected that of a run, a comparison or a diagnosis",
+        ));
+    }
+    let has = |name: &str| folder.join(name).is_file();
+    let report = folder.join(diagnose::REPORT);
+    let (kind, page) = if has("manifest.json") || has("results.csv") {
+        ("run", summary::page_again(folder)?)
+    } else if has(compare_tables::COMPARISON) {
+        ("comparison", compare_tables::page_again(folder)?)
+    } else if has(diagnose::DIAGNOSIS) {
+        if report.is_file() {
+            return Err(fault(
+                "its report.html has pictures that diagnosis.json does not hold; move it away to \
+                 have one without them, or run `shakebench diagnose` on the case again",
+            ));
+        }
+        ("diagnosis", diagnose::page_again(folder)?)
+    } else {
+        return Err(fault(
+            "holds no results; expected results.csv, summary.json and manifest.json of a run, \
+             comparison.json of a comparison, or diagnosis.json of a diagnosis",
+        ));
+    };
+    let mut results = Results::begin(folder)?;
+    results.write_text(diagnose::REPORT, &page)?;
+    results.finish()?;
+    if arguments.json {
+        println!("{}", serde_json::json!({"of": kind, "report": report}));
+    } else {
+        println!("written, of a {kind}:\n  {}", report.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,132 @@
+//! `report`: the page again from the other files of a folder.
+
+use std::fs;
+use std::path::Path;
+
+use crate::{shakebench, stderr, stdout};
+
+fn done(folder: &Path, arguments: &[&str]) -> String {
+    let output = shakebench(folder, arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    stdout(&output)
+}
+
+/// The page that was written and the one that `report` makes without it.
+fn twice(folder: &Path) -> [String; 2] {
+    let page = folder.join("out/report.html");
+    let first = fs::read_to_string(&page).unwrap();
+    fs::remove_file(&page).unwrap();
+    let said = done(folder, &["report", "out"]);
+    assert!(said.contains("report.html"), "{said}");
+    [first, fs::read_to_string(&page).unwrap()]
+}
+
+#[test]
+fn the_report_of_a_run_is_the_same_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    done(folder, &["run", "displacement-pid", "--out", "out"]);
+    let [first, again] = twice(folder);
+    assert!(first == again, "the pages differ");
+    // It is read, not repeated: another figure shows.
+    let summary = folder.join("out/summary.json");
+    let mut json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(&summary).unwrap()).unwrap();
+    json["tracking"]["time_domain_percent"] = 87.65.into();
+    fs::write(&summary, json.to_string()).unwrap();
+    assert!(twice(folder)[1].contains("an error of 87.65 % in time"));
+}
+
+#[test]
+fn a_run_that_played_the_beginning_keeps_the_figures_of_the_whole_motion() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let run = ["run", "three-variable", "--duration", "3 s", "--out", "out"];
+    done(folder, &run);
+    let [first, again] = twice(folder);
+    // Up to the plots, which show what was played.
+    let figures = |page: &str| page.split("Time histories").next().unwrap().to_string();
+    assert!(figures(&first).contains("of the reference"));
+    assert_eq!(figures(&first), figures(&again));
+}
+
+#[test]
+fn the_report_of_a_comparison_is_the_same_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut reference =
+        "time [s],displacement [m],velocity [m/s],acceleration [m/s^2]\n".to_string();
+    for n in 0..1500 {
+        let (t, w, a) = (f64::from(n) * 0.002, 6.0_f64, 0.004);
+        let (sine, cosine) = (w * t).sin_cos();
+        let (v, c) = (a * w * sine, a * w * w * cosine);
+        reference += &format!("{t},{},{v},{c}\n", a * (1.0 - cosine));
+    }
+    fs::write(folder.join("sine.csv"), reference).unwrap();
+    let controllers = "three-variable,displacement-pid";
+    let arguments = [
+        "compare",
+        "--controllers",
+        controllers,
+        "--reference",
+        "sine.csv",
+    ];
+    done(folder, &[&arguments[..], &["--out", "out"]].concat());
+    let [first, again] = twice(folder);
+    assert!(first.contains("error on sine"), "there are no plots");
+    assert!(first == again, "the pages differ");
+}
+
+#[test]
+fn folders_and_files_at_fault_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let complaint = |words: &[&str]| {
+        let output = shakebench(folder, &["report", "out"]);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        for word in words {
+            assert!(said.contains(word), "`{word}` is not in: {said}");
+        }
+        assert!(!folder.join("out/report.html").exists());
+    };
+    complaint(&["error: out: is no folder"]);
+    fs::create_dir(folder.join("out")).unwrap();
+    complaint(&[
+        "out: holds no results",
+        "results.csv",
+        "comparison.json",
+        "diagnosis.json",
+    ]);
+    for name in ["comparison.json", "diagnosis.json"] {
+        fs::write(folder.join("out").join(name), "{}").unwrap();
+        complaint(&[name, "missing field"]);
+        fs::remove_file(folder.join("out").join(name)).unwrap();
+    }
+    fs::write(folder.join("out/results.csv"), "").unwrap();
+    complaint(&["manifest.json"]);
+    fs::remove_file(folder.join("out/results.csv")).unwrap();
+
+    let run = [
+        "run",
+        "displacement-pid",
+        "--duration",
+        "1 s",
+        "--out",
+        "out",
+    ];
+    done(folder, &run);
+    fs::remove_file(folder.join("out/report.html")).unwrap();
+    let results = folder.join("out/results.csv");
+    let text = fs::read_to_string(&results).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    fs::write(&results, [lines[0], lines[1], "0.002,x"].join("\n")).unwrap();
+    complaint(&["results.csv", "line: 3"]);
+    let broken = lines[2].replacen("0.002", "soon", 1);
+    fs::write(&results, [lines[0], lines[1], &broken].join("\n")).unwrap();
+    complaint(&["results.csv: line 3: `soon` is no number"]);
+    fs::write(&results, text.replacen("reference.velocity", "other", 1)).unwrap();
+    complaint(&["results.csv", "no column `reference.velocity`"]);
+    fs::remove_file(folder.join("out/summary.json")).unwrap();
+    complaint(&["summary.json"]);
+}
