@@ -47,7 +47,12 @@ fn main() -> ExitCode {
     }
     println!("{plan:?}");
     let results = run_all(&plan, |scored| {
-        eprintln!("{}, {:.1} s, {:?}", line(scored), scored.seconds, scored.errors);
+        eprintln!(
+            "{}, {:.1} s, {:?}",
+            line(scored),
+            scored.seconds,
+            scored.errors
+        );
     });
     println!("{}", table(&results));
     ExitCode::SUCCESS

@@ -265,12 +265,11 @@ pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, Apply)> {
                         (4.0, 40.0),
                     ),
                 ],
-                &[
-                    &[7.0, 0.05, 12.0],
-                    &[9.5, 0.05, 12.0],
-                    &[13.0, 0.05, 12.0],
-                    &[17.0, 0.05, 12.0],
-                ],
+                // A lightly damped mode is found from nearby only.
+                &[6.3, 7.3, 8.5, 9.8, 11.4, 13.2, 15.3, 17.7]
+                    .map(|frequency| [frequency, 0.05, 12.0])
+                    .each_ref()
+                    .map(<[f64; 3]>::as_slice),
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| {
                 rig.effects.foundation.frequency = p[0];

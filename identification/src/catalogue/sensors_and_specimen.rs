@@ -144,7 +144,11 @@ pub(super) fn entries(period: f64) -> Vec<(Candidate, Apply)> {
                         (0.005, 0.2),
                     ),
                 ],
-                &[&[4.5, 0.03], &[6.0, 0.03], &[8.0, 0.03], &[11.0, 0.03]],
+                // A lightly damped mode is found from nearby only.
+                &[4.2, 4.8, 5.5, 6.3, 7.2, 8.2, 9.4, 10.7, 12.0]
+                    .map(|frequency| [frequency, 0.03])
+                    .each_ref()
+                    .map(<[f64; 2]>::as_slice),
             ),
             |rig: &mut IdentifiedRig, p: &[f64]| {
                 rig.effects.specimen.second_mode_frequency = p[0];

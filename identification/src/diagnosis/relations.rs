@@ -27,6 +27,9 @@ pub struct Relation {
 const EQUILIBRIUM: &str = "R2 equilibrium of the table";
 const KINEMATICS: &str = "R4 kinematics";
 
+/// Relative difference below which the specimen's channel shows nothing, or the table.
+const LOOKS_ABSENT: f64 = 0.2;
+
 /// What shows that columns and nominal model do not belong together: signs, units, another rig.
 /// The limits lie beyond anything that an effect of the catalogue does.
 pub fn misfit(relations: &[Relation]) -> Option<String> {
@@ -144,10 +147,25 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
             let inertia = (table.mass * sa).powi(2) + (mass * ss).powi(2);
             (error, sf * sf + inertia + of_x.norm_sqr() * sx * sx)
         };
+        // An absent specimen is an effect, not a sign of wrong columns: its channel then shows
+        // nothing or the table.
+        let follows = |share: f64| {
+            let off = |k: usize, _: Complex<f64>| (specimen[k] - a[k] * share, 1.0);
+            relative(&off, a).is_some_and(|off| off < LOOKS_ABSENT)
+        };
+        let absent = follows(0.0) || follows(1.0);
+        let without = |k: usize, s: Complex<f64>| {
+            let (error, variance) = error(k, s);
+            (error + specimen[k] * mass, variance)
+        };
         all.push(Relation {
             name: EQUILIBRIUM,
             ratio: ratio(&error),
-            relative: relative(&error, f),
+            relative: if absent {
+                relative(&without, f)
+            } else {
+                relative(&error, f)
+            },
         });
     }
     if let (
