@@ -168,3 +168,29 @@ fn reference(duration: f64, band: (f64, f64), random: &mut ChaCha8Rng) -> Vec<Mo
     }
     motion
 }
+
+/// A recording as the file that `shakebench identify` reads.
+pub fn csv(recording: &Recording) -> String {
+    let unit = |name: &str| match name {
+        "valve_command" => "V",
+        "actuator_force" => "N",
+        "displacement" | "reference" => "m",
+        _ => "m/s^2",
+    };
+    let names: Vec<&str> = recording.names().collect();
+    let mut text = String::from("time [s]");
+    for name in &names {
+        text += &format!(",{name} [{}]", unit(name));
+    }
+    let columns: Vec<&[f64]> = names
+        .iter()
+        .filter_map(|name| recording.channel(name))
+        .collect();
+    for k in 0..recording.len() {
+        text += &format!("\n{:.3}", k as f64 * recording.period);
+        for column in &columns {
+            text += &format!(",{:.8e}", column[k]);
+        }
+    }
+    text + "\n"
+}

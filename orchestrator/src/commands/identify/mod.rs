@@ -2,9 +2,10 @@
 
 pub mod measured;
 mod printed;
+mod responses;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -75,6 +76,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             reason: format!("{}; expected 0.3 to 0.95", arguments.fit_part),
         });
     }
+    let folder = output_folder(arguments)?;
     let mut recordings = Vec::new();
     let mut warnings = Vec::new();
     for path in &arguments.data {
@@ -97,8 +99,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let summary = summary(arguments, &found, warnings, started);
     write(
         arguments,
+        &folder,
         &model.to_toml()?,
-        &printed::report(&found, &summary),
+        &printed::report(&found, &recordings, &summary),
     )?;
     if arguments.json {
         println!(
@@ -158,15 +161,67 @@ fn summary(
     }
 }
 
-fn write(arguments: &Arguments, model: &str, page: &report::Report) -> Result<(), Error> {
-    let fault = |path: &PathBuf, reason: String| Error::File {
-        path: path.clone(),
+/// The folder of the model file, after checks that it can be written and overwrites no data.
+fn output_folder(arguments: &Arguments) -> Result<PathBuf, Error> {
+    let out = &arguments.out;
+    let fault = |reason: String| Error::Option {
+        option: "--out",
+        reason,
+    };
+    if out.extension().is_none_or(|extension| extension != "toml") {
+        return Err(fault(format!(
+            "{}; expected a file name that ends in .toml",
+            out.display()
+        )));
+    }
+    let folder = match out.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
+        _ => PathBuf::from("."),
+    };
+    if !folder.is_dir() {
+        return Err(fault(format!(
+            "{}: the folder does not exist; expected one that does",
+            folder.display()
+        )));
+    }
+    let same =
+        |path: &Path| matches!((path.canonicalize(), out.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    let read = arguments.data.iter().chain(&arguments.specimen);
+    if let Some(path) = read.into_iter().find(|path| same(path)) {
+        return Err(fault(format!(
+            "{} is read from; expected another file",
+            path.display()
+        )));
+    }
+    Ok(folder)
+}
+
+/// Writes model and report beside each other, each whole or not at all.
+fn write(
+    arguments: &Arguments,
+    folder: &Path,
+    model: &str,
+    page: &report::Report,
+) -> Result<(), Error> {
+    let fault = |path: &Path, reason: String| Error::File {
+        path: path.to_path_buf(),
         reason,
     };
     let beside = arguments.out.with_extension("html");
     let html = report::html(page).map_err(|error| fault(&beside, error.to_string()))?;
-    for (path, text) in [(&arguments.out, model), (&beside, html.as_str())] {
-        std::fs::write(path, text).map_err(|error| fault(path, error.to_string()))?;
+    let staging = tempfile::Builder::new()
+        .prefix(".shakebench")
+        .tempdir_in(folder)
+        .map_err(|error| fault(folder, error.to_string()))?;
+    let files = [
+        (staging.path().join("model"), &arguments.out, model),
+        (staging.path().join("report"), &beside, html.as_str()),
+    ];
+    for (draft, path, text) in &files {
+        std::fs::write(draft, text).map_err(|error| fault(path, error.to_string()))?;
+    }
+    for (draft, path, _) in &files {
+        std::fs::rename(draft, path).map_err(|error| fault(path, error.to_string()))?;
     }
     Ok(())
 }

@@ -2,10 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use identification::data::Recording;
 use identification::model_file::{ModelFile, StandardErrors};
 use identification::rig::RigIdentification;
 
-use super::Summary;
+use super::{Summary, responses};
 use crate::commands::table::{aligned, significant};
 use crate::report::{Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units};
 
@@ -20,7 +21,11 @@ fn parameters(found: &RigIdentification) -> Vec<[String; 4]> {
         rows.push([
             name.to_string(),
             significant(value, 6),
-            significant(error, 2),
+            match error {
+                0.0 if name.starts_with("specimen") => "given".to_string(),
+                0.0 => "held".to_string(),
+                _ => significant(error, 2),
+            },
             unit.to_string(),
         ]);
     };
@@ -171,7 +176,11 @@ pub(super) fn text(found: &RigIdentification, summary: &Summary) -> String {
 }
 
 /// The report with plots like Fig 2-7 and 2-10.
-pub(super) fn report(found: &RigIdentification, summary: &Summary) -> Report {
+pub(super) fn report(
+    found: &RigIdentification,
+    recordings: &[Recording],
+    summary: &Summary,
+) -> Report {
     let table = Table {
         caption: "Parameters with standard errors".into(),
         columns: ["parameter", "value", "standard error", "unit"]
@@ -236,7 +245,10 @@ pub(super) fn report(found: &RigIdentification, summary: &Summary) -> Report {
     sections.push(Section {
         heading: "Order".into(),
         panels: vec![Panel {
-            title: "Singular values of the subspace method".into(),
+            title: format!(
+                "Singular values of the subspace method (the model has order {})",
+                if found.specimen { 7 } else { 5 }
+            ),
             x: Axis::linear("order", Units::NONE),
             y: Axis::logarithmic("singular value", Units::NONE),
             series: vec![
@@ -250,49 +262,24 @@ pub(super) fn report(found: &RigIdentification, summary: &Summary) -> Report {
         }],
         ..Section::default()
     });
-    if found.identifiable {
-        sections.push(responses(found));
-    }
+    sections.push(responses::section(found, recordings));
     Report {
         title: "Identified rig".into(),
         summary: format!(
-            "{}; {} warnings.",
+            "{}; {}.",
             if found.identifiable {
                 "The data determine actuator and table"
             } else {
                 "The data determine the table and not the actuator"
             },
-            summary.warnings.len()
+            match summary.warnings.len() {
+                0 => "no warnings".to_string(),
+                1 => "one warning".to_string(),
+                several => format!("{several} warnings"),
+            }
         ),
         sections,
         footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
         ..Report::default()
-    }
-}
-
-fn responses(found: &RigIdentification) -> Section {
-    let omega = plant::linear::log_space(TAU * 0.02, TAU * 50.0, 300);
-    let actuator = found.rig().shake_table.actuator;
-    let frequency: Vec<f64> = omega.iter().map(|w| w / TAU).collect();
-    let panel = |title: &str, path: plant::linear::TransferFunction| {
-        let response = plant::linear::FrequencyResponse::continuous(&omega, |s| path.evaluate(s));
-        Panel {
-            title: title.into(),
-            x: Axis::logarithmic("frequency", Units::FREQUENCY),
-            y: Axis::linear("gain (SI)", Units::DECIBEL),
-            series: vec![Series::line(
-                title,
-                Abscissa::At(frequency.clone().into()),
-                response.gain_db(),
-            )],
-        }
-    };
-    Section {
-        heading: "Frequency responses".into(),
-        panels: vec![
-            panel("G1, command to force", actuator.g1()),
-            panel("G2, velocity to force", actuator.g2()),
-        ],
-        ..Section::default()
     }
 }

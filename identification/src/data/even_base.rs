@@ -1,93 +1,15 @@
-//! Recordings and their faults: gaps, drop-outs, clipped and constant channels, uneven time
-//! stamps.
+//! From raw columns to recordings on an even time base: drop-outs, uneven stamps, gaps.
 
-use std::fmt;
-
+use super::faults::runs;
+use super::{Finding, Recording};
 use crate::IdentificationError;
-
-/// Channels of one test on an even time base, SI units.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Recording {
-    /// What the recording is called in messages.
-    pub name: String,
-    /// Sampling period, s.
-    pub period: f64,
-    /// Time of the first sample, s.
-    pub start: f64,
-    /// The file or test it comes from; pieces of one recording share it.
-    pub source: String,
-    channels: Vec<(String, Vec<f64>)>,
-}
-
-/// Something about a recording that its reader should know.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Finding {
-    /// The recording.
-    pub recording: String,
-    /// What was found, with its place.
-    pub what: String,
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.recording, self.what)
-    }
-}
 
 /// Missing samples up to this many in a row are bridged by a straight line.
 const LONGEST_BRIDGE: usize = 5;
 /// Time stamps may stray from the even grid by this part of the period.
 const JITTER: f64 = 0.02;
-/// A stretch at the same extreme value this long is a clipped channel.
-const CLIPPED_RUN: usize = 4;
-/// A stretch of one repeated value this long, in a channel that otherwise moves, is a drop-out.
-const STUCK_RUN: usize = 25;
 
 impl Recording {
-    /// Joins channels that are sampled evenly.
-    ///
-    /// # Errors
-    /// Channels of different length, a period that is not positive, samples that are not finite.
-    pub fn new(
-        name: &str,
-        period: f64,
-        channels: Vec<(String, Vec<f64>)>,
-    ) -> Result<Self, IdentificationError> {
-        let unreadable = |what: String, expected| IdentificationError::Unreadable {
-            recording: name.to_string(),
-            what,
-            expected,
-        };
-        if !(period.is_finite() && period > 0.0) {
-            return Err(unreadable(
-                format!("the period is {period} s"),
-                "a positive sampling period",
-            ));
-        }
-        let length = channels.first().map_or(0, |channel| channel.1.len());
-        for (channel, values) in &channels {
-            if values.len() != length {
-                return Err(unreadable(
-                    format!("`{channel}` has {} samples, not {length}", values.len()),
-                    "channels of one length",
-                ));
-            }
-            if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-                return Err(unreadable(
-                    format!("`{channel}` has no number at sample {}", at + 1),
-                    "finite numbers",
-                ));
-            }
-        }
-        Ok(Self {
-            name: name.to_string(),
-            period,
-            start: 0.0,
-            source: name.to_string(),
-            channels,
-        })
-    }
-
     /// Puts raw columns on an even time base: short drop-outs (NaN) are bridged, uneven stamps
     /// interpolated, and the recording is cut where samples are missing for longer. Each piece is
     /// a recording of its own; everything done is told.
@@ -231,149 +153,6 @@ impl Recording {
         }
         Ok((recordings, findings))
     }
-
-    /// Number of samples.
-    pub fn len(&self) -> usize {
-        self.channels.first().map_or(0, |channel| channel.1.len())
-    }
-
-    /// True without samples.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Length in seconds.
-    pub fn duration(&self) -> f64 {
-        self.len() as f64 * self.period
-    }
-
-    /// Names of the channels.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.channels.iter().map(|channel| channel.0.as_str())
-    }
-
-    /// The samples of a channel, if it was recorded.
-    pub fn channel(&self, name: &str) -> Option<&[f64]> {
-        let found = self.channels.iter().find(|channel| channel.0 == name)?;
-        Some(&found.1)
-    }
-
-    /// The samples of a channel that must be there and must move.
-    ///
-    /// # Errors
-    /// It is missing or constant.
-    pub fn require(
-        &self,
-        name: &str,
-        expected: &'static str,
-    ) -> Result<&[f64], IdentificationError> {
-        let values = self
-            .channel(name)
-            .ok_or_else(|| IdentificationError::MissingChannel {
-                recording: self.name.clone(),
-                channel: name.to_string(),
-                found: self.names().collect::<Vec<_>>().join(", "),
-                expected,
-            })?;
-        match values.first() {
-            Some(&value) if is_constant(values) => Err(IdentificationError::ConstantChannel {
-                recording: self.name.clone(),
-                channel: name.to_string(),
-                value,
-            }),
-            _ => Ok(values),
-        }
-    }
-
-    /// The samples `first..end` as a recording.
-    pub fn cut(&self, first: usize, end: usize) -> Self {
-        let (first, end) = (first.min(self.len()), end.min(self.len()));
-        Self {
-            name: self.name.clone(),
-            period: self.period,
-            start: self.start + first as f64 * self.period,
-            source: self.source.clone(),
-            channels: self
-                .channels
-                .iter()
-                .map(|(name, values)| (name.clone(), values[first..end.max(first)].to_vec()))
-                .collect(),
-        }
-    }
-
-    /// Constant, clipped and stuck channels.
-    pub fn faults(&self) -> Vec<Finding> {
-        let mut findings = Vec::new();
-        let mut tell = |what: String| {
-            findings.push(Finding {
-                recording: self.name.clone(),
-                what,
-            });
-        };
-        for (name, values) in &self.channels {
-            if is_constant(values) {
-                tell(format!("`{name}` is constant"));
-                continue;
-            }
-            let (low, high) = values
-                .iter()
-                .fold((f64::MAX, f64::MIN), |(low, high), &value| {
-                    (low.min(value), high.max(value))
-                });
-            let mut clipped = 0;
-            for extreme in [low, high] {
-                clipped += runs(values, |value| value == extreme)
-                    .iter()
-                    .map(|run| run.1 - run.0)
-                    .filter(|&length| length >= CLIPPED_RUN)
-                    .sum::<usize>();
-            }
-            if clipped > 0 {
-                tell(format!(
-                    "`{name}` is clipped: {clipped} samples stand at {low:.4e} or {high:.4e} (SI)"
-                ));
-            }
-            let stuck: Vec<(usize, usize)> = stuck_runs(values)
-                .into_iter()
-                .filter(|run| ![low, high, 0.0].contains(&values[run.0]))
-                .collect();
-            if let Some(&(first, end)) = stuck.first() {
-                tell(format!(
-                    "drop-out in `{name}`: the value repeats for {:.3} s from {:.3} s ({} such \
-                     places)",
-                    (end - first) as f64 * self.period,
-                    self.start + first as f64 * self.period,
-                    stuck.len()
-                ));
-            }
-        }
-        findings
-    }
-}
-
-/// Mean, and root mean square about it.
-pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
-    let count = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let square = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / count;
-    (mean, square.sqrt())
-}
-
-/// `100 (1 - ||y - m|| / ||y - mean(y)||)`, per cent.
-pub fn fit_percent(measured: &[f64], model: &[f64]) -> f64 {
-    let (mean, _) = mean_and_deviation(measured);
-    let error: f64 = measured
-        .iter()
-        .zip(model)
-        .map(|(y, m)| (y - m) * (y - m))
-        .sum();
-    let size: f64 = measured.iter().map(|y| (y - mean) * (y - mean)).sum();
-    100.0 * (1.0 - (error / size).sqrt())
-}
-
-fn is_constant(values: &[f64]) -> bool {
-    let (mean, deviation) = mean_and_deviation(values);
-    deviation <= 1e-12 * mean.abs() || deviation == 0.0
 }
 
 /// The step of the even base: the median step, refined over the whole recording where no gap
@@ -391,39 +170,6 @@ fn even_period(time: &[f64]) -> f64 {
     // Stamps are decimal: 0.002 s must not become 0.0019999999.
     let rounded = (even * 1e9).round() / 1e9;
     if rounded > 0.0 { rounded } else { even }
-}
-
-fn runs(values: &[f64], is: impl Fn(f64) -> bool) -> Vec<(usize, usize)> {
-    let mut found = Vec::new();
-    let mut first = None;
-    for (at, &value) in values.iter().enumerate() {
-        match (is(value), first) {
-            (true, None) => first = Some(at),
-            (false, Some(start)) => {
-                found.push((start, at));
-                first = None;
-            }
-            _ => {}
-        }
-    }
-    if let Some(start) = first {
-        found.push((start, values.len()));
-    }
-    found
-}
-
-fn stuck_runs(values: &[f64]) -> Vec<(usize, usize)> {
-    let mut found = Vec::new();
-    let mut first = 0;
-    for at in 1..=values.len() {
-        if at == values.len() || values[at] != values[first] {
-            if at - first >= STUCK_RUN {
-                found.push((first, at));
-            }
-            first = at;
-        }
-    }
-    found
 }
 
 fn bridge(values: &mut [f64], first: usize, end: usize) {
