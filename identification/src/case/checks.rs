@@ -52,9 +52,15 @@ pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
     }
     found.extend(timing(record, nominal));
     for (channel, values) in CHANNELS.iter().zip(&record.channels) {
-        found.extend(readings(name, channel, values));
+        found.extend(readings(name, channel, values, f64::INFINITY));
     }
-    found.extend(readings(name, "valve_command", &record.valve_command));
+    let limit = nominal.controller.map_or(f64::INFINITY, |law| law.limit);
+    found.extend(readings(
+        name,
+        "valve_command",
+        &record.valve_command,
+        limit,
+    ));
     if found.is_empty() {
         found.extend(held(record));
     }
@@ -71,14 +77,21 @@ pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
             ));
         }
     }
-    let excitation = deviation(&record.channels[0]) / nominal.noise[0];
-    if found.is_empty() && !record.channels[0].is_empty() && excitation < LEAST_EXCITATION {
-        found.push(format!(
-            "{name}: too little excitation, the displacement varies by {excitation:.1} standard \
-             deviations of its noise, at least {LEAST_EXCITATION} are needed"
-        ));
-    }
     found
+}
+
+/// That `record` moves too little to tell anything, if it does. A low level is no fault of a record
+/// that is there to show what happens at it: a table that sticks says something.
+pub fn too_little_excitation(record: &Record, nominal: &Nominal) -> Option<String> {
+    let displacement = &record.channels[0];
+    let excitation = deviation(displacement) / nominal.noise[0];
+    (!displacement.is_empty() && excitation < LEAST_EXCITATION).then(|| {
+        format!(
+            "{}: too little excitation, the displacement varies by {excitation:.1} standard \
+             deviations of its noise, at least {LEAST_EXCITATION} are needed",
+            record.name
+        )
+    })
 }
 
 fn timing(record: &Record, nominal: &Nominal) -> Option<String> {
@@ -118,7 +131,8 @@ fn timing(record: &Record, nominal: &Nominal) -> Option<String> {
     })
 }
 
-fn readings(name: &str, channel: &str, values: &[f64]) -> Vec<String> {
+/// What is wrong with the readings of a channel, which may well stand at `limit`.
+fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String> {
     let mut found = Vec::new();
     if let Some(row) = values.iter().position(|value| !value.is_finite()) {
         let count = values.iter().filter(|value| !value.is_finite()).count();
@@ -138,6 +152,9 @@ fn readings(name: &str, channel: &str, values: &[f64]) -> Vec<String> {
         }
         let value = values[k - 1];
         let is_extreme = (value == low || value == high) && high > low;
+        if value.abs() >= limit {
+            run = 1;
+        }
         if run >= FROZEN_RUN && !is_extreme {
             found.push(format!(
                 "{name}: `{channel}` is frozen at {value:.4e} for {run} samples from sample {start}"

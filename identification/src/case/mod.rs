@@ -4,7 +4,7 @@ mod checks;
 mod nominal;
 mod record;
 
-pub use checks::{blind_spot, deviation, noise_ratios, problems};
+pub use checks::{blind_spot, deviation, noise_ratios, problems, too_little_excitation};
 pub use nominal::{ControlLaw, Nominal};
 pub use record::{CHANNELS, Record};
 

@@ -13,7 +13,10 @@ use super::relations::{Relation, misfit, relations};
 use super::sentence::sentence;
 use super::verdict::{NamedEffect, Verdict, judge};
 use super::{Point, Role, Test};
-use crate::case::{CHANNELS, Case, CaseError, Nominal, Record, blind_spot, noise_ratios, problems};
+use crate::case::{
+    CHANNELS, Case, CaseError, Nominal, Record, blind_spot, noise_ratios, problems,
+    too_little_excitation,
+};
 use crate::catalogue::{ModelRecord, NUISANCE, ShakeTableModel, nominal_parameters};
 use crate::predictor::{Predictor, Signals};
 
@@ -124,6 +127,11 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
         .records()
         .flat_map(|record| problems(record, nominal))
         .collect();
+    if found.is_empty() {
+        let to_be_moved = [&case.identification, &case.validation];
+        let still = |record: &&Record| too_little_excitation(record, nominal);
+        found.extend(to_be_moved.iter().filter_map(still));
+    }
     let has = |record: &Record| {
         record
             .channels

@@ -270,7 +270,7 @@ mod tests {
         rig.table.friction = SealFriction::viscous_only(0.0);
         rig.table.table.stiffness = 1e-12;
         rig.table.table.damping = 0.0;
-        rig.table.cylinder.leakage = 1.0;
+        rig.table.cylinder.area *= 1e-3;
         let mut state = rig.rest();
         state.foundation = [0.01 * INCH, 0.0];
         let (w, zeta) = (TAU * 8.0, 0.05_f64);
