@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use identification::case::{Case, CaseError, Nominal, Record};
+use identification::case::{Case, CaseError, Nominal, Record, problems};
 use identification::diagnosis::Verdict;
 use identification::diagnosis::experiment::play;
 use identification::diagnosis::shake_table::diagnose;
@@ -278,6 +278,17 @@ fn too_little_excitation_is_named() {
         message.contains("identification: too little excitation"),
         "{message}"
     );
+}
+
+#[test]
+fn a_table_that_sticks_at_low_level_and_a_command_at_its_limit_are_no_faults() {
+    let mut case = healthy();
+    let record = &mut case.identification;
+    record.channels[0].iter_mut().for_each(|x| *x *= 1e-3);
+    record.valve_command[500..600].fill(10.0);
+    assert_eq!(problems(record, &case.nominal), Vec::<String>::new());
+    record.valve_command[500..600].fill(9.0);
+    assert_eq!(problems(record, &case.nominal).len(), 1);
 }
 
 #[test]
