@@ -159,25 +159,10 @@ fn fmus_with_an_effect_move_in_closed_loop_like_the_engine_that_finds_it() {
         ..IdentifiedRig::default()
     };
     let plain = native(&without, &law, &reference);
-    let unchanged = |name| file(originals, name).unwrap();
-    let fmus = RigFmus {
-        table: (unchanged("ShakeTable"), Vec::new()),
-        specimen: Some((unchanged("Specimen"), Vec::new())),
-        sensors: unchanged("Instrumentation"),
-        control: unchanged("ThreeVariableControl"),
-    };
-    // What the coupling alone makes of the healthy rig is no matter of an effect.
-    let coupled = play(&fmus, &law, &reference, PERIOD, None).unwrap();
-    let mut worst = (0.0, "");
-    for name in names() {
-        let (rig, effect) = with_effect(name);
-        let model = extended(&rig, &[effect]);
-        let folder = tempfile::tempdir().unwrap();
-        let changed = model.write_fmus(originals, folder.path()).unwrap();
+    let played_with = |changed: &[PackedFmu]| {
         let path = |name| {
-            file(&changed, name)
-                .or_else(|| file(originals, name))
-                .unwrap()
+            let found = file(changed, name).or_else(|| file(originals, name));
+            found.unwrap()
         };
         let fmus = RigFmus {
             table: (path("ShakeTable"), Vec::new()),
@@ -185,7 +170,17 @@ fn fmus_with_an_effect_move_in_closed_loop_like_the_engine_that_finds_it() {
             sensors: path("Instrumentation"),
             control: path("ThreeVariableControl"),
         };
-        let played = play(&fmus, &law, &reference, PERIOD, None).unwrap();
+        play(&fmus, &law, &reference, PERIOD, None).unwrap()
+    };
+    // What the coupling alone makes of the healthy rig is no matter of an effect.
+    let coupled = played_with(&[]);
+    let mut worst = (0.0, "");
+    for name in names() {
+        let (rig, effect) = with_effect(name);
+        let model = extended(&rig, &[effect]);
+        let folder = tempfile::tempdir().unwrap();
+        let changed = model.write_fmus(originals, folder.path()).unwrap();
+        let played = played_with(&changed);
         let expected = native(&rig, &law, &reference);
         // In units of the channel's own variation.
         let (mut off, mut effect) = (0.0f64, 0.0f64);

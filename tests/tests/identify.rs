@@ -57,6 +57,19 @@ fn seeds() -> u64 {
     asked.and_then(|text| text.parse().ok()).unwrap_or(24)
 }
 
+/// Poles and responses are within 2 % of the true rig's, and what was simulated fits.
+fn is_within_two_percent(found: &RigIdentification) {
+    let rig = ShakeTable::default();
+    let actuator = pole_error(found.actuator_poles(), &rig.actuator.g1().poles());
+    let table = pole_error(found.table_poles(), &rig.table.transfer_function().poles());
+    let response = response_error(found, 0.1, 30.0);
+    println!("poles {actuator:.1e} {table:.1e}, responses {response:.1e}");
+    assert!(actuator < 0.02 && table < 0.02 && response < 0.02);
+    for fit in &found.fits {
+        assert!(fit.simulated > 98.5, "{} {}", fit.channel, fit.simulated);
+    }
+}
+
 #[test]
 fn a_known_rig_is_found_from_a_minute_with_a_specimen() {
     let started = std::time::Instant::now();
@@ -65,15 +78,7 @@ fn a_known_rig_is_found_from_a_minute_with_a_specimen() {
     let found = identify(&[recording], Options::default()).unwrap();
     println!("identified in {:?}", started.elapsed() - made);
     assert!(found.identifiable);
-    let rig = ShakeTable::default();
-    let actuator = pole_error(&found.actuator_poles(), &rig.actuator.g1().poles());
-    let table = pole_error(&found.table_poles(), &rig.table.transfer_function().poles());
-    let response = response_error(&found, 0.1, 30.0);
-    println!("poles {actuator:.1e} {table:.1e}, responses {response:.1e}");
-    assert!(actuator < 0.02 && table < 0.02 && response < 0.02);
-    for fit in &found.fits {
-        assert!(fit.simulated > 98.5, "{} {}", fit.channel, fit.simulated);
-    }
+    is_within_two_percent(&found);
     assert!(found.warnings.is_empty(), "{:?}", found.warnings);
 }
 
@@ -247,15 +252,7 @@ fn a_known_specimen_stands_for_its_sensor() {
     for recording in [unsensed, recording] {
         let found = identify(&[recording], known).unwrap();
         assert!(found.identifiable && found.specimen);
-        let rig = ShakeTable::default();
-        let actuator = pole_error(&found.actuator_poles(), &rig.actuator.g1().poles());
-        let table = pole_error(&found.table_poles(), &rig.table.transfer_function().poles());
-        let response = response_error(&found, 0.1, 30.0);
-        println!("poles {actuator:.1e} {table:.1e}, responses {response:.1e}");
-        assert!(actuator < 0.02 && table < 0.02 && response < 0.02);
-        for fit in &found.fits {
-            assert!(fit.simulated > 98.5, "{} {}", fit.channel, fit.simulated);
-        }
+        is_within_two_percent(&found);
         assert_eq!(found.rig().specimen, Some(LinearSpecimen::appendix_a()));
         assert!(found.warnings.is_empty(), "{:?}", found.warnings);
     }

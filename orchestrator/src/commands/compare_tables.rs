@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::compare::{History, Row};
+use super::compare_errors;
 use super::table::aligned;
 use crate::error::Error;
 use crate::report::{self, Axis, Cell, Panel, Report, Section, Series, Units};
@@ -96,10 +97,6 @@ const PRINTED_TIME: [[f64; 3]; 2] = [[13.19, 10.70, 4.76], [4.49, 4.14, 2.06]];
 
 /// File with the errors by run.
 pub(super) const COMPARISON: &str = "comparison.json";
-/// File with the errors over time.
-const ERRORS: &str = "errors.csv";
-/// Its columns, after the controller's name.
-const COLUMNS: [&str; 2] = ["displacement_error", "acceleration_error"];
 
 /// A table as words.
 pub(super) struct Words {
@@ -251,7 +248,7 @@ pub(super) fn write(
     let mut results = Results::begin(folder)?;
     results.write_text("report.html", &page)?;
     results.write_text(COMPARISON, &json.to_string())?;
-    results.write_text(ERRORS, &errors(rows))?;
+    results.write_text(compare_errors::FILE, &compare_errors::written(rows))?;
     Ok(results.finish()?)
 }
 
@@ -280,37 +277,6 @@ fn page(folder: &Path, rows: &[Row], controllers: &[String]) -> Result<String, E
     })
 }
 
-/// Errors over time on the first motion as CSV: `time`, then two columns a controller; a run that
-/// ended early leaves cells empty.
-fn errors(rows: &[Row]) -> String {
-    let kept: Vec<(&str, &History)> = rows
-        .iter()
-        .filter_map(|row| Some((row.controller.as_str(), row.history.as_ref()?)))
-        .collect();
-    let mut text = "time".to_string();
-    for (controller, _) in &kept {
-        text += &format!(",{controller}.{},{controller}.{}", COLUMNS[0], COLUMNS[1]);
-    }
-    text += "\n";
-    let dt = kept.first().map_or(0.0, |(_, history)| history.dt);
-    let lengths = kept
-        .iter()
-        .map(|(_, history)| history.displacement_error.len());
-    for sample in 0..lengths.max().unwrap_or(0) {
-        text += &(sample as f64 * dt).to_string();
-        for (_, history) in &kept {
-            for values in [&history.displacement_error, &history.acceleration_error] {
-                text += ",";
-                if let Some(value) = values.get(sample) {
-                    text += &value.to_string();
-                }
-            }
-        }
-        text += "\n";
-    }
-    text
-}
-
 /// The report of the comparison whose files lie in `folder`; without `errors.csv` it has no plots.
 ///
 /// # Errors
@@ -334,10 +300,10 @@ pub(super) fn page_again(folder: &Path) -> Result<String, Error> {
             controllers.push(row.controller.clone());
         }
     }
-    let plots = folder.join(ERRORS);
+    let plots = folder.join(compare_errors::FILE);
     if plots.is_file() {
         for controller in &controllers {
-            let history = history(&plots, controller)?;
+            let history = compare_errors::read(&plots, controller)?;
             let mut own = rows.iter_mut().filter(|row| row.controller == *controller);
             if let Some(first) = own.next() {
                 first.history = history;
@@ -345,37 +311,6 @@ pub(super) fn page_again(folder: &Path) -> Result<String, Error> {
         }
     }
     page(folder, &rows, &controllers)
-}
-
-/// The columns of a controller in `errors.csv`; none where they are missing.
-fn history(path: &Path, controller: &str) -> Result<Option<History>, Error> {
-    let fault = |reason: String| Error::File {
-        path: path.to_path_buf(),
-        reason,
-    };
-    let mut csv = csv::Reader::from_path(path).map_err(|error| fault(error.to_string()))?;
-    let names = csv.headers().map_err(|error| fault(error.to_string()))?;
-    let place = |column: &str| names.iter().position(|name| name == column);
-    let [Some(x), Some(a)] = COLUMNS.map(|column| place(&format!("{controller}.{column}"))) else {
-        return Ok(None);
-    };
-    let mut columns = [Vec::new(), Vec::new(), Vec::new()];
-    for (row, line) in csv.records().zip(2..) {
-        let row = row.map_err(|error| fault(error.to_string()))?;
-        for (column, at) in columns.iter_mut().zip([0, x, a]) {
-            let cell = row.get(at).unwrap_or_default();
-            if !cell.is_empty() {
-                let wrong = |_| fault(format!("line {line}: `{cell}` is no number"));
-                column.push(cell.parse::<f64>().map_err(wrong)?);
-            }
-        }
-    }
-    let [time, displacement_error, acceleration_error] = columns;
-    Ok(time.get(1).map(|dt| History {
-        dt: *dt,
-        displacement_error,
-        acceleration_error,
-    }))
 }
 
 /// A line for each run that ended early.

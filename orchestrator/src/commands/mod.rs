@@ -2,6 +2,7 @@
 
 pub mod build;
 pub mod compare;
+mod compare_errors;
 mod compare_tables;
 pub mod design;
 mod design_report;
