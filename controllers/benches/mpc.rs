@@ -26,8 +26,8 @@ use controllers::mpc::{
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion};
 use nalgebra::{DVector, dvector};
-use plant::rig::Rig;
-use plant::units::{G, INCH};
+use plant::identified::coupled::Rig;
+use units::constants::{G, INCH};
 
 const H: f64 = 0.002;
 const STEPS: usize = 4000;

@@ -4,7 +4,7 @@
 //! model, a specimen or an actuator from needless damage; whoever works at a rig is protected by
 //! the emergency stop, the pressure-off valve and the fence, none of which may depend on it.
 
-use plant::units::{G, INCH, LBF, SAMPLING_PERIOD, STROKE};
+use units::constants::{G, INCH, LBF, SAMPLING_PERIOD, STROKE};
 
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};

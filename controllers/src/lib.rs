@@ -11,10 +11,9 @@ pub mod mpc;
 pub mod pid;
 pub mod prediction_over_delay;
 pub mod sliding_mode;
-pub mod sliding_mode_tuning;
 pub mod synthesis;
 pub mod three_variable;
-pub mod three_variable_tuning;
+pub mod tuning;
 
 pub use plant::ModelError;
 

@@ -1,6 +1,6 @@
 //! Loop shaping: the second-order displacement controller of Section 3.4 as a sampled law.
 
-use plant::units::INCH;
+use units::constants::INCH;
 
 use crate::pid::{PidInput, VALVE_LIMIT, limit_and_integrate};
 use crate::{Controller, ModelError};

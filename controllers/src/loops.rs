@@ -5,9 +5,9 @@
 //! plant behind a zero-order hold, so that a margin given here is a margin of what runs.
 
 use nalgebra::{Complex, DMatrix, DVector, RowSVector, dmatrix};
+use plant::identified::coupled::Rig;
 use plant::linear::margins::{self, Margins};
 use plant::linear::{DiscreteStateSpace, StateSpace, TransferFunction};
-use plant::rig::Rig;
 
 use crate::ModelError;
 use crate::allocation::ControlAllocation;

@@ -1,6 +1,6 @@
 //! PID control of one measured quantity (Eq 3-1).
 
-use plant::units::{INCH, LBF};
+use units::constants::{INCH, LBF};
 
 use crate::{Controller, ModelError};
 

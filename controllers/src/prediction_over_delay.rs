@@ -8,9 +8,9 @@
 //! so that a biased sensor biases the result by no more than itself.
 
 use nalgebra::{DMatrix, SMatrix, SVector};
+use plant::identified::shake_table::ShakeTable;
 use plant::linear::{discrete_riccati, zero_order_hold};
-use plant::shake_table::ShakeTable;
-use plant::units::{INCH, LBF};
+use units::constants::{INCH, LBF};
 
 use crate::allocation::{ControlAllocation, LoopCommands};
 use crate::pid::{Pid, PidInput};

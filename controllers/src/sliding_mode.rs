@@ -35,10 +35,10 @@
 
 use std::f64::consts::TAU;
 
+use plant::identified::coupled::Rig;
+use plant::identified::table::Table;
 use plant::linear::margins::{crossovers, nyquist};
-use plant::rig::Rig;
-use plant::specimen::LinearSpecimen;
-use plant::table::Table;
+use plant::specimens::linear::LinearSpecimen;
 
 use crate::allocation::ControlAllocation;
 use crate::loops::{Controlled, LinearLaw, Loop, Time};

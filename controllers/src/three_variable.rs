@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 use plant::linear::StateSpace;
-use plant::units::INCH;
+use units::constants::INCH;
 
 use crate::pid::{VALVE_LIMIT, limit_and_integrate};
 use crate::{Controller, ModelError, Motion};
@@ -208,7 +208,7 @@ pub fn continuous_process_model(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use plant::actuator::PublishedActuator;
+    use plant::identified::actuator::PublishedActuator;
 
     /// Eq 5-5 as printed, with half a unit of the last digit of each entry.
     const A_P: [[(f64, f64); 6]; 6] = [

@@ -14,7 +14,7 @@ mod identify_data;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use identification::rig::{Options, identify};
+use identification::identify::rig::{Options, identify};
 use identify_data::Test;
 
 fn a_minute(criterion: &mut Criterion) {

@@ -4,12 +4,12 @@
 
 use std::f64::consts::TAU;
 
-use identification::case::{Case, CaseError, Nominal, Record, problems};
-use identification::diagnosis::Verdict;
-use identification::diagnosis::experiment::play;
-use identification::diagnosis::shake_table::diagnose;
-use plant::effects::{Effects, ValveEffects};
-use plant::identified_rig::IdentifiedRig;
+use identification::diagnosis::case::{Case, CaseError, Nominal, Record, problems};
+use identification::diagnosis::engine::Verdict;
+use identification::diagnosis::engine::experiment::play;
+use identification::diagnosis::rigs::shake_table::diagnosis::diagnose;
+use plant::identified::effects::{Effects, ValveEffects};
+use plant::identified::rig::IdentifiedRig;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -378,7 +378,7 @@ fn the_extended_model_reads_back_as_written() {
     assert_eq!(diagnosis.verdict, Verdict::Named, "{}", diagnosis.sentence);
     assert_eq!(diagnosis.effects[0].effect, "valve_dead_band");
     let text = toml::to_string(&diagnosis.extended_model).unwrap();
-    let back: identification::diagnosis::shake_table::ExtendedModel =
+    let back: identification::diagnosis::rigs::shake_table::diagnosis::ExtendedModel =
         toml::from_str(&text).unwrap();
     assert!((back.effects.valve.dead_band - 0.1).abs() < 2e-3, "{text}");
     assert_eq!(back, diagnosis.extended_model);

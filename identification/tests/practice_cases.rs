@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use identification::case::Case;
-use identification::diagnosis::Verdict;
-use identification::diagnosis::shake_table::diagnose;
+use identification::diagnosis::case::Case;
+use identification::diagnosis::engine::Verdict;
+use identification::diagnosis::rigs::shake_table::diagnosis::diagnose;
 
 fn shared() -> PathBuf {
     std::env::var_os("SHAKEBENCH_SHARED").map_or_else(
@@ -30,7 +30,7 @@ fn truth(text: &str) -> Vec<(String, Option<f64>)> {
 }
 
 fn to_si(effect: &str, value: f64) -> f64 {
-    use plant::units::{INCH, LBF};
+    use units::constants::{INCH, LBF};
     value
         * match effect {
             "coulomb_friction" | "valve_flow_saturation" => LBF,

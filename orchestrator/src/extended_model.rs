@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use identification::IdentificationError;
-use identification::catalogue::NUISANCE;
-use identification::diagnosis::NamedEffect;
-use identification::diagnosis::shake_table::ExtendedModel as Estimated;
-use identification::model_file::{
+use identification::diagnosis::engine::NamedEffect;
+use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
+use identification::diagnosis::rigs::shake_table::catalogue::NUISANCE;
+use identification::identify::model_file::{
     BodySection, EffectSections, ModelFile, SI, StandardErrors, Units,
 };
-use plant::actuator::IdentifiedActuator;
+use plant::identified::actuator::IdentifiedActuator;
 
 use crate::pack::{PackError, PackedFmu, StartValue, file_error, write_variant};
 use crate::system::model::{component_of, shake_table_values, specimen_values};

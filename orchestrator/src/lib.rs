@@ -16,4 +16,4 @@ pub mod pack;
 pub mod report;
 pub mod results;
 pub mod system;
-pub use identification::units;
+pub use units;

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use plant::servo_hydraulic::{ServoHydraulicInput, ServoHydraulicTable};
 use plant::specimens::{YieldingSpecimen, YieldingState};
-use plant::units::SAMPLING_PERIOD;
+use units::constants::SAMPLING_PERIOD;
 
 const STEPS: u32 = 5_000;
 

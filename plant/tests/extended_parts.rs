@@ -1,13 +1,13 @@
 //! Table, specimen and sensors as parts that hold each other's quantities over a step, against the
 //! one-piece rig, every effect by itself.
 
-use plant::effects::{Effects, SensorEffects};
-use plant::extended_specimen::{ExtendedSpecimen, ExtendedSpecimenState};
-use plant::extended_table::{ExtendedTable, ExtendedTableState};
-use plant::identified_rig::{IdentifiedRig, IdentifiedRigState};
-use plant::instrumentation::{Instrumentation, InstrumentationState, TrueMotion};
-use plant::specimen::LinearSpecimen;
-use plant::units::{INCH, LBF, LBF_S_PER_INCH, LBF_S2_PER_INCH};
+use plant::identified::effects::{Effects, SensorEffects};
+use plant::identified::extended_table::{ExtendedTable, ExtendedTableState};
+use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
+use plant::sensors::instrumentation::{Instrumentation, InstrumentationState, TrueMotion};
+use plant::specimens::extended::{ExtendedSpecimen, ExtendedSpecimenState};
+use plant::specimens::linear::LinearSpecimen;
+use units::constants::{INCH, LBF, LBF_S_PER_INCH, LBF_S2_PER_INCH};
 
 const DURATION: f64 = 3.0;
 

@@ -2,12 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use plant::effects::{Effects, FoundationEffects, SensorEffects, SpecimenEffects, ValveEffects};
-use plant::identified_rig::{IdentifiedRig, IdentifiedRigState};
+use plant::identified::coupled::Rig;
+use plant::identified::effects::{
+    Effects, FoundationEffects, SensorEffects, SpecimenEffects, ValveEffects,
+};
+use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
 use plant::linear::StateSpace;
-use plant::rig::Rig;
-use plant::specimen::LinearSpecimen;
-use plant::units::{G, INCH};
+use plant::specimens::linear::LinearSpecimen;
+use units::constants::{G, INCH};
 
 const PERIOD: f64 = 0.002;
 

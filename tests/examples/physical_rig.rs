@@ -8,9 +8,9 @@ use std::path::Path;
 
 use acceptance::native_rig::{NativeRig, PERIOD};
 use nalgebra::Complex;
+use plant::identified::shake_table::ShakeTable;
 use plant::linear::log_space;
 use plant::servo_hydraulic::{ServoHydraulicInput, ServoHydraulicTable};
-use plant::shake_table::ShakeTable;
 use shakebench::motion::{self, Options};
 use shakebench::report::{Abscissa, Axis, Panel, Report, Section, Series, Style, Units, html, svg};
 
@@ -43,7 +43,7 @@ fn frequency_responses() -> Panel {
     let grid = log_space(0.1, 60.0, 300);
     let gain = |system: &plant::linear::StateSpace| {
         let at = |f: &f64| system.evaluate(Complex::new(0.0, TAU * f));
-        let norm = |f: &f64| at(f).map_or(f64::NAN, |g| g[(0, 0)].norm() / plant::units::INCH);
+        let norm = |f: &f64| at(f).map_or(f64::NAN, |g| g[(0, 0)].norm() / units::constants::INCH);
         grid.iter().map(|f| 20.0 * norm(f).log10()).collect()
     };
     let line = |name: &str, values| Series::line(name, Abscissa::At(grid.clone().into()), values);

@@ -6,8 +6,8 @@ use std::time::UNIX_EPOCH;
 
 use hidden_effects::score::{Estimate, NamedEffect, outcome, parameter_errors, wilson};
 use hidden_effects::{Case, Kind, Outcome, Settings, Truth, Verdict};
-use identification::case::Case as Laboratory;
-use identification::diagnosis::shake_table::{Diagnosis, diagnose};
+use identification::diagnosis::case::Case as Laboratory;
+use identification::diagnosis::rigs::shake_table::{Diagnosis, diagnose};
 use rayon::prelude::*;
 
 /// How many cases of each kind, and from which seed.

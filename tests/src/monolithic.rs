@@ -3,8 +3,8 @@
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion as Sample};
 use nalgebra::{DVector, dvector};
-use plant::rig::Rig;
-use plant::specimen::LinearSpecimen;
+use plant::identified::coupled::Rig;
+use plant::specimens::linear::LinearSpecimen;
 use shakebench::motion::Motion;
 
 /// Acceleration of the table (m/s²) at the samples of `motion` under three-variable control, from

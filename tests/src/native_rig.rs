@@ -3,7 +3,7 @@
 use controllers::interlock::{Interlock, InterlockInput};
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableGains, ThreeVariableInput};
 use controllers::{Controller, Motion as Sample};
-use plant::instrumentation::{Instrumentation, InstrumentationState, TrueMotion};
+use plant::sensors::instrumentation::{Instrumentation, InstrumentationState, TrueMotion};
 use plant::servo_hydraulic::{ServoHydraulicInput, ServoHydraulicTable};
 use plant::specimens::{YieldingSpecimen, YieldingState};
 use shakebench::motion::Motion;

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use acceptance::python::run_script;
 use hidden_effects::case::{Case as Generated, Kind, Settings};
-use identification::case::{CHANNELS, ControlLaw, Nominal, deviation};
-use identification::catalogue::catalogue;
-use identification::diagnosis::shake_table::ExtendedModel as Estimated;
-use identification::diagnosis::{Candidate, Estimate, NamedEffect, Role};
-use plant::identified_rig::{IdentifiedRig, IdentifiedRigState};
-use plant::specimen::LinearSpecimen;
+use identification::diagnosis::case::{CHANNELS, ControlLaw, Nominal, deviation};
+use identification::diagnosis::engine::{Candidate, Estimate, NamedEffect, Role};
+use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
+use identification::diagnosis::rigs::shake_table::catalogue::catalogue;
+use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
+use plant::specimens::linear::LinearSpecimen;
 use shakebench::commands::diagnose::co_simulation::{Channels, RigFmus, play};
 use shakebench::extended_model::ExtendedModel;
 use shakebench::fmu::{FmiVersion, Fmu};

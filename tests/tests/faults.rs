@@ -2,9 +2,9 @@
 
 use acceptance::native_rig::{Injected, NativeRig, NativeRun, PERIOD};
 use controllers::interlock::Trip;
-use plant::instrumentation::{CHANNELS, SensorFault};
-use plant::units::{INCH, STROKE};
+use plant::sensors::instrumentation::{CHANNELS, SensorFault};
 use shakebench::motion::{self, Motion, Options};
+use units::constants::{INCH, STROKE};
 
 /// When the fault occurs, s.
 const AT: f64 = 8.0;

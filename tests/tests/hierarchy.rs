@@ -15,10 +15,10 @@ use nalgebra::Complex;
 use native::{
     Hierarchy, PERIOD, Sensors, ThreeVariableLaw, band_limited, loop_shaping, run, run_biased,
 };
-use plant::rig::Rig;
-use plant::shake_table::ShakeTable;
-use plant::specimen::LinearSpecimen;
-use plant::units::LBF;
+use plant::identified::coupled::Rig;
+use plant::identified::shake_table::ShakeTable;
+use plant::specimens::linear::LinearSpecimen;
+use units::constants::LBF;
 
 fn rigs() -> [(&'static str, Rig); 2] {
     let specimen = Some(LinearSpecimen::appendix_a());

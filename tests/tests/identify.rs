@@ -3,12 +3,12 @@
 mod identify_data;
 
 use identification::data::Recording;
-use identification::rig::{Options, RigIdentification, identify};
-use identification::rig_model::{DELAY, PHYSICAL_NAMES};
+use identification::identify::model::{DELAY, PHYSICAL_NAMES};
+use identification::identify::rig::{Options, RigIdentification, identify};
 use identify_data::{PERIOD, Test};
 use nalgebra::Complex;
-use plant::shake_table::ShakeTable;
-use plant::specimen::LinearSpecimen;
+use plant::identified::shake_table::ShakeTable;
+use plant::specimens::linear::LinearSpecimen;
 
 fn truth() -> Vec<f64> {
     let ShakeTable { actuator, table } = ShakeTable::default();
@@ -60,8 +60,8 @@ fn seeds() -> u64 {
 /// Poles and responses are within 2 % of the true rig's, and what was simulated fits.
 fn is_within_two_percent(found: &RigIdentification) {
     let rig = ShakeTable::default();
-    let actuator = pole_error(found.actuator_poles(), &rig.actuator.g1().poles());
-    let table = pole_error(found.table_poles(), &rig.table.transfer_function().poles());
+    let actuator = pole_error(&found.actuator_poles(), &rig.actuator.g1().poles());
+    let table = pole_error(&found.table_poles(), &rig.table.transfer_function().poles());
     let response = response_error(found, 0.1, 30.0);
     println!("poles {actuator:.1e} {table:.1e}, responses {response:.1e}");
     assert!(actuator < 0.02 && table < 0.02 && response < 0.02);

@@ -3,7 +3,7 @@
 mod identify_data;
 
 use identification::data::Recording;
-use identification::rig::{Options, identify};
+use identification::identify::rig::{Options, identify};
 use identify_data::{PERIOD, Test};
 
 fn refused(recording: Recording) -> String {

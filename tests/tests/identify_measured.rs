@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use identification::data::fit_percent;
-use identification::state_variable_filter::{Between, equal_lags, filter};
-use identification::transfer_function::{Structure, identify};
+use identification::estimation::state_variable_filter::{Between, equal_lags, filter};
+use identification::estimation::transfer_function::{Structure, identify};
 
 /// Columns of a file under `measured`, or nothing and a word about it.
 fn measured(file: &str) -> Option<Vec<Vec<f64>>> {

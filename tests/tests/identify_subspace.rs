@@ -4,11 +4,11 @@ use std::io::Write;
 use std::time::Instant;
 
 use acceptance::python;
-use identification::continuous::inverse_zero_order_hold;
-use identification::input_matrices::{Form, refit};
-use identification::subspace::{Options, SubspaceModel, identify};
+use identification::estimation::continuous::inverse_zero_order_hold;
+use identification::estimation::input_matrices::{Form, refit};
+use identification::estimation::subspace::{Options, SubspaceModel, identify};
 use nalgebra::{Complex, DMatrix, dvector};
-use plant::actuator::PublishedActuator;
+use plant::identified::actuator::PublishedActuator;
 use plant::linear::{DiscreteStateSpace, StateSpace};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -5,12 +5,12 @@ mod identify_data;
 
 use acceptance::python::run_script;
 use identification::data::mean_and_deviation;
-use identification::model_file::ModelFile;
-use identification::rig::{Options, identify};
+use identification::identify::model_file::ModelFile;
+use identification::identify::rig::{Options, identify};
 use identify_data::{PERIOD, Test};
 use nalgebra::{DVector, dvector};
-use plant::rig::Rig;
-use plant::shake_table::ShakeTable;
+use plant::identified::coupled::Rig;
+use plant::identified::shake_table::ShakeTable;
 use shakebench::fmu::{Causality, FmiVersion};
 use shakebench::library::FmuLibrary;
 use shakebench::pack;

@@ -4,7 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use acceptance::shared;
-use identification::rigs::{Description, Measurement, PartReport, Report, Series, diagnose};
+use identification::diagnosis::rigs::{
+    Description, Measurement, PartReport, Report, Series, diagnose,
+};
 
 /// Description and data of a rig; none where the data are missing.
 fn rig(name: &str) -> Option<(Description, Measurement)> {

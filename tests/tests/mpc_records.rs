@@ -8,8 +8,8 @@ use controllers::mpc::{
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion};
 use nalgebra::{DVector, dvector};
-use plant::rig::Rig;
-use plant::specimen::LinearSpecimen;
+use plant::identified::coupled::Rig;
+use plant::specimens::linear::LinearSpecimen;
 use rayon::prelude::*;
 use shakebench::motion;
 

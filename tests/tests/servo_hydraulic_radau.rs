@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use acceptance::python::run_script;
 use plant::servo_hydraulic::{INNER_STEP, ServoHydraulicRig};
-use plant::units::{INCH, LBF, PSI};
+use units::constants::{INCH, LBF, PSI};
 
 const STEP: f64 = 0.002;
 

@@ -4,10 +4,10 @@
 use acceptance::native_rig::{NativeRig, PERIOD};
 use controllers::interlock::Trip;
 use controllers::three_variable::ThreeVariableGains;
-use plant::units::{INCH, STROKE};
 use rayon::prelude::*;
 use shakebench::metrics;
 use shakebench::motion::{self, Motion, Options, Scaling};
+use units::constants::{INCH, STROKE};
 
 fn records(options: &Options) -> Vec<Motion> {
     let files = acceptance::shared::records();

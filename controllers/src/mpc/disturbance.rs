@@ -1,7 +1,7 @@
 //! Disturbance model of the prediction: an independent random walk on each output (Eq 5-6).
 
 use nalgebra::Vector3;
-use plant::units::INCH;
+use units::constants::INCH;
 
 use crate::ModelError;
 

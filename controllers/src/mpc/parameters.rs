@@ -1,9 +1,9 @@
 //! Parameters of model predictive control, with Table 5-1 as default.
 
 use nalgebra::{DMatrix, Vector3};
+use plant::identified::coupled::Rig;
 use plant::linear::StateSpace;
-use plant::rig::Rig;
-use plant::units::{INCH, SAMPLING_PERIOD, STROKE};
+use units::constants::{INCH, SAMPLING_PERIOD, STROKE};
 
 use super::disturbance::OutputDisturbance;
 use super::prediction::CHANNELS;

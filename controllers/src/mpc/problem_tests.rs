@@ -1,10 +1,10 @@
 //! The reduced problem against the 45-variable one of the thesis.
 
 use nalgebra::{Cholesky, DMatrix, DVector, dvector};
-use plant::rig::Rig;
-use plant::units::INCH;
+use plant::identified::coupled::Rig;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use units::constants::INCH;
 
 use super::*;
 use crate::mpc::solver::{Outcome, Solver};
@@ -299,16 +299,16 @@ fn sampled_prediction_is_what_plant_and_law_do() {
 fn continuous_prediction_is_equation_5_5() {
     let parameters = Parameters {
         plant: prediction_plant(&Rig {
-            shake_table: plant::shake_table::ShakeTable::derounded(),
+            shake_table: plant::identified::shake_table::ShakeTable::derounded(),
             specimen: None,
         }),
         law: LowLevelLaw::Continuous,
         ..Parameters::default()
     };
-    let table = plant::shake_table::ShakeTable::derounded().table;
+    let table = plant::identified::shake_table::ShakeTable::derounded().table;
     // The process model that is checked against the printed digits.
     let printed = continuous_process_model(
-        &plant::actuator::PublishedActuator::Derounded
+        &plant::identified::actuator::PublishedActuator::Derounded
             .transfer_functions()
             .state_space(),
         [

@@ -221,9 +221,9 @@ pub(crate) fn no_solution(reason: String) -> ModelError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use plant::identified::shake_table::ShakeTable;
     use plant::linear::{continuous_riccati_residual, log_space};
-    use plant::shake_table::ShakeTable;
-    use plant::units::INCH;
+    use units::constants::INCH;
 
     fn design(crossover: f64) -> LoopShapingDesign {
         loop_shaping(&ShakeTable::default().voltage_to_displacement(), crossover).unwrap()

@@ -2,7 +2,7 @@
 //! Sensors of the rig as an FMU.
 
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Variable};
-use plant::instrumentation::{
+use plant::sensors::instrumentation::{
     Instrumentation as Sensors, InstrumentationState, Measured, SensorFault, TrueMotion,
     VelocityEstimate, VelocityFilter,
 };

@@ -7,9 +7,9 @@ use controllers::mpc::{
 use controllers::three_variable::ThreeVariableControl;
 use fmu_kit::{Enumeration, Item, Variable};
 use plant::ModelError;
-use plant::rig::Rig;
-use plant::shake_table::ShakeTable;
-use plant::specimen::LinearSpecimen;
+use plant::identified::coupled::Rig;
+use plant::identified::shake_table::ShakeTable;
+use plant::specimens::linear::LinearSpecimen;
 use serde::{Deserialize, Serialize};
 
 use crate::ModelPredictive;

@@ -2,9 +2,9 @@
 //! Shake table with its hydraulic actuator as an FMU.
 
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
-use plant::effects::Effects;
-use plant::extended_table::{ExtendedTable, ExtendedTableState};
-use plant::shake_table::{SampledShakeTable, ShakeTable as Rig, ShakeTableState};
+use plant::identified::effects::Effects;
+use plant::identified::extended_table::{ExtendedTable, ExtendedTableState};
+use plant::identified::shake_table::{SampledShakeTable, ShakeTable as Rig, ShakeTableState};
 use serde::{Deserialize, Serialize};
 
 /// The identified shake table between valve command, specimen force and motion.

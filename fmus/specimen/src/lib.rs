@@ -2,9 +2,9 @@
 //! Linear specimen on the table as an FMU.
 
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
-use plant::effects::SpecimenEffects;
-use plant::extended_specimen::{ExtendedSpecimen, ExtendedSpecimenState};
-use plant::specimen::{LinearSpecimen, SampledSpecimen};
+use plant::identified::effects::SpecimenEffects;
+use plant::specimens::extended::{ExtendedSpecimen, ExtendedSpecimenState};
+use plant::specimens::linear::{LinearSpecimen, SampledSpecimen};
 use serde::{Deserialize, Serialize};
 
 /// The linear specimen between the table's acceleration and its force on the table.

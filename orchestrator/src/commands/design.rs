@@ -12,11 +12,11 @@ use controllers::pid::Pid;
 use controllers::sliding_mode::{self, SlidingMode};
 use controllers::synthesis::{self, EQUATION_3_10_CROSSOVER, LoopShapingDesign};
 use controllers::three_variable::ThreeVariableGains;
-use plant::rig::Rig;
-use plant::shake_table::ShakeTable;
-use plant::specimen::LinearSpecimen;
-use plant::units::SAMPLING_PERIOD;
+use plant::identified::coupled::Rig;
+use plant::identified::shake_table::ShakeTable;
+use plant::specimens::linear::LinearSpecimen;
 use serde::Serialize;
+use units::constants::SAMPLING_PERIOD;
 
 use super::design_report;
 use super::table::{aligned, significant};

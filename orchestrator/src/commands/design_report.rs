@@ -9,9 +9,9 @@ use controllers::loop_shaping::LoopShapingCoefficients;
 use controllers::loops::Time;
 use controllers::synthesis::{self, LoopShapingDesign};
 use nalgebra::Complex;
+use plant::identified::shake_table::ShakeTable;
 use plant::linear::{FrequencyResponse, log_space};
-use plant::shake_table::ShakeTable;
-use plant::units::SAMPLING_PERIOD;
+use units::constants::SAMPLING_PERIOD;
 
 use super::design::{NAMES, NamedLoop};
 use crate::error::Error;

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
-use identification::rigs::{self, Description, DescriptionError, Measurement, PartReport, Report};
+use identification::diagnosis::rigs::{
+    self, Description, DescriptionError, Measurement, PartReport, Report,
+};
 
 use super::diagnose;
 use crate::error::Error;

@@ -70,13 +70,13 @@ impl Summary {
             }
         });
         if let Some(tracking) = &tracking
-            && tracking.peak_displacement > plant::units::STROKE
+            && tracking.peak_displacement > units::constants::STROKE
         {
             warnings.push(format!(
                 "the table went to {:.2} in, the stroke is {:.2} in: a real one would have hit \
                  its stop",
                 tracking.peak_displacement / INCH,
-                plant::units::STROKE / INCH
+                units::constants::STROKE / INCH
             ));
         }
         let simulated = outcome.steps as f64 * outcome.step;

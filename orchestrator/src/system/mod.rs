@@ -24,7 +24,7 @@ pub use value::Value;
 use crate::fmu::Fmu;
 
 /// Sampling period of a controller for which nothing else is said, s (Section 5.3.1: 500 Hz).
-pub const DEFAULT_PERIOD: f64 = plant::units::SAMPLING_PERIOD;
+pub const DEFAULT_PERIOD: f64 = units::constants::SAMPLING_PERIOD;
 
 /// A system whose names, types, units and connections have been checked.
 #[derive(Debug, Clone)]

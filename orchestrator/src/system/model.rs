@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use identification::model_file::ModelFile;
-use plant::actuator::PublishedActuator;
-use plant::shake_table::ShakeTable;
-use plant::specimen::LinearSpecimen;
-use plant::table::Table;
+use identification::identify::model_file::ModelFile;
+use plant::identified::actuator::PublishedActuator;
+use plant::identified::shake_table::ShakeTable;
+use plant::identified::table::Table;
+use plant::specimens::linear::LinearSpecimen;
 
 use super::{Value, hint};
 use crate::fmu::{Causality, Description};

@@ -16,13 +16,13 @@ use std::sync::OnceLock;
 
 use controllers::pid::Pid;
 use controllers::sliding_mode::DISPLACEMENT_INTEGRAL_LEAK;
-use controllers::sliding_mode_tuning::{Hierarchy, SlidingModeTuning};
 use controllers::three_variable::ThreeVariableGains;
+use controllers::tuning::sliding_mode::{Hierarchy, SlidingModeTuning};
+use plant::identified::shake_table::ShakeTable;
 use plant::servo_hydraulic::ServoHydraulicTable;
-use plant::shake_table::ShakeTable;
 use plant::specimens::YieldingSpecimen;
-use plant::units::SAMPLING_PERIOD;
 use serde::{Deserialize, Serialize};
+use units::constants::SAMPLING_PERIOD;
 
 use super::SystemFile;
 use super::file::ComponentFile;

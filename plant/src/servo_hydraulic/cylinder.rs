@@ -1,7 +1,7 @@
 //! The double-ended cylinder: two chambers of compressible oil with a leak between them.
 
 use crate::ModelError;
-use crate::units::{INCH, PSI};
+use units::constants::{INCH, PSI};
 
 /// A symmetrical cylinder. Each chamber obeys `V dp/dt = β (q - dV/dt)` with its own volume; at
 /// the middle position and with matched flows this is `V_t/(4 β) dP_L/dt = q_L - A v - C_l P_L`

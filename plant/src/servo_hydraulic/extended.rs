@@ -5,8 +5,8 @@ use super::{
     Driven, INNER_STEP, STATES, ServoHydraulicInput, ServoHydraulicState, ServoHydraulicTable,
 };
 use crate::ModelError;
-use crate::effects::FoundationEffects;
-use crate::effects::valve::{CommandPath, ValveEffects};
+use crate::identified::effects::FoundationEffects;
+use crate::identified::effects::valve::{CommandPath, ValveEffects};
 use crate::integration::{self, Dynamics};
 
 /// [`ServoHydraulicTable`] behind a command path and on a foundation; each effect is off at zero.
@@ -155,7 +155,7 @@ mod tests {
 
     use super::*;
     use crate::servo_hydraulic::SealFriction;
-    use crate::units::{INCH, SAMPLING_PERIOD as PERIOD};
+    use units::constants::{INCH, SAMPLING_PERIOD as PERIOD};
 
     fn input(valve_command: f64) -> ServoHydraulicInput {
         ServoHydraulicInput {

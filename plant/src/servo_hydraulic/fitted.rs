@@ -6,9 +6,9 @@ use nalgebra::{Complex, Matrix3, Vector3};
 
 use super::ServoHydraulicTable;
 use crate::ModelError;
-use crate::actuator::IdentifiedActuator;
+use crate::identified::actuator::IdentifiedActuator;
+use crate::identified::shake_table::ShakeTable;
 use crate::linear::log_space;
-use crate::shake_table::ShakeTable;
 
 impl ServoHydraulicTable {
     /// The rig in the form of Eq 2-4, `F = G1 u + G2 v` of third order, at rest in the middle with

@@ -1,7 +1,7 @@
 //! Friction of the piston's seals, with stiction that holds.
 
 use crate::ModelError;
-use crate::units::{INCH, LBF, LBF_PER_INCH, LBF_S_PER_INCH};
+use units::constants::{INCH, LBF, LBF_PER_INCH, LBF_S_PER_INCH};
 
 /// The elasto-plastic bristle model (Dupont, Hayward, Armstrong and Altpeter, IEEE Transactions on
 /// Automatic Control 47, 2002) with the Stribeck curve of the LuGre model (Canudas de Wit, Olsson,

@@ -77,9 +77,9 @@ mod tests {
     use nalgebra::Complex;
 
     use super::*;
+    use crate::identified::shake_table::ShakeTable;
     use crate::linear::log_space;
-    use crate::shake_table::ShakeTable;
-    use crate::units::{INCH, LBF};
+    use units::constants::{INCH, LBF};
 
     #[test]
     fn linearised_rig_is_within_2_db_of_the_identified_plant() {

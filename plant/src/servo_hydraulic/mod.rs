@@ -26,8 +26,8 @@ pub use supply::Supply;
 pub use valve::{ServoValve, ValveFlows};
 
 use crate::ModelError;
+use crate::identified::table::Table;
 use crate::integration::{self, Dynamics};
-use crate::table::Table;
 
 /// The physical rig without specimen. Inputs are the valve command (V) and the specimen's force
 /// on the table (N).

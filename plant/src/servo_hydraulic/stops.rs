@@ -1,7 +1,7 @@
 //! The ends of the stroke: cushions and hard stops.
 
 use crate::ModelError;
-use crate::units::{INCH, LBF_PER_INCH, LBF_S_PER_INCH, STROKE};
+use units::constants::{INCH, LBF_PER_INCH, LBF_S_PER_INCH, STROKE};
 
 /// A cushion that brakes an outward motion near the end of the stroke (a check valve frees the way
 /// back) and a stop that the piston meets there. Assumed values.

@@ -1,7 +1,7 @@
 //! Hydraulic supply: a pressure-compensated pump and an accumulator.
 
 use crate::ModelError;
-use crate::units::{INCH, PSI};
+use units::constants::{INCH, PSI};
 
 /// A pump that delivers in proportion to the missing pressure, up to its largest flow, into a
 /// gas-charged accumulator from which the valve draws. Assumed values: at a mean demand of

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::specimens::{YieldingSpecimen, YieldingState};
-use crate::units::{INCH, LBF, PSI};
+use units::constants::{INCH, LBF, PSI};
 
 /// A chirp with pauses that holds and slides: V at time t.
 fn command(t: f64) -> f64 {

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::ModelError;
-use crate::units::{INCH, PSI};
+use units::constants::{INCH, PSI};
 
 /// A four-edge servo valve with matched, symmetrical edges (Merritt, Hydraulic Control Systems,
 /// 1967, chapter 5). Spool positions are measured in volts of command.

@@ -1,5 +1,8 @@
-//! Specimens beyond the linear one: yielding, and of several storeys.
+//! What stands on the table.
 
+pub mod extended;
+pub mod hysteresis;
+pub mod linear;
 mod storeys;
 mod yielding;
 

@@ -2,8 +2,8 @@
 
 use super::{YieldingSpecimen, YieldingState};
 use crate::ModelError;
-use crate::hysteresis::Hysteresis;
 use crate::integration::{self, Dynamics};
+use crate::specimens::hysteresis::Hysteresis;
 
 /// The largest number of storeys.
 pub const MAX_STOREYS: usize = 5;

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use crate::ModelError;
-use crate::hysteresis::{BoucWen, Hysteresis};
 use crate::integration::{self, Dynamics};
+use crate::specimens::hysteresis::{BoucWen, Hysteresis};
 
 /// A storey that yields: `m (at + d'') + c d' + F(d, z) = 0`, with the force of a [`BoucWen`]
 /// spring.
@@ -125,8 +125,8 @@ impl Dynamics<4> for Shaken<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::specimen::{LinearSpecimen, SpecimenState};
-    use crate::units::{INCH, LBF};
+    use crate::specimens::linear::{LinearSpecimen, SpecimenState};
+    use units::constants::{INCH, LBF};
 
     #[test]
     fn it_weighs_100_pounds() {

@@ -9,8 +9,8 @@ use controllers::sliding_mode::{SlidingMode, SlidingModeInput, displacement_loop
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion};
 use nalgebra::{DVector, dvector};
-use plant::rig::Rig;
-use plant::units::{G, INCH};
+use plant::identified::coupled::Rig;
+use units::constants::{G, INCH};
 
 pub const PERIOD: f64 = 0.002;
 

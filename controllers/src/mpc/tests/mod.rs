@@ -4,11 +4,11 @@ mod refusals;
 use std::f64::consts::TAU;
 
 use nalgebra::{DVector, dvector};
-use plant::rig::Rig;
-use plant::specimen::LinearSpecimen;
-use plant::units::{G, INCH};
+use plant::identified::coupled::Rig;
+use plant::specimens::linear::LinearSpecimen;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use units::constants::{G, INCH};
 
 use super::*;
 

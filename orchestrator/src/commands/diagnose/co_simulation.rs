@@ -6,8 +6,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use identification::case::{CHANNELS, ControlLaw, Nominal, Record};
-use identification::diagnosis::gain::{running, share_gone};
+use identification::diagnosis::case::{CHANNELS, ControlLaw, Nominal, Record};
+use identification::diagnosis::engine::gain::{running, share_gone};
 
 use super::GainReport;
 use crate::fmu::Fmu;
@@ -268,7 +268,7 @@ fn gain(record: &Record, before: &Channels, after: &Channels, floor: &[f64; 4]) 
         .filter(|&i| !record.channels[i].is_empty() && floor[i] > 0.0)
         .collect();
     let scale = |i: usize| {
-        let deviation = identification::case::deviation(&record.channels[i]);
+        let deviation = identification::diagnosis::case::deviation(&record.channels[i]);
         deviation.max(f64::MIN_POSITIVE)
     };
     let rms = |simulated: &Channels, i: usize| -> f64 {

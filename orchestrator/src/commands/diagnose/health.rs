@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use identification::case::{Case, Nominal, Record};
-use identification::diagnosis::relations;
-use identification::diagnosis::shake_table::Diagnosis;
-use identification::predictor::Disturbance;
-use plant::identified_rig::{IdentifiedRig, IdentifiedRigState};
+use identification::diagnosis::case::{Case, Nominal, Record};
+use identification::diagnosis::rigs::shake_table::Diagnosis;
+use identification::diagnosis::rigs::shake_table::predictor::Disturbance;
+use identification::diagnosis::rigs::shake_table::relations;
+use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

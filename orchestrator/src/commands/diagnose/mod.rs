@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use identification::case::{CHANNELS, Case, CaseError};
-use identification::diagnosis::NamedEffect;
-use identification::diagnosis::shake_table::{self, Diagnosis};
+use identification::diagnosis::case::{CHANNELS, Case, CaseError};
+use identification::diagnosis::engine::NamedEffect;
+use identification::diagnosis::rigs::shake_table::{self, Diagnosis};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use identification::case::Case;
-use identification::diagnosis::shake_table::Diagnosis;
+use identification::diagnosis::case::Case;
+use identification::diagnosis::rigs::shake_table::Diagnosis;
 
 use super::co_simulation::Comparison;
 use super::{DIAGNOSIS, DiagnosisReport, GainReport, pictures, text};

@@ -1,7 +1,7 @@
 //! The pictures of a diagnosis.
 
-use identification::case::{CHANNELS, Case};
-use identification::diagnosis::shake_table::{Diagnosis, Validation};
+use identification::diagnosis::case::{CHANNELS, Case};
+use identification::diagnosis::rigs::shake_table::{Diagnosis, Validation};
 use realfft::RealFftPlanner;
 
 use super::co_simulation::Comparison;

@@ -1,6 +1,7 @@
 //! A diagnosis on the terminal, and the tables that it shares with the report.
 
-use identification::diagnosis::{Estimate, amount, laboratory_unit};
+use identification::diagnosis::engine::Estimate;
+use identification::diagnosis::rigs::shake_table::{amount, laboratory_unit};
 
 use super::{DiagnosisReport, GainReport, ParameterReport};
 use crate::commands::table::{aligned, significant};

@@ -11,9 +11,9 @@ use std::time::Instant;
 
 use clap::Args;
 use identification::data::Recording;
-use identification::model_file::ModelFile;
-use identification::rig::{self, Options, RigIdentification};
-use identification::specimen_file;
+use identification::identify::model_file::ModelFile;
+use identification::identify::rig::{self, Options, RigIdentification};
+use identification::identify::specimen_file;
 use serde::Serialize;
 
 use crate::error::Error;

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use identification::data::Recording;
-use identification::model_file::{ModelFile, StandardErrors};
-use identification::rig::RigIdentification;
+use identification::identify::model_file::{ModelFile, StandardErrors};
+use identification::identify::rig::RigIdentification;
 
 use super::{Summary, responses};
 use crate::commands::table::{aligned, significant};

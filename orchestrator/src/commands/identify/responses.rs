@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use identification::data::Recording;
-use identification::frequency_response::{Estimate, direct, joint_input_output};
-use identification::rig::RigIdentification;
-use identification::rig_model::rig_from;
+use identification::estimation::frequency_response::{Estimate, direct, joint_input_output};
+use identification::identify::model::rig_from;
+use identification::identify::rig::RigIdentification;
 use plant::linear::{FrequencyResponse, TransferFunction, log_space};
 
 use crate::report::{Abscissa, Axis, Panel, Section, Series, Style, Units};

@@ -1,0 +1,4 @@
+//! Gains from a model, by stated rules.
+
+pub mod sliding_mode;
+pub mod three_variable;

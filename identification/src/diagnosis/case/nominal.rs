@@ -1,0 +1,251 @@
+//! `nominal.toml`: what the laboratory believes.
+
+use plant::identified::actuator::IdentifiedActuator;
+use plant::identified::shake_table::ShakeTable;
+use plant::identified::table::Table;
+use plant::specimens::linear::LinearSpecimen;
+use serde::Deserialize;
+use units::constants::{INCH, LBF, LBF_PER_INCH, LBF_S_PER_INCH, LBF_S2_PER_INCH};
+
+/// The nominal rig, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Nominal {
+    /// Samples per second.
+    pub sample_rate: f64,
+    /// Actuator and table.
+    pub shake_table: ShakeTable,
+    /// The specimen, if one is believed to stand on the table.
+    pub specimen: Option<LinearSpecimen>,
+    /// The law that made the command, if stated.
+    pub controller: Option<ControlLaw>,
+    /// Noise of displacement (m), acceleration (m/s²), actuator force (N), specimen acceleration
+    /// (m/s²): one standard deviation.
+    pub noise: [f64; 4],
+    /// Noise of the recorded command, V.
+    pub command_noise: f64,
+    /// Relative standard deviation of every plant parameter.
+    pub uncertainty: f64,
+}
+
+/// Relation R5: three-variable control as sampled by the rig's computer, SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlLaw {
+    /// V/m.
+    pub proportional: f64,
+    /// V/(m s).
+    pub integral: f64,
+    /// V s/m.
+    pub velocity_feedforward: f64,
+    /// V s²/m.
+    pub acceleration_feedforward: f64,
+    /// V s/m.
+    pub velocity_feedback: f64,
+    /// V s²/m.
+    pub acceleration_feedback: f64,
+    /// Share of the newest difference in the filtered velocity.
+    pub velocity_filter: f64,
+    /// V.
+    pub limit: f64,
+}
+
+#[derive(Deserialize)]
+struct File {
+    sample_rate: f64,
+    actuator: Actuator,
+    table: Oscillator,
+    specimen: Option<Oscillator>,
+    controller: Option<Controller>,
+    noise: Noise,
+    uncertainty: Uncertainty,
+}
+
+#[derive(Deserialize)]
+struct Actuator {
+    denominator: [f64; 4],
+    voltage_to_force: [f64; 3],
+    velocity_to_force: [f64; 3],
+}
+
+#[derive(Deserialize)]
+struct Oscillator {
+    mass: f64,
+    damping: f64,
+    stiffness: f64,
+}
+
+#[derive(Deserialize)]
+struct Controller {
+    kind: String,
+    proportional: f64,
+    integral: f64,
+    velocity_feedforward: f64,
+    acceleration_feedforward: f64,
+    velocity_feedback: f64,
+    acceleration_feedback: f64,
+    velocity_filter: f64,
+    limit: f64,
+}
+
+#[derive(Deserialize)]
+struct Noise {
+    displacement: f64,
+    acceleration: f64,
+    actuator_force: f64,
+    specimen_acceleration: f64,
+    valve_command: f64,
+}
+
+#[derive(Deserialize)]
+struct Uncertainty {
+    relative: f64,
+}
+
+impl Nominal {
+    /// Reads the text of a `nominal.toml` in inch, lbf, s, V; a sentence says what is wrong.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
+        let lead = file.actuator.denominator[0];
+        if lead.is_nan() || lead <= 0.0 {
+            return Err("actuator.denominator: the leading coefficient must be positive".into());
+        }
+        let over_lead = |c: [f64; 3]| c.map(|value| value / lead);
+        let [_, a2, a1, a0] = file.actuator.denominator;
+        let shake_table = ShakeTable {
+            actuator: IdentifiedActuator::from_thesis_units(
+                over_lead([a2, a1, a0]),
+                over_lead(file.actuator.voltage_to_force),
+                over_lead(file.actuator.velocity_to_force),
+            ),
+            table: Table::from_thesis_units(
+                file.table.mass,
+                file.table.damping,
+                file.table.stiffness,
+            ),
+        };
+        shake_table.validate().map_err(|error| error.to_string())?;
+        let specimen = file.specimen.map(|specimen| LinearSpecimen {
+            mass: specimen.mass * LBF_S2_PER_INCH,
+            damping: specimen.damping * LBF_S_PER_INCH,
+            stiffness: specimen.stiffness * LBF_PER_INCH,
+        });
+        if let Some(specimen) = &specimen {
+            specimen.validate().map_err(|error| error.to_string())?;
+        }
+        let controller = match file.controller {
+            None => None,
+            Some(c) if c.kind == "three_variable_control" => Some(ControlLaw {
+                proportional: c.proportional / INCH,
+                integral: c.integral / INCH,
+                velocity_feedforward: c.velocity_feedforward / INCH,
+                acceleration_feedforward: c.acceleration_feedforward / INCH,
+                velocity_feedback: c.velocity_feedback / INCH,
+                acceleration_feedback: c.acceleration_feedback / INCH,
+                velocity_filter: c.velocity_filter,
+                limit: c.limit,
+            }),
+            Some(c) => {
+                return Err(format!(
+                    "controller.kind: `{}` is unknown, expected `three_variable_control`",
+                    c.kind
+                ));
+            }
+        };
+        let noise = [
+            file.noise.displacement * INCH,
+            file.noise.acceleration * INCH,
+            file.noise.actuator_force * LBF,
+            file.noise.specimen_acceleration * INCH,
+        ];
+        let positive = |value: f64| value.is_finite() && value > 0.0;
+        if !noise.iter().all(|&sd| positive(sd)) {
+            return Err("noise: every standard deviation must be positive".into());
+        }
+        if !positive(file.sample_rate) {
+            return Err("sample_rate must be positive".into());
+        }
+        if !(0.0..0.5).contains(&file.uncertainty.relative) {
+            return Err("uncertainty.relative must lie between 0 and 0.5".into());
+        }
+        Ok(Self {
+            sample_rate: file.sample_rate,
+            shake_table,
+            specimen,
+            controller,
+            noise,
+            command_noise: file.noise.valve_command.max(0.0),
+            uncertainty: file.uncertainty.relative,
+        })
+    }
+}
+
+impl ControlLaw {
+    /// The law at rest, sampled every `period` s.
+    pub fn start(&self, period: f64) -> ControlLawState {
+        ControlLawState {
+            law: *self,
+            period,
+            before: None,
+            velocity: 0.0,
+            integral: 0.0,
+        }
+    }
+
+    /// The commands that the law makes of what was measured (V), sampled every `period` s; from
+    /// rest. As many as the shortest column has samples.
+    pub fn commands(
+        &self,
+        reference: &[f64],
+        displacement: &[f64],
+        acceleration: &[f64],
+        period: f64,
+    ) -> Vec<f64> {
+        let mut state = self.start(period);
+        let n = reference
+            .len()
+            .min(displacement.len())
+            .min(acceleration.len());
+        (0..n)
+            .map(|k| state.command(&reference[..n], k, displacement[k], acceleration[k]))
+            .collect()
+    }
+}
+
+/// Memory of a [`ControlLaw`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlLawState {
+    law: ControlLaw,
+    period: f64,
+    before: Option<f64>,
+    velocity: f64,
+    integral: f64,
+}
+
+impl ControlLawState {
+    /// The command (V) at sample `k` of `reference` (m), from the measured displacement (m) and
+    /// acceleration (m/s²).
+    pub fn command(
+        &mut self,
+        reference: &[f64],
+        k: usize,
+        displacement: f64,
+        acceleration: f64,
+    ) -> f64 {
+        let (law, period) = (&self.law, self.period);
+        let difference = displacement - self.before.unwrap_or(displacement);
+        self.before = Some(displacement);
+        self.velocity += law.velocity_filter * (difference / period - self.velocity);
+        let error = reference[k] - displacement;
+        self.integral += law.integral * error * period;
+        let ahead = reference[(k + 1).min(reference.len() - 1)];
+        let behind = reference[k.saturating_sub(1)];
+        let reference_velocity = (ahead - behind) / (2.0 * period);
+        let reference_acceleration = (ahead - 2.0 * reference[k] + behind) / (period * period);
+        let u = law.proportional * error
+            + self.integral
+            + law.velocity_feedforward * reference_velocity
+            + law.acceleration_feedforward * reference_acceleration
+            - law.velocity_feedback * self.velocity
+            - law.acceleration_feedback * acceleration;
+        u.clamp(-law.limit, law.limit)
+    }
+}

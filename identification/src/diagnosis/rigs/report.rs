@@ -1,0 +1,293 @@
+//! The report of a diagnosis on real data.
+
+use serde::Serialize;
+
+use super::measured::{Measured, Selection};
+use super::resampling::gain_interval;
+use super::selection::{Selected, select};
+use super::{Description, DescriptionError, Measurement};
+use crate::diagnosis::engine::{Point, RigModel, Verdict};
+
+/// A parameter of the extended model, SI.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Value {
+    /// Its name.
+    pub name: String,
+    /// The estimate.
+    pub value: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// One standard deviation, autocorrelation of the residuals counted.
+    pub standard_error: f64,
+}
+
+/// An effect that one part of the data asks for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EffectReport {
+    /// Its name.
+    pub effect: String,
+    /// Its parameters.
+    pub parameters: Vec<Value>,
+    /// Probability that its gain on unseen data is no chance, correlated samples counted once.
+    pub confidence: f64,
+    /// By how much the squared error on the data not fitted grows without it (all else refitted),
+    /// as a share of the nominal model's.
+    pub share: f64,
+}
+
+/// What one part of the data says, tested on the other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PartReport {
+    /// Normalised error of the nominal model on the data not fitted.
+    pub nominal_error: f64,
+    /// With its parameters refitted.
+    pub refitted_error: f64,
+    /// Extended, on the data not fitted.
+    pub extended_error: f64,
+    /// Extended, on the fitted data.
+    pub fitted_error: f64,
+    /// 95 % interval of the share of the refitted model's squared error that the effects take away
+    /// on the data not fitted.
+    pub gain_interval: (f64, f64),
+    /// Nominal parameters as refitted.
+    pub parameters: Vec<Value>,
+    /// The effects.
+    pub effects: Vec<EffectReport>,
+    /// Share of the nominal model's squared error on the data not fitted that the extended model
+    /// explains.
+    pub explained: f64,
+    /// Pairs of an effect that nearly did as well and the one that was taken.
+    pub rivals: Vec<(String, String)>,
+    #[serde(skip)]
+    point: Point,
+}
+
+/// The diagnosis of a rig.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// The rig.
+    pub name: String,
+    /// Its kind.
+    pub kind: String,
+    /// What is simulated.
+    pub output: &'static str,
+    /// `adequate`, `named`, `ambiguous` or `unexplained`.
+    pub verdict: &'static str,
+    /// Effects that both parts of the data name.
+    pub named: Vec<String>,
+    /// Effects that only one part names.
+    pub not_confirmed: Vec<String>,
+    /// Fitted as described, tested on what is left out.
+    pub as_described: PartReport,
+    /// Fitted on what is left out, tested on the rest.
+    pub swapped: PartReport,
+    /// Share of the squared error on the data left out that stays unexplained.
+    pub unexplained: f64,
+}
+
+/// Diagnoses a rig on its measurements.
+///
+/// # Errors
+/// When the description does not fit the rig, or the nominal model cannot be simulated.
+pub fn diagnose(
+    description: &Description,
+    measurement: &Measurement,
+    verbose: bool,
+) -> Result<Report, DescriptionError> {
+    let rig = description.rig()?;
+    let nominal = description.nominal(rig.as_ref())?;
+    let measured = Measured::new(rig.as_ref(), measurement, nominal);
+    let part = |fitted: Selection| {
+        if verbose {
+            eprintln!("fitting {}", measured.record_name(fitted as usize));
+        }
+        let selected =
+            select(&measured, fitted, verbose).ok_or_else(|| DescriptionError::Description {
+                path: description.path.clone(),
+                what: "the nominal model gives no finite output on these data".to_owned(),
+            })?;
+        Ok(part_report(&measured, fitted, &selected))
+    };
+    let as_described = part(Selection::Fitted)?;
+    let swapped = part(Selection::LeftOut)?;
+    let list = |part: &PartReport| -> Vec<String> {
+        part.effects
+            .iter()
+            .map(|effect| effect.effect.clone())
+            .collect()
+    };
+    let (here, there) = (list(&as_described), list(&swapped));
+    // Effects that records of a rig cannot tell apart confirm each other.
+    let alike = |name: &str, other: &str| {
+        name == other
+            || measured
+                .candidates()
+                .iter()
+                .any(|c| c.effect == name && c.look_alikes.contains(&other))
+    };
+    let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
+    let named: Vec<String> = here
+        .iter()
+        .filter(|name| in_both(name, &there))
+        .map(|name| match there.iter().find(|other| alike(name, other)) {
+            Some(other) if other != name => format!("{name} or {other}"),
+            _ => name.clone(),
+        })
+        .collect();
+    let only = here.iter().filter(|name| !in_both(name, &there));
+    let not_confirmed: Vec<String> = only
+        .chain(there.iter().filter(|name| !in_both(name, &here)))
+        .cloned()
+        .collect();
+    let pays = as_described.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
+    let rivalled = as_described
+        .rivals
+        .iter()
+        .any(|(rival, against)| named.contains(against) && !alike(against, rival));
+    let verdict = match (
+        here.is_empty() && there.is_empty(),
+        named.is_empty() || !pays,
+        rivalled,
+    ) {
+        (true, ..) => Verdict::Adequate,
+        (_, true, _) => Verdict::Unexplained,
+        (_, _, true) => Verdict::Ambiguous,
+        _ => Verdict::Named,
+    };
+    Ok(Report {
+        name: description.name.clone(),
+        kind: description.kind.clone(),
+        output: rig.output().0,
+        verdict: verdict.word(),
+        named,
+        not_confirmed,
+        unexplained: 1.0 - as_described.explained,
+        as_described,
+        swapped,
+    })
+}
+
+fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) -> PartReport {
+    let tested = fitted.other() as usize;
+    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
+    let origin = Point {
+        nuisance: vec![0.0; measured.nuisance()],
+        effects: Vec::new(),
+    };
+    let before = squares(&measured.errors(&origin, tested));
+    let refitted = measured.errors(&selected.nominal.point, tested);
+    let extended = measured.errors(&selected.extended.point, tested);
+    let after = squares(&extended);
+    let point = &selected.extended.point;
+    let mut place = point.nuisance.len();
+    let mut effects = Vec::new();
+    for (i, (index, internal)) in point.effects.iter().enumerate() {
+        let candidate = &measured.candidates()[*index];
+        let parameters = candidate
+            .parameters
+            .iter()
+            .zip(internal)
+            .map(|(parameter, &q)| {
+                let deviation = selected.deviations.get(place).copied().unwrap_or(f64::NAN);
+                place += 1;
+                Value {
+                    name: parameter.name.to_owned(),
+                    value: parameter.scale.to_value(q),
+                    unit: parameter.unit,
+                    standard_error: (parameter.scale.slope(q) * deviation).abs(),
+                }
+            })
+            .collect();
+        let without = squares(&measured.errors(&selected.without[i].point, tested));
+        effects.push(EffectReport {
+            effect: candidate.effect.to_owned(),
+            parameters,
+            confidence: normal(selected.deviates[i]),
+            share: (without - after) / before,
+        });
+    }
+    let name = |i: usize| measured.candidates()[i].effect.to_owned();
+    PartReport {
+        nominal_error: measured.normalised_error(&origin, tested),
+        refitted_error: measured.normalised_error(&selected.nominal.point, tested),
+        extended_error: measured.normalised_error(point, tested),
+        fitted_error: measured.normalised_error(point, fitted as usize),
+        gain_interval: gain_interval(&refitted, &extended),
+        parameters: parameters(measured, point, &selected.deviations),
+        effects,
+        explained: 1.0 - after / before,
+        rivals: selected
+            .rivals
+            .iter()
+            .map(|r| (name(r.effect), name(r.against)))
+            .collect(),
+        point: point.clone(),
+    }
+}
+
+/// Probability below `deviate` of the normal distribution (Zelen and Severo 1964, 26.2.17 in
+/// Abramowitz and Stegun; error below 1e-7), for positive deviates.
+fn normal(deviate: f64) -> f64 {
+    let x = deviate.abs();
+    let t = 1.0 / (1.0 + 0.231_641_9 * x);
+    let series = [
+        0.319_381_530,
+        -0.356_563_782,
+        1.781_477_937,
+        -1.821_255_978,
+        1.330_274_429,
+    ];
+    let sum = series.iter().rev().fold(0.0, |sum, c| (sum + c) * t);
+    let above = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt() * sum;
+    if deviate < 0.0 { above } else { 1.0 - above }
+}
+
+fn parameters(measured: &Measured<'_>, point: &Point, deviations: &[f64]) -> Vec<Value> {
+    let values = measured.nominal_values(point);
+    let names = measured.uncertain_names();
+    let known = measured.rig.parameters();
+    names
+        .iter()
+        .enumerate()
+        .filter_map(|(i, name)| {
+            let place = known.iter().position(|(k, _)| k == name)?;
+            let mut moved = point.clone();
+            moved.nuisance[i] += deviations.get(i).copied().unwrap_or(0.0);
+            Some(Value {
+                name: (*name).to_owned(),
+                value: values[place],
+                unit: known[place].1,
+                standard_error: (measured.nominal_values(&moved)[place] - values[place]).abs(),
+            })
+        })
+        .collect()
+}
+
+impl Report {
+    /// Measured output, nominal and extended model of every series, for pictures.
+    ///
+    /// # Errors
+    /// When the description does not fit the rig.
+    pub fn curves(
+        &self,
+        description: &Description,
+        measurement: &Measurement,
+    ) -> Result<Vec<[Vec<f64>; 3]>, DescriptionError> {
+        let rig = description.rig()?;
+        let nominal = description.nominal(rig.as_ref())?;
+        let measured = Measured::new(rig.as_ref(), measurement, nominal);
+        let origin = Point {
+            nuisance: vec![0.0; measured.nuisance()],
+            effects: Vec::new(),
+        };
+        let curves = (0..measurement.series.len()).map(|s| {
+            let measured_output = measurement.series[s].output.clone();
+            [
+                measured_output,
+                measured.simulate(&origin, s),
+                measured.simulate(&self.as_described.point, s),
+            ]
+        });
+        Ok(curves.collect())
+    }
+}

@@ -1,0 +1,372 @@
+//! The identified shake table as the engine sees it: fifteen uncertain nominal parameters, the
+//! catalogue, and the innovations of every record.
+
+mod effects;
+mod entry;
+mod sensors_and_specimen;
+
+pub use effects::catalogue;
+pub use entry::Apply;
+
+use plant::identified::rig::IdentifiedRig;
+use plant::identified::shake_table::ShakeTable;
+
+use crate::diagnosis::case::{CHANNELS, Nominal};
+use crate::diagnosis::engine::{Candidate, Point, RigModel};
+use crate::diagnosis::rigs::shake_table::predictor::{Disturbance, Predictor, Signals};
+
+/// One record and whether the effects were there when it was taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelRecord {
+    /// Its name.
+    pub name: String,
+    /// The signals, SI.
+    pub signals: Signals,
+    /// False for a baseline: the same rig before the effect.
+    pub with_effects: bool,
+}
+
+/// The shake table of a case.
+#[derive(Debug, Clone)]
+pub struct ShakeTableModel {
+    /// The nominal rig.
+    pub nominal: IdentifiedRig,
+    /// Relative standard deviation of its parameters.
+    pub uncertainty: f64,
+    /// Sampling period, s.
+    pub period: f64,
+    /// Sensor noise, SI, infinite where a channel is missing.
+    pub noise: [f64; 4],
+    /// What drives the rig unseen.
+    pub disturbance: Disturbance,
+    /// The records.
+    pub records: Vec<ModelRecord>,
+    candidates: Vec<Candidate>,
+    apply: Vec<Apply>,
+}
+
+/// Names of the uncertain nominal parameters, in the order of [`Point::nuisance`].
+pub const NUISANCE: [&str; 15] = [
+    "actuator.denominator[1]",
+    "actuator.denominator[2]",
+    "actuator.denominator[3]",
+    "actuator.voltage_to_force[1]",
+    "actuator.voltage_to_force[2]",
+    "actuator.voltage_to_force[3]",
+    "actuator.velocity_to_force[1]",
+    "actuator.velocity_to_force[2]",
+    "actuator.velocity_to_force[3]",
+    "table.mass",
+    "table.damping",
+    "table.stiffness",
+    "specimen.mass",
+    "specimen.damping",
+    "specimen.stiffness",
+];
+
+/// The parameters of `rig` in the order of [`NUISANCE`], SI; without a specimen the first twelve.
+pub fn nominal_parameters(rig: &IdentifiedRig) -> Vec<f64> {
+    let ShakeTable { actuator, table } = rig.shake_table;
+    let mut values = Vec::with_capacity(NUISANCE.len());
+    values.extend(actuator.denominator);
+    values.extend(actuator.voltage_to_force);
+    values.extend(actuator.velocity_to_force);
+    values.extend([table.mass, table.damping, table.stiffness]);
+    values.extend(
+        rig.specimen
+            .iter()
+            .flat_map(|s| [s.mass, s.damping, s.stiffness]),
+    );
+    values
+}
+
+impl ShakeTableModel {
+    /// The model for `nominal` and `records`; `noise` as in [`Nominal::noise`], infinite where a
+    /// channel is missing.
+    pub fn new(nominal: &Nominal, noise: [f64; 4], records: Vec<ModelRecord>) -> Self {
+        let period = 1.0 / nominal.sample_rate;
+        let commands = records
+            .first()
+            .map(|record| record.signals.command.as_slice());
+        let peak = commands
+            .unwrap_or_default()
+            .iter()
+            .fold(1e-3f64, |peak, u| peak.max(u.abs()));
+        let (candidates, apply) = catalogue(peak, period).into_iter().unzip();
+        Self {
+            nominal: IdentifiedRig {
+                shake_table: nominal.shake_table,
+                specimen: nominal.specimen,
+                ..Default::default()
+            },
+            uncertainty: nominal.uncertainty,
+            period,
+            noise,
+            disturbance: Disturbance::beside_command(nominal.command_noise, period),
+            records,
+            candidates,
+            apply,
+        }
+    }
+
+    /// The nominal rig with `nuisance` (in standard deviations of the parameters' logarithms, so that
+    /// factors add up) and no effects.
+    pub fn rig_without_effects(&self, nuisance: &[f64]) -> IdentifiedRig {
+        let mut rig = self.nominal;
+        let mut factors = nuisance.iter().map(|p| (self.uncertainty * p).exp());
+        let mut scale = |value: &mut f64| *value *= factors.next().unwrap_or(1.0);
+        let actuator = &mut rig.shake_table.actuator;
+        actuator.denominator.iter_mut().for_each(&mut scale);
+        actuator.voltage_to_force.iter_mut().for_each(&mut scale);
+        actuator.velocity_to_force.iter_mut().for_each(&mut scale);
+        let table = &mut rig.shake_table.table;
+        scale(&mut table.mass);
+        scale(&mut table.damping);
+        scale(&mut table.stiffness);
+        if let Some(specimen) = &mut rig.specimen {
+            scale(&mut specimen.mass);
+            scale(&mut specimen.damping);
+            scale(&mut specimen.stiffness);
+        }
+        rig
+    }
+
+    /// The rig at `point`.
+    pub fn rig(&self, point: &Point) -> IdentifiedRig {
+        let mut rig = self.rig_without_effects(&point.nuisance);
+        for (candidate, internal) in &point.effects {
+            self.apply[*candidate](&mut rig, &self.candidates[*candidate].values(internal));
+        }
+        rig
+    }
+}
+
+/// Predictors of the rig with and without its effects.
+pub struct ShakeTablePredictor {
+    with_effects: Predictor,
+    without_effects: Option<Predictor>,
+}
+
+impl RigModel for ShakeTableModel {
+    type Predictor = ShakeTablePredictor;
+
+    fn nuisance(&self) -> usize {
+        if self.nominal.specimen.is_some() {
+            15
+        } else {
+            12
+        }
+    }
+
+    fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
+    fn records(&self) -> usize {
+        self.records.len()
+    }
+
+    fn record_name(&self, record: usize) -> &str {
+        &self.records[record].name
+    }
+
+    fn channels(&self) -> &[&'static str] {
+        &CHANNELS
+    }
+
+    fn disturbed(&self, factor: f64) -> Self {
+        let mut model = self.clone();
+        model.disturbance.sigma *= factor;
+        model
+    }
+
+    // From the measured signals one sample before: the noise of the sample itself is in its
+    // innovation.
+    fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)> {
+        let signals = &self.records[record].signals;
+        let n = signals.len();
+        let before = |k: usize| k.saturating_sub(1);
+        let channel =
+            |i: usize| -> Vec<f64> { (0..n).map(|k| signals.channels[before(k)][i]).collect() };
+        let x = channel(0);
+        // Velocity over eight samples, smooth enough for its sign.
+        let v: Vec<f64> = (0..n)
+            .map(|k| (x[k] - x[k.saturating_sub(8)]) / (8.0 * self.period))
+            .collect();
+        let command: Vec<f64> = (0..n).map(|k| signals.command[before(k)]).collect();
+        let mut all = Vec::new();
+        for (name, signal) in [
+            ("valve command", command),
+            ("displacement", x.clone()),
+            ("velocity", v),
+            ("actuator force", channel(2)),
+            ("specimen acceleration", channel(3)),
+        ] {
+            let peak = signal.iter().fold(0.0f64, |peak, s| peak.max(s.abs()));
+            if peak == 0.0 {
+                continue;
+            }
+            let even = signal.iter().map(|s| s * s / peak).collect();
+            let odd = signal.iter().map(|s| s * s * s / (peak * peak)).collect();
+            let sign = signal.iter().map(|s| (40.0 * s / peak).tanh()).collect();
+            all.push((format!("{name} squared"), even));
+            all.push((format!("{name} cubed"), odd));
+            all.push((format!("sign of {name}"), sign));
+            all.push((name.to_string(), signal));
+        }
+        all
+    }
+
+    fn residual_count(&self, record: usize) -> usize {
+        4 * self.records[record].signals.len()
+    }
+
+    fn sample_count(&self, record: usize) -> usize {
+        self.records[record].signals.len()
+    }
+
+    fn predictor(&self, point: &Point) -> Option<ShakeTablePredictor> {
+        let design = |rig: &IdentifiedRig| {
+            Predictor::design(rig, self.period, self.noise, self.disturbance).ok()
+        };
+        let without_effects = if self.records.iter().all(|record| record.with_effects) {
+            None
+        } else {
+            Some(design(&self.rig_without_effects(&point.nuisance))?)
+        };
+        Some(ShakeTablePredictor {
+            with_effects: design(&self.rig(point))?,
+            without_effects,
+        })
+    }
+
+    fn log_determinant(&self, predictor: &ShakeTablePredictor) -> f64 {
+        predictor.with_effects.log_determinant
+    }
+
+    fn residuals(
+        &self,
+        predictor: &ShakeTablePredictor,
+        point: &Point,
+        record: usize,
+        out: &mut [f64],
+    ) -> bool {
+        let ModelRecord {
+            signals,
+            with_effects,
+            ..
+        } = &self.records[record];
+        let (rig, predictor) = match (&predictor.without_effects, with_effects) {
+            (Some(without), false) => (self.rig_without_effects(&point.nuisance), without),
+            _ => (self.rig(point), &predictor.with_effects),
+        };
+        predictor
+            .sample(&rig)
+            .is_ok_and(|sampled| predictor.innovations(&sampled, signals, out))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::diagnosis::engine::{Judgement, judge};
+    use plant::identified::shake_table::ShakeTable;
+    use plant::specimens::linear::LinearSpecimen;
+
+    /// Records of `rig` under a small proportional controller on random references.
+    fn model(rig: &IdentifiedRig, seed: u64) -> ShakeTableModel {
+        let nominal = Nominal {
+            sample_rate: 500.0,
+            shake_table: ShakeTable::default(),
+            specimen: Some(LinearSpecimen::default()),
+            controller: None,
+            noise: [1.3e-5, 0.04, 1.3, 0.025],
+            command_noise: 5e-4,
+            uncertainty: 0.01,
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = move || -> f64 { StandardNormal.sample(&mut random) };
+        let period = 1.0 / nominal.sample_rate;
+        let sampled = rig.sample(period, 2).unwrap();
+        let disturbance = Disturbance::beside_command(nominal.command_noise, period);
+        let records = ["identification", "validation"].map(|name| {
+            let mut state = Default::default();
+            let (mut reference, mut slow, mut unseen) = (0.0, 0.0, 0.0);
+            let mut signals = Signals {
+                command: Vec::new(),
+                channels: Vec::new(),
+            };
+            for k in 0..4000 {
+                slow += 0.01 * (0.15 * normal() - slow);
+                reference += 0.02 * (slow - reference);
+                let mut channels = sampled.measure(&mut state, f64::from(k) * period);
+                for (value, noise) in channels.iter_mut().zip(nominal.noise) {
+                    *value += noise * normal();
+                }
+                let command = 240.0 * (reference - channels[0]);
+                signals.command.push(command);
+                signals.channels.push(channels);
+                let fresh = disturbance.sigma * (1.0 - disturbance.phi.powi(2)).sqrt();
+                unseen = disturbance.phi * unseen + fresh * normal();
+                sampled.step_disturbed(&mut state, command, unseen);
+            }
+            ModelRecord {
+                name: name.into(),
+                signals,
+                with_effects: true,
+            }
+        });
+        ShakeTableModel::new(&nominal, nominal.noise, records.into())
+    }
+
+    fn said(judgement: &Judgement) -> (crate::diagnosis::engine::Verdict, Vec<&'static str>) {
+        let mut names: Vec<_> = judgement.effects.iter().map(|e| e.effect).collect();
+        names.sort_unstable();
+        (judgement.verdict, names)
+    }
+
+    #[test]
+    fn order_and_labels_of_the_catalogue_change_no_verdict() {
+        let mut rig = IdentifiedRig {
+            specimen: Some(LinearSpecimen::default()),
+            ..Default::default()
+        };
+        for hidden in [vec![], vec!["load_cell_bias", "valve_dead_band"]] {
+            rig.effects.valve.dead_band = f64::from(hidden.contains(&"valve_dead_band")) * 0.12;
+            rig.sensors.load_cell_bias = f64::from(hidden.contains(&"load_cell_bias")) * 8.0;
+            let model = model(&rig, 31);
+            let straight = judge(&model, &[0], &[1], false).unwrap();
+            assert_eq!(said(&straight).1, hidden);
+
+            let mut turned = model.clone();
+            turned.candidates.reverse();
+            turned.apply.reverse();
+            turned.candidates.rotate_left(7);
+            turned.apply.rotate_left(7);
+            assert_eq!(
+                said(&judge(&turned, &[0], &[1], false).unwrap()),
+                said(&straight)
+            );
+
+            // Labels: every effect takes the name of its mirror image in the catalogue.
+            let names: Vec<&'static str> = model.candidates.iter().map(|c| c.effect).collect();
+            let mirror = |name: &str| {
+                let place = names.iter().position(|n| *n == name).unwrap();
+                names[names.len() - 1 - place]
+            };
+            let mut relabelled = model.clone();
+            for candidate in &mut relabelled.candidates {
+                candidate.effect = mirror(candidate.effect);
+                candidate.contains = candidate.contains.map(mirror);
+            }
+            let judgement = judge(&relabelled, &[0], &[1], false).unwrap();
+            let mut expected: Vec<_> = hidden.iter().map(|name| mirror(name)).collect();
+            expected.sort_unstable();
+            assert_eq!(said(&judgement), (straight.verdict, expected));
+        }
+    }
+}

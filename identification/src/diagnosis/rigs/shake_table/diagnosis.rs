@@ -1,0 +1,388 @@
+//! Diagnosis of a case of the shake table: from folder to verdict, extended model and gain.
+
+use std::collections::BTreeMap;
+
+use plant::identified::effects::{Effects, SensorEffects};
+use plant::identified::shake_table::ShakeTable;
+use plant::specimens::linear::LinearSpecimen;
+use units::constants::INCH;
+
+use super::relations::{Relation, misfit, relations};
+use super::sentence::sentence;
+use crate::diagnosis::case::{
+    CHANNELS, Case, CaseError, Nominal, Record, blind_spot, noise_ratios, problems,
+    too_little_excitation,
+};
+use crate::diagnosis::engine::experiment;
+use crate::diagnosis::engine::gain::{Gain, gain};
+use crate::diagnosis::engine::{NamedEffect, Verdict, judge};
+use crate::diagnosis::engine::{Point, RigModel, Role, Test};
+use crate::diagnosis::rigs::shake_table::catalogue::{
+    ModelRecord, NUISANCE, ShakeTableModel, nominal_parameters,
+};
+use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Signals};
+
+/// R5 fires, and the recorded command is used, where it misses the law by more than this many
+/// standard deviations of its noise.
+const LAW_HOLDS_WITHIN: f64 = 4.0;
+
+/// A channel whose noise is this many times what is stated is said to be loud.
+const LOUD: f64 = 2.0;
+
+/// The parameter set that the FMUs of table, specimen and instrumentation take, SI.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ExtendedModel {
+    /// Actuator and table, nominal values corrected within their uncertainty.
+    pub shake_table: ShakeTable,
+    /// The specimen, if one stands on the table.
+    pub specimen: Option<LinearSpecimen>,
+    /// The effects found.
+    pub effects: Effects,
+    /// The sensors' effects found.
+    pub sensors: SensorEffects,
+    /// Standard errors, SI: of the effects' parameters as `effect.parameter`, of the nominal ones
+    /// by their names in [`NUISANCE`].
+    pub standard_errors: BTreeMap<String, f64>,
+}
+
+/// What came out of a case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnosis {
+    /// One sentence for a laboratory engineer.
+    pub sentence: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The effects, with estimates in SI.
+    pub effects: Vec<NamedEffect>,
+    /// Rival sets of effects.
+    pub alternatives: Vec<Vec<&'static str>>,
+    /// The experiment that would tell the first rival apart.
+    pub separating_experiment: Option<String>,
+    /// What the extended model brings on the validation record.
+    pub gain: Gain,
+    /// The extended model.
+    pub extended_model: ExtendedModel,
+    /// The effects in it: [`Self::effects`], and under `Unexplained` those that only help.
+    pub modelled: Vec<NamedEffect>,
+    /// The five relations on the identification record, nominal model.
+    pub relations: Vec<Relation>,
+    /// Traces left over, strongest first.
+    pub remaining: Vec<Test>,
+    /// Share of the nominal model's excess error that the effects explain.
+    pub share_explained: f64,
+    /// What the reader should know: missing channels, a law that does not hold.
+    pub notes: Vec<String>,
+    /// The validation record before and after.
+    pub validation: Validation,
+}
+
+/// One-step errors on the validation record, whitened: the noise alone has a deviation of one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Validation {
+    /// Sampling period, s.
+    pub period: f64,
+    /// What acted and what was measured, SI.
+    pub signals: Signals,
+    /// Errors of the nominal model, four channels a sample.
+    pub before: Vec<f64>,
+    /// Errors of the extended model.
+    pub after: Vec<f64>,
+}
+
+/// The command that acted: by the law where it explains the record, as recorded elsewhere.
+fn acting_command(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -> Vec<f64> {
+    let recorded = &record.valve_command;
+    let [x, a, ..] = &record.channels;
+    let Some(law) = nominal.controller else {
+        return recorded.clone();
+    };
+    let mut commands = law.commands(&record.reference, x, a, 1.0 / nominal.sample_rate);
+    if commands.len() != recorded.len() || commands.len() < 3 {
+        return recorded.clone();
+    }
+    let last = commands.len() - 1;
+    // The record's ends lack a neighbour of the reference.
+    commands[0] = recorded[0];
+    commands[last] = recorded[last];
+    let square: f64 = commands
+        .iter()
+        .zip(recorded)
+        .map(|(a, b)| (a - b).powi(2))
+        .sum();
+    let miss = (square / recorded.len() as f64).sqrt();
+    if miss > LAW_HOLDS_WITHIN * nominal.command_noise {
+        notes.push(format!(
+            "{}: the stated controller's law does not make the recorded command (R5, {:.1} times \
+             its noise); the recorded one is used",
+            record.name,
+            miss / nominal.command_noise
+        ));
+        return recorded.clone();
+    }
+    commands
+}
+
+/// Model and records of a case, after its checks; sentences on what is missing go to `notes`.
+fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, CaseError> {
+    let nominal = &case.nominal;
+    let mut found: Vec<String> = case
+        .records()
+        .flat_map(|record| problems(record, nominal))
+        .collect();
+    if found.is_empty() {
+        let to_be_moved = [&case.identification, &case.validation];
+        let still = |record: &&Record| too_little_excitation(record, nominal);
+        found.extend(to_be_moved.iter().filter_map(still));
+    }
+    let has = |record: &Record| {
+        record
+            .channels
+            .each_ref()
+            .map(|channel| !channel.is_empty())
+    };
+    let present = has(&case.identification);
+    for record in case.records() {
+        if found.is_empty() && has(record) != present {
+            found.push(format!(
+                "{}: its channels are not those of {}, are the records of one rig?",
+                record.name, case.identification.name
+            ));
+        }
+    }
+    if !found.is_empty() {
+        return Err(CaseError::Unfit { problems: found });
+    }
+    let mut noise = nominal.noise;
+    for (i, there) in present.into_iter().enumerate() {
+        if !there {
+            noise[i] = f64::INFINITY;
+            notes.push(format!(
+                "column `{}` is missing: {}",
+                CHANNELS[i],
+                blind_spot(i)
+            ));
+        }
+    }
+    let mut records = Vec::new();
+    let ordered = [
+        Some((&case.identification, true)),
+        case.small.as_ref().map(|record| (record, true)),
+        case.baseline.as_ref().map(|record| (record, false)),
+        Some((&case.validation, true)),
+    ];
+    for (record, with_effects) in ordered.into_iter().flatten() {
+        let value = |i: usize, k: usize| record.channels[i].get(k).copied().unwrap_or(0.0);
+        records.push(ModelRecord {
+            name: record.name.clone(),
+            with_effects,
+            signals: Signals {
+                command: acting_command(record, nominal, notes),
+                channels: (0..record.len())
+                    .map(|k| [value(0, k), value(1, k), value(2, k), value(3, k)])
+                    .collect(),
+            },
+        });
+    }
+    Ok(ShakeTableModel::new(nominal, noise, records))
+}
+
+fn prediction(
+    model: &ShakeTableModel,
+    point: &Point,
+    record: usize,
+) -> Option<(Predictor, Vec<f64>)> {
+    let rig = model.rig(point);
+    let predictor = Predictor::design(&rig, model.period, model.noise, model.disturbance).ok()?;
+    let signals = &model.records[record].signals;
+    let mut out = vec![0.0; 4 * signals.len()];
+    let sampled = predictor.sample(&rig).ok()?;
+    predictor
+        .innovations(&sampled, signals, &mut out)
+        .then_some((predictor, out))
+}
+
+/// Diagnoses a case. `verbose` tells the search's steps on standard error.
+///
+/// Refuses records that would mislead, naming record, column and place.
+pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
+    let unfit = |problem: &str| CaseError::Unfit {
+        problems: vec![problem.into()],
+    };
+    let mut notes = Vec::new();
+    let model = prepare(case, &mut notes)?;
+    let relations = relations(&case.identification, &case.nominal);
+    if let Some(problem) = misfit(&relations) {
+        return Err(unfit(&problem));
+    }
+    let held_out = model.records.len() - 1;
+    let fitted: Vec<usize> = (0..held_out).collect();
+    let origin = Point {
+        nuisance: vec![0.0; RigModel::nuisance(&model)],
+        effects: Vec::new(),
+    };
+    let lost = || {
+        unfit(
+            "the nominal model leaves the finite on these records: do its units and the columns' \
+             belong together?",
+        )
+    };
+    let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
+    let signals = &model.records[held_out].signals;
+    let mut judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
+    for note in at_their_ends(&model, &judgement.best.point) {
+        judgement.verdict = Verdict::Unexplained;
+        notes.push(note);
+    }
+    let after = prediction(&model, &judgement.best.point, held_out).ok_or_else(lost)?;
+    let gain = gain(
+        signals,
+        &CHANNELS,
+        (&before.0, &before.1),
+        (&after.0, &after.1),
+    );
+    let rig = model.rig(&judgement.all.point);
+    let effects = readable(judgement.effects);
+    let separating_experiment = judgement.rival_points.first().and_then(|rival| {
+        let law = case.nominal.controller?;
+        let found = experiment::separate(
+            &rig,
+            &model.rig(rival),
+            &law,
+            &case.nominal.noise,
+            model.period,
+        )?;
+        Some(format!(
+            "{} with a peak of {:.2} in ({:.1} mm): the rivals differ there by {:.1} standard \
+             deviations of the noise",
+            found.kind,
+            found.peak / INCH,
+            1e3 * found.peak,
+            found.separation
+        ))
+    });
+    let fits_fitted = {
+        let squares: f64 = judgement.best.residuals.iter().map(|r| r * r).sum();
+        squares / (judgement.best.residuals.len().max(1) as f64)
+    };
+    if judgement.verdict == Verdict::Unexplained && fits_fitted < 1.03 && gain.after_ratio > 1.2 {
+        notes.push(
+            "what was fitted is explained and the validation record is not: are the records of \
+             one rig?"
+                .into(),
+        );
+    }
+    if judgement.verdict == Verdict::Unexplained {
+        let ratios = noise_ratios(&case.identification, &case.nominal);
+        for (channel, ratio) in CHANNELS.iter().zip(ratios) {
+            if let Some(ratio) = ratio.filter(|ratio| *ratio > LOUD) {
+                notes.push(format!(
+                    "the noise of `{channel}` is {ratio:.1} times what nominal.toml states"
+                ));
+            }
+        }
+    }
+    let standard_errors = effects
+        .iter()
+        .flat_map(|e| {
+            e.parameters
+                .iter()
+                .map(|p| (format!("{}.{}", e.effect, p.name), p.standard_error))
+        })
+        .chain(
+            nominal_parameters(&model.nominal)
+                .into_iter()
+                .zip(&judgement.nuisance_errors)
+                .zip(NUISANCE)
+                .map(|((value, error), name)| {
+                    let error = value.abs() * model.uncertainty * error;
+                    (name.to_string(), error)
+                }),
+        )
+        .filter(|(_, error)| error.is_finite())
+        .collect();
+    let sentence = sentence(
+        judgement.verdict,
+        &effects,
+        &judgement.alternatives,
+        &gain,
+        &judgement.tests,
+        judgement.share_explained,
+    );
+    Ok(Diagnosis {
+        sentence,
+        verdict: judgement.verdict,
+        effects: if judgement.verdict == Verdict::Unexplained {
+            Vec::new()
+        } else {
+            effects.clone()
+        },
+        modelled: effects,
+        alternatives: judgement.alternatives,
+        separating_experiment,
+        gain,
+        extended_model: ExtendedModel {
+            shake_table: rig.shake_table,
+            specimen: rig.specimen,
+            effects: rig.effects,
+            sensors: rig.sensors,
+            standard_errors,
+        },
+        relations,
+        remaining: judgement
+            .tests
+            .into_iter()
+            .filter(|test| test.deviate > 3.5)
+            .take(12)
+            .collect(),
+        share_explained: judgement.share_explained,
+        notes,
+        validation: Validation {
+            period: model.period,
+            signals: signals.clone(),
+            before: before.1,
+            after: after.1,
+        },
+    })
+}
+
+/// Effects whose size ran to the end of what is tried: no cause, but a nominal model of another rig.
+fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (index, internal) in &point.effects {
+        let candidate = &RigModel::candidates(model)[*index];
+        for (parameter, value) in candidate.parameters.iter().zip(candidate.values(internal)) {
+            let (low, high) = parameter.bounds;
+            let near = |end: f64| (value - end).abs() < 1e-3 * end.abs();
+            if matches!(parameter.role, Role::Size { .. }) && (near(low) || near(high)) {
+                let unit = Some(parameter.unit).filter(|unit| *unit != "1");
+                notes.push(format!(
+                    "{}.{} ran to the end of what is plausible, {value:.3}{}{}: does nominal.toml \
+                     belong to this rig?",
+                    candidate.effect,
+                    parameter.name,
+                    unit.map_or("", |_| " "),
+                    unit.unwrap_or_default()
+                ));
+            }
+        }
+    }
+    notes
+}
+
+/// The mains as amplitude and phase instead of two components.
+fn readable(mut effects: Vec<NamedEffect>) -> Vec<NamedEffect> {
+    for effect in &mut effects {
+        if let ("mains_hum", [a, b]) = (effect.effect, effect.parameters.as_mut_slice()) {
+            let (p, q) = (a.value, b.value);
+            let amplitude = p.hypot(q);
+            a.name = "amplitude".into();
+            a.value = amplitude;
+            b.name = "phase".into();
+            b.value = q.atan2(p);
+            b.unit = "rad";
+            b.standard_error /= amplitude.max(f64::MIN_POSITIVE);
+            b.is_shape = true;
+        }
+    }
+    effects
+}

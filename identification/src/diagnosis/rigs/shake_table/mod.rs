@@ -1,0 +1,10 @@
+//! The shake table of the thesis with its records.
+
+pub mod catalogue;
+mod diagnosis;
+pub mod predictor;
+pub mod relations;
+mod sentence;
+
+pub use diagnosis::*;
+pub use sentence::{amount, laboratory_unit, said};

@@ -1,0 +1,215 @@
+//! A verdict as one sentence for a laboratory engineer.
+
+use crate::diagnosis::engine::Test;
+use crate::diagnosis::engine::gain::Gain;
+use crate::diagnosis::engine::{Estimate, NamedEffect, Verdict};
+use units::convert;
+
+/// The laboratory's unit for an SI unit of the catalogue.
+pub fn laboratory_unit(si: &str) -> &str {
+    match si {
+        "m" => "in",
+        "N" => "lbf",
+        "kg" => "lbf s^2/in",
+        "m/s" => "in/s",
+        "m/s^2" => "in/s^2",
+        "N s/m" => "lbf s/in",
+        "N/m^3" => "lbf/in^3",
+        "V/N" => "V/lbf",
+        "V s/N" => "V s/lbf",
+        "rad/m" => "rad/in",
+        "s" => "ms",
+        "1" => "%",
+        "1/V" => "%/V",
+        same => same,
+    }
+}
+
+/// Value and standard error in `unit`, with as many digits as the error leaves meaning:
+/// `0.0865 ± 0.0001 V`.
+pub fn amount(parameter: &Estimate, unit: &str) -> String {
+    let converted = convert(1.0, parameter.unit, unit);
+    let (factor, unit) = converted.map_or((1.0, parameter.unit), |factor| (factor, unit));
+    let (value, error) = (factor * parameter.value, factor * parameter.standard_error);
+    let unit = if unit == "1" { "" } else { unit };
+    let order = |x: f64| x.abs().log10().floor() as i32;
+    if !(error.is_finite() && error > 0.0 && value.is_finite() && value != 0.0) {
+        return format!("{value:.4} {unit}").trim_end().to_string();
+    }
+    // One digit of an error of 3 and more, two of a smaller one.
+    let place = order(error);
+    let digits = if error / 10f64.powi(place) < 2.95 {
+        1
+    } else {
+        0
+    };
+    let last = place - digits;
+    if order(value) < -4 || order(value) > 5 {
+        let ten = order(value.abs().max(error));
+        let (value, error) = (value / 10f64.powi(ten), error / 10f64.powi(ten));
+        let decimals = (ten - last).clamp(0, 8) as usize;
+        return format!("({value:.decimals$} ± {error:.decimals$})e{ten} {unit}")
+            .trim_end()
+            .to_string();
+    }
+    let decimals = (-last).clamp(0, 8) as usize;
+    format!("{value:.decimals$} ± {error:.decimals$} {unit}")
+        .trim_end()
+        .to_string()
+}
+
+/// What an effect is, with a gap for the size of each of its parameters that tells one.
+fn phrase(effect: &str) -> &'static str {
+    match effect {
+        "valve_null_bias" => "the spool is off its null by {}",
+        "valve_dead_band" => "the spool has a dead band of {} to either side",
+        "valve_flow_gain" => "the valve's flow gain is off by {}",
+        "valve_asymmetric_gain" => {
+            "the valve's flow gain is off by {} one way and by as much less the other"
+        }
+        "valve_spool_lag" => "the spool lags its command, with a natural frequency of {}",
+        "command_delay" => "the command reaches the valve {} late",
+        "valve_flow_saturation" => "the flow falls with the load and stops at {}",
+        "valve_spool_saturation" => "the spool's travel ends at {}",
+        "valve_hysteresis" => "the spool has a play of {} to either side",
+        "supply_pressure_droop" => "the supply droops, with {} of the flow lost",
+        "coulomb_friction" => "the table has dry friction of {}",
+        "stribeck_friction" => "the table has dry friction of {} and {} more to break away",
+        "internal_leakage" => "oil leaks past the piston, {}",
+        "oil_column_compliance" => "the oil column is compressible, {}",
+        "added_payload" => "the table carries an unknown mass of {}",
+        "viscous_damping" => "the table has extra damping of {}",
+        "cubic_stiffness" => "the table has an extra cubic stiffness of {}",
+        "foundation_compliance" => "the reaction mass moves, with a natural frequency of {}",
+        "accelerometer_bias" => "the table's accelerometer has an offset of {}",
+        "accelerometer_scale" => "the scale of the table's accelerometer is off by {}",
+        "accelerometer_tilt" => "the table pitches as it moves, by {}",
+        "accelerometer_delay" => "the channel of the table's accelerometer is {} late",
+        "displacement_scale" => "the scale of the displacement sensor is off by {}",
+        "displacement_lag" => "the displacement sensor lags, with a corner at {}",
+        "load_cell_scale" => "the scale of the load cell is off by {}",
+        "load_cell_bias" => "the load cell has an offset of {}",
+        "mains_hum" => "the table's accelerometer picks up the mains with {}",
+        "specimen_yielding" => "the specimen yields at a drift of {}",
+        "specimen_stiffness" => "the specimen's stiffness is off by {}",
+        "specimen_damping" => "the specimen's damping is off by {}",
+        "specimen_second_mode" => "a part of the specimen swings by itself at {}",
+        "specimen_degradation" => "the specimen loses up to {} of its stiffness",
+        "specimen_uplift" => "the specimen lifts off beyond a drift of {}",
+        "specimen_absent" => "nothing stands on the table",
+        _ => "there is an effect of {}",
+    }
+}
+
+/// An effect in words, its sizes in the laboratory's units.
+pub fn said(effect: &NamedEffect) -> String {
+    let mut sizes = effect.parameters.iter().filter(|p| !p.is_shape);
+    let mut text = String::new();
+    let mut pieces = phrase(effect.effect).split("{}").peekable();
+    while let Some(piece) = pieces.next() {
+        text += piece;
+        if pieces.peek().is_some() {
+            text += &sizes.next().map_or_else(
+                || "an unknown amount".into(),
+                |p| amount(p, laboratory_unit(p.unit)),
+            );
+        }
+    }
+    text
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
+}
+
+/// The sentence.
+pub(super) fn sentence(
+    verdict: Verdict,
+    effects: &[NamedEffect],
+    alternatives: &[Vec<&'static str>],
+    gain: &Gain,
+    tests: &[Test],
+    share: f64,
+) -> String {
+    let causes: Vec<String> = effects.iter().map(said).collect();
+    let causes = capitalised(&causes.join(" and "));
+    let it = if effects.len() > 1 { "them" } else { "it" };
+    let falls = format!(
+        "the error on the unseen record falls from {:.1} to {:.2} times the noise floor",
+        gain.before_ratio, gain.after_ratio
+    );
+    match verdict {
+        Verdict::Adequate => format!(
+            "The nominal model is adequate: within its stated uncertainty the error on the unseen \
+             record is {:.2} times the noise floor.",
+            gain.after_ratio
+        ),
+        Verdict::Named => format!("{causes}; with {it} {falls}."),
+        Verdict::Ambiguous => {
+            let sets: Vec<String> = alternatives
+                .iter()
+                .map(|set| set.join(" and ").replace('_', " "))
+                .collect();
+            format!(
+                "{causes}, or as likely it is {}; with {it} {falls}.",
+                sets.join(", or ")
+            )
+        }
+        Verdict::Unexplained => format!(
+            "Something is there that no effect of the catalogue explains: the best of them takes \
+             {:.0} % of the excess error; what is left shows most in \"{}\".",
+            100.0 * share.clamp(0.0, 1.0),
+            tests.first().map_or("nothing", |test| test.what.as_str())
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(value: f64, standard_error: f64, unit: &'static str) -> Estimate {
+        Estimate {
+            name: "size".into(),
+            value,
+            unit,
+            standard_error,
+            is_shape: false,
+        }
+    }
+
+    #[test]
+    fn digits_end_where_the_error_begins() {
+        for (value, error, si, unit, want) in [
+            (0.086_532, 0.000_109, "V", "V", "0.08653 ± 0.00011 V"),
+            (0.086_532, 0.000_8, "V", "V", "0.0865 ± 0.0008 V"),
+            (0.025_4, 0.001_27, "m", "in", "1.00 ± 0.05 in"),
+            (0.154_2, 0.004, "1", "%", "15.4 ± 0.4 %"),
+            (-0.007_614, 0.000_2, "s", "ms", "-7.61 ± 0.20 ms"),
+            (6.928, 0.031, "Hz", "Hz", "6.93 ± 0.03 Hz"),
+            (2.4e-6, 1e-8, "V s/N", "V s/N", "(2.400 ± 0.010)e-6 V s/N"),
+            (4321.0, 250.0, "N", "N", "4321 ± 250 N"),
+        ] {
+            assert_eq!(amount(&estimate(value, error, si), unit), want);
+        }
+    }
+
+    #[test]
+    fn an_effect_is_said_with_its_sizes() {
+        let friction = NamedEffect {
+            effect: "stribeck_friction",
+            parameters: vec![
+                estimate(4.448_221_6, 0.044, "N"),
+                estimate(8.896_443_2, 0.2, "N"),
+            ],
+            confidence: 1.0,
+        };
+        assert_eq!(
+            said(&friction),
+            "the table has dry friction of 1.000 ± 0.010 lbf and 2.00 ± 0.04 lbf more to break away"
+        );
+    }
+}

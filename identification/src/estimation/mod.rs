@@ -1,0 +1,13 @@
+//! Estimation from sampled signals; knows no rig.
+
+pub mod continuous;
+pub mod frequency_response;
+pub mod gauss_newton;
+pub mod input_matrices;
+pub mod instrumental_variables;
+pub(crate) mod least_squares;
+pub mod prediction;
+pub mod residuals;
+pub mod state_variable_filter;
+pub mod subspace;
+pub mod transfer_function;

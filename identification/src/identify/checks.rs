@@ -1,0 +1,138 @@
+//! Recordings from which no rig can be had, named before any fit.
+
+use crate::IdentificationError;
+use crate::data::{Recording, mean_and_deviation};
+use crate::estimation::frequency_response::excited_band;
+use crate::estimation::least_squares::reduce;
+
+/// Parameters of an experiment at most: nine of the actuator, three of the table, three of the
+/// specimen, offsets, initial state and noise.
+const PARAMETERS: usize = 33;
+/// Samples needed for each.
+const SAMPLES_A_PARAMETER: usize = 40;
+/// A command that its past and the outputs explain to this part of its size is pure feedback.
+const FEEDBACK: f64 = 1e-4;
+
+/// Checks one recording; returns warnings.
+///
+/// # Errors
+/// Too short, no excitation, too few frequencies, pure feedback.
+pub(crate) fn check(
+    recording: &Recording,
+    fit_part: f64,
+) -> Result<Vec<String>, IdentificationError> {
+    const NEEDED: &str = "valve_command, displacement, acceleration and actuator_force";
+    let name = &recording.name;
+    let needed = (SAMPLES_A_PARAMETER * PARAMETERS) as f64 / fit_part;
+    if (recording.len() as f64) < needed {
+        return Err(IdentificationError::TooShort {
+            recording: name.clone(),
+            samples: recording.len(),
+            parameters: PARAMETERS,
+            needed: needed.ceil() as usize,
+            seconds: needed * recording.period,
+        });
+    }
+    let command = recording
+        .require("valve_command", NEEDED)
+        .map_err(|error| match error {
+            IdentificationError::ConstantChannel { value, .. } => {
+                IdentificationError::NoExcitation {
+                    recording: name.clone(),
+                    what: format!("valve_command stands at {value:.4} V"),
+                }
+            }
+            other => other,
+        })?;
+    for channel in ["displacement", "acceleration", "actuator_force"] {
+        let values = recording.require(channel, NEEDED)?;
+        let noise = high_frequency_noise(values);
+        let (_, size) = mean_and_deviation(values);
+        if noise > 0.5 * size {
+            return Err(IdentificationError::NoExcitation {
+                recording: name.clone(),
+                what: format!(
+                    "`{channel}` is noise for the most part (root mean square {size:.3e}, white \
+                     noise {noise:.3e}, SI)"
+                ),
+            });
+        }
+    }
+    feedback(recording, command)?;
+    excitation(recording, command)
+}
+
+/// Standard deviation of white noise under a smooth signal, by third differences.
+fn high_frequency_noise(values: &[f64]) -> f64 {
+    let square: f64 = values
+        .windows(4)
+        .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2))
+        .sum();
+    (square / (20.0 * values.len().max(1) as f64)).sqrt()
+}
+
+/// Whether the command is a fixed function of its own past and of the outputs.
+fn feedback(recording: &Recording, command: &[f64]) -> Result<(), IdentificationError> {
+    let outputs: Vec<&[f64]> = ["displacement", "acceleration", "actuator_force"]
+        .iter()
+        .filter_map(|name| recording.channel(name))
+        .collect();
+    let count = 3 + 2 * outputs.len();
+    let all = reduce(command.len() - 2, count, 1, |k, row| {
+        let k = k + 2;
+        row[0] = command[k - 1];
+        row[1] = command[k - 2];
+        row[2] = 1.0;
+        for (i, output) in outputs.iter().enumerate() {
+            row[3 + 2 * i] = output[k];
+            row[4 + 2 * i] = output[k - 1];
+        }
+        row[count] = command[k];
+    });
+    let (law, _) = all.solve(1e-12)?;
+    let square: f64 = (2..command.len())
+        .map(|k| {
+            let mut rest = command[k] - law[0] * command[k - 1] - law[1] * command[k - 2] - law[2];
+            for (i, output) in outputs.iter().enumerate() {
+                rest -= law[3 + 2 * i] * output[k] + law[4 + 2 * i] * output[k - 1];
+            }
+            rest * rest
+        })
+        .sum();
+    let residual = (square / command.len() as f64).sqrt() / mean_and_deviation(command).1;
+    if residual < FEEDBACK {
+        return Err(IdentificationError::FeedbackOnly {
+            recording: recording.name.clone(),
+            residual,
+        });
+    }
+    Ok(())
+}
+
+/// Frequencies that the command holds.
+fn excitation(recording: &Recording, command: &[f64]) -> Result<Vec<String>, IdentificationError> {
+    let segment = (command.len() / 4).clamp(64, 8192);
+    let (low, high, lines) = excited_band(command, recording.period, segment, 1e-6)?;
+    let width = 1.0 / (segment as f64 * recording.period);
+    // A Hann window spreads one line over some ten at this depth.
+    if lines <= 24 {
+        return Err(IdentificationError::RankDeficient {
+            what: format!(
+                "{}: the command holds {lines} lines of {width:.3} Hz between {low:.2} and \
+                 {high:.2} Hz, too few frequencies for fifteen parameters",
+                recording.name
+            ),
+            remedy: "excite with band-limited noise, a sweep or an earthquake instead of a sine"
+                .into(),
+        });
+    }
+    let mut warnings = Vec::new();
+    if high < 20.0 {
+        warnings.push(format!(
+            "{}: the excitation ends at {high:.1} Hz; the oil column (near 18 Hz on the thesis's \
+             rig) is seen only from its flank",
+            recording.name
+        ));
+    }
+    Ok(warnings)
+}

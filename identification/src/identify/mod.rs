@@ -1,0 +1,12 @@
+//! From recordings of the shake table to its parameters.
+
+mod assessment;
+mod checks;
+mod identifiability;
+pub mod model;
+pub mod model_file;
+pub mod rig;
+mod setup;
+pub mod specimen_file;
+mod start;
+pub mod validation;

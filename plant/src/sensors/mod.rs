@@ -1,0 +1,4 @@
+//! What the channels show of the rig.
+
+pub mod channel;
+pub mod instrumentation;

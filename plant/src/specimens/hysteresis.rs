@@ -1,0 +1,289 @@
+//! Hysteresis of the Bouc-Wen family: yielding with hardening, degradation and pinching.
+
+use crate::ModelError;
+use units::constants::{INCH, LBF};
+
+/// Restoring force of a yielding spring (Bouc 1967, Wen 1976; degradation after Baber and Wen
+/// 1981, pinching after Baber and Noori 1985):
+/// `F = r k d + (1 - r) F_y z + h F_y (d/d_y)³`, `k = F_y/d_y`,
+/// `dz/dt = d'/d_y · p(z) [1 - ν |z|^n (γ + β sign(d' z))] / η`,
+/// `ν = 1 + δ_ν ε`, `η = 1 + δ_η ε`,
+/// `p(z) = 1 - ζ (1 - e^(-2 ε)) exp(-((z sign(d') - q)/ψ)²)`, where `ε` is the work done on the
+/// hysteretic part in units of `F_y d_y`. Off by default: h, δ_ν, δ_η, ζ.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct BoucWen {
+    /// `F_y`, N.
+    pub yield_force: f64,
+    /// `d_y`, m.
+    pub yield_displacement: f64,
+    /// `r`, stiffness after yielding over that before (kinematic hardening).
+    pub post_yield_ratio: f64,
+    /// `n`, sharpness of the yield point, at least 1.
+    pub sharpness: f64,
+    /// `β`.
+    pub beta: f64,
+    /// `γ`.
+    pub gamma: f64,
+    /// `h`, force of the cubic hardening at the yield displacement over the yield force (plates
+    /// that begin to pull as membranes).
+    pub hardening: f64,
+    /// `δ_ν`, loss of strength.
+    pub strength_degradation: f64,
+    /// `δ_η`, loss of stiffness.
+    pub stiffness_degradation: f64,
+    /// `ζ`, loss of slope in the pinched range after much work, below 1.
+    pub pinching: f64,
+    /// `q`, middle of the pinched range in units of the yield force.
+    pub pinching_level: f64,
+    /// `ψ`, width of the pinched range.
+    pub pinching_width: f64,
+}
+
+/// State of a [`BoucWen`] spring besides its deformation.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Hysteresis {
+    /// `z`, force of the hysteretic part over its yield force.
+    pub z: f64,
+    /// `ε`, work done on the hysteretic part over `F_y d_y`.
+    pub work: f64,
+}
+
+impl Default for BoucWen {
+    fn default() -> Self {
+        // Chosen values of the yielding specimen: 6 lbf, 0.147 in, 0.05, n = 1.5, 0.5, 0.5.
+        Self {
+            yield_force: 6.0 * LBF,
+            yield_displacement: 0.147 * INCH,
+            post_yield_ratio: 0.05,
+            sharpness: 1.5,
+            beta: 0.5,
+            gamma: 0.5,
+            hardening: 0.0,
+            strength_degradation: 0.0,
+            stiffness_degradation: 0.0,
+            pinching: 0.0,
+            pinching_level: 0.1,
+            pinching_width: 0.2,
+        }
+    }
+}
+
+impl BoucWen {
+    /// Refuses parameters that cannot be simulated or that would make energy.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        ModelError::require_positive("yield_force", self.yield_force)?;
+        ModelError::require_positive("yield_displacement", self.yield_displacement)?;
+        ModelError::require_finite("post_yield_ratio", self.post_yield_ratio)?;
+        ModelError::require_non_negative("hardening", self.hardening)?;
+        ModelError::require_non_negative("strength_degradation", self.strength_degradation)?;
+        ModelError::require_non_negative("stiffness_degradation", self.stiffness_degradation)?;
+        ModelError::require_finite("pinching_level", self.pinching_level)?;
+        ModelError::require_positive("pinching_width", self.pinching_width)?;
+        let checks = [
+            (
+                "post_yield_ratio",
+                self.post_yield_ratio,
+                self.post_yield_ratio <= 1.0,
+                "a number not above 1",
+            ),
+            (
+                "sharpness",
+                self.sharpness,
+                self.sharpness.is_finite() && self.sharpness >= 1.0,
+                "a number of at least 1",
+            ),
+            (
+                "beta",
+                self.beta,
+                self.beta.is_finite() && self.beta > -self.gamma,
+                "a number with beta + gamma above 0",
+            ),
+            (
+                "gamma",
+                self.gamma,
+                self.gamma.is_finite() && self.gamma <= self.beta,
+                "a number not above beta (the loop would turn backwards)",
+            ),
+            (
+                "pinching",
+                self.pinching,
+                (0.0..1.0).contains(&self.pinching),
+                "a number from 0 to below 1",
+            ),
+        ];
+        for (name, value, holds, expected) in checks {
+            if !holds {
+                return Err(ModelError::Parameter {
+                    name,
+                    value,
+                    expected,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Stiffness before yielding, N/m.
+    pub fn stiffness(&self) -> f64 {
+        self.yield_force / self.yield_displacement
+    }
+
+    /// Force of the spring at `deformation` (m), N.
+    pub fn force(&self, deformation: f64, state: &Hysteresis) -> f64 {
+        let ratio = deformation / self.yield_displacement;
+        self.yield_force
+            * (self.post_yield_ratio * ratio
+                + (1.0 - self.post_yield_ratio) * state.z
+                + self.hardening * ratio * ratio * ratio)
+    }
+
+    /// Rates of the state at deformation rate `velocity` (m/s), 1/s.
+    pub fn rates(&self, velocity: f64, state: &Hysteresis) -> Hysteresis {
+        let speed = velocity / self.yield_displacement;
+        let (z, work) = (state.z, state.work.max(0.0));
+        let strength = 1.0 + self.strength_degradation * work;
+        let stiffness = 1.0 + self.stiffness_degradation * work;
+        let power = self.power(z.abs());
+        let sign = if velocity * z >= 0.0 { 1.0 } else { -1.0 };
+        let elastic = 1.0 - strength * power * (self.gamma + self.beta * sign);
+        let mut rate = speed * elastic / stiffness;
+        if self.pinching > 0.0 {
+            let off = (z * velocity.signum() - self.pinching_level) / self.pinching_width;
+            rate *= 1.0 - self.pinching * (1.0 - (-2.0 * work).exp()) * (-off * off).exp();
+        }
+        Hysteresis {
+            z: rate,
+            work: (1.0 - self.post_yield_ratio) * z * speed,
+        }
+    }
+
+    /// `ratio^n`. The usual sharpnesses have a root where a power would take longer than the rest.
+    fn power(&self, ratio: f64) -> f64 {
+        match self.sharpness {
+            1.0 => ratio,
+            1.5 => ratio * ratio.sqrt(),
+            2.0 => ratio * ratio,
+            n => ratio.powf(n),
+        }
+    }
+
+    /// Energy that the spring can give back, J; exact without degradation and pinching.
+    pub fn stored_energy(&self, deformation: f64, state: &Hysteresis) -> f64 {
+        let ratio = deformation / self.yield_displacement;
+        let scale = self.yield_force * self.yield_displacement;
+        scale
+            * (0.5 * self.post_yield_ratio * ratio * ratio
+                + 0.5 * (1.0 - self.post_yield_ratio) * state.z * state.z
+                + 0.25 * self.hardening * ratio.powi(4))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integration::{Dynamics, advance};
+
+    /// A spring pulled with constant speed; states deformation, z, work.
+    struct Pulled {
+        spring: BoucWen,
+        velocity: f64,
+    }
+
+    impl Dynamics<3> for Pulled {
+        fn derivatives(&self, &[_, z, work]: &[f64; 3]) -> [f64; 3] {
+            let rates = self.spring.rates(self.velocity, &Hysteresis { z, work });
+            [self.velocity, rates.z, rates.work]
+        }
+    }
+
+    /// Pulls through `amplitudes` (in yield displacements) one after the other; returns ratio and
+    /// force at many points.
+    fn pull(spring: BoucWen, amplitudes: &[f64]) -> Vec<(f64, f64)> {
+        let mut x = [0.0; 3];
+        let mut loop_ = Vec::new();
+        for &amplitude in amplitudes {
+            let target = amplitude * spring.yield_displacement;
+            let pulled = Pulled {
+                spring,
+                velocity: (target - x[0]) / 200.0,
+            };
+            for _ in 0..200 {
+                x = advance(&pulled, &x, 1.0, 0.1);
+                let state = Hysteresis {
+                    z: x[1],
+                    work: x[2],
+                };
+                let force = spring.force(x[0], &state) / spring.yield_force;
+                loop_.push((x[0] / spring.yield_displacement, force));
+            }
+        }
+        loop_
+    }
+
+    fn area(loop_: &[(f64, f64)]) -> f64 {
+        loop_
+            .windows(2)
+            .map(|w| 0.5 * (w[0].1 + w[1].1) * (w[1].0 - w[0].0))
+            .sum()
+    }
+
+    #[test]
+    fn loading_with_sharpness_1_follows_its_closed_form() {
+        let spring = BoucWen {
+            sharpness: 1.0,
+            ..BoucWen::default()
+        };
+        for (ratio, force) in pull(spring, &[4.0]) {
+            // dz/dr = 1 - z: z = 1 - exp(-r).
+            let expected = 0.05 * ratio + 0.95 * (1.0 - (-ratio).exp());
+            assert!(
+                (force - expected).abs() < 1e-9,
+                "{ratio}: {force} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn it_starts_and_unloads_with_the_elastic_stiffness_and_yields_at_the_yield_force() {
+        let curve = pull(BoucWen::default(), &[8.0, 7.8]);
+        let slope = |i: usize| (curve[i + 1].1 - curve[i].1) / (curve[i + 1].0 - curve[i].0);
+        assert!((slope(0) - 1.0).abs() < 0.02);
+        // Post-yield line 0.05 r + 0.95.
+        assert!((slope(195) - 0.05).abs() < 0.005);
+        assert!((curve[199].1 - (0.05 * 8.0 + 0.95)).abs() < 0.01);
+        assert!((slope(201) - 1.0).abs() < 0.02, "{}", slope(201));
+    }
+
+    #[test]
+    fn degradation_and_pinching_narrow_the_loop_and_hardening_raises_its_ends() {
+        let cycles = [3.0, -3.0, 3.0, -3.0, 3.0];
+        let last = |spring: BoucWen| pull(spring, &cycles)[599..].to_vec();
+        let plain = last(BoucWen::default());
+        let weak = last(BoucWen {
+            strength_degradation: 0.05,
+            ..BoucWen::default()
+        });
+        let soft = last(BoucWen {
+            stiffness_degradation: 0.1,
+            ..BoucWen::default()
+        });
+        let pinched = last(BoucWen {
+            pinching: 0.9,
+            ..BoucWen::default()
+        });
+        let hard = last(BoucWen {
+            hardening: 0.02,
+            ..BoucWen::default()
+        });
+        for (name, changed) in [("weak", &weak), ("soft", &soft), ("pinched", &pinched)] {
+            assert!(area(changed) < 0.95 * area(&plain), "{name}");
+            assert!(area(changed) > 0.0, "{name}");
+        }
+        // Cubic hardening is elastic: 0.02 * 27 more at the end, the same area.
+        let end = plain.len() - 1;
+        assert!((hard[end].1 - plain[end].1 - 0.54).abs() < 1e-9);
+        assert!((area(&hard) / area(&plain) - 1.0).abs() < 1e-3);
+        // Pinched: soft near zero force, as strong at the ends.
+        assert!((pinched[end].1 / plain[end].1 - 1.0).abs() < 0.05);
+    }
+}
