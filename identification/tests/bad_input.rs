@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use identification::diagnosis::case::{Case, CaseError, Nominal, Record, problems};
 use identification::diagnosis::engine::Verdict;
 use identification::diagnosis::engine::experiment::play;
-use identification::diagnosis::rigs::shake_table::diagnosis::diagnose;
+use identification::diagnosis::rigs::shake_table::diagnose;
 use plant::identified::effects::{Effects, ValveEffects};
 use plant::identified::rig::IdentifiedRig;
 use rand::{RngExt, SeedableRng};
@@ -378,7 +378,7 @@ fn the_extended_model_reads_back_as_written() {
     assert_eq!(diagnosis.verdict, Verdict::Named, "{}", diagnosis.sentence);
     assert_eq!(diagnosis.effects[0].effect, "valve_dead_band");
     let text = toml::to_string(&diagnosis.extended_model).unwrap();
-    let back: identification::diagnosis::rigs::shake_table::diagnosis::ExtendedModel =
+    let back: identification::diagnosis::rigs::shake_table::ExtendedModel =
         toml::from_str(&text).unwrap();
     assert!((back.effects.valve.dead_band - 0.1).abs() < 2e-3, "{text}");
     assert_eq!(back, diagnosis.extended_model);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use identification::diagnosis::case::Case;
 use identification::diagnosis::engine::Verdict;
-use identification::diagnosis::rigs::shake_table::diagnosis::diagnose;
+use identification::diagnosis::rigs::shake_table::diagnose;
 
 fn shared() -> PathBuf {
     std::env::var_os("SHAKEBENCH_SHARED").map_or_else(
