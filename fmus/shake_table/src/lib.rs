@@ -271,7 +271,7 @@ fmu_kit::export!(ShakeTable);
 mod tests {
     use super::*;
     use fmu_kit::conformance::number;
-    use plant::{actuator::IdentifiedActuator, table::Table};
+    use plant::identified::{actuator::IdentifiedActuator, table::Table};
 
     #[test]
     fn parameters_arrive_where_they_belong() {

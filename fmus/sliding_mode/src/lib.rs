@@ -9,10 +9,10 @@ use controllers::{
     sliding_mode::{self, LowLevelReferences, SlidingMode as Law, SlidingModeInput},
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
-use plant::{
-    ModelError, actuator::IdentifiedActuator, shake_table::ShakeTable, units::SAMPLING_PERIOD,
-};
+use plant::ModelError;
+use plant::identified::{actuator::IdentifiedActuator, shake_table::ShakeTable};
 use serde::{Deserialize, Serialize};
+use units::constants::SAMPLING_PERIOD;
 
 /// The sliding-mode law over the loops of Fig 4-3.
 #[derive(Debug, Clone, Serialize, Deserialize)]
