@@ -1,5 +1,6 @@
 //! From measured data to a model, and what a model gets wrong
 
+pub mod closed_loop;
 pub mod data;
 pub mod diagnosis;
 mod error;

@@ -3,5 +3,6 @@
 pub mod hidden_suite;
 pub mod monolithic;
 pub mod native_rig;
+pub mod physical_recordings;
 pub mod python;
 pub mod shared;

@@ -1,0 +1,338 @@
+//! Identification of hydraulic rigs from closed-loop recordings, with the reference as instrument.
+//!
+//! 1. [`bands`]: every channel is projected on the reference, band by band.
+//! 2. [`start`]: linear regressions over a grid of spools, leakages and delays.
+//! 3. [`equations`], [`least_squares`]: maximum likelihood with errors in all channels, from
+//!    several starts (Pintelon and Schoukens 2012, Chapters 9 and 12).
+
+pub mod bands;
+pub mod equations;
+pub mod friction;
+pub mod least_squares;
+pub mod simulation;
+pub mod specimen;
+pub mod start;
+pub mod velocity;
+
+use nalgebra::DMatrix;
+
+use self::bands::Bands;
+use self::equations::{EQUATIONS, Equations, HydraulicRig, PARAMETERS};
+use self::friction::{SHAPE, SealShape};
+use self::specimen::SpecimenFit;
+use self::least_squares::{Coordinate, Optimum, minimise};
+use crate::IdentificationError;
+use crate::data::{Recording, mean_and_deviation};
+
+/// How to identify.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Frequencies between which the equations are fitted, Hz.
+    pub band: (f64, f64),
+    /// Whether a dry friction of the seals is looked for.
+    pub friction: bool,
+    pub extra: Option<HydraulicRig>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            band: (0.05, 35.0),
+            friction: true,
+            extra: None,
+        }
+    }
+}
+
+/// What was found.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The rig.
+    pub rig: HydraulicRig,
+    /// Its standard errors, in the order of [`equations::NAMES`].
+    pub standard_error: [f64; PARAMETERS],
+    /// Covariance of the rig's parameters.
+    pub covariance: DMatrix<f64>,
+    /// Payload of each further experiment over the first, kg.
+    pub payloads: Vec<f64>,
+    /// Shape of the friction.
+    pub shape: SealShape,
+    /// Mean squares of the whitened equations: one for a rig that obeys them.
+    pub mean_squares: [f64; EQUATIONS],
+    /// The specimen, where one stood on the table.
+    pub specimen: Option<SpecimenFit>,
+    /// Whether the search came to its end.
+    pub converged: bool,
+    /// Costs of the optima that the starts led to.
+    pub costs: Vec<f64>,
+}
+
+/// Inertia of a spool of 250 Hz, s²: what is quicker is a lag.
+const LEAST_INERTIA: f64 = 4.05e-7;
+
+/// Channels of a recording as the equations take them.
+struct Channels<'a> {
+    recording: &'a Recording,
+    velocity: Vec<f64>,
+}
+
+const NEEDED: &str = "valve_command, displacement, acceleration, actuator_force and, with a \
+                      specimen, specimen_acceleration";
+
+impl<'a> Channels<'a> {
+    fn new(recording: &'a Recording) -> Result<Self, IdentificationError> {
+        let x = recording.require("displacement", NEEDED)?;
+        let a = recording.require("acceleration", NEEDED)?;
+        Ok(Self {
+            recording,
+            velocity: velocity::velocity(x, a, recording.period)?,
+        })
+    }
+
+    /// The band of the fit, Hz.
+    fn band(&self, settings: &Settings) -> (f64, f64) {
+        let highest = 0.35 / self.recording.period;
+        (settings.band.0, settings.band.1.min(highest))
+    }
+
+    /// Bands with the friction of `shape`, `None` without friction.
+    fn bands(
+        &self,
+        shape: Option<SealShape>,
+        settings: &Settings,
+        specimen: bool,
+    ) -> Result<Bands, IdentificationError> {
+        let recording = self.recording;
+        let period = recording.period;
+        let command = recording.require("valve_command", NEEDED)?;
+        let reference = recording.channel("reference").unwrap_or(command);
+        let band = self.band(settings);
+        let nothing = vec![0.0; recording.len()];
+        let mut friction = vec![nothing.clone(); 1 + SHAPE];
+        // The friction that the reference alone would have made: instruments for its harmonics.
+        let mut instruments = Vec::new();
+        if let Some(shape) = shape {
+            friction = shape.histories(&self.velocity, period);
+            let wanted = bands::explained(reference, &self.velocity, period, band)?;
+            instruments = shape.histories(&wanted, period);
+        }
+        let mut channels = vec![
+            command,
+            recording.require("displacement", NEEDED)?,
+            recording.require("acceleration", NEEDED)?,
+            recording.require("actuator_force", NEEDED)?,
+            &friction[0],
+        ];
+        channels.push(if specimen {
+            recording.require("specimen_acceleration", NEEDED)?
+        } else {
+            &nothing
+        });
+        channels.extend(friction[1..].iter().map(Vec::as_slice));
+        let mut causes = vec![reference];
+        causes.extend(instruments.iter().map(Vec::as_slice));
+        Bands::new(&recording.name, &causes, &channels, period, band)
+    }
+}
+
+/// Identifies a hydraulic rig from recordings of one rig.
+///
+/// # Errors
+/// Every way in which data give no model, see [`IdentificationError`].
+pub fn identify(
+    recordings: &[Recording],
+    settings: Settings,
+) -> Result<Found, IdentificationError> {
+    let channels: Vec<Channels> = recordings.iter().map(Channels::new).collect::<Result<_, _>>()?;
+    let specimen = recordings
+        .iter()
+        .all(|r| r.channel("specimen_acceleration").is_some());
+    let bands = |shape| -> Result<Equations, IdentificationError> {
+        let experiments = channels
+            .iter()
+            .map(|c| c.bands(shape, &settings, specimen))
+            .collect::<Result<_, _>>()?;
+        Ok(Equations {
+            experiments,
+            held: None,
+        })
+    };
+    let root_mean_square = |of: &dyn Fn(&Channels) -> f64| {
+        let sum: f64 = channels.iter().map(|c| of(c).powi(2)).sum();
+        (sum / channels.len().max(1) as f64).sqrt()
+    };
+    let size = |name: &'static str| {
+        root_mean_square(&|c: &Channels| {
+            c.recording.channel(name).map_or(0.0, |v| mean_and_deviation(v).1)
+        })
+    };
+    let speed = root_mean_square(&|c: &Channels| mean_and_deviation(&c.velocity).1);
+    let (way, force) = (size("displacement"), size("actuator_force"));
+
+    let mut shape = SealShape {
+        presliding: 0.01 * way,
+        excess: 0.2,
+        stribeck_velocity: 0.05 * speed,
+        sharpness: 2.0,
+    };
+    let mut equations = bands(settings.friction.then_some(shape))?;
+    let (table, payloads) = start::table(&equations.experiments, specimen)?;
+    let mut best: Option<Optimum> = None;
+    let mut costs = Vec::new();
+    for rig in start::actuators(&equations.experiments, &table, 4)? {
+        let coordinates = coordinates(&rig, &payloads, force, specimen, settings.friction);
+        if let Some(optimum) = approach(&equations, &coordinates) {
+            costs.push(optimum.cost);
+            if best.as_ref().is_none_or(|b| optimum.cost < b.cost) {
+                best = Some(optimum);
+            }
+        }
+    }
+    let Some(mut optimum) = best else {
+        return Err(IdentificationError::NotConverged {
+            method: "the fit of the hydraulic rig",
+            reason: "no start makes a model".into(),
+        });
+    };
+    if settings.friction {
+        let refit = |shape: SealShape, from: &Optimum, free: bool| {
+            let trial = bands(Some(shape)).ok()?;
+            let rig = HydraulicRig::at(&from.values)?;
+            let mut own = coordinates(&rig, &from.values[PARAMETERS + SHAPE..], force, specimen, true);
+            for coordinate in &mut own[PARAMETERS..PARAMETERS + SHAPE] {
+                coordinate.free = free;
+            }
+            Some((approach(&trial, &own)?, trial))
+        };
+        for part in [0.002, 0.05] {
+            let trial = SealShape {
+                presliding: part * way,
+                ..shape
+            };
+            if let Some((found, own)) = refit(trial, &optimum, false)
+                && found.cost < optimum.cost
+            {
+                (optimum, equations, shape) = (found, own, trial);
+            }
+        }
+        for _ in 0..6 {
+            let Some((found, own)) = refit(shape, &optimum, true) else {
+                break;
+            };
+            costs.push(found.cost);
+            let changes = found.values[PARAMETERS..PARAMETERS + SHAPE].to_vec();
+            (optimum, equations) = (found, own);
+            shape = shape.changed(&changes);
+            if changes.iter().all(|c| c.abs() < 0.03) {
+                break;
+            }
+        }
+    }
+    let rig = HydraulicRig::at(&optimum.values).unwrap_or(table);
+    let slopes = rig.slopes();
+    let covariance = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
+        optimum.covariance[(i, j)] * slopes[i] * slopes[j]
+    });
+    Ok(Found {
+        rig,
+        standard_error: std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt()),
+        covariance,
+        payloads: optimum.values[PARAMETERS + SHAPE..].to_vec(),
+        shape,
+        mean_squares: equations
+            .mean_squares(&optimum.values)
+            .unwrap_or([f64::NAN; EQUATIONS]),
+        specimen: specimen.then(|| carried(&channels, &equations)).flatten(),
+        converged: optimum.converged,
+        costs,
+    })
+}
+
+/// The specimen of the recordings.
+fn carried(channels: &[Channels], equations: &Equations) -> Option<SpecimenFit> {
+    let [damping, stiffness] = start::specimen(&equations.experiments)?;
+    let of = |name: &str| -> Option<Vec<&[f64]>> {
+        channels.iter().map(|c| c.recording.channel(name)).collect()
+    };
+    let period = channels.first()?.recording.period;
+    let (base, mass) = (of("acceleration")?, of("specimen_acceleration")?);
+    specimen::fit(&base, &mass, period, damping, stiffness)
+}
+
+/// Fits with the residuals' covariance held where the fit before ended, twice, and then going with
+/// the rig: from far away the latter may fit noise to the signal.
+fn approach(equations: &Equations, coordinates: &[Coordinate]) -> Option<Optimum> {
+    let mut own = coordinates.to_vec();
+    let mut held = equations.clone();
+    for _ in 0..2 {
+        held.held = Some(own.iter().map(|c| c.start).collect());
+        let found = minimise(&held, &own)?;
+        for (coordinate, value) in own.iter_mut().zip(found.values) {
+            coordinate.start = value;
+        }
+    }
+    minimise(equations, &own)
+}
+
+/// The fit's coordinates from `rig`; forces are of the size of `force` (N).
+fn coordinates(
+    rig: &HydraulicRig,
+    payloads: &[f64],
+    force: f64,
+    specimen: bool,
+    friction: bool,
+) -> Vec<Coordinate> {
+    let critical = (rig.oil_stiffness * rig.mass).sqrt();
+    let stiffness = rig.stiffness.abs().max(rig.mass * 10.0);
+    let scale = [
+        1e-3,
+        1e-6,
+        0.1,
+        0.1,
+        0.3,
+        0.1 * critical,
+        0.1 * force,
+        0.1,
+        0.1 * (stiffness * rig.mass).sqrt(),
+        0.1 * stiffness,
+        0.1 * rig.mass,
+        1e-3,
+        1e-3,
+        1e-3,
+        0.01,
+    ];
+    let mut all: Vec<Coordinate> = rig
+        .coordinates()
+        .iter()
+        .zip(scale)
+        .map(|(&start, scale)| Coordinate {
+            start,
+            scale,
+            free: true,
+            bounds: (f64::NEG_INFINITY, f64::INFINITY),
+        })
+        .collect();
+    // Dampings and friction take no negative values.
+    for i in [0, 5, 6, 8, 11] {
+        all[i].bounds.0 = 0.0;
+    }
+    all[1].bounds.0 = LEAST_INERTIA;
+    for coordinate in &mut all {
+        coordinate.start = coordinate.start.max(coordinate.bounds.0);
+    }
+    all[6].free = friction;
+    all[10].free = specimen;
+    all.extend((0..SHAPE).map(|_| Coordinate {
+        start: 0.0,
+        scale: 0.1,
+        free: false,
+        bounds: (-0.5, 0.5),
+    }));
+    all.extend(payloads.iter().map(|&start| Coordinate {
+        start,
+        scale: 0.1 * rig.mass,
+        free: true,
+        bounds: (-0.9 * rig.mass, f64::INFINITY),
+    }));
+    all
+}
