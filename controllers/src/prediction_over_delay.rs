@@ -13,8 +13,8 @@ use plant::linear::{discrete_riccati, zero_order_hold};
 use units::constants::{INCH, LBF};
 
 use crate::allocation::{ControlAllocation, LoopCommands};
+use crate::hierarchy::{LowLevelReferences, SlidingModeInput, displacement_loop, force_loop};
 use crate::pid::{Pid, PidInput};
-use crate::sliding_mode::{LowLevelReferences, SlidingModeInput, displacement_loop, force_loop};
 use crate::{Controller, ModelError, Motion};
 
 /// Largest delay that can be predicted over, samples.

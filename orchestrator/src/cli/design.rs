@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use controllers::ModelError;
 use controllers::allocation::ControlAllocation;
+use controllers::hierarchy;
 use controllers::loop_shaping::LoopShapingCoefficients;
 use controllers::loops::{Controlled, LinearLaw, Loop, Time};
 use controllers::pid::Pid;
@@ -248,8 +249,8 @@ fn loops(rig: &Rig, design: &LoopShapingDesign) -> Result<Vec<NamedLoop>, ModelE
         (
             LinearLaw::hierarchy(
                 &SlidingMode::default(),
-                &sliding_mode::displacement_loop(&allocation),
-                &sliding_mode::force_loop(&allocation),
+                &hierarchy::displacement_loop(&allocation),
+                &hierarchy::force_loop(&allocation),
                 &allocation,
                 h,
             )?,

@@ -14,8 +14,8 @@
 
 use std::sync::OnceLock;
 
+use controllers::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
 use controllers::pid::Pid;
-use controllers::sliding_mode::DISPLACEMENT_INTEGRAL_LEAK;
 use controllers::three_variable::ThreeVariableGains;
 use controllers::tuning::sliding_mode::{Hierarchy, SlidingModeTuning};
 use plant::identified::shake_table::ShakeTable;
