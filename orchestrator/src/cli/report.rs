@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::diagnose;
-use crate::comparison::tables as compare_tables;
+use crate::comparison;
 use crate::error::Error;
 use crate::results::Results;
 use crate::run::summary;
@@ -43,8 +43,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let report = folder.join(diagnose::REPORT);
     let (kind, page) = if has("manifest.json") || has("results.csv") {
         ("run", summary::page_again(folder)?)
-    } else if has(compare_tables::COMPARISON) {
-        ("comparison", compare_tables::page_again(folder)?)
+    } else if has(comparison::COMPARISON) {
+        ("comparison", comparison::page_again(folder)?)
     } else if has(diagnose::DIAGNOSIS) {
         if report.is_file() {
             return Err(fault(
