@@ -178,7 +178,8 @@ impl Hierarchy<'_> {
 /// `lambda = K` in 1/s: a tenth of the highest crossover of the force loop that runs with
 /// `force_share` of the valve, sampled with `period`.
 ///
-/// Fails where that loop never has a gain of one.
+/// # Errors
+/// A loop that never has a gain of one.
 pub fn rate_by_rule(
     rig: &Rig,
     force: &Pid,
