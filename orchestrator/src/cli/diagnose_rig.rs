@@ -53,7 +53,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let fail = |error: DescriptionError| fault(&arguments.case, error);
     let description = Description::read(&arguments.case).map_err(fail)?;
     let measurement = description.measurement(&arguments.data).map_err(fail)?;
-    let report = rigs::diagnose(&description, &measurement, arguments.verbose).map_err(fail)?;
+    let report = rigs::diagnose(
+        &description,
+        &measurement,
+        identification::diagnosis::engine::Observer::none(),
+    )
+    .map_err(fail)?;
     let mut value = contract(&report);
     value["wall_s"] = begun.elapsed().as_secs_f64().into();
     if let Some(folder) = out {

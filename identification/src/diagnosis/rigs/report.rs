@@ -2,11 +2,13 @@
 
 use serde::Serialize;
 
-use super::measured::{Measured, Selection};
-use super::resampling::gain_interval;
-use super::selection::{Selected, select};
+use super::measured::{Measured, Part};
 use super::{Description, DescriptionError, Measurement};
-use crate::diagnosis::engine::{Point, RigModel, Verdict};
+use crate::diagnosis::engine::resampling::gain_interval;
+use crate::diagnosis::engine::{
+    ExtensibleModel, Observer, Point, Progress, Selected, SimulatedModel, Verdict, estimates,
+    select,
+};
 
 /// A parameter of the extended model, SI.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -71,8 +73,8 @@ pub struct Report {
     pub kind: String,
     /// What is simulated.
     pub output: &'static str,
-    /// `adequate`, `named`, `ambiguous` or `unexplained`.
-    pub verdict: &'static str,
+    /// The verdict.
+    pub verdict: Verdict,
     /// Effects that both parts of the data name.
     pub named: Vec<String>,
     /// Effects that only one part names.
@@ -92,24 +94,23 @@ pub struct Report {
 pub fn diagnose(
     description: &Description,
     measurement: &Measurement,
-    verbose: bool,
+    observer: Observer<'_>,
 ) -> Result<Report, DescriptionError> {
     let rig = description.rig()?;
-    let nominal = description.nominal(rig.as_ref())?;
-    let measured = Measured::new(rig.as_ref(), measurement, nominal);
-    let part = |fitted: Selection| {
-        if verbose {
-            eprintln!("fitting {}", measured.record_name(fitted as usize));
-        }
+    let nominal = description.nominal(rig)?;
+    let measured = Measured::new(rig, measurement, nominal);
+    let part = |fitted: Part| {
+        let record = fitted as usize;
+        observer.tell(|| Progress::Fitting(measured.record_name(record).to_owned()));
         let selected =
-            select(&measured, fitted, verbose).ok_or_else(|| DescriptionError::Description {
+            select(&measured, record, observer).ok_or_else(|| DescriptionError::Description {
                 path: description.path.clone(),
                 what: "the nominal model gives no finite output on these data".to_owned(),
             })?;
         Ok(part_report(&measured, fitted, &selected))
     };
-    let as_described = part(Selection::Fitted)?;
-    let swapped = part(Selection::LeftOut)?;
+    let as_described = part(Part::Fitted)?;
+    let swapped = part(Part::LeftOut)?;
     let list = |part: &PartReport| -> Vec<String> {
         part.effects
             .iter()
@@ -158,7 +159,7 @@ pub fn diagnose(
         name: description.name.clone(),
         kind: description.kind.clone(),
         output: rig.output().0,
-        verdict: verdict.word(),
+        verdict,
         named,
         not_confirmed,
         unexplained: 1.0 - as_described.explained,
@@ -167,7 +168,7 @@ pub fn diagnose(
     })
 }
 
-fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) -> PartReport {
+fn part_report(measured: &Measured<'_>, fitted: Part, selected: &Selected) -> PartReport {
     let tested = fitted.other() as usize;
     let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
     let origin = Point {
@@ -179,29 +180,24 @@ fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) 
     let extended = measured.errors(&selected.extended.point, tested);
     let after = squares(&extended);
     let point = &selected.extended.point;
-    let mut place = point.nuisance.len();
     let mut effects = Vec::new();
-    for (i, (index, internal)) in point.effects.iter().enumerate() {
-        let candidate = &measured.candidates()[*index];
-        let parameters = candidate
-            .parameters
-            .iter()
-            .zip(internal)
-            .map(|(parameter, &q)| {
-                let deviation = selected.deviations.get(place).copied().unwrap_or(f64::NAN);
-                place += 1;
-                Value {
-                    name: parameter.name.to_owned(),
-                    value: parameter.scale.to_value(q),
-                    unit: parameter.unit,
-                    standard_error: (parameter.scale.slope(q) * deviation).abs(),
-                }
-            })
-            .collect();
+    for (i, named) in estimates(measured, point, &selected.deviations)
+        .into_iter()
+        .enumerate()
+    {
         let without = squares(&measured.errors(&selected.without[i].point, tested));
         effects.push(EffectReport {
-            effect: candidate.effect.to_owned(),
-            parameters,
+            effect: named.effect.to_owned(),
+            parameters: named
+                .parameters
+                .into_iter()
+                .map(|p| Value {
+                    name: p.name,
+                    value: p.value,
+                    unit: p.unit,
+                    standard_error: p.standard_error,
+                })
+                .collect(),
             confidence: normal(selected.deviates[i]),
             share: (without - after) / before,
         });
@@ -274,8 +270,8 @@ impl Report {
         measurement: &Measurement,
     ) -> Result<Vec<[Vec<f64>; 3]>, DescriptionError> {
         let rig = description.rig()?;
-        let nominal = description.nominal(rig.as_ref())?;
-        let measured = Measured::new(rig.as_ref(), measurement, nominal);
+        let nominal = description.nominal(rig)?;
+        let measured = Measured::new(rig, measurement, nominal);
         let origin = Point {
             nuisance: vec![0.0; measured.nuisance()],
             effects: Vec::new(),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use identification::diagnosis::case::{CHANNELS, ControlLaw, Nominal, Record};
-use identification::diagnosis::engine::gain::{running, share_gone};
+use identification::diagnosis::engine::resampling::{running, share_gone};
 
 use super::GainReport;
 use crate::fmu::Fmu;

@@ -39,7 +39,7 @@ pub struct DiagnosisReport {
     /// One sentence.
     pub sentence: String,
     /// `adequate`, `named`, `ambiguous` or `unexplained`.
-    pub verdict: &'static str,
+    pub verdict: identification::diagnosis::engine::Verdict,
     /// The effects.
     pub effects: Vec<EffectReport>,
     /// Rival sets of effects.
@@ -119,7 +119,7 @@ impl DiagnosisReport {
         let gain = &diagnosis.gain;
         Self {
             sentence: diagnosis.sentence.clone(),
-            verdict: diagnosis.verdict.word(),
+            verdict: diagnosis.verdict,
             effects: diagnosis.effects.iter().map(effect).collect(),
             alternatives: diagnosis.alternatives.clone(),
             separating_experiment: diagnosis.separating_experiment.clone(),
@@ -186,7 +186,9 @@ pub fn diagnose(case: &Path, folder: &Path) -> Result<DiagnosisReport, Error> {
         CaseError::File { file, reason } => Error::File { path: file, reason },
         other => fail(case, other.to_string()),
     })?;
-    let diagnosis = shake_table::diagnose(&read, false).map_err(|e| fail(case, e.to_string()))?;
+    let diagnosis =
+        shake_table::diagnose(&read, identification::diagnosis::engine::Observer::none())
+            .map_err(|e| fail(case, e.to_string()))?;
     let mut report = DiagnosisReport::new(&diagnosis);
     report.relations = health::relations(&read, &diagnosis);
     let model = ExtendedModel::new(&diagnosis.extended_model, &diagnosis.modelled);

@@ -107,7 +107,7 @@ fn facts(report: &DiagnosisReport) -> Vec<Fact> {
         ),
     };
     let mut facts = vec![
-        fact("Verdict", report.verdict.into(), &verdict),
+        fact("Verdict", report.verdict.to_string().into(), &verdict),
         fact(
             "Error one step ahead",
             fall(&report.gain),
@@ -134,7 +134,7 @@ fn findings(report: &DiagnosisReport) -> Section {
         ));
     }
     let notes = text::remarks(report);
-    let text = match report.verdict {
+    let text = match report.verdict.to_string().as_str() {
         "adequate" => {
             "Nothing is there that the stated uncertainty of the nominal model and the \
                        noise of the sensors do not explain."

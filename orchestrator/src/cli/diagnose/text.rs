@@ -1,13 +1,13 @@
 //! A diagnosis on the terminal, and the tables that it shares with the report.
 
-use identification::diagnosis::engine::Estimate;
+use identification::diagnosis::engine::ParameterEstimate;
 use identification::diagnosis::rigs::shake_table::{amount, laboratory_unit};
 
 use super::{DiagnosisReport, GainReport, ParameterReport};
 use crate::report::columns::{aligned, significant};
 
 fn in_unit(name: &str, parameter: &ParameterReport, unit: &str) -> String {
-    let estimate = Estimate {
+    let estimate = ParameterEstimate {
         name: name.into(),
         value: parameter.value,
         unit: parameter.unit,

@@ -7,16 +7,16 @@ use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
 use units::constants::INCH;
 
+use super::experiment;
+use super::gain::{Gain, gain};
 use super::relations::{Relation, misfit, relations};
 use super::sentence::sentence;
 use crate::diagnosis::case::{
     CHANNELS, Case, CaseError, Nominal, Record, blind_spot, noise_ratios, problems,
     too_little_excitation,
 };
-use crate::diagnosis::engine::experiment;
-use crate::diagnosis::engine::gain::{Gain, gain};
-use crate::diagnosis::engine::{NamedEffect, Verdict, judge};
-use crate::diagnosis::engine::{Point, RigModel, Role, Test};
+use crate::diagnosis::engine::{ExtensibleModel, NamedEffect, Verdict, judge};
+use crate::diagnosis::engine::{Observer, Point, Role, Test};
 use crate::diagnosis::rigs::shake_table::catalogue::{
     ModelRecord, NUISANCE, ShakeTableModel, nominal_parameters,
 };
@@ -201,10 +201,11 @@ fn prediction(
         .then_some((predictor, out))
 }
 
-/// Diagnoses a case. `verbose` tells the search's steps on standard error.
+/// Diagnoses a case; `observer` is told the search's steps.
 ///
-/// Refuses records that would mislead, naming record, column and place.
-pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
+/// # Errors
+/// Records that would mislead, by record, column and place.
+pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseError> {
     let unfit = |problem: &str| CaseError::Unfit {
         problems: vec![problem.into()],
     };
@@ -217,7 +218,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     let held_out = model.records.len() - 1;
     let fitted: Vec<usize> = (0..held_out).collect();
     let origin = Point {
-        nuisance: vec![0.0; RigModel::nuisance(&model)],
+        nuisance: vec![0.0; ExtensibleModel::nuisance(&model)],
         effects: Vec::new(),
     };
     let lost = || {
@@ -228,7 +229,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     };
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
     let signals = &model.records[held_out].signals;
-    let mut judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
+    let mut judgement = judge(&model, &fitted, &[held_out], observer).ok_or_else(lost)?;
     for note in at_their_ends(&model, &judgement.best.point) {
         judgement.verdict = Verdict::Unexplained;
         notes.push(note);
@@ -349,7 +350,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
 fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
     let mut notes = Vec::new();
     for (index, internal) in &point.effects {
-        let candidate = &RigModel::candidates(model)[*index];
+        let candidate = &ExtensibleModel::candidates(model)[*index];
         for (parameter, value) in candidate.parameters.iter().zip(candidate.values(internal)) {
             let (low, high) = parameter.bounds;
             let near = |end: f64| (value - end).abs() < 1e-3 * end.abs();

@@ -2,6 +2,8 @@
 
 pub mod catalogue;
 mod diagnosis;
+pub mod experiment;
+pub mod gain;
 pub mod predictor;
 pub mod relations;
 mod sentence;
