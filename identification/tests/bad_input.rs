@@ -200,8 +200,8 @@ fn without_displacement_the_rest_is_used() {
     assert!(
         diagnosis
             .relations
-            .iter()
-            .all(|r| !r.name.starts_with("R4"))
+            .keys()
+            .all(|name| !name.starts_with("R4"))
     );
     let names: Vec<_> = diagnosis.effects.iter().map(|e| e.effect).collect();
     assert!(

@@ -57,11 +57,8 @@ fn every_practice_case_is_right() {
         let case = Case::read(&folder.join("cases").join(&name)).unwrap();
         let diagnosis = diagnose(&case, Observer::none()).unwrap();
         println!("{name}: {}", diagnosis.sentence);
-        for relation in &diagnosis.relations {
-            println!(
-                "    {}: {:.2} times its noise",
-                relation.name, relation.ratio
-            );
+        for (name, relation) in &diagnosis.relations {
+            println!("    {name}: {:.2} times its noise", relation.nominal);
         }
         let mut found: Vec<&str> = diagnosis.effects.iter().map(|e| e.effect).collect();
         found.sort_unstable();

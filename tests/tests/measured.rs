@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use acceptance::shared;
 use identification::diagnosis::engine::{Observer, Verdict};
 use identification::diagnosis::rigs::{
-    Description, Measurement, PartReport, Report, Series, diagnose,
+    Description, Measurement, PartReport, RigDiagnosis, Series, diagnose,
 };
 
 /// Description and data of a rig; none where the data are missing.
@@ -30,14 +30,14 @@ fn rig(name: &str) -> Option<(Description, Measurement)> {
     Some((description, measurement))
 }
 
-fn report(name: &str) -> Option<Report> {
+fn report(name: &str) -> Option<RigDiagnosis> {
     let (description, measurement) = rig(name)?;
     let report = diagnose(&description, &measurement, Observer::none()).unwrap();
     print(&report);
     Some(report)
 }
 
-fn print(report: &Report) {
+fn print(report: &RigDiagnosis) {
     println!(
         "{}: {} {:?}, on one part only {:?}",
         report.name, report.verdict, report.named, report.not_confirmed
@@ -52,7 +52,7 @@ fn print(report: &Report) {
     }
 }
 
-fn names(report: &Report, effects: &[&str]) {
+fn names(report: &RigDiagnosis, effects: &[&str]) {
     for effect in effects {
         assert!(
             report.named.iter().any(|name| name == effect),
@@ -202,7 +202,7 @@ fn four_more_milliseconds_of_delay_are_found_on_the_press() {
     print(&after);
     names(&after, &["delay", "asymmetric_gain"]);
     // The nominal lag of the command shares what it can with the delay.
-    let time = |report: &Report| {
+    let time = |report: &RigDiagnosis| {
         let lag = report
             .as_described
             .parameters
@@ -300,7 +300,7 @@ fn misalignment_put_on_the_drive_is_found() {
 fn put_on_top(
     description: &Description,
     series: &Series,
-    report: &Report,
+    report: &RigDiagnosis,
     effect: &str,
     values: &[f64],
 ) -> Vec<f64> {

@@ -5,17 +5,20 @@
 //! on data not fitted and that is found on each part of the data.
 
 mod closed_loop_actuator;
+pub mod curves;
 mod cyclic_material;
 mod description;
+mod diagnosis;
+mod extended;
 mod hysteretic_device;
 mod measured;
 mod positioning_drive;
-mod report;
 pub mod shake_table;
 mod table;
 
 pub use description::{Description, DescriptionError, LeftOut, Measurement, Quantity, Series};
-pub use report::{EffectReport, PartReport, Report, Value, diagnose};
+pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, diagnose};
+pub use extended::ExtendedRig;
 
 pub use table::{Effect, EffectTable, NominalTable};
 

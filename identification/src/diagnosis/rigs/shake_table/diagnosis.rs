@@ -9,7 +9,8 @@ use units::constants::INCH;
 
 use super::experiment;
 use super::gain::{Gain, gain};
-use super::relations::{Relation, misfit, relations};
+use super::health::{RelationReport, health};
+use super::relations::{misfit, relations};
 use super::sentence::sentence;
 use crate::diagnosis::case::{
     CHANNELS, Case, CaseError, Nominal, Record, blind_spot, noise_ratios, problems,
@@ -64,8 +65,8 @@ pub struct Diagnosis {
     pub extended_model: ExtendedModel,
     /// The effects in it: [`Self::effects`], and under `Unexplained` those that only help.
     pub modelled: Vec<NamedEffect>,
-    /// The five relations on the identification record, nominal model.
-    pub relations: Vec<Relation>,
+    /// The five relations on the identification record.
+    pub relations: BTreeMap<&'static str, RelationReport>,
     /// Traces left over, strongest first.
     pub remaining: Vec<Test>,
     /// Share of the nominal model's excess error that the effects explain.
@@ -83,22 +84,23 @@ pub struct Validation {
     pub period: f64,
     /// What acted and what was measured, SI.
     pub signals: Signals,
+    /// Whether the command that acted is what the stated law makes of the readings (R5), free of the
+    /// recorder's noise, rather than the recorded one.
+    pub by_law: bool,
     /// Errors of the nominal model, four channels a sample.
     pub before: Vec<f64>,
     /// Errors of the extended model.
     pub after: Vec<f64>,
 }
 
-/// The command that acted: by the law where it explains the record, as recorded elsewhere.
-fn acting_command(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -> Vec<f64> {
+/// The command that the stated law made, where it explains the recorded one.
+fn command_by_law(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -> Option<Vec<f64>> {
     let recorded = &record.valve_command;
     let [x, a, ..] = &record.channels;
-    let Some(law) = nominal.controller else {
-        return recorded.clone();
-    };
+    let law = nominal.controller?;
     let mut commands = law.commands(&record.reference, x, a, 1.0 / nominal.sample_rate);
     if commands.len() != recorded.len() || commands.len() < 3 {
-        return recorded.clone();
+        return None;
     }
     let last = commands.len() - 1;
     // The record's ends lack a neighbour of the reference.
@@ -117,9 +119,9 @@ fn acting_command(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -
             record.name,
             miss / nominal.command_noise
         ));
-        return recorded.clone();
+        return None;
     }
-    commands
+    Some(commands)
 }
 
 /// Model and records of a case, after its checks; sentences on what is missing go to `notes`.
@@ -172,11 +174,13 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
     ];
     for (record, with_effects) in ordered.into_iter().flatten() {
         let value = |i: usize, k: usize| record.channels[i].get(k).copied().unwrap_or(0.0);
+        let command = command_by_law(record, nominal, notes);
         records.push(ModelRecord {
             name: record.name.clone(),
             with_effects,
+            by_law: command.is_some(),
             signals: Signals {
-                command: acting_command(record, nominal, notes),
+                command: command.unwrap_or_else(|| record.valve_command.clone()),
                 channels: (0..record.len())
                     .map(|k| [value(0, k), value(1, k), value(2, k), value(3, k)])
                     .collect(),
@@ -328,7 +332,15 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
             sensors: rig.sensors,
             standard_errors,
         },
-        relations,
+        relations: health(
+            case,
+            &relations,
+            &Nominal {
+                shake_table: rig.shake_table,
+                specimen: rig.specimen,
+                ..case.nominal.clone()
+            },
+        ),
         remaining: judgement
             .tests
             .into_iter()
@@ -340,6 +352,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         validation: Validation {
             period: model.period,
             signals: signals.clone(),
+            by_law: model.records[held_out].by_law,
             before: before.1,
             after: after.1,
         },

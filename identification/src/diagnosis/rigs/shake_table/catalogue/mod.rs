@@ -24,6 +24,8 @@ pub struct ModelRecord {
     pub signals: Signals,
     /// False for a baseline: the same rig before the effect.
     pub with_effects: bool,
+    /// Whether the command is that of the stated law rather than the recorded one.
+    pub by_law: bool,
 }
 
 /// The shake table of a case.
@@ -318,6 +320,7 @@ mod tests {
                 name: name.into(),
                 signals,
                 with_effects: true,
+                by_law: false,
             }
         });
         ShakeTableModel::new(&nominal, nominal.noise, records.into())
