@@ -62,7 +62,7 @@ pub fn diagnose(
         } => {
             let curves = rig::extend(description, measurement, found, &mut results, folder)?;
             report.wall_s = begun.elapsed().as_secs_f64();
-            page::of_rig(subject, &report, &curves)
+            page::of_rig(&found.name, subject, &report, &curves)
         }
     };
     results.write_text(REPORT, &html(&page, folder)?)?;

@@ -28,10 +28,9 @@ fn table(caption: &str, rows: Vec<Vec<String>>) -> Table {
     }
 }
 
-fn page(title: &Path, source: &str, report: &DiagnosisReport, sections: Vec<Section>) -> Report {
-    let name = title.file_name().unwrap_or(title.as_os_str());
+fn page(name: &str, source: &str, report: &DiagnosisReport, sections: Vec<Section>) -> Report {
     Report {
-        title: format!("Diagnosis of {}", name.to_string_lossy()),
+        title: format!("Diagnosis of {name}"),
         summary: report.sentence.clone(),
         facts: facts(report),
         sections,
@@ -59,13 +58,20 @@ pub(super) fn of_case(
     }
     sections.extend(errors(case, found));
     sections.push(extended_case(case, &extended.model));
-    page(place, &place.display().to_string(), report, sections)
+    let name = place.file_name().unwrap_or(place.as_os_str());
+    let source = place.display().to_string();
+    page(&name.to_string_lossy(), &source, report, sections)
 }
 
-/// The report on a rig.
-pub(super) fn of_rig(place: &Path, report: &DiagnosisReport, curves: &[Curves]) -> Report {
+/// The report on the rig called `name`.
+pub(super) fn of_rig(
+    name: &str,
+    place: &Path,
+    report: &DiagnosisReport,
+    curves: &[Curves],
+) -> Report {
     let sections = rig_sections(report, Some(curves));
-    page(place, &place.display().to_string(), report, sections)
+    page(name, &place.display().to_string(), report, sections)
 }
 
 /// The report of what `diagnosis.json` in `folder` tells, with pictures of `curves`.
@@ -89,11 +95,11 @@ pub(super) fn again(folder: &Path, report: &DiagnosisReport, curves: Option<&[Cu
             sections
         }
     };
-    let title = match &report.evidence {
-        Evidence::Rig(evidence) => Path::new(&evidence.rig.name),
-        Evidence::ShakeTable(_) => folder,
+    let name = match &report.evidence {
+        Evidence::Rig(evidence) => &evidence.rig.name,
+        Evidence::ShakeTable(_) => "a case",
     };
-    page(title, &source, report, sections)
+    page(name, &source, report, sections)
 }
 
 fn rig_sections(report: &DiagnosisReport, curves: Option<&[Curves]>) -> Vec<Section> {
