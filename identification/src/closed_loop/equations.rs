@@ -15,7 +15,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::bands::{Band, Bands};
-use super::friction::SHAPE;
+use super::friction::{SHAPE, SealShape};
 use super::least_squares::Residuals;
 
 /// Channels of an experiment, in the order of [`Bands::new`].
@@ -235,6 +235,8 @@ pub struct Equations {
     /// Coordinates at which the residuals' covariance is held; by default it goes with the rig, as
     /// maximum likelihood with errors in all channels has it.
     pub held: Option<Vec<f64>>,
+    /// The friction's shape from which changes are counted, where there is friction.
+    pub shape: Option<SealShape>,
 }
 
 impl Equations {
@@ -362,6 +364,10 @@ impl Whitener {
 impl Residuals for Equations {
     fn residuals(&self, values: &[f64]) -> Option<Vec<f64>> {
         let all = self.whitened(values)?;
-        Some(all.iter().flatten().flat_map(|v| [v.re, v.im]).collect())
+        let mut residuals: Vec<f64> = all.iter().flatten().flat_map(|v| [v.re, v.im]).collect();
+        if let Some(shape) = &self.shape {
+            residuals.extend(shape.changed(&values[PARAMETERS..PARAMETERS + SHAPE]).surprise());
+        }
+        Some(residuals)
     }
 }

@@ -1,8 +1,8 @@
 //! Dry friction of the seals with a deflection before they slide.
 
 /// Shape of the friction over its Coulomb force: `z' = v (1 - |z/z_s|^n)` while it is loaded
-/// further and `z' = v` while it is unloaded, `z_s = z_c (1 + e exp(-(v/v_s)²))`, force `z/z_c`.
-/// Dahl's law for `n = 1` and `e = 0` (Dahl, Aerospace Report TOR-158, 1968), with the bump of
+/// further and `z' = v` while it is unloaded, `z_s = z_c (1 + e exp(-(v/v_s)²))`, force
+/// `(z + τ exp(-(v/v_s)²) z')/z_c`. Dahl's law for `n = 1` and `e = 0` (Dahl, Aerospace Report TOR-158, 1968), with the bump of
 /// Stribeck that the LuGre model has; a larger `n` slides more abruptly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SealShape {
@@ -14,13 +14,43 @@ pub struct SealShape {
     pub stribeck_velocity: f64,
     /// `n`.
     pub sharpness: f64,
+    /// `τ`, damping of the deflection over its stiffness, s.
+    pub relaxation: f64,
 }
 
 /// Number of [`SealShape`]'s parameters.
-pub const SHAPE: usize = 4;
+pub const SHAPE: usize = 5;
 
 impl SealShape {
-    /// The shape `changes` away: logarithms, but the excess itself.
+    /// What is known of seals before any data, as residuals of unit variance: an excess of
+    /// 0.25 ± 0.25, a Stribeck velocity of 4 mm/s and a sharpness of 3, each within a factor of
+    /// two to three.
+    pub fn surprise(&self) -> [f64; 3] {
+        [
+            (self.excess - 0.25) / 0.25,
+            (self.stribeck_velocity / 4e-3).ln(),
+            (self.sharpness / 3.0).ln() / 0.7,
+        ]
+    }
+
+    fn bump(&self, velocity: f64) -> f64 {
+        let ratio = velocity / self.stribeck_velocity;
+        (-ratio * ratio).exp()
+    }
+
+    /// Force over the Coulomb force at a deflection `z` (over `z_c`) and `velocity` (m/s).
+    pub fn force(&self, z: f64, velocity: f64) -> f64 {
+        let bump = self.bump(velocity);
+        let rate = velocity / self.presliding;
+        let loaded = if z * velocity <= 0.0 {
+            0.0
+        } else {
+            (z.abs() / (1.0 + self.excess * bump)).powf(self.sharpness).min(1.0)
+        };
+        z + self.relaxation * bump * rate * (1.0 - loaded)
+    }
+
+    /// The shape `changes` away: logarithms, but excess and relaxation (ms) themselves.
     pub fn changed(&self, changes: &[f64]) -> Self {
         let at = |i: usize| changes.get(i).copied().unwrap_or(0.0);
         Self {
@@ -28,6 +58,7 @@ impl SealShape {
             excess: (self.excess + at(1)).max(0.0),
             stribeck_velocity: self.stribeck_velocity * at(2).exp(),
             sharpness: (self.sharpness * at(3).exp()).clamp(1.0, 12.0),
+            relaxation: (self.relaxation + 1e-3 * at(4)).max(0.0),
         }
     }
 
@@ -43,8 +74,7 @@ impl SealShape {
                 self.advance(1e-12 * velocity.signum(), velocity, step - (-z / rate))
             };
         }
-        let ratio = velocity / self.stribeck_velocity;
-        let steady = 1.0 + self.excess * (-ratio * ratio).exp();
+        let steady = 1.0 + self.excess * self.bump(velocity);
         let n = self.sharpness;
         let part = (z.abs() / steady).powf(n);
         let slope = -rate.abs() * n * part / z.abs().max(1e-12);
@@ -73,7 +103,7 @@ impl SealShape {
                     z = self.advance(z, before + share * (v - before), period / PARTS as f64);
                 }
                 before = v;
-                z
+                self.force(z, v)
             })
             .collect()
     }
@@ -81,8 +111,7 @@ impl SealShape {
     /// The history and its derivatives by [`Self::changed`]'s changes.
     pub fn histories(&self, velocity: &[f64], period: f64) -> Vec<Vec<f64>> {
         const CHANGE: f64 = 0.05;
-        let base = self.history(velocity, period);
-        let mut all = vec![base];
+        let mut all = vec![self.history(velocity, period)];
         for i in 0..SHAPE {
             let beside = |sign: f64| {
                 let mut changes = [0.0; SHAPE];
@@ -90,9 +119,11 @@ impl SealShape {
                 let shape = self.changed(&changes);
                 (shape, shape.history(velocity, period))
             };
-            let ((_, up), (_, down)) = (beside(1.0), beside(-1.0));
-            let slope = up.iter().zip(&down).map(|(a, b)| (a - b) / (2.0 * CHANGE));
-            all.push(slope.collect());
+            // Upwards only: what may not be negative may be zero.
+            let (_, up) = beside(1.0);
+            let slope = up.iter().zip(&all[0]).map(|(a, b)| (a - b) / CHANGE);
+            let slope = slope.collect();
+            all.push(slope);
         }
         all
     }

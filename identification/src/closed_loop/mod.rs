@@ -12,6 +12,7 @@ pub mod least_squares;
 pub mod simulation;
 pub mod specimen;
 pub mod start;
+pub mod thesis_form;
 pub mod velocity;
 
 use nalgebra::DMatrix;
@@ -31,7 +32,6 @@ pub struct Settings {
     pub band: (f64, f64),
     /// Whether a dry friction of the seals is looked for.
     pub friction: bool,
-    pub extra: Option<HydraulicRig>,
 }
 
 impl Default for Settings {
@@ -39,7 +39,6 @@ impl Default for Settings {
         Self {
             band: (0.05, 35.0),
             friction: true,
-            extra: None,
         }
     }
 }
@@ -63,8 +62,21 @@ pub struct Found {
     pub specimen: Option<SpecimenFit>,
     /// Whether the search came to its end.
     pub converged: bool,
-    /// Costs of the optima that the starts led to.
-    pub costs: Vec<f64>,
+    /// One standard deviation of the noise of displacement (m), acceleration (m/s²), actuator force
+    /// (N), specimen acceleration (m/s²; zero without) and command (V), by what is rough in them.
+    pub noise: [f64; 5],
+    /// Sampling period of the first recording, s.
+    pub period: f64,
+    /// Everything the reader should know, the gravest first.
+    pub warnings: Vec<String>,
+}
+
+impl Found {
+    /// Whether the rig obeys its equations: what is left of them is noise for the most part.
+    pub fn holds(&self) -> bool {
+        const MOST: f64 = 3.0;
+        self.mean_squares.iter().all(|square| *square < MOST)
+    }
 }
 
 /// Inertia of a spool of 250 Hz, s²: what is quicker is a lag.
@@ -155,6 +167,7 @@ pub fn identify(
         Ok(Equations {
             experiments,
             held: None,
+            shape,
         })
     };
     let root_mean_square = |of: &dyn Fn(&Channels) -> f64| {
@@ -166,23 +179,32 @@ pub fn identify(
             c.recording.channel(name).map_or(0.0, |v| mean_and_deviation(v).1)
         })
     };
-    let speed = root_mean_square(&|c: &Channels| mean_and_deviation(&c.velocity).1);
     let (way, force) = (size("displacement"), size("actuator_force"));
 
     let mut shape = SealShape {
         presliding: 0.01 * way,
         excess: 0.2,
-        stribeck_velocity: 0.05 * speed,
-        sharpness: 2.0,
+        stribeck_velocity: 4e-3,
+        sharpness: 3.0,
+        relaxation: 0.0,
     };
     let mut equations = bands(settings.friction.then_some(shape))?;
+    let ratio = start::motion_ratio(&equations.experiments);
+    if !(0.6..1.6).contains(&ratio) {
+        return Err(IdentificationError::Unstable {
+            what: format!(
+                "`acceleration` is {ratio:.3e} times the second derivative of `displacement` where \
+                 it should be once"
+            ),
+            remedy: "check the units in the header, the signs, and that no channels are swapped"
+                .into(),
+        });
+    }
     let (table, payloads) = start::table(&equations.experiments, specimen)?;
     let mut best: Option<Optimum> = None;
-    let mut costs = Vec::new();
     for rig in start::actuators(&equations.experiments, &table, 4)? {
         let coordinates = coordinates(&rig, &payloads, force, specimen, settings.friction);
         if let Some(optimum) = approach(&equations, &coordinates) {
-            costs.push(optimum.cost);
             if best.as_ref().is_none_or(|b| optimum.cost < b.cost) {
                 best = Some(optimum);
             }
@@ -219,7 +241,6 @@ pub fn identify(
             let Some((found, own)) = refit(shape, &optimum, true) else {
                 break;
             };
-            costs.push(found.cost);
             let changes = found.values[PARAMETERS..PARAMETERS + SHAPE].to_vec();
             (optimum, equations) = (found, own);
             shape = shape.changed(&changes);
@@ -229,23 +250,82 @@ pub fn identify(
         }
     }
     let rig = HydraulicRig::at(&optimum.values).unwrap_or(table);
+    let mean_squares = equations
+        .mean_squares(&optimum.values)
+        .unwrap_or([f64::NAN; EQUATIONS]);
+    // Where the rig does more than its equations the errors are larger than their noise says.
+    let excess = mean_squares.iter().copied().fold(1.0, f64::max);
     let slopes = rig.slopes();
     let covariance = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
-        optimum.covariance[(i, j)] * slopes[i] * slopes[j]
+        excess * optimum.covariance[(i, j)] * slopes[i] * slopes[j]
     });
-    Ok(Found {
+    let floor = |channel: &str| {
+        let own = channels.first().and_then(|c| c.recording.channel(channel));
+        own.map_or(0.0, velocity::noise_floor)
+    };
+    let mut found = Found {
         rig,
         standard_error: std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt()),
         covariance,
         payloads: optimum.values[PARAMETERS + SHAPE..].to_vec(),
         shape,
-        mean_squares: equations
-            .mean_squares(&optimum.values)
-            .unwrap_or([f64::NAN; EQUATIONS]),
+        mean_squares,
         specimen: specimen.then(|| carried(&channels, &equations)).flatten(),
         converged: optimum.converged,
-        costs,
-    })
+        noise: [
+            "displacement",
+            "acceleration",
+            "actuator_force",
+            "specimen_acceleration",
+            "valve_command",
+        ]
+        .map(floor),
+        period: channels.first().map_or(0.0, |c| c.recording.period),
+        warnings: Vec::new(),
+    };
+    found.warnings = remarks(&found, recordings);
+    Ok(found)
+}
+
+/// What a reader should know of a result.
+fn remarks(found: &Found, recordings: &[Recording]) -> Vec<String> {
+    const CLEAR: f64 = 1.6;
+    let mut all = Vec::new();
+    let names = ["motion", "table", "actuator"];
+    for (name, square) in names.iter().zip(found.mean_squares) {
+        if square > CLEAR {
+            all.push(format!(
+                "what is left of the {name}'s equation is not noise alone (mean square {square:.2} \
+                 of it): the rig does something that this model lacks; the standard errors are \
+                 widened by {:.1}",
+                square.sqrt()
+            ));
+        }
+    }
+    if !found.converged {
+        all.push(
+            "the fit was still moving at its end: the friction's shape is not determined; record \
+             a slow triangle of some tenths of an inch besides"
+                .into(),
+        );
+    }
+    for recording in recordings {
+        if recording.channel("reference").is_none() {
+            all.push(format!(
+                "{}: no `reference` is recorded; the command stands in for it, so noise on the \
+                 recorded command and what is fed back bias the result unseen",
+                recording.name
+            ));
+        }
+    }
+    let (scale, error) = (found.rig.accelerometer_scale, found.standard_error[14]);
+    if (scale - 1.0).abs() > 0.02 + 4.0 * error {
+        all.push(format!(
+            "the accelerometer shows {scale:.3} of the displacement's second derivative: calibrate \
+             one of the two"
+        ));
+    }
+    all
 }
 
 /// The specimen of the recordings.
@@ -328,6 +408,9 @@ fn coordinates(
         free: false,
         bounds: (-0.5, 0.5),
     }));
+    // Relaxation, ms.
+    all[PARAMETERS + SHAPE - 1].scale = 0.3;
+    all[PARAMETERS + SHAPE - 1].bounds = (-2.0, 2.0);
     all.extend(payloads.iter().map(|&start| Coordinate {
         start,
         scale: 0.1 * rig.mass,

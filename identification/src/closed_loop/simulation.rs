@@ -63,7 +63,7 @@ impl Simulation {
     }
 
     fn seal_force(&self, v: f64) -> f64 {
-        self.rig.seal_damping * v + self.rig.seal_friction * self.seal
+        self.rig.seal_damping * v + self.rig.seal_friction * self.shape.force(self.seal, v)
     }
 
     fn accelerations(&self, s: &[f64; STATES]) -> (f64, f64, f64) {
