@@ -200,6 +200,8 @@ fn model_file(model: &Estimated, effects: EffectSections, errors: EffectSections
             .map(|s| body([s.mass, s.damping, s.stiffness])),
         effects,
         noise: None,
+        hydraulics: None,
+        uncertainty: None,
         standard_errors: Some(StandardErrors {
             actuator: Some(actuator_errors),
             table: body(three(9)),

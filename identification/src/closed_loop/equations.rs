@@ -269,6 +269,32 @@ impl Equations {
         Some(all)
     }
 
+    /// What is left of each equation over its largest term, root mean squares over the bands'
+    /// projections on the reference.
+    pub fn relative_errors(&self, values: &[f64]) -> Option<[f64; EQUATIONS]> {
+        const LARGEST: [usize; EQUATIONS] = [ACCELERATION, FORCE, COMMAND];
+        let rig = HydraulicRig::at(values)?;
+        let shape = values.get(PARAMETERS..PARAMETERS + SHAPE)?;
+        let (mut left, mut size) = ([0.0; EQUATIONS], [0.0; EQUATIONS]);
+        for (index, experiment) in self.experiments.iter().enumerate() {
+            let payload = match index {
+                0 => 0.0,
+                _ => *values.get(PARAMETERS + SHAPE + index - 1)?,
+            };
+            for band in &experiment.bands {
+                let rows = rows(&rig, shape, payload, experiment, band);
+                let sums = sums(&rig, shape, payload, experiment, band);
+                for equation in 0..EQUATIONS {
+                    let channel = LARGEST[equation];
+                    let term = rows[(equation, channel)] * band.projected(channel);
+                    size[equation] += term.norm_sqr();
+                    left[equation] += sums.first()?[equation].norm_sqr();
+                }
+            }
+        }
+        Some(std::array::from_fn(|i| (left[i] / size[i]).sqrt()))
+    }
+
     /// Mean square of each equation's whitened residuals, near one for a rig that obeys it. The
     /// equations are whitened one after the other: the motion's first.
     pub fn mean_squares(&self, values: &[f64]) -> Option<[f64; EQUATIONS]> {

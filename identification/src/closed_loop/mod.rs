@@ -9,6 +9,7 @@ pub mod bands;
 pub mod equations;
 pub mod friction;
 pub mod least_squares;
+pub mod model_section;
 pub mod simulation;
 pub mod specimen;
 pub mod start;
@@ -145,6 +146,45 @@ impl<'a> Channels<'a> {
         causes.extend(instruments.iter().map(Vec::as_slice));
         Bands::new(&recording.name, &causes, &channels, period, band)
     }
+}
+
+/// How recordings that were not fitted obey a rig's equations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Check {
+    /// Mean squares of the whitened equations (motion, table, actuator).
+    pub mean_squares: [f64; EQUATIONS],
+    /// What is left of each equation over its largest term.
+    pub relative_errors: [f64; EQUATIONS],
+}
+
+/// Checks `found` on other recordings with the same payloads.
+///
+/// # Errors
+/// Recordings that make no bands, see [`IdentificationError`].
+pub fn check(
+    found: &Found,
+    recordings: &[Recording],
+    settings: Settings,
+) -> Result<Check, IdentificationError> {
+    let specimen = found.rig.specimen_mass > 0.0;
+    let mut experiments = Vec::new();
+    for recording in recordings {
+        let channels = Channels::new(recording)?;
+        experiments.push(channels.bands(Some(found.shape), &settings, specimen)?);
+    }
+    let equations = Equations {
+        experiments,
+        held: None,
+        shape: None,
+    };
+    let mut values = found.rig.coordinates().to_vec();
+    values.extend([0.0; SHAPE]);
+    values.extend(&found.payloads);
+    let nothing = [f64::NAN; EQUATIONS];
+    Ok(Check {
+        mean_squares: equations.mean_squares(&values).unwrap_or(nothing),
+        relative_errors: equations.relative_errors(&values).unwrap_or(nothing),
+    })
 }
 
 /// Identifies a hydraulic rig from recordings of one rig.

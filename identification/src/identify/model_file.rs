@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use units::constants::{INCH, LBF};
 
 use crate::IdentificationError;
+use crate::closed_loop::model_section::{HydraulicSection, UncertaintySection};
 use crate::identify::model::{DELAY, MASS, OUTPUT_NAMES, SPECIMEN};
 use crate::identify::rig::RigIdentification;
 
@@ -52,6 +53,12 @@ pub struct ModelFile {
     /// One standard deviation of the white noise of each channel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<toml::Table>,
+    /// Valve, oil, seals and sensors beyond the form of Eq 2-4, where they were identified, SI.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hydraulics: Option<HydraulicSection>,
+    /// How far a diagnosis may take the parameters from their values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<UncertaintySection>,
     /// Standard errors of everything above, in the same layout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_errors: Option<StandardErrors>,
@@ -354,6 +361,8 @@ impl ModelFile {
                 .map(|s| Self::body_section([s.mass, s.damping, s.stiffness], units)),
             effects: EffectSections::new(),
             noise: Some(noise),
+            hydraulics: None,
+            uncertainty: None,
             standard_errors: Some(StandardErrors {
                 effects: EffectSections::new(),
                 actuator: found.identifiable.then_some(actuator_errors),

@@ -1,0 +1,167 @@
+//! An identified hydraulic rig as a model file.
+
+use serde::{Deserialize, Serialize};
+
+use super::Found;
+use super::equations::{HydraulicRig, PARAMETERS};
+use super::friction::SealShape;
+use super::thesis_form::{coefficients, standard_errors};
+use crate::IdentificationError;
+use crate::identify::model_file::{
+    ActuatorSection, BodySection, EffectSections, INCH_POUND, ModelFile, StandardErrors, Units,
+};
+use plant::identified::actuator::IdentifiedActuator;
+
+/// `[hydraulics]`: what the form of Eq 2-4 has no place for, SI whatever the file's units.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HydraulicSection {
+    /// `2 D/w` of the spool, s.
+    pub spool_lag: f64,
+    /// `1/w²` of the spool, s².
+    pub spool_inertia: f64,
+    /// N/(V s).
+    pub force_rate: f64,
+    /// N/m.
+    pub oil_stiffness: f64,
+    /// 1/s.
+    pub leakage_rate: f64,
+    /// N s/m.
+    pub seal_damping: f64,
+    /// Coulomb friction of the seals, N.
+    pub seal_friction: f64,
+    /// Deflection of the seals before they slide, m.
+    pub seal_presliding: f64,
+    /// Breakaway force over the Coulomb force, less one.
+    pub seal_excess: f64,
+    /// m/s.
+    pub seal_stribeck_velocity: f64,
+    /// Exponent with which the seals begin to slide.
+    pub seal_sharpness: f64,
+    /// Damping of their deflection over its stiffness, s.
+    pub seal_relaxation: f64,
+    /// Lateness of the accelerometers behind the displacement, s.
+    pub accelerometer_delay: f64,
+    /// Lateness of the load cell behind the displacement, s.
+    pub load_cell_delay: f64,
+    /// What the accelerometers show over the displacement's second derivative.
+    pub accelerometer_scale: f64,
+}
+
+/// `[uncertainty]`: how far a diagnosis may take the parameters from their values.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct UncertaintySection {
+    /// Relative standard deviation of every parameter.
+    pub relative: f64,
+}
+
+impl HydraulicSection {
+    /// The section of a rig with friction of `shape`.
+    pub fn new(rig: &HydraulicRig, shape: &SealShape) -> Self {
+        Self {
+            spool_lag: rig.spool_lag,
+            spool_inertia: rig.spool_inertia,
+            force_rate: rig.force_rate,
+            oil_stiffness: rig.oil_stiffness,
+            leakage_rate: rig.leakage_rate,
+            seal_damping: rig.seal_damping,
+            seal_friction: rig.seal_friction,
+            seal_presliding: shape.presliding,
+            seal_excess: shape.excess,
+            seal_stribeck_velocity: shape.stribeck_velocity,
+            seal_sharpness: shape.sharpness,
+            seal_relaxation: shape.relaxation,
+            accelerometer_delay: rig.accelerometer_delay,
+            load_cell_delay: rig.load_cell_delay,
+            accelerometer_scale: rig.accelerometer_scale,
+        }
+    }
+}
+
+impl Found {
+    /// The model file, in inch and pound-force: as `diagnose` reads a nominal rig.
+    ///
+    /// # Errors
+    /// A rig that the form of Eq 2-4 cannot hold or that must not be simulated.
+    pub fn model_file(&self) -> Result<ModelFile, IdentificationError> {
+        let unstable = |what: String| IdentificationError::Unstable {
+            what,
+            remedy: "record a minute or longer with more motion between 0.1 and 30 Hz".into(),
+        };
+        let rig = self.rig.shake_table();
+        let rig = rig.ok_or_else(|| unstable("the velocity path cannot be fitted".into()))?;
+        rig.validate().map_err(|error| unstable(error.to_string()))?;
+        let errors = standard_errors(&self.rig, &self.covariance);
+        let values = coefficients(&self.rig);
+        let (Some(errors), Some(values)) = (errors, values) else {
+            return Err(unstable("the velocity path cannot be fitted".into()));
+        };
+        let units = Units::INCH_POUND;
+        let three = |all: &[f64], first: usize| [all[first], all[first + 1], all[first + 2]];
+        let actuator = |all: &[f64]| -> ActuatorSection {
+            ModelFile::actuator_section(
+                &IdentifiedActuator {
+                    denominator: three(all, 0),
+                    voltage_to_force: three(all, 3),
+                    velocity_to_force: three(all, 6),
+                },
+                units,
+            )
+        };
+        let body = |all: [f64; 3]| -> BodySection { ModelFile::body_section(all, units) };
+        let mut actuator_errors = actuator(&errors);
+        actuator_errors.denominator[0] = 0.0;
+        let mass = (self.rig.specimen_mass, self.standard_error[10]);
+        let specimen = self.specimen.as_ref().filter(|_| mass.0 > 0.0).map(|own| {
+            let s = own.specimen;
+            let error = |value: f64, index: usize| {
+                let relative = mass.1 / mass.0;
+                let own = own.covariance[(index, index)].max(0.0).sqrt();
+                (own * mass.0).hypot(value * mass.0 * relative)
+            };
+            (
+                body([mass.0, s.damping * mass.0, s.stiffness * mass.0]),
+                body([mass.1, error(s.damping, 0), error(s.stiffness, 1)]),
+            )
+        });
+        // Of the parameters that make the loops: gain, oil, mass.
+        let relative = [2, 3, 7]
+            .map(|i| self.standard_error[i] / <[f64; PARAMETERS]>::from(self.rig)[i])
+            .into_iter()
+            .fold(0.005, f64::max);
+        let mut noise = toml::Table::new();
+        let keys = [
+            ("displacement", units.length),
+            ("acceleration", units.length),
+            ("actuator_force", units.force),
+            ("specimen_acceleration", units.length),
+            ("valve_command", 1.0),
+        ];
+        for ((key, factor), own) in keys.into_iter().zip(self.noise) {
+            // Without a specimen its channel is as noisy as the table's: a diagnosis wants one.
+            let own = if own > 0.0 { own } else { self.noise[1] };
+            noise.insert(key.to_string(), (own / factor).into());
+        }
+        let delay = self.rig.command_delay;
+        Ok(ModelFile {
+            units: INCH_POUND.to_string(),
+            sample_rate: Some(1.0 / self.period),
+            command_delay: (delay > 0.0).then_some(delay),
+            actuator: Some(actuator(&values)),
+            table: body(three(&values, 9)),
+            specimen: specimen.map(|own| own.0),
+            effects: EffectSections::new(),
+            noise: Some(noise),
+            hydraulics: Some(HydraulicSection::new(&self.rig, &self.shape)),
+            uncertainty: Some(UncertaintySection {
+                relative: relative.min(0.3),
+            }),
+            standard_errors: Some(StandardErrors {
+                effects: EffectSections::new(),
+                actuator: Some(actuator_errors),
+                table: body(three(&errors, 9)),
+                specimen: specimen.map(|own| own.1),
+                command_delay: (delay > 0.0).then_some(self.standard_error[11]),
+            }),
+        })
+    }
+}
