@@ -1,60 +1,82 @@
 //! Identifies the physical rig from the nine kinds of recordings, and says how well.
 //!
-//! `cargo run --release -p identification --example closed_loop [-- KIND...]`
+//! `cargo run --release -p identification --example closed_loop [-- KIND... | model FILE]`; the
+//! latter writes the model that controllers of the physical rig are tuned on.
 
 #[path = "../../tests/src/physical_recordings.rs"]
+#[allow(dead_code)]
 mod physical_recordings;
 
-use controllers::Controller;
-use controllers::pid::PidInput;
-#[allow(unused_imports)]
-use identification::closed_loop::simulation::Simulation;
-use physical_recordings::{PhysicalTest, controller, nine_kinds};
 use identification::closed_loop::{Settings, equations::NAMES, identify};
+use physical_recordings::{PhysicalTest, nine_kinds, other_motions, prediction};
+
+/// Commissions the default rig, one sample late and bare, and writes its model.
+fn commission(path: &str) -> Result<(), Box<dyn std::error::Error>> {
+    let test = PhysicalTest {
+        name: "commissioning".into(),
+        level: 0.3,
+        delay: 0.002,
+        seed: 2026,
+        ..PhysicalTest::default()
+    };
+    let found = identify(&[test.record()?], Settings::default())?;
+    let note = "# The physical rig as its recordings show it, bare, 0.3 g, a minute under Eq 3-6, \
+                seed 2026:\n\
+                # cargo run --release -p identification --example closed_loop -- model FILE\n";
+    std::fs::write(path, format!("{note}{}", found.model_file()?.to_toml()?))?;
+    println!("written: {path} (seed {})", test.seed);
+    Ok(())
+}
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let asked: Vec<usize> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
-    for (number, (name, tests)) in nine_kinds().into_iter().enumerate() {
-        if !asked.is_empty() && !asked.contains(&(number + 1)) {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let [what, path] = arguments.as_slice()
+        && what == "model"
+    {
+        return commission(path);
+    }
+    let asked: Vec<usize> = arguments.iter().filter_map(|a| a.parse().ok()).collect();
+    for (number, (name, tests)) in (1..).zip(nine_kinds()) {
+        if !asked.is_empty() && !asked.contains(&number) {
             continue;
         }
-        let recordings = tests.iter().map(|t| t.record()).collect::<Result<Vec<_>, _>>()?;
-        println!("{} {name}", number + 1);
+        let recordings = tests
+            .iter()
+            .map(PhysicalTest::record)
+            .collect::<Result<Vec<_>, _>>()?;
+        println!("{number} {name}");
         let begun = std::time::Instant::now();
-        match identify(&recordings, Settings::default()) {
-            Err(error) => println!("   {error}"),
-            Ok(found) => {
-                let values: [f64; 15] = found.rig.into();
-                for ((name, value), error) in NAMES.iter().zip(values).zip(found.standard_error) {
-                    println!("   {name:22} {value:12.5} +- {error:.2e} ({:.2} %)", 100.0 * error / value.abs());
-                }
-                if let Some(s) = &found.specimen {
-                    println!("   specimen {:?} misfit {:.3}", s.specimen, s.misfit);
-                }
-                for (index, test) in tests.iter().enumerate() {
-                    let payload = if index == 0 { 0.0 } else { found.payloads[index - 1] };
-                    for other in [
-                        PhysicalTest { noise: 0.0, seed: test.seed + 100, duration: 20.0, ..test.clone() },
-                        PhysicalTest { noise: 0.0, seed: test.seed + 200, duration: 20.0, lines: Some(60), band: (2.0, 20.0), ..test.clone() },
-                    ] {
-                        let wanted = other.reference()?;
-                        let played = other.play(&wanted)?;
-                        let mut model = Simulation::new(found.rig, found.shape, payload, found.specimen.as_ref().map(|s| s.specimen), other.period);
-                        let mut law = controller();
-                        let (mut worst, mut square, mut peak) = (0.0f64, 0.0, 0.0f64);
-                        for (k, r) in wanted.iter().enumerate() {
-                            let shown = model.shown();
-                            let u = law.step(&PidInput { reference: *r, measured: shown.displacement }, other.period);
-                            let error = shown.acceleration - played.measured[1][k];
-                            worst = worst.max(error.abs());
-                            square += error * error;
-                            peak = peak.max(played.measured[1][k].abs());
-                            model.step(u);
-                        }
-                        println!("   other motion: peak {:.2} m/s2, error {:.1} % of it at most, {:.1} % rms", peak, 100.0 * worst / peak, 100.0 * (square / wanted.len() as f64).sqrt() / peak);
-                    }
-                }
-                println!("   payloads {:?} {:?} squares {:.2?} converged {} in {:.1?}", found.payloads, found.shape, found.mean_squares, found.converged, begun.elapsed());
+        let found = match identify(&recordings, Settings::default()) {
+            Err(error) => {
+                println!("   {error}");
+                continue;
+            }
+            Ok(found) => found,
+        };
+        println!("   identified in {:.1?}", begun.elapsed());
+        let values: [f64; NAMES.len()] = found.rig.into();
+        for ((name, value), error) in NAMES.iter().zip(values).zip(found.standard_error) {
+            println!("   {name:20} {value:12.5} +- {error:.2e}");
+        }
+        println!("   {:?}", found.shape);
+        println!("   payloads {:.2?} kg", found.payloads);
+        if let Some(own) = &found.specimen {
+            println!("   {:?}", own.specimen);
+        }
+        println!("   left over noise {:.2?}", found.mean_squares);
+        for warning in &found.warnings {
+            println!("   {warning}");
+        }
+        for (index, test) in tests.iter().enumerate() {
+            let payload = index.checked_sub(1).map_or(0.0, |before| found.payloads[before]);
+            for other in other_motions(test) {
+                let made = prediction(&found, payload, &other)?;
+                println!(
+                    "   other motion: peak {:.2} m/s2, error {:.1} % of it at most, {:.1} % rms",
+                    made.peak,
+                    100.0 * made.largest,
+                    100.0 * made.root_mean_square
+                );
             }
         }
     }

@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 
 use controllers::pid::{Pid, PidInput};
 use controllers::{Controller, ModelError};
+use identification::closed_loop::Found;
+use identification::closed_loop::simulation::Simulation;
 use identification::data::Recording;
 use plant::sensors::channel::Noise;
 use plant::sensors::instrumentation::{Instrumentation, InstrumentationState, TrueMotion};
@@ -300,6 +302,71 @@ impl PhysicalTest {
         }
         Ok(Recording::new(&self.name, self.period, columns)?)
     }
+}
+
+/// How far a model's acceleration is from the rig's, both in the loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// Peak of the rig's, m/s².
+    pub peak: f64,
+    /// Largest error over the peak.
+    pub largest: f64,
+    /// Root mean square of the error over the peak.
+    pub root_mean_square: f64,
+}
+
+/// Plays `test`, without noise, on the rig and on what was `found` of it under `payload` (kg).
+///
+/// # Errors
+/// As [`PhysicalTest::play`].
+pub fn prediction(
+    found: &Found,
+    payload: f64,
+    test: &PhysicalTest,
+) -> Result<Prediction, ModelError> {
+    let test = PhysicalTest {
+        noise: 0.0,
+        ..test.clone()
+    };
+    let wanted = test.reference()?;
+    let played = test.play(&wanted)?;
+    let specimen = found.specimen.as_ref().map(|own| own.specimen);
+    let mut model = Simulation::new(found.rig, found.shape, payload, specimen, test.period);
+    let mut law = controller();
+    let (mut largest, mut square, mut peak) = (0.0f64, 0.0, 0.0f64);
+    for (reference, measured) in wanted.iter().zip(&played.measured[1]) {
+        let shown = model.shown();
+        let input = PidInput {
+            reference: *reference,
+            measured: shown.displacement,
+        };
+        model.step(law.step(&input, test.period));
+        let error = shown.acceleration - measured;
+        largest = largest.max(error.abs());
+        square += error * error;
+        peak = peak.max(measured.abs());
+    }
+    Ok(Prediction {
+        peak,
+        largest: largest / peak,
+        root_mean_square: (square / wanted.len().max(1) as f64).sqrt() / peak,
+    })
+}
+
+/// Two other motions for `test`: noise of its band, and sines of 2 to 20 Hz.
+pub fn other_motions(test: &PhysicalTest) -> [PhysicalTest; 2] {
+    let noise = PhysicalTest {
+        seed: test.seed + 100,
+        duration: 20.0,
+        ..test.clone()
+    };
+    let sines = PhysicalTest {
+        seed: test.seed + 200,
+        lines: Some(60),
+        band: (2.0, 20.0),
+        ..noise.clone()
+    };
+    [noise, sines]
 }
 
 /// The nine kinds of recordings: each a set of tests of one rig.

@@ -123,7 +123,10 @@ impl Bands {
             .iter()
             .map(|c| crate::data::mean_and_deviation(c).1.max(f64::MIN_POSITIVE))
             .collect();
-        let wanted: Vec<Vector> = causes.iter().map(|c| spectrum(c)).collect::<Result<_, _>>()?;
+        let wanted: Vec<Vector> = causes
+            .iter()
+            .map(|c| spectrum(c))
+            .collect::<Result<_, _>>()?;
         let mut all = Vec::new();
         for (channel, scale) in channels.iter().zip(&scale) {
             let own: Vector = spectrum(channel)?.into_iter().map(|v| v / *scale).collect();
@@ -229,12 +232,12 @@ pub fn explained(
     }
     let inverse = RealFftPlanner::<f64>::new().plan_fft_inverse(count);
     let mut history = inverse.make_output_vec();
-    inverse
-        .process(&mut kept, &mut history)
-        .map_err(|error| IdentificationError::NotConverged {
+    inverse.process(&mut kept, &mut history).map_err(|error| {
+        IdentificationError::NotConverged {
             method: "the Fourier transform",
             reason: error.to_string(),
-        })?;
+        }
+    })?;
     let scale = 1.0 / (count.max(1) as f64).sqrt();
     Ok(history.into_iter().map(|v| v * scale).collect())
 }
@@ -279,10 +282,10 @@ fn pool_noise(bands: &mut [Band]) {
     for (i, band) in bands.iter_mut().enumerate() {
         let near = i.saturating_sub(POOLED)..(i + POOLED + 1).min(own.len());
         let count = near.len() as f64;
-        band.noise = own[near]
-            .iter()
-            .fold(DMatrix::zeros(band.noise.nrows(), band.noise.ncols()), |sum, n| sum + n)
-            / Complex::new(count, 0.0);
+        band.noise = own[near].iter().fold(
+            DMatrix::zeros(band.noise.nrows(), band.noise.ncols()),
+            |sum, n| sum + n,
+        ) / Complex::new(count, 0.0);
     }
 }
 

@@ -358,7 +358,9 @@ impl Whitener {
     fn new(rows: &DMatrix<Complex<f64>>, noise: &DMatrix<Complex<f64>>) -> Option<Self> {
         let product = rows * noise * rows.adjoint();
         let mut covariance =
-            nalgebra::SMatrix::<Complex<f64>, EQUATIONS, EQUATIONS>::from_fn(|i, j| product[(i, j)]);
+            nalgebra::SMatrix::<Complex<f64>, EQUATIONS, EQUATIONS>::from_fn(|i, j| {
+                product[(i, j)]
+            });
         // Equations are of different units: scale before factoring.
         let size: [f64; EQUATIONS] = std::array::from_fn(|i| covariance[(i, i)].re.sqrt());
         if size.iter().any(|own| own.is_nan() || *own <= 0.0) {
@@ -392,7 +394,11 @@ impl Residuals for Equations {
         let all = self.whitened(values)?;
         let mut residuals: Vec<f64> = all.iter().flatten().flat_map(|v| [v.re, v.im]).collect();
         if let Some(shape) = &self.shape {
-            residuals.extend(shape.changed(&values[PARAMETERS..PARAMETERS + SHAPE]).surprise());
+            residuals.extend(
+                shape
+                    .changed(&values[PARAMETERS..PARAMETERS + SHAPE])
+                    .surprise(),
+            );
         }
         Some(residuals)
     }

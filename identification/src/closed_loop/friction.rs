@@ -45,7 +45,9 @@ impl SealShape {
         let loaded = if z * velocity <= 0.0 {
             0.0
         } else {
-            (z.abs() / (1.0 + self.excess * bump)).powf(self.sharpness).min(1.0)
+            (z.abs() / (1.0 + self.excess * bump))
+                .powf(self.sharpness)
+                .min(1.0)
         };
         z + self.relaxation * bump * rate * (1.0 - loaded)
     }

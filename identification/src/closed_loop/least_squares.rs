@@ -144,7 +144,13 @@ fn jacobian(
             moved[i] += sign * CHANGE * coordinate.scale;
             let there = model.residuals(&moved)?;
             let slope = sign / CHANGE;
-            Some(there.iter().zip(here).map(|(a, b)| (a - b) * slope).collect())
+            Some(
+                there
+                    .iter()
+                    .zip(here)
+                    .map(|(a, b)| (a - b) * slope)
+                    .collect(),
+            )
         })
         .collect();
     let columns = columns?;

@@ -21,8 +21,8 @@ use nalgebra::DMatrix;
 use self::bands::Bands;
 use self::equations::{EQUATIONS, Equations, HydraulicRig, PARAMETERS};
 use self::friction::{SHAPE, SealShape};
-use self::specimen::SpecimenFit;
 use self::least_squares::{Coordinate, Optimum, minimise};
+use self::specimen::SpecimenFit;
 use crate::IdentificationError;
 use crate::data::{Recording, mean_and_deviation};
 
@@ -195,7 +195,10 @@ pub fn identify(
     recordings: &[Recording],
     settings: Settings,
 ) -> Result<Found, IdentificationError> {
-    let channels: Vec<Channels> = recordings.iter().map(Channels::new).collect::<Result<_, _>>()?;
+    let channels: Vec<Channels> = recordings
+        .iter()
+        .map(Channels::new)
+        .collect::<Result<_, _>>()?;
     let specimen = recordings
         .iter()
         .all(|r| r.channel("specimen_acceleration").is_some());
@@ -216,7 +219,9 @@ pub fn identify(
     };
     let size = |name: &'static str| {
         root_mean_square(&|c: &Channels| {
-            c.recording.channel(name).map_or(0.0, |v| mean_and_deviation(v).1)
+            c.recording
+                .channel(name)
+                .map_or(0.0, |v| mean_and_deviation(v).1)
         })
     };
     let (way, force) = (size("displacement"), size("actuator_force"));
@@ -260,7 +265,13 @@ pub fn identify(
         let refit = |shape: SealShape, from: &Optimum, free: bool| {
             let trial = bands(Some(shape)).ok()?;
             let rig = HydraulicRig::at(&from.values)?;
-            let mut own = coordinates(&rig, &from.values[PARAMETERS + SHAPE..], force, specimen, true);
+            let mut own = coordinates(
+                &rig,
+                &from.values[PARAMETERS + SHAPE..],
+                force,
+                specimen,
+                true,
+            );
             for coordinate in &mut own[PARAMETERS..PARAMETERS + SHAPE] {
                 coordinate.free = free;
             }

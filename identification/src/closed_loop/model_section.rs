@@ -89,7 +89,8 @@ impl Found {
         };
         let rig = self.rig.shake_table();
         let rig = rig.ok_or_else(|| unstable("the velocity path cannot be fitted".into()))?;
-        rig.validate().map_err(|error| unstable(error.to_string()))?;
+        rig.validate()
+            .map_err(|error| unstable(error.to_string()))?;
         let errors = standard_errors(&self.rig, &self.covariance);
         let values = coefficients(&self.rig);
         let (Some(errors), Some(values)) = (errors, values) else {

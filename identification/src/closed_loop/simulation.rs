@@ -68,7 +68,9 @@ impl Simulation {
 
     fn accelerations(&self, s: &[f64; STATES]) -> (f64, f64, f64) {
         let force = s[2] - self.seal_force(s[4]);
-        let carried = self.specimen.map_or(0.0, |own| own.force([s[5], s[6], s[7]]));
+        let carried = self
+            .specimen
+            .map_or(0.0, |own| own.force([s[5], s[6], s[7]]));
         let pushed = force + self.rig.specimen_mass * carried
             - self.rig.damping * s[4]
             - self.rig.stiffness * s[3];

@@ -97,7 +97,11 @@ impl Tests<'_> {
         SpecimenOverMass {
             damping: p[0],
             stiffness: p[1].exp(),
-            yield_displacement: if self.yields { p[2].exp() } else { f64::INFINITY },
+            yield_displacement: if self.yields {
+                p[2].exp()
+            } else {
+                f64::INFINITY
+            },
             post_ratio: p[3],
             exponent: p[4],
         }
@@ -116,7 +120,9 @@ impl Residuals for Tests<'_> {
                 all.push((own - measured - offset) / self.noise);
             }
         }
-        all.iter().all(|v| v.is_finite() && v.abs() < 1e9).then_some(all)
+        all.iter()
+            .all(|v| v.is_finite() && v.abs() < 1e9)
+            .then_some(all)
     }
 }
 
@@ -178,9 +184,16 @@ pub fn fit(
     let specimen = tests.at(&best.values);
     // The error is no white noise of the sensor's size: scale by what is left.
     let left = 2.0 * best.cost / best.residuals.max(1) as f64;
-    let slope = [1.0, specimen.stiffness, specimen.yield_displacement.min(1e3), 1.0, 1.0];
-    let covariance =
-        DMatrix::from_fn(5, 5, |i, j| best.covariance[(i, j)] * slope[i] * slope[j] * left);
+    let slope = [
+        1.0,
+        specimen.stiffness,
+        specimen.yield_displacement.min(1e3),
+        1.0,
+        1.0,
+    ];
+    let covariance = DMatrix::from_fn(5, 5, |i, j| {
+        best.covariance[(i, j)] * slope[i] * slope[j] * left
+    });
     Some(SpecimenFit {
         specimen,
         covariance,

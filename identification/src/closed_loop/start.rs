@@ -5,9 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::bands::{Band, Bands};
-use super::equations::{
-    ACCELERATION, COMMAND, DISPLACEMENT, FORCE, HydraulicRig, SIGN, SPECIMEN,
-};
+use super::equations::{ACCELERATION, COMMAND, DISPLACEMENT, FORCE, HydraulicRig, SIGN, SPECIMEN};
 use crate::IdentificationError;
 
 /// Projection of `weight(s)` times a channel, SI.
@@ -251,12 +249,10 @@ pub fn actuators(
 
 /// `F (s + p) = g W u - K s x - c_p (s + p) s x - F_c (s + p) S` with `W`, `p` given: unknowns
 /// `[g, K, c_p, F_c]` and what is left.
-fn actuator(
-    experiments: &[Bands],
-    rig: &HydraulicRig,
-    period: f64,
-) -> Option<(DVector<f64>, f64)> {
-    let friction = experiments.iter().all(|bands| bands.scale.get(SIGN).is_some_and(|scale| *scale > 1e-6));
+fn actuator(experiments: &[Bands], rig: &HydraulicRig, period: f64) -> Option<(DVector<f64>, f64)> {
+    let friction = experiments
+        .iter()
+        .all(|bands| bands.scale.get(SIGN).is_some_and(|scale| *scale > 1e-6));
     let mut regression = Regression::new(3 + usize::from(friction));
     let leak = |s: Complex<f64>| s + rig.leakage_rate;
     for bands in experiments {

@@ -35,6 +35,9 @@ pub struct Arguments {
     /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
     #[arg(long, value_enum)]
     tuning: Option<Tuning>,
+    /// Model that the controllers are tuned on, as `shakebench identify` writes it
+    #[arg(long, value_name = "MODEL.toml")]
+    control_model: Option<PathBuf>,
     /// Folder for report.html, comparison.json and errors.csv [default: shakebench-results/comparison]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -56,6 +59,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         plant: or(&arguments.plant, built_in::DEFAULT_PLANT),
         specimen: or(&arguments.specimen, built_in::DEFAULT_SPECIMEN),
         tuning: arguments.tuning,
+        control_model: arguments.control_model.clone(),
     };
     let bar = ProgressBar::hidden();
     // A template that cannot be read leaves the plain bar.

@@ -10,6 +10,7 @@ use crate::fmu::{Causality, FmiVersion, Fmu};
 use crate::library::FmuLibrary;
 use crate::motion;
 use crate::report::columns::{aligned, significant};
+use crate::system::tuning::Wanted;
 use crate::system::{self, Operation, SystemFile, built_in};
 use crate::units::STANDARD_GRAVITY;
 
@@ -41,7 +42,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             &name,
             built_in::DEFAULT_PLANT,
             built_in::DEFAULT_SPECIMEN,
-            None,
+            Wanted::default(),
         )?)?,
         _ => {
             let reason = format!(

@@ -44,6 +44,9 @@ pub struct Arguments {
     /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
     #[arg(long, value_enum)]
     tuning: Option<Tuning>,
+    /// Model that the controllers are tuned on, as `shakebench identify` writes it
+    #[arg(long, value_name = "MODEL.toml")]
+    control_model: Option<PathBuf>,
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
@@ -82,7 +85,7 @@ pub struct Arguments {
     json: bool,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
-        "system", "record", "reference", "plant", "specimen", "tuning", "set", "fmi", "algorithm", "step",
+        "system", "record", "reference", "plant", "specimen", "tuning", "control_model", "set", "fmi", "algorithm", "step",
         "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
@@ -202,6 +205,7 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         plant: or(&arguments.plant, built_in::DEFAULT_PLANT),
         specimen: or(&arguments.specimen, built_in::DEFAULT_SPECIMEN),
         tuning: arguments.tuning,
+        control_model: arguments.control_model.as_deref().map(absolute),
         record: arguments.record.as_deref().map(absolute),
         reference: arguments.reference.as_deref().map(absolute),
         seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),

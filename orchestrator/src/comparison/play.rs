@@ -25,6 +25,8 @@ pub struct Plan {
     pub specimen: String,
     /// Parameters of the controllers; none: by the plant.
     pub tuning: Option<Tuning>,
+    /// Model file on which they are tuned.
+    pub control_model: Option<PathBuf>,
 }
 
 /// What is played.
@@ -124,6 +126,7 @@ fn request(plan: &Plan, controller: &str, played: &Played) -> Request {
         plant: plan.plant.clone(),
         specimen: plan.specimen.clone(),
         tuning: plan.tuning,
+        control_model: plan.control_model.clone(),
         record,
         reference,
         seed,

@@ -9,7 +9,7 @@ use crate::fmu::FmiVersion;
 use crate::library::FmuLibrary;
 use crate::master::{Algorithm, MasterError, Outcome, Pace, Simulation};
 use crate::motion::{self, Motion, Scaling};
-use crate::system::tuning::Tuning;
+use crate::system::tuning::{Tuning, Wanted};
 use crate::system::{self, System, SystemFile, built_in};
 
 /// What a run is asked to be; a manifest keeps it.
@@ -24,6 +24,9 @@ pub struct Request {
     /// Parameters of a built-in system's controllers; absent: by its plant.
     #[serde(default)]
     pub tuning: Option<Tuning>,
+    /// Model file on which the controllers of a built-in system are tuned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub control_model: Option<PathBuf>,
     /// Record to play.
     pub record: Option<PathBuf>,
     /// Reference to play.
@@ -76,6 +79,7 @@ impl Request {
             plant: built_in::DEFAULT_PLANT.to_string(),
             specimen: built_in::DEFAULT_SPECIMEN.to_string(),
             tuning: None,
+            control_model: None,
             record: None,
             reference: None,
             seed: motion::DEFAULT_SEED,
@@ -121,7 +125,10 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
             &request.system,
             &request.plant,
             &request.specimen,
-            request.tuning,
+            Wanted {
+                tuning: request.tuning,
+                model: request.control_model.as_deref(),
+            },
         )?
     };
     let motion = motion(request, &file)?;

@@ -7,7 +7,7 @@ use plant::specimens::linear::LinearSpecimen;
 use super::error::SystemError;
 use super::file::SystemFile;
 use super::hint;
-use super::tuning::{self, Tuning};
+use super::tuning::{self, Wanted};
 
 /// A part of a built-in system.
 struct Part {
@@ -73,7 +73,8 @@ pub fn specimens() -> impl Iterator<Item = &'static str> {
 }
 
 /// A built-in system: the controller `name` on a rig of `plant` and `specimen` (or `none`), with the
-/// parameters of `tuning`, by default tuned for the physical rig and as printed for the identified.
+/// parameters that are `wanted`, by default tuned for the physical rig and as printed for the
+/// identified.
 ///
 /// # Errors
 /// A name that is unknown, or a rig for which there is no tuning.
@@ -81,7 +82,7 @@ pub fn system(
     name: &str,
     plant: &str,
     specimen: &str,
-    tuning: Option<Tuning>,
+    wanted: Wanted<'_>,
 ) -> Result<SystemFile, SystemError> {
     let controller = CONTROLLERS.iter().find(|part| part.name == name);
     let mut file = read("system", controller, name, names())?;
@@ -103,7 +104,7 @@ pub fn system(
         file.disconnect("specimen");
     }
     let mass = on_table.as_ref().and_then(|(_, mass)| *mass);
-    tuning::apply(&mut file, &rig, mass, tuning).map_err(|reason| file.fault("tuning", reason))?;
+    tuning::apply(&mut file, &rig, mass, wanted).map_err(|reason| file.fault("tuning", reason))?;
     file.redirect(&rig.instead);
     file.extend(rig);
     match on_table {

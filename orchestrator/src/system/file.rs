@@ -51,8 +51,8 @@ pub struct SystemFile {
     pub instead: BTreeMap<VariableName, VariableName>,
     /// In a part of a system: parameters of a component of another part, where there is one.
     pub adjust: BTreeMap<String, BTreeMap<String, Setting>>,
-    /// In a plant with sensors: what controllers tuned for it know of their measurements.
-    pub measurements: Option<MeasurementsFile>,
+    /// Whether this is a plant whose commissioning left a model to tune controllers on.
+    pub commissioned: bool,
     /// What is done with it.
     pub experiment: ExperimentFile,
     /// Where it came from: a file's name, or the name of a built-in system.
@@ -79,7 +79,7 @@ struct Written {
     #[serde(default)]
     adjust: BTreeMap<String, BTreeMap<String, Setting>>,
     #[serde(default)]
-    measurements: Option<MeasurementsFile>,
+    commissioned: bool,
     #[serde(default)]
     experiment: ExperimentFile,
 }
@@ -107,19 +107,6 @@ pub struct ComponentFile {
     /// Values of inputs that no connection drives.
     #[serde(default)]
     pub inputs: BTreeMap<String, Setting>,
-}
-
-/// What tuned controllers know of a plant's measurements: one standard deviation of the noise,
-/// each a value or the parameter of a component that holds it (`"sensors.displacement_noise"`).
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MeasurementsFile {
-    /// Of the displacement.
-    pub displacement_noise: Setting,
-    /// Of the velocity.
-    pub velocity_noise: Setting,
-    /// Of the acceleration.
-    pub acceleration_noise: Setting,
 }
 
 /// The experiment in a system file; the command line goes before it.
@@ -242,7 +229,7 @@ impl SystemFile {
             components: written.components,
             instead: written.instead,
             adjust: written.adjust,
-            measurements: written.measurements,
+            commissioned: written.commissioned,
             experiment: written.experiment,
             origin: origin.to_string(),
             directory: None,
@@ -296,23 +283,6 @@ impl SystemFile {
             place: place.to_string(),
             reason,
         }
-    }
-
-    /// A value in `unit` that stands in the file, or in the parameter of a component that is named
-    /// instead.
-    ///
-    /// # Errors
-    /// What was expected.
-    pub(super) fn number(&self, written: &Setting, unit: &str) -> Result<f64, String> {
-        let named = match written {
-            Setting::Text(text) => text.parse::<VariableName>().ok(),
-            _ => None,
-        };
-        let held = named.and_then(|name| {
-            let component = self.components.get(&name.component)?;
-            component.parameters.get(&name.variable)
-        });
-        held.unwrap_or(written).number(unit)
     }
 
     /// Takes out the connections that come from the component `name`.

@@ -1,35 +1,33 @@
-//! Parameters of the built-in systems' controllers for the physical rig.
+//! Parameters of the built-in systems' controllers by rule from an identified model.
 //!
-//! Every rule works on the model that [`ServoHydraulicTable::fitted`] gives of the rig, with
-//! measurements one sample late:
+//! Every rule works on what a [`ControlModel`] says: a model file of `shakebench identify`, by
+//! default the one of the physical rig's commissioning. Nothing here knows the rig itself.
 //!
 //! - three-variable control: [`ThreeVariableGains::tuned`];
 //! - displacement PID and loop shaping: the printed controller, its gain changed so that the
 //!   displacement gain is that of three-variable control (half the gain at which the loop
 //!   oscillates);
 //! - force loop, lambda and K of sliding mode: [`Hierarchy::tuned`], the largest gain that leaves the
-//!   whole hierarchy a margin of 6 dB on the linearised rig;
-//! - sliding mode and model predictive control have the fitted model as theirs and know the delay;
-//!   the latter also knows the sensors' noise and weighs outputs in units of stroke, 20 in/s and 1 g.
+//!   whole hierarchy a margin of 6 dB on the model;
+//! - sliding mode and model predictive control have the model as theirs and know the delay; the
+//!   latter also knows the measurements' noise and weighs outputs in units of stroke, 20 in/s and
+//!   1 g.
 
+use std::path::Path;
 use std::sync::OnceLock;
 
 use controllers::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
 use controllers::pid::Pid;
 use controllers::three_variable::ThreeVariableGains;
 use controllers::tuning::sliding_mode::{Hierarchy, SlidingModeTuning};
-use plant::identified::shake_table::ShakeTable;
-use plant::servo_hydraulic::ServoHydraulicTable;
 use serde::{Deserialize, Serialize};
 use units::constants::SAMPLING_PERIOD;
 
 use super::connection::{Link, Origin};
+use super::control_model::ControlModel;
 use super::file::{ComponentFile, SystemFile};
 use super::model::shake_table_values;
 use super::rule::Rule;
-
-/// Samples by which the sensors of the physical rig are late.
-const DELAY: usize = 1;
 
 /// Which parameters the controllers of a built-in system have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -37,40 +35,57 @@ const DELAY: usize = 1;
 pub enum Tuning {
     /// Those of the thesis, made for the identified plant.
     Printed,
-    /// Made by rule from a model fitted to the physical rig.
+    /// Made by rule from an identified model.
     Tuned,
+}
+
+/// What is wanted of the controllers' parameters.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Wanted<'a> {
+    /// Which parameters; none: by plant and model.
+    pub tuning: Option<Tuning>,
+    /// Model file to tune on; none: the physical rig's commissioning.
+    pub model: Option<&'a Path>,
 }
 
 /// Gives the controllers in `file` the parameters for `plant` with a specimen of that mass (kg).
 ///
 /// # Errors
-/// A plant for which there is no tuning, one without measurements of its own; a noise that cannot
-/// be read.
+/// A plant for which there is no tuning; a model that cannot be read or that a rule refuses.
 pub(super) fn apply(
     file: &mut SystemFile,
     plant: &SystemFile,
     specimen_mass: Option<f64>,
-    tuning: Option<Tuning>,
+    wanted: Wanted<'_>,
 ) -> Result<(), String> {
-    let measurements = match (tuning, &plant.measurements) {
-        (Some(Tuning::Tuned), None) => {
+    let own;
+    let rules = match (wanted.tuning, wanted.model, plant.commissioned) {
+        (Some(Tuning::Printed), Some(_), _) => {
+            return Err("printed parameters know no `--control-model`; expected one of the two".into());
+        }
+        (Some(Tuning::Printed), None, _) | (None, None, false) => return Ok(()),
+        (Some(Tuning::Tuned), None, false) => {
             return Err(format!(
                 "there is no tuning for the plant `{}`: the printed one was made for it; \
-                 expected `--plant servohydraulic` or `--tuning printed`",
+                 expected `--plant servohydraulic`, `--tuning printed` or `--control-model FILE`",
                 plant.name
             ));
         }
-        (Some(Tuning::Printed), _) | (None, None) => return Ok(()),
-        (_, Some(measurements)) => measurements,
+        (_, Some(path), _) => {
+            own = Rules::new(ControlModel::read(path)?).map_err(|error| {
+                format!("{}: {error}", path.display())
+            })?;
+            &own
+        }
+        (_, None, true) => {
+            static RULES: OnceLock<Result<Rules, String>> = OnceLock::new();
+            let rules = RULES.get_or_init(|| {
+                Rules::new(ControlModel::commissioned()?).map_err(|error| error.to_string())
+            });
+            rules.as_ref().map_err(Clone::clone)?
+        }
     };
-    static RULES: OnceLock<Result<Rules, String>> = OnceLock::new();
-    let rules = RULES.get_or_init(|| Rules::new().map_err(|error| error.to_string()));
-    let rules = rules.as_ref().map_err(Clone::clone)?;
-    let noise = Noise {
-        displacement: plant.number(&measurements.displacement_noise, "m")?,
-        velocity: plant.number(&measurements.velocity_noise, "m/s")?,
-        acceleration: plant.number(&measurements.acceleration_noise, "m/s2")?,
-    };
+    let specimen_mass = rules.model.specimen_mass.or(specimen_mass);
     for (name, component) in &mut file.components {
         match component.tuning {
             None => {}
@@ -78,8 +93,8 @@ pub(super) fn apply(
             Some(Rule::ForcePid) => rules.force_pid(component),
             Some(Rule::LoopShaping) => rules.loop_shaping(component),
             Some(Rule::ModelPredictive) => {
-                rules.model_predictive(component, &noise);
-                delay_references(&mut file.connections, name);
+                rules.model_predictive(component);
+                delay_references(&mut file.connections, name, rules.model.delay);
             }
             Some(Rule::SlidingMode) => {
                 rules.sliding_mode(component, specimen_mass);
@@ -91,26 +106,19 @@ pub(super) fn apply(
 }
 
 /// The component `name` compares late measurements with the reference of the same time.
-fn delay_references(connections: &mut [Link], name: &str) {
+fn delay_references(connections: &mut [Link], name: &str, delay: usize) {
     for link in connections {
         if let Origin::Reference { ahead, .. } = &mut link.from
             && link.to.component == name
         {
-            *ahead -= DELAY as isize;
+            *ahead -= delay as isize;
         }
     }
 }
 
-/// One standard deviation of what is measured, SI.
-struct Noise {
-    displacement: f64,
-    velocity: f64,
-    acceleration: f64,
-}
-
 /// What all rules use.
 struct Rules {
-    model: ShakeTable,
+    model: ControlModel,
     gains: ThreeVariableGains,
     /// Displacement gain over the printed one.
     displacement: f64,
@@ -124,22 +132,21 @@ fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
 }
 
 impl Rules {
-    fn new() -> Result<Self, plant::ModelError> {
-        let table = ServoHydraulicTable::default();
-        let model = table.fitted()?;
-        let gains = ThreeVariableGains::tuned(&model, DELAY, SAMPLING_PERIOD)?;
+    fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
+        let ControlModel { rig, delay, .. } = model;
+        let gains = ThreeVariableGains::tuned(&rig, delay, SAMPLING_PERIOD)?;
         let printed = Pid::equation_3_6();
         let displacement = gains.proportional / printed.proportional;
         let sliding = Hierarchy {
-            rig: &table.linearised(),
-            model: &model,
+            rig: &rig.state_space(),
+            model: &rig,
             displacement: Pid {
                 proportional: gains.proportional,
                 integral: printed.integral * displacement,
                 integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
                 ..printed
             },
-            delay: DELAY,
+            delay,
             period: SAMPLING_PERIOD,
         }
         .tuned()?;
@@ -219,12 +226,13 @@ impl Rules {
         if let Some(mass) = specimen_mass {
             component.set("specimen_mass", mass);
         }
-        component.set("loop_delay_samples", DELAY as i64);
+        component.set("loop_delay_samples", self.model.delay as i64);
         // The valve moves when the reference is due; only the measurements are late.
         component.set("reference_ahead", true);
     }
 
-    fn model_predictive(&self, component: &mut ComponentFile, noise: &Noise) {
+    fn model_predictive(&self, component: &mut ComponentFile) {
+        let noise = &self.model.noise;
         self.model(component);
         self.three_variable(component);
         // The sensors' noise, and outputs in units of the stroke, 20 in/s and 1 g: with the printed
@@ -240,10 +248,10 @@ impl Rules {
                 ("acceleration_scale", 9.80665),
             ],
         );
-        component.set("loop_delay_samples", DELAY as i64);
+        component.set("loop_delay_samples", self.model.delay as i64);
     }
 
     fn model(&self, component: &mut ComponentFile) {
-        set(component, &shake_table_values(&self.model));
+        set(component, &shake_table_values(&self.model.rig));
     }
 }

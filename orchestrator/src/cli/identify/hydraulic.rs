@@ -41,7 +41,10 @@ pub(super) fn identify(
     let settings = Settings::default();
     let split = |recording: &Recording| (recording.len() as f64 * options.fit_part) as usize;
     let fitted: Vec<Recording> = recordings.iter().map(|r| r.cut(0, split(r))).collect();
-    let rest: Vec<Recording> = recordings.iter().map(|r| r.cut(split(r), r.len())).collect();
+    let rest: Vec<Recording> = recordings
+        .iter()
+        .map(|r| r.cut(split(r), r.len()))
+        .collect();
     let found = closed_loop::identify(&fitted, settings)?;
     if !found.holds() && recordings.len() > 1 {
         let alone = |r: &Recording| closed_loop::identify(std::slice::from_ref(r), settings);
@@ -145,11 +148,21 @@ fn parameters(own: &Validated) -> Vec<Vec<String>> {
         let frequency = s.stiffness.sqrt() / TAU;
         rows.push(row("specimen frequency", frequency, None, "Hz"));
         rows.push(row("specimen damping/mass", s.damping, error(0), "1/s"));
-        rows.push(row("specimen stiffness/mass", s.stiffness, error(1), "1/s^2"));
+        rows.push(row(
+            "specimen stiffness/mass",
+            s.stiffness,
+            error(1),
+            "1/s^2",
+        ));
         if s.yield_displacement.is_finite() {
             let drift = s.yield_displacement;
             rows.push(row("specimen yield displacement", drift, error(2), "m"));
-            rows.push(row("specimen stiffness after it", s.post_ratio, error(3), "1"));
+            rows.push(row(
+                "specimen stiffness after it",
+                s.post_ratio,
+                error(3),
+                "1",
+            ));
         }
     }
     for (index, payload) in own.found.payloads.iter().enumerate() {

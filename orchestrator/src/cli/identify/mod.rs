@@ -1,7 +1,7 @@
 //! `shakebench identify`
 
-pub mod measured;
 mod hydraulic;
+pub mod measured;
 mod printed;
 mod responses;
 
