@@ -19,7 +19,7 @@ pub use assemble::{Library, assemble};
 pub use checked::{Component, Connection, DEFAULT_PERIOD, Source, System};
 pub use connection::{Link, Origin, Quantity, VariableName};
 pub use error::SystemError;
-pub use file::{ComponentFile, ExperimentFile, MeasurementsFile, SystemFile};
+pub use file::{ComponentFile, ExperimentFile, SystemFile};
 pub use graph::{Operation, Schedule};
 pub use rule::Rule;
 pub use value::{Setting, Value};
