@@ -2,10 +2,10 @@
 
 mod identify_data;
 
-use identification::data::Recording;
+use identification::data::Channel;
 use identification::identify::model::{DELAY, PHYSICAL_NAMES};
 use identification::identify::rig::{Options, RigIdentification, identify};
-use identify_data::{PERIOD, Test};
+use identify_data::Test;
 use nalgebra::Complex;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
@@ -239,12 +239,7 @@ fn a_punctual_command_has_no_delay() {
 #[test]
 fn a_known_specimen_stands_for_its_sensor() {
     let recording = Test::default().record();
-    let columns = recording
-        .names()
-        .filter(|name| *name != "specimen_acceleration")
-        .map(|name| (name.to_string(), recording.channel(name).unwrap().to_vec()))
-        .collect();
-    let unsensed = Recording::new("test", PERIOD, columns).unwrap();
+    let unsensed = recording.clone().without(Channel::SpecimenAcceleration);
     let known = Options {
         specimen: Some(LinearSpecimen::appendix_a()),
         ..Options::default()

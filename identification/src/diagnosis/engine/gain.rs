@@ -3,8 +3,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::diagnosis::case::deviation;
-use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Signals};
+use crate::data::mean_and_deviation;
+use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Samples};
 
 /// Seed of the bootstrap.
 pub const BOOTSTRAP_SEED: u64 = 20_170_401;
@@ -47,16 +47,16 @@ pub struct ChannelGain {
     pub intervals_95: [[f64; 2]; 2],
 }
 
-/// Compares two predictions of `signals`: whitened innovations with the predictor that made them.
+/// Compares two predictions of `samples`: whitened innovations with the predictor that made them.
 pub fn gain(
-    signals: &Signals,
+    samples: &Samples,
     names: &[&'static str; 4],
     before: (&Predictor, &[f64]),
     after: (&Predictor, &[f64]),
 ) -> Gain {
     let scale = [0, 1, 2, 3].map(|i| {
-        let channel: Vec<f64> = signals.channels.iter().map(|row| row[i]).collect();
-        deviation(&channel).max(f64::MIN_POSITIVE)
+        let channel: Vec<f64> = samples.channels.iter().map(|row| row[i]).collect();
+        mean_and_deviation(&channel).1.max(f64::MIN_POSITIVE)
     });
     let floor = after.0.floor();
     let live: Vec<usize> = (0..4).filter(|&i| floor[i] > 0.0).collect();

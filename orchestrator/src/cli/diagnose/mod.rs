@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use identification::diagnosis::case::{CHANNELS, Case, CaseError};
+use identification::data::Channel;
+use identification::diagnosis::case::{Case, CaseError};
 use identification::diagnosis::engine::NamedEffect;
 use identification::diagnosis::rigs::shake_table::{self, Diagnosis};
 use serde::{Deserialize, Serialize};
@@ -272,19 +273,21 @@ fn in_closed_loop(
     diagnosis: &Diagnosis,
     extended: &[(PackedFmu, PathBuf)],
 ) -> Result<Comparison, String> {
-    let record = &case.validation;
+    let recording = &case.validation;
     let law = case.nominal.controller.ok_or("the case states no law")?;
-    if record.reference.len() != record.len() {
+    if recording.channel(Channel::Reference).is_none() {
         return Err("the validation record has no column `reference`".into());
     }
-    if let Some(missing) = [0, 1].into_iter().find(|&i| record.channels[i].is_empty()) {
+    let needed = [Channel::Displacement, Channel::Acceleration];
+    let is_missing = |channel: &Channel| recording.channel(*channel).is_none();
+    if let Some(missing) = needed.into_iter().find(is_missing) {
         return Err(format!(
             "without `{}` nothing tells whether the stated law made the command (R5)",
-            CHANNELS[missing]
+            missing.name()
         ));
     }
     // The law's command is used wherever it explains the recorded one.
-    if diagnosis.validation.signals.command == record.valve_command {
+    if diagnosis.validation.samples.command == recording.samples(Channel::ValveCommand) {
         return Err("the stated law did not make the recorded command (R5)".into());
     }
     let originals = pack::all_fmus().map_err(|error| error.to_string())?;
@@ -311,7 +314,7 @@ fn in_closed_loop(
         })
     };
     let before = rig(&original)?.nominal(&case.nominal);
-    co_simulation::compare(record, &case.nominal, &law, &before, &rig(&changed)?)
+    co_simulation::compare(recording, &case.nominal, &law, &before, &rig(&changed)?)
 }
 
 /// The report of the diagnosis whose `diagnosis.json` lies in `folder`, without the pictures, which

@@ -1,6 +1,5 @@
 //! `shakebench identify`
 
-pub mod measured;
 mod printed;
 mod responses;
 
@@ -24,8 +23,9 @@ use crate::report;
 #[command(after_help = "Example:\n  \
     shakebench identify bare.csv payload.csv --out MODEL.toml\n\n\
     Columns: time, valve_command, displacement, acceleration, actuator_force and, with a specimen\n\
-    on the table, specimen_acceleration; each header cell is `name [unit]`. A bare table alone\n\
-    does not determine the actuator: measure with a specimen or two payloads.")]
+    on the table, specimen_acceleration; each header cell is `name [unit]` or `name (unit)`, parted\n\
+    by comma, semicolon or tab. A bare table alone does not determine the actuator: measure with a\n\
+    specimen or two payloads.")]
 pub struct Arguments {
     /// Recordings of one rig
     #[arg(value_name = "DATA.csv", required = true)]
@@ -80,7 +80,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let mut recordings = Vec::new();
     let mut warnings = Vec::new();
     for path in &arguments.data {
-        let (pieces, findings) = measured::read(path)?;
+        let measured = Recording::read(path, &path.display().to_string())?;
+        let (pieces, findings) = measured.on_even_base()?;
         warnings.extend(findings.iter().map(ToString::to_string));
         recordings.extend(long_enough(pieces, &mut warnings));
     }
