@@ -139,13 +139,12 @@ impl<'a> Heading<'a> {
                 unit,
             })
         };
-        for brackets in [('[', ']'), ('(', ')')] {
-            let inside = cell
-                .strip_suffix(brackets.1)
-                .and_then(|rest| rest.split_once(brackets.0));
-            if let Some((name, unit)) = inside {
-                return heading(name, Some(unit));
-            }
+        let square = cell
+            .strip_suffix(']')
+            .and_then(|rest| rest.rsplit_once('['));
+        let round = || cell.strip_suffix(')')?.split_once('(');
+        if let Some((name, unit)) = square.or_else(round) {
+            return heading(name, Some(unit));
         }
         if let Some(found) = heading(cell, None) {
             return Some(found);

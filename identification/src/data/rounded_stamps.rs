@@ -113,7 +113,7 @@ mod tests {
         assert_eq!(found.period, None);
         // Fine stamps are uneven, not rounded.
         let fine: Vec<f64> = (0..4000)
-            .map(|k| 0.002 * f64::from(k) + 1e-4 * f64::from(k % 3))
+            .map(|k| 0.002 * f64::from(k) + 3.7e-5 * f64::from(k % 3))
             .collect();
         assert_eq!(RoundedStamps::of(&fine, None), None);
     }
