@@ -62,7 +62,7 @@ fn an_fmu_with_the_identified_model_moves_like_the_identified_rig() {
     let out = pack::default_folder()
         .unwrap()
         .with_file_name("fmus-for-tests");
-    let packed = pack::build_package("fmu-shake-table", &out, &pack::FmiVersion::ALL).unwrap();
+    let packed = pack::build_component("fmus/shake_table", &out, &pack::FmiVersion::ALL).unwrap();
     let command = &recording.channel("valve_command").unwrap()[..2500];
     let expected = native(found.rig().shake_table, command);
     for fmu in packed {
