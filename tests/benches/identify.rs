@@ -1,21 +1,12 @@
 //! A minute of four measured channels at 500 Hz (displacement, acceleration, force, acceleration of
 //! the specimen) and the command, from arrays to the rig with standard errors. Reading the file and
-//! writing the report are not timed. `cargo bench -p identification --bench identify`
-
-#![allow(
-    clippy::unwrap_used,
-    missing_docs,
-    reason = "a benchmark that cannot go on has failed"
-)]
-
-#[path = "../../tests/tests/identify_data/mod.rs"]
-mod identify_data;
+//! writing the report are not timed. `cargo bench -p acceptance --bench identify`
 
 use std::hint::black_box;
 use std::time::Instant;
 
+use acceptance::recordings::Test;
 use identification::identify::rig::{Options, identify};
-use identify_data::Test;
 
 const RUNS: usize = 11;
 

@@ -1,13 +1,11 @@
 //! Data, to a model file, to an FMU's parameters, to fmpy: the same response as the identified
 //! model without FMI.
 
-mod identify_data;
-
 use acceptance::python::run_script;
+use acceptance::recordings::{PERIOD, Test};
 use identification::data::mean_and_deviation;
 use identification::identify::model_file::ModelFile;
 use identification::identify::rig::{Options, identify};
-use identify_data::{PERIOD, Test};
 use nalgebra::{DVector, dvector};
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
