@@ -6,12 +6,12 @@ use crate::native::{
 };
 use controllers::Motion;
 use controllers::allocation::ControlAllocation;
+use controllers::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
 use controllers::loops::{Controlled, LinearLaw, Loop, Time};
 use controllers::pid::Pid;
 use controllers::prediction_over_delay::PredictionOverDelay;
-use controllers::sliding_mode::{
-    DISPLACEMENT_INTEGRAL_LEAK, IDENTIFIED_RATE, SlidingMode, rate_by_rule,
-};
+use controllers::sliding_mode::{IDENTIFIED_RATE, SlidingMode};
+use controllers::tuning::sliding_mode::rate_by_rule;
 use nalgebra::Complex;
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
