@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!(
             "{system}: {:.1} % error in acceleration, {}",
             figures.time_domain_percent,
-            outcome.ended.word()
+            outcome.ended.kind().word()
         );
     }
     Ok(())
