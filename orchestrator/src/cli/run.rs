@@ -9,14 +9,16 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::OneVersion;
 use crate::error::Error;
 use crate::master::{Algorithm, Ended, Pace};
-use crate::motion;
+use crate::motion::{self, Motion};
+use crate::report::columns::{aligned, significant};
 use crate::results::Results;
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
-use crate::run::summary;
+use crate::run::page;
+use crate::run::summary::Summary;
 use crate::system::built_in;
 use crate::system::tuning::Tuning;
-use crate::units::{self, STANDARD_GRAVITY};
+use crate::units::{self, INCH, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
 #[derive(Debug, Default, Args)]
@@ -128,15 +130,15 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 
     let plan = (request.algorithm, *step, *samples);
     let manifest = Manifest::new(&request, system, motion, plan, &outcome.record);
-    let summary = summary::Summary::new(&request, &prepared, &outcome, &manifest);
-    let files = summary::write(&folder, &prepared, &outcome, &summary, &manifest)?;
+    let summary = Summary::new(&request, &prepared, &outcome, &manifest);
+    let files = page::write(&folder, &prepared, &outcome, &summary, &manifest)?;
     for line in &summary.warnings {
         eprintln!("warning: {line}");
     }
     if arguments.json {
         println!("{}", serde_json::json!(summary));
     } else {
-        print!("{}", summary.table(motion));
+        print!("{}", table(&summary, motion));
         println!("\nwritten:");
         for file in files {
             println!("  {}", file.display());
@@ -159,6 +161,81 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::from(1))
 }
 
+/// The figures as a table for people.
+fn table(summary: &Summary, motion: &Motion) -> String {
+    let mut text = format!("{} on {}\n", summary.system, summary.motion.name);
+    for note in &motion.notes {
+        text += &format!("  {note}\n");
+    }
+    for (name, seed) in &summary.seeds {
+        text += &format!("  seed of the noise of `{name}`: {seed}\n");
+    }
+    text += &format!(
+        "\n{} steps of {} ms (FMI {}, {}), {} times real time, {}\n\n",
+        summary.steps,
+        significant(1e3 * summary.step_s, 3)
+            .trim_end_matches('0')
+            .trim_end_matches('.'),
+        summary.fmi,
+        summary.algorithm,
+        significant(summary.real_time_factor, 2),
+        summary.ended.word(),
+    );
+    let Some(tracking) = &summary.tracking else {
+        return text;
+    };
+    let row = |name: &str, cells: [String; 3]| {
+        let mut row = vec![name.to_string()];
+        row.extend(cells);
+        row
+    };
+    let inches = |value: f64| format!("{:.4} in", value / INCH);
+    let gravity = |value: f64| format!("{:.4} g", value / STANDARD_GRAVITY);
+    let percent = |value: f64| format!("{value:.4} %");
+    text += &aligned(&[
+        row(
+            "",
+            ["reference".into(), "table".into(), "largest error".into()],
+        ),
+        row(
+            "displacement, peak",
+            [
+                inches(motion.peak_displacement()),
+                inches(tracking.peak_displacement),
+                inches(tracking.peak_displacement_error),
+            ],
+        ),
+        row(
+            "acceleration, peak",
+            [
+                gravity(motion.peak_acceleration()),
+                gravity(tracking.peak_acceleration),
+                gravity(tracking.peak_acceleration_error),
+            ],
+        ),
+    ]);
+    text += "\n";
+    let pair = |name: &str, value: String| vec![name.to_string(), value];
+    text += &aligned(&[
+        pair(
+            "error in time, acceleration",
+            percent(tracking.time_domain_percent),
+        ),
+        pair(
+            "error in frequency, acceleration",
+            percent(tracking.frequency_domain_percent),
+        ),
+        pair(
+            "error in time, displacement",
+            percent(tracking.displacement_percent),
+        ),
+        pair(
+            "delay of the table",
+            format!("{:.1} ms", 1e3 * tracking.delay),
+        ),
+    ]);
+    text
+}
 /// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.
 ///
 /// # Errors

@@ -23,8 +23,8 @@ use plant::servo_hydraulic::ServoHydraulicTable;
 use serde::{Deserialize, Serialize};
 use units::constants::SAMPLING_PERIOD;
 
-use super::connection::{Link, Origin};
 use super::file::{ComponentFile, SystemFile};
+use super::link::{Link, Origin};
 use super::model::shake_table_values;
 use super::rule::Rule;
 
