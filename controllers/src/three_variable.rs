@@ -70,6 +70,25 @@ impl ThreeVariableGains {
         }
     }
 
+    /// The gains with the names of their parameters.
+    pub fn named(&self) -> [(&'static str, f64); 7] {
+        [
+            ("proportional_gain", self.proportional),
+            ("integral_gain", self.integral),
+            ("velocity_feedback_gain", self.velocity_feedback),
+            ("acceleration_feedback_gain", self.acceleration_feedback),
+            (
+                "displacement_feedforward_gain",
+                self.displacement_feedforward,
+            ),
+            ("velocity_feedforward_gain", self.velocity_feedforward),
+            (
+                "acceleration_feedforward_gain",
+                self.acceleration_feedforward,
+            ),
+        ]
+    }
+
     /// The law as `u = K [rd rv ra]' - L [x v a]' + xi`: returns `(K, L)`.
     pub fn reference_and_feedback(&self) -> ([f64; 3], [f64; 3]) {
         let feedback = [
@@ -117,16 +136,7 @@ impl Controller for ThreeVariableControl {
     type Output = f64;
 
     fn validate(&self) -> Result<(), ModelError> {
-        let g = &self.gains;
-        for (name, value) in [
-            ("proportional_gain", g.proportional),
-            ("integral_gain", g.integral),
-            ("velocity_feedback_gain", g.velocity_feedback),
-            ("acceleration_feedback_gain", g.acceleration_feedback),
-            ("displacement_feedforward_gain", g.displacement_feedforward),
-            ("velocity_feedforward_gain", g.velocity_feedforward),
-            ("acceleration_feedforward_gain", g.acceleration_feedforward),
-        ] {
+        for (name, value) in self.gains.named() {
             ModelError::require_finite(name, value)?;
         }
         ModelError::require_positive("valve_limit", self.limit)

@@ -7,6 +7,7 @@ pub mod diagnose;
 pub mod identify;
 pub mod info;
 pub mod report;
+mod rig;
 pub mod run;
 
 use std::process::ExitCode;

@@ -7,17 +7,18 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::OneVersion;
+use super::rig::RigArguments;
 use crate::error::Error;
 use crate::master::{Algorithm, Ended, Pace};
 use crate::motion::{self, Motion};
-use crate::report::columns::{aligned, significant};
+use crate::report::columns::aligned;
+use crate::report::number::significant;
 use crate::results::Results;
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
 use crate::run::summary::Summary;
 use crate::system::built_in;
-use crate::system::tuning::Tuning;
 use crate::units::{self, INCH, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
@@ -37,15 +38,8 @@ pub struct Arguments {
     /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Plant of a built-in system: identified, servohydraulic [default: identified]
-    #[arg(long)]
-    plant: Option<String>,
-    /// Specimen of a built-in system: none, linear, yielding [default: linear]
-    #[arg(long)]
-    specimen: Option<String>,
-    /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
-    #[arg(long, value_enum)]
-    tuning: Option<Tuning>,
+    #[command(flatten)]
+    rig: RigArguments,
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
@@ -156,7 +150,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if matches!(outcome.ended, Ended::Complete) {
         return Ok(ExitCode::SUCCESS);
     }
-    eprintln!("error: the run ended early: {}", outcome.ended.story());
+    eprintln!("error: the run ended early: {}", outcome.ended.message());
     eprintln!("what was computed until then is saved");
     Ok(ExitCode::from(1))
 }
@@ -247,15 +241,14 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         .unwrap_or(built_in::DEFAULT_SYSTEM.to_string());
     let is_file = is_file(&system);
     for (option, given) in [
-        ("--plant", &arguments.plant),
-        ("--specimen", &arguments.specimen),
+        ("--plant", &arguments.rig.plant),
+        ("--specimen", &arguments.rig.specimen),
     ] {
         if let (true, Some(_)) = (is_file, given) {
             let reason = format!("{system} is a file and has its own; edit it instead");
             return Err(Error::Option { option, reason });
         }
     }
-    let or = |given: &Option<String>, default: &str| given.clone().unwrap_or(default.into());
     let text = |option, given: &Option<String>, unit: &'static str| {
         given
             .as_ref()
@@ -276,9 +269,9 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         } else {
             system
         },
-        plant: or(&arguments.plant, built_in::DEFAULT_PLANT),
-        specimen: or(&arguments.specimen, built_in::DEFAULT_SPECIMEN),
-        tuning: arguments.tuning,
+        plant: arguments.rig.plant(),
+        specimen: arguments.rig.specimen(),
+        tuning: arguments.rig.tuning,
         record: arguments.record.as_deref().map(absolute),
         reference: arguments.reference.as_deref().map(absolute),
         seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),

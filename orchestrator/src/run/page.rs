@@ -11,7 +11,7 @@ use super::summary::{Summary, Table};
 use crate::error::Error;
 use crate::master::{Outcome, Record};
 use crate::motion::Motion;
-use crate::report::columns::significant;
+use crate::report::number::significant;
 use crate::report::{self, Cell, Whole};
 use crate::results::Results;
 use crate::units::STANDARD_GRAVITY;

@@ -26,7 +26,7 @@ pub enum Operation {
         /// The component.
         component: usize,
     },
-    /// Repeat these until their values stand still.
+    /// Repeat these until their values converge.
     Iterate(Vec<Operation>),
 }
 

@@ -170,19 +170,7 @@ impl Rules {
     }
 
     fn three_variable(&self, component: &mut ComponentFile) {
-        let g = &self.gains;
-        set(
-            component,
-            &[
-                ("proportional_gain", g.proportional),
-                ("integral_gain", g.integral),
-                ("velocity_feedback_gain", g.velocity_feedback),
-                ("acceleration_feedback_gain", g.acceleration_feedback),
-                ("displacement_feedforward_gain", g.displacement_feedforward),
-                ("velocity_feedforward_gain", g.velocity_feedforward),
-                ("acceleration_feedforward_gain", g.acceleration_feedforward),
-            ],
-        );
+        set(component, &self.gains.named());
     }
 
     fn force_pid(&self, component: &mut ComponentFile) {
