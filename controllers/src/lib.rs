@@ -4,6 +4,7 @@
 //! period with what the sensors gave, and the command they return is held until the next call.
 
 pub mod allocation;
+pub mod hybrid;
 pub mod interlock;
 pub mod loop_shaping;
 pub mod loops;

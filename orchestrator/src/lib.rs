@@ -1,5 +1,6 @@
 //! Hydraulic shake tables as FMI components, co-simulated
 
+pub mod benchmark;
 pub mod cli;
 pub mod commands;
 pub mod component_library;

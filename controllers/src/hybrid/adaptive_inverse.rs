@@ -1,0 +1,193 @@
+//! Feed-forward by an inverse whose coefficients are estimated while the test runs.
+
+use plant::hybrid::{Deviation, TransferSystemParameters};
+
+use super::TrackingInput;
+use super::extrapolation::{DERIVATIVES, Extrapolation};
+use super::lag_chain::LagChain;
+use crate::{Controller, ModelError};
+
+/// `u = sum_i a_i x_d^(i)(t + lead)` with coefficients from recursive estimation by instrumental
+/// variables.
+///
+/// The actuator obeys `u = sum_i a_i x^(i)`. Both sides pass the same low-pass filter, so that no
+/// noise is differentiated. Regressors are the filtered derivatives of the measured displacement;
+/// those of the desired displacement, which carries no sensor noise, are the instruments (Young
+/// 1970): noise then does not bias the estimate. It starts from a nominal plant and from how far
+/// the coefficients of its family spread together, so that what one of them tells moves the
+/// others, and it takes a prior's place where the motion tells nothing.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct AdaptiveInverse {
+    /// Coefficients at the start, s^i.
+    pub nominal: [f64; DERIVATIVES],
+    /// Their covariance at the start, s^(i + j).
+    pub covariance: [[f64; DERIVATIVES]; DERIVATIVES],
+    /// Variance of the filtered equation's error, times its correlation in samples, m².
+    pub error_variance: f64,
+    /// Corner of each lag of the filter, rad/s.
+    pub corner: f64,
+    /// Where the derivatives of the desired displacement come from.
+    pub desired: Extrapolation,
+    /// What the law remembers.
+    pub memory: AdaptiveInverseMemory,
+}
+
+/// Memory of [`AdaptiveInverse`]; coefficients are scaled by `corner^i`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct AdaptiveInverseMemory {
+    started: bool,
+    coefficients: [f64; DERIVATIVES],
+    covariance: [[f64; DERIVATIVES]; DERIVATIVES],
+    command: LagChain,
+    measured: LagChain,
+    instrument: LagChain,
+    last_command: f64,
+    last_input: TrackingInput,
+}
+
+impl AdaptiveInverse {
+    /// For a family of plants around `nominal`.
+    ///
+    /// # Errors
+    /// None with the default window.
+    pub fn for_family(
+        nominal: &TransferSystemParameters,
+        deviation: &Deviation,
+        period: f64,
+        lead: f64,
+    ) -> Result<Self, ModelError> {
+        let centre = held(nominal.inverse(), period);
+        let mut covariance = [[0.0; DERIVATIVES]; DERIVATIVES];
+        for direction in 0..4 {
+            let mut by = [0.0; 4];
+            by[direction] = 1.0;
+            let there = held(deviation.moved(nominal, by).inverse(), period);
+            let moved: [f64; DERIVATIVES] = std::array::from_fn(|i| there[i] - centre[i]);
+            for i in 0..DERIVATIVES {
+                for j in 0..DERIVATIVES {
+                    covariance[i][j] += moved[i] * moved[j];
+                }
+            }
+        }
+        // What the family does not know of: a thousandth of each coefficient.
+        for i in 0..DERIVATIVES {
+            covariance[i][i] += (1e-3 * centre[i]).powi(2);
+        }
+        Ok(Self {
+            nominal: centre,
+            covariance,
+            error_variance: 2.5e-9,
+            corner: 125.0,
+            desired: Extrapolation::new(5, 16, lead)?,
+            memory: AdaptiveInverseMemory::default(),
+        })
+    }
+
+    fn start(&mut self) {
+        let scale: [f64; DERIVATIVES] = std::array::from_fn(|i| self.corner.powi(i as i32));
+        let memory = &mut self.memory;
+        for i in 0..DERIVATIVES {
+            memory.coefficients[i] = self.nominal[i] * scale[i];
+            for j in 0..DERIVATIVES {
+                memory.covariance[i][j] = self.covariance[i][j] * scale[i] * scale[j];
+            }
+        }
+        memory.started = true;
+    }
+
+    /// The coefficients as they are now, s^i.
+    pub fn coefficients(&self) -> [f64; DERIVATIVES] {
+        if !self.memory.started {
+            return self.nominal;
+        }
+        std::array::from_fn(|i| self.memory.coefficients[i] / self.corner.powi(i as i32))
+    }
+
+    /// Takes in the readings of a sample and the command that was computed from them.
+    fn adapt(&mut self, input: &TrackingInput, period: f64) {
+        let variance = self.error_variance;
+        let memory = &mut self.memory;
+        let command = memory
+            .command
+            .step(memory.last_command, self.corner, period)
+            .value();
+        let regressor = memory
+            .measured
+            .step(input.measured, self.corner, period)
+            .differences();
+        let instrument = memory
+            .instrument
+            .step(input.desired, self.corner, period)
+            .differences();
+        let mut weighted = [0.0; DERIVATIVES];
+        for i in 0..DERIVATIVES {
+            for j in 0..DERIVATIVES {
+                weighted[i] += memory.covariance[i][j] * instrument[j];
+            }
+        }
+        let mut spread = variance;
+        let mut error = command;
+        for i in 0..DERIVATIVES {
+            spread += instrument[i] * weighted[i];
+            error -= regressor[i] * memory.coefficients[i];
+        }
+        for i in 0..DERIVATIVES {
+            let gain = weighted[i] / spread;
+            memory.coefficients[i] += gain * error;
+            for j in 0..DERIVATIVES {
+                memory.covariance[i][j] -= gain * weighted[j];
+            }
+        }
+    }
+}
+
+/// An inverse seen through a command that is held over each period, which is late by half of it:
+/// the inverse times `e^(s period / 2)`, to the same order.
+fn held(inverse: [f64; DERIVATIVES], period: f64) -> [f64; DERIVATIVES] {
+    let mut result = [0.0; DERIVATIVES];
+    for (i, a) in inverse.iter().enumerate() {
+        let mut term = *a;
+        for (n, slot) in result[i..].iter_mut().enumerate() {
+            *slot += term;
+            term *= 0.5 * period / (n + 1) as f64;
+        }
+    }
+    result
+}
+
+impl Controller for AdaptiveInverse {
+    type Input = TrackingInput;
+    type Output = f64;
+
+    fn validate(&self) -> Result<(), ModelError> {
+        for coefficient in self.nominal {
+            ModelError::require_finite("coefficients", coefficient)?;
+        }
+        for variance in self.covariance.as_flattened() {
+            ModelError::require_finite("covariance", *variance)?;
+        }
+        ModelError::require_positive("error_variance", self.error_variance)?;
+        ModelError::require_positive("corner", self.corner)
+    }
+
+    fn step(&mut self, input: &TrackingInput, period: f64) -> f64 {
+        if !self.memory.started {
+            self.start();
+        }
+        let last = self.memory.last_input;
+        self.adapt(&last, period);
+        let desired = self.desired.step(input.desired, period);
+        let (mut command, mut scale) = (0.0, 1.0);
+        for (a, x) in self.memory.coefficients.iter().zip(&desired) {
+            command += a * x * scale;
+            scale /= self.corner;
+        }
+        (self.memory.last_command, self.memory.last_input) = (command, *input);
+        command
+    }
+
+    fn reset(&mut self) {
+        self.memory = AdaptiveInverseMemory::default();
+        self.desired.reset();
+    }
+}
