@@ -2,9 +2,9 @@
 
 use plant::hybrid::{Deviation, TransferSystemParameters};
 
-use super::TrackingInput;
 use super::extrapolation::{DERIVATIVES, Extrapolation};
 use super::lag_chain::LagChain;
+use super::{TrackingInput, held_inverse};
 use crate::{Controller, ModelError};
 
 /// `u = sum_i a_i x_d^(i)(t + lead)` with coefficients from recursive estimation by instrumental
@@ -56,12 +56,12 @@ impl AdaptiveInverse {
         period: f64,
         lead: f64,
     ) -> Result<Self, ModelError> {
-        let centre = held(nominal.inverse(), period);
+        let centre = held_inverse(nominal.inverse(), period);
         let mut covariance = [[0.0; DERIVATIVES]; DERIVATIVES];
         for direction in 0..4 {
             let mut by = [0.0; 4];
             by[direction] = 1.0;
-            let there = held(deviation.moved(nominal, by).inverse(), period);
+            let there = held_inverse(deviation.moved(nominal, by).inverse(), period);
             let moved: [f64; DERIVATIVES] = std::array::from_fn(|i| there[i] - centre[i]);
             for i in 0..DERIVATIVES {
                 for j in 0..DERIVATIVES {
@@ -139,20 +139,6 @@ impl AdaptiveInverse {
             }
         }
     }
-}
-
-/// An inverse seen through a command that is held over each period, which is late by half of it:
-/// the inverse times `e^(s period / 2)`, to the same order.
-fn held(inverse: [f64; DERIVATIVES], period: f64) -> [f64; DERIVATIVES] {
-    let mut result = [0.0; DERIVATIVES];
-    for (i, a) in inverse.iter().enumerate() {
-        let mut term = *a;
-        for (n, slot) in result[i..].iter_mut().enumerate() {
-            *slot += term;
-            term *= 0.5 * period / (n + 1) as f64;
-        }
-    }
-    result
 }
 
 impl Controller for AdaptiveInverse {
