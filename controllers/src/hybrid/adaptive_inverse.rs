@@ -76,8 +76,8 @@ impl AdaptiveInverse {
         Ok(Self {
             nominal: centre,
             covariance,
-            error_variance: 2.5e-9,
-            corner: 125.0,
+            error_variance: 2e-10,
+            corner: 180.0,
             desired: Extrapolation::new(5, 16, lead)?,
             memory: AdaptiveInverseMemory::default(),
         })

@@ -12,8 +12,9 @@ use crate::{Controller, ModelError};
 const COUNT: usize = 4;
 
 /// `u = sum_i a_i D^i x_d` with backward differences `D`, and the gradient law
-/// `da/dt = Gamma phi (u_f - a' phi)`, `phi_i = D^i x_f`, where `u_f` and `x_f` are command and
-/// measured displacement behind a low-pass filter of Butterworth.
+/// `da/dt = Gamma phi (u_f - a' phi) / (1 + phi' phi)`, `phi_i = D^i x_f`, where `u_f` and `x_f` are
+/// command and measured displacement behind a low-pass filter of Butterworth. Without the
+/// denominator the published gains diverge on this plant.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GradientInverse {
     /// Coefficients at the start, s^i: those of the transfer system without a specimen.
@@ -114,10 +115,7 @@ impl Controller for GradientInverse {
 
         let w = (PI * self.corner * period).tan();
         // Quality factors of Butterworth's fourth order.
-        let qualities = [
-            1.0 / (2.0 - SQRT_2).sqrt(),
-            1.0 / (2.0 + SQRT_2).sqrt(),
-        ];
+        let qualities = [1.0 / (2.0 - SQRT_2).sqrt(), 1.0 / (2.0 + SQRT_2).sqrt()];
         let mut filtered = [command, input.measured];
         for (value, sections) in filtered.iter_mut().zip(&mut memory.filters) {
             for (section, quality) in sections.iter_mut().zip(qualities) {
@@ -127,6 +125,7 @@ impl Controller for GradientInverse {
         push(&mut memory.measured, filtered[1]);
         let regressor = differences(&memory.measured, period);
         let error = filtered[0] - dot(&memory.coefficients, &regressor);
+        let error = error / (1.0 + dot(&regressor, &regressor));
         for i in 0..COUNT {
             let rate = self.gains[i] * regressor[i] * error;
             memory.coefficients[i] = (memory.coefficients[i] + period * rate).max(0.0);

@@ -82,8 +82,7 @@ impl LinearQuadraticTracking {
         b[(STATES - 1, 0)] = plant.command_gain * plant.valve_gain / denominator[STATES]
             * SCALE.powi(1 - STATES as i32);
         let one = |i: usize, j: usize| DMatrix::from_fn(i, j, |i, j| f64::from(i == j));
-        let sampled =
-            StateSpace::new(a, b, one(1, STATES), DMatrix::zeros(1, 1))?.sample(period);
+        let sampled = StateSpace::new(a, b, one(1, STATES), DMatrix::zeros(1, 1))?.sample(period);
         let (a, b) = (&sampled.a, &sampled.b);
 
         let mut weight = DMatrix::zeros(STATES, STATES);
@@ -135,12 +134,7 @@ impl Controller for LinearQuadraticTracking {
             *state += gain * innovation;
         }
         let desired = self.desired.step(input.desired, period);
-        let mut command: f64 = self
-            .inverse
-            .iter()
-            .zip(&desired)
-            .map(|(a, x)| a * x)
-            .sum();
+        let mut command: f64 = self.inverse.iter().zip(&desired).map(|(a, x)| a * x).sum();
         let mut scale = 1.0;
         for i in 0..STATES {
             command += self.feedback[i] * (desired[i] * scale - self.estimate[i]);

@@ -73,7 +73,8 @@ impl RobustTracking {
         // W behind K: the states of K, then that of W.
         let mut a = DMatrix::zeros(ORDER, ORDER);
         a.view_mut((0, 0), (SHAPED, SHAPED)).copy_from(&k.a);
-        a.view_mut((SHAPED, 0), (1, SHAPED)).copy_from(&(&w.b * &k.c));
+        a.view_mut((SHAPED, 0), (1, SHAPED))
+            .copy_from(&(&w.b * &k.c));
         a.view_mut((SHAPED, SHAPED), (1, 1)).copy_from(&w.a);
         let mut b = DMatrix::zeros(ORDER, 1);
         b.view_mut((0, 0), (SHAPED, 1)).copy_from(&k.b);

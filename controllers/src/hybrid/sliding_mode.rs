@@ -3,6 +3,8 @@
 //! Mechanical Systems and Signal Processing 151 (2021), with the constants of its published
 //! program.
 
+use plant::hybrid::TransferSystemParameters;
+
 use super::TrackingInput;
 use super::extrapolation::Extrapolation;
 use crate::{Controller, ModelError};
@@ -60,13 +62,14 @@ pub struct TrackingSlidingModeMemory {
 }
 
 impl TrackingSlidingMode {
-    /// The published law; its lead by one sample is that of the derivatives.
+    /// The published law; its lead by one sample is that of the derivatives. The published model
+    /// leaves the command gain out, as its plant does; here it is part of both.
     ///
     /// # Errors
     /// None with these constants.
     pub fn published() -> Result<Self, ModelError> {
         Ok(Self {
-            model_gain: 53_354.0,
+            model_gain: 53_354.0 * TransferSystemParameters::default().command_gain,
             model_damping: 221.64,
             model_stiffness: 54_290.0,
             lag_zero: 0.000_105_95,
@@ -113,8 +116,8 @@ impl Controller for TrackingSlidingMode {
         let acceleration = wanted_acceleration
             - self.rate * error_rate
             - switching * (surface / self.boundary_layer).clamp(-1.0, 1.0);
-        let unled = (acceleration + self.model_damping * v + self.model_stiffness * x)
-            / self.model_gain;
+        let unled =
+            (acceleration + self.model_damping * v + self.model_stiffness * x) / self.model_gain;
 
         // The lead (e s + 1) / (d s + 1) by Tustin's rule.
         let rate = 2.0 / period;
@@ -126,8 +129,8 @@ impl Controller for TrackingSlidingMode {
 
         // The model moves as it was told, but for the correction.
         let innovation = input.measured - x;
-        memory.displacement += period
-            * (v + 0.5 * period * acceleration + self.observer_gain[0] * innovation);
+        memory.displacement +=
+            period * (v + 0.5 * period * acceleration + self.observer_gain[0] * innovation);
         memory.velocity += period * (acceleration + self.observer_gain[1] * innovation);
         command
     }

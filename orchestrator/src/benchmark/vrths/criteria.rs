@@ -48,7 +48,13 @@ pub fn normalised_deviation(signal: &[f64], wanted: &[f64]) -> f64 {
 
 /// Largest magnitude of `signal - wanted` over that of `wanted`.
 fn normalised_peak(signal: &[f64], wanted: &[f64]) -> f64 {
-    let largest = |a: f64, b: f64| if b.abs() > a || b.is_nan() { b.abs() } else { a };
+    let largest = |a: f64, b: f64| {
+        if b.abs() > a || b.is_nan() {
+            b.abs()
+        } else {
+            a
+        }
+    };
     let error = signal
         .iter()
         .zip(wanted)

@@ -54,7 +54,11 @@ impl Ground {
     }
 
     fn over_step(&self, k: usize) -> [f64; 3] {
-        [self.halves[2 * k], self.halves[2 * k + 1], self.halves[2 * k + 2]]
+        [
+            self.halves[2 * k],
+            self.halves[2 * k + 1],
+            self.halves[2 * k + 2],
+        ]
     }
 }
 
