@@ -46,6 +46,26 @@ pub struct AdaptiveInverseMemory {
 }
 
 impl AdaptiveInverse {
+    /// For the benchmark, sampled every `period` (s): its nominal plant and spread, but for a
+    /// stiffness of the specimen that is as good as unknown (a third of it is one standard
+    /// deviation), and a lead of one and a half samples, which is how old the force is in the mean
+    /// that the numerical substructure gets.
+    ///
+    /// # Errors
+    /// None with these constants.
+    pub fn benchmark(period: f64) -> Result<Self, ModelError> {
+        let deviation = Deviation {
+            specimen_stiffness: 4e5,
+            ..Deviation::default()
+        };
+        Self::for_family(
+            &TransferSystemParameters::default(),
+            &deviation,
+            period,
+            1.5,
+        )
+    }
+
     /// For a family of plants around `nominal`.
     ///
     /// # Errors

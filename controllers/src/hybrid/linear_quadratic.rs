@@ -37,7 +37,7 @@ impl Default for LinearQuadraticDesign {
         Self {
             command_weight: 1.0,
             command_noise: 1e-5,
-            disturbance_step: 1e-6,
+            disturbance_step: 1e-5,
             measurement_noise: 1.6e-5,
             lead: 1.5,
         }

@@ -81,16 +81,17 @@ pub fn reference(frame: &Frame, ground: &Ground) -> Result<Reference, ModelError
     Ok(floors)
 }
 
-/// Noise of displacement (m) and force (N), a value a sample: independent draws.
+/// Noise of displacement (m) and force (N), a value a sample: independent draws, others for every
+/// `stream` of a seed.
 #[must_use]
-pub fn independent_noise(seed: u64, samples: usize) -> [Vec<f64>; 2] {
+pub fn independent_noise(seed: u64, stream: u64, samples: usize) -> [Vec<f64>; 2] {
     let size = SensorNoise::default();
-    [(0, size.displacement), (1, size.force)].map(|(channel, deviation)| {
+    [(0, size.displacement), (1, size.force)].map(|(sensor, deviation)| {
         (0..samples as u64)
             .map(|sample| {
                 let draw = Noise {
                     seed,
-                    channel,
+                    channel: stream << 1 | sensor,
                     sample,
                 };
                 deviation * draw.gaussian()
