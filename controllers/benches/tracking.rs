@@ -46,7 +46,10 @@ fn laws() -> Result<Vec<(&'static str, Law)>, Box<dyn Error>> {
         ),
         ("sliding-mode", Box::new(TrackingSlidingMode::published()?)),
         ("gradient-inverse", Box::new(GradientInverse::default())),
-        ("adaptive-inverse", Box::new(AdaptiveInverse::benchmark(PERIOD)?)),
+        (
+            "adaptive-inverse",
+            Box::new(AdaptiveInverse::benchmark(PERIOD)?),
+        ),
     ])
 }
 

@@ -46,23 +46,33 @@ pub struct AdaptiveInverseMemory {
 }
 
 impl AdaptiveInverse {
+    /// Standard deviation of the specimen's stiffness at the start, N/m: a third of the nominal
+    /// one, which is as good as unknown.
+    pub const STIFFNESS_DEVIATION: f64 = 4e5;
+    /// Lead of the desired displacement, samples: how old the force is, in the mean, that the
+    /// numerical substructure gets.
+    pub const LEAD: f64 = 1.5;
+    /// Corner of each lag of the filter, rad/s: above the frames' first two modes, where the
+    /// motion tells most.
+    pub const CORNER: f64 = 180.0;
+    /// Variance of the filtered equation's error times its correlation, m².
+    pub const ERROR_VARIANCE: f64 = 2e-10;
+
     /// For the benchmark, sampled every `period` (s): its nominal plant and spread, but for a
-    /// stiffness of the specimen that is as good as unknown (a third of it is one standard
-    /// deviation), and a lead of one and a half samples, which is how old the force is in the mean
-    /// that the numerical substructure gets.
+    /// stiffness of the specimen that is as good as unknown.
     ///
     /// # Errors
     /// None with these constants.
     pub fn benchmark(period: f64) -> Result<Self, ModelError> {
         let deviation = Deviation {
-            specimen_stiffness: 4e5,
+            specimen_stiffness: Self::STIFFNESS_DEVIATION,
             ..Deviation::default()
         };
         Self::for_family(
             &TransferSystemParameters::default(),
             &deviation,
             period,
-            1.5,
+            Self::LEAD,
         )
     }
 
@@ -96,8 +106,8 @@ impl AdaptiveInverse {
         Ok(Self {
             nominal: centre,
             covariance,
-            error_variance: 2e-10,
-            corner: 180.0,
+            error_variance: Self::ERROR_VARIANCE,
+            corner: Self::CORNER,
             desired: Extrapolation::new(5, 16, lead)?,
             memory: AdaptiveInverseMemory::default(),
         })

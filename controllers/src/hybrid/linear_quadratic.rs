@@ -18,7 +18,7 @@ const ALL: usize = STATES + 1;
 const SCALE: f64 = 150.0;
 
 /// What the law is designed for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LinearQuadraticDesign {
     /// Weight of the command's square against that of the displacement error's.
     pub command_weight: f64,

@@ -161,7 +161,10 @@ impl ReferenceFrame {
         block *= period;
         block[(2 * n, 2 * n + 1)] = 1.0;
         let exponential = block.exp();
-        let held = exponential.view((0, 2 * n), (2 * n, 1)).column(0).into_owned();
+        let held = exponential
+            .view((0, 2 * n), (2 * n, 1))
+            .column(0)
+            .into_owned();
         let ramp = exponential
             .view((0, 2 * n + 1), (2 * n, 1))
             .column(0)

@@ -93,8 +93,14 @@ mod tests {
         let variance = draws.iter().map(|k| (k - mean).powi(2)).sum::<f64>() / n as f64;
         assert!((mean - 1.19e6).abs() < 1.5e3, "{mean}");
         assert!((variance.sqrt() - 5e4).abs() < 1e3);
-        assert_eq!(deviation.draw(&nominal, 5, 3), deviation.draw(&nominal, 5, 3));
-        assert_ne!(deviation.draw(&nominal, 5, 3), deviation.draw(&nominal, 6, 3));
+        assert_eq!(
+            deviation.draw(&nominal, 5, 3),
+            deviation.draw(&nominal, 5, 3)
+        );
+        assert_ne!(
+            deviation.draw(&nominal, 5, 3),
+            deviation.draw(&nominal, 6, 3)
+        );
     }
 
     #[test]

@@ -114,7 +114,13 @@ mod tests {
 
     #[test]
     fn the_published_sequence_starts_as_published() {
-        let start = [1.164_953_51, 0.626_839_08, 0.075_080_15, 0.351_606_9, -0.696_512_54];
+        let start = [
+            1.164_953_51,
+            0.626_839_08,
+            0.075_080_15,
+            0.351_606_9,
+            -0.696_512_54,
+        ];
         for (got, wanted) in PublishedNoise::default().zip(start) {
             assert!((got - wanted).abs() < 1e-8, "{got} {wanted}");
         }
@@ -130,7 +136,10 @@ mod tests {
     #[test]
     fn converters_round_and_limit() {
         let converter = Converter::default();
-        assert_eq!(converter.read(5.0), 3.8f64.mul_add(262_144.0, 0.0).round() / 262_144.0);
+        assert_eq!(
+            converter.read(5.0),
+            3.8f64.mul_add(262_144.0, 0.0).round() / 262_144.0
+        );
         assert_eq!(converter.write(-5.0), -3.8);
         assert_eq!(converter.read(1.9e-6), 0.0);
         assert_eq!(converter.read(2.0e-6), 1.0 / 262_144.0);

@@ -73,7 +73,8 @@ impl NumericalSubstructure {
 
         let slope = |x: &DVector<f64>, force: f64, ground: f64| {
             let (position, velocity) = (x.rows(0, n), x.rows(n, n));
-            let acceleration = -(&damping * velocity) - &stiffness * position
+            let acceleration = -(&damping * velocity)
+                - &stiffness * position
                 - &push * force
                 - &influence * ground;
             let mut slope = DVector::zeros(2 * n);

@@ -83,7 +83,8 @@ impl TransferSystemParameters {
     /// derivative: the denominator over `gain a1b0`; s^i.
     pub fn inverse(&self) -> [f64; 6] {
         let numerator = self.command_gain * self.valve_gain;
-        self.denominator().map(|coefficient| coefficient / numerator)
+        self.denominator()
+            .map(|coefficient| coefficient / numerator)
     }
 
     /// Refuses parameters that make no plant.
