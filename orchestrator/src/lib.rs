@@ -1,10 +1,13 @@
 //! Hydraulic shake tables as FMI components, co-simulated
 
+#![warn(clippy::missing_errors_doc)]
+
 pub mod benchmark;
 pub mod cli;
 pub mod comparison;
 pub mod component_library;
 pub mod design;
+pub mod diagnosis;
 pub mod error;
 pub mod extended_model;
 pub mod fmu;
