@@ -207,3 +207,82 @@ impl Controller for AdaptiveInverse {
         self.desired.reset();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use plant::hybrid::{InteractionForm, PERIOD, SensorNoise, TransferSystem};
+    use plant::sensors::channel::Noise;
+
+    use super::*;
+
+    /// A smooth start and four sines between 1 and 17 Hz, m.
+    fn wanted(t: f64) -> f64 {
+        let ramp = (t / 2.0).min(1.0).powi(3);
+        [(1.1, 1e-3), (3.6, 1e-3), (9.0, 1e-4), (17.0, 3e-5)]
+            .iter()
+            .map(|(hertz, peak)| ramp * peak * (std::f64::consts::TAU * hertz * t).sin())
+            .sum()
+    }
+
+    #[test]
+    fn the_coefficients_of_a_plant_it_was_not_told_are_found_through_noise() {
+        let plant = TransferSystemParameters {
+            specimen_stiffness: 0.6e6,
+            valve_beta2: 1.06e5,
+            ..TransferSystemParameters::default()
+        };
+        let mut system =
+            TransferSystem::new(plant, InteractionForm::TransferFunction, PERIOD).unwrap();
+        let mut law = AdaptiveInverse::benchmark(PERIOD).unwrap();
+        let noise = SensorNoise::default().displacement;
+        let start = law.coefficients();
+        let mut late: f64 = 0.0;
+        for k in 0..30 * 4096 {
+            let t = k as f64 * PERIOD;
+            let draw = Noise {
+                seed: 3,
+                channel: 0,
+                sample: k,
+            };
+            let input = TrackingInput {
+                desired: wanted(t),
+                measured: system.state.displacement + noise * draw.gaussian(),
+                force: 0.0,
+            };
+            if t > 10.0 {
+                let led = wanted(t + AdaptiveInverse::LEAD * PERIOD);
+                late = late.max((system.state.displacement - led).abs());
+            }
+            let command = law.step(&input, PERIOD);
+            system.step(command);
+        }
+        let truth = held_inverse(plant.inverse(), PERIOD);
+        let found = law.coefficients();
+        for (i, within) in [2e-3, 5e-3, 0.02].into_iter().enumerate() {
+            let off = (found[i] / truth[i] - 1.0).abs();
+            assert!(off < within, "{i}: {start:?} {found:?} {truth:?}");
+        }
+        assert!(late < 1.5e-5, "{late:e}");
+    }
+
+    #[test]
+    fn without_motion_nothing_is_learnt() {
+        let mut law = AdaptiveInverse::benchmark(PERIOD).unwrap();
+        let start = law.coefficients();
+        for k in 0..40_960 {
+            let draw = Noise {
+                seed: 4,
+                channel: 0,
+                sample: k,
+            };
+            let input = TrackingInput {
+                measured: 1.6e-5 * draw.gaussian(),
+                ..TrackingInput::default()
+            };
+            assert_eq!(law.step(&input, PERIOD), 0.0);
+        }
+        for (now, before) in law.coefficients().iter().zip(start) {
+            assert!((now / before - 1.0).abs() < 1e-12);
+        }
+    }
+}

@@ -157,3 +157,33 @@ impl Controller for LinearQuadraticTracking {
         self.desired.reset();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use plant::hybrid::{PERIOD, TransferSystem};
+
+    use super::*;
+
+    #[test]
+    fn a_constant_disturbance_at_the_command_is_taken_out() {
+        let plant = TransferSystemParameters::default();
+        let design = LinearQuadraticDesign::default();
+        let mut law = LinearQuadraticTracking::design(&plant, &design, PERIOD).unwrap();
+        let mut system = TransferSystem::default();
+        for _ in 0..3 * 4096 {
+            let input = TrackingInput {
+                desired: 1e-3,
+                measured: system.state.displacement,
+                force: 0.0,
+            };
+            let command = law.step(&input, PERIOD);
+            system.step(command + 2e-4);
+        }
+        assert!((system.state.displacement - 1e-3).abs() < 1e-7);
+        let none = LinearQuadraticDesign {
+            command_weight: 0.0,
+            ..design
+        };
+        assert!(LinearQuadraticTracking::design(&plant, &none, PERIOD).is_err());
+    }
+}

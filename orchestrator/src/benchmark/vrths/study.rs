@@ -247,9 +247,10 @@ impl Study {
     }
 }
 
-/// Number of a run's draws of noise: another one for every case, motion and plant.
+/// Number of a run's draws of noise, another one for every case, motion and plant; it fits the
+/// parameter `stream` of the component TrackingSensors.
 fn stream(scene: &Scene<'_>, plant: usize) -> u64 {
-    u64::from(scene.case.number()) << 40 | (scene.place as u64) << 20 | plant as u64
+    u64::from(scene.case.number()) << 24 | (scene.place as u64) << 16 | plant as u64
 }
 
 impl ControllerScore {
