@@ -24,6 +24,9 @@ use plant::hybrid::{
 };
 
 const STEPS: usize = 40_000;
+/// The run is repeated; the fastest time of each step is what the step takes, the rest is what
+/// else the machine does.
+const REPEATS: usize = 9;
 
 type Law = Box<dyn Controller<Input = TrackingInput, Output = f64>>;
 
@@ -57,27 +60,30 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("law                 median   99.9 %   longest  (ns, {STEPS} steps)");
     for (name, mut law) in laws()? {
         let parameters = TransferSystemParameters::default();
-        let mut plant = TransferSystem::default();
         let specimen = [
             parameters.specimen_mass,
             parameters.specimen_damping(),
             parameters.specimen_stiffness,
         ];
         let frame = BenchmarkCase::ALL[0].frame();
-        let mut part = NumericalSubstructure::new(&frame, specimen, 0, 1, PERIOD)?;
-        let mut times = Vec::with_capacity(STEPS);
-        for k in 0..STEPS {
-            let input = TrackingInput {
-                desired: part.displacements()[0],
-                measured: plant.state.displacement,
-                force: plant.force(),
-            };
-            let start = Instant::now();
-            let command = std::hint::black_box(law.step(std::hint::black_box(&input), PERIOD));
-            times.push(start.elapsed().as_nanos());
-            let ground = 0.8 * (21.0 * k as f64 * PERIOD).sin();
-            plant.step(command);
-            part.step(input.force, [ground; 3]);
+        let mut times = vec![u128::MAX; STEPS];
+        for _ in 0..REPEATS {
+            law.reset();
+            let mut plant = TransferSystem::default();
+            let mut part = NumericalSubstructure::new(&frame, specimen, 0, 1, PERIOD)?;
+            for (k, time) in times.iter_mut().enumerate() {
+                let input = TrackingInput {
+                    desired: part.displacements()[0],
+                    measured: plant.state.displacement,
+                    force: plant.force(),
+                };
+                let start = Instant::now();
+                let command = std::hint::black_box(law.step(std::hint::black_box(&input), PERIOD));
+                *time = start.elapsed().as_nanos().min(*time);
+                let ground = 0.8 * (21.0 * k as f64 * PERIOD).sin();
+                plant.step(command);
+                part.step(input.force, [ground; 3]);
+            }
         }
         times.sort_unstable();
         println!(
