@@ -1,11 +1,9 @@
 //! Chapter 2 as a tool: the rig's parameters from noisy data taken in closed loop.
 
-mod identify_data;
-
+use acceptance::recordings::{PERIOD, Test};
 use identification::data::Recording;
 use identification::identify::model::{DELAY, PHYSICAL_NAMES};
 use identification::identify::rig::{Options, RigIdentification, identify};
-use identify_data::{PERIOD, Test};
 use nalgebra::Complex;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
