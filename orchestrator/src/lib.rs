@@ -2,6 +2,7 @@
 
 #![warn(clippy::missing_errors_doc)]
 
+pub mod benchmark;
 pub mod cli;
 pub mod comparison;
 pub mod component_library;

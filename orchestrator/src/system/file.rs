@@ -126,6 +126,9 @@ pub struct MeasurementsFile {
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentFile {
+    /// Time between samples of the motion, such as `"1 ms"`; absent: 2 ms.
+    #[serde(default)]
+    pub sampling: Option<Setting>,
     /// Coupling step, such as `"2 ms"`.
     #[serde(default)]
     pub step: Option<Setting>,
@@ -268,6 +271,14 @@ impl SystemFile {
         Ok(file)
     }
 
+    /// Time between samples of the motion, s.
+    ///
+    /// # Errors
+    /// What stands there is no time.
+    pub fn sampling(&self) -> Result<Option<f64>, SystemError> {
+        self.time("sampling", self.experiment.sampling.as_ref())
+    }
+
     /// Coupling step of the experiment, s.
     ///
     /// # Errors
@@ -347,6 +358,7 @@ impl SystemFile {
             }
         }
         let (own, other) = (&mut self.experiment, part.experiment);
+        own.sampling = other.sampling.or(own.sampling.take());
         own.step = other.step.or(own.step.take());
         own.duration = other.duration.or(own.duration.take());
         own.record = other.record.or(own.record.take());
