@@ -5,4 +5,5 @@ pub mod monolithic;
 pub mod native_rig;
 pub mod physical_recordings;
 pub mod python;
+pub mod recordings;
 pub mod shared;

@@ -7,7 +7,7 @@ use controllers::pid::{Pid, PidInput};
 use controllers::{Controller, ModelError};
 use identification::closed_loop::Found;
 use identification::closed_loop::simulation::Simulation;
-use identification::data::Recording;
+use identification::data::{Channel, Recording};
 use plant::sensors::channel::Noise;
 use plant::sensors::instrumentation::{Instrumentation, InstrumentationState, TrueMotion};
 use plant::servo_hydraulic::{SealFriction, ServoHydraulicRig, ServoHydraulicTable};
@@ -291,14 +291,14 @@ impl PhysicalTest {
         }
         let [x, a, f, s] = played.measured;
         let mut columns = vec![
-            ("reference".to_string(), played.reference),
-            ("valve_command".to_string(), played.command),
-            ("displacement".to_string(), x),
-            ("acceleration".to_string(), a),
-            ("actuator_force".to_string(), f),
+            (Channel::Reference, played.reference),
+            (Channel::ValveCommand, played.command),
+            (Channel::Displacement, x),
+            (Channel::Acceleration, a),
+            (Channel::ActuatorForce, f),
         ];
         if self.specimen != OnTable::Nothing {
-            columns.push(("specimen_acceleration".to_string(), s));
+            columns.push((Channel::SpecimenAcceleration, s));
         }
         Ok(Recording::new(&self.name, self.period, columns)?)
     }

@@ -24,7 +24,7 @@ use self::friction::{SHAPE, SealShape};
 use self::least_squares::{Coordinate, Optimum, minimise};
 use self::specimen::SpecimenFit;
 use crate::IdentificationError;
-use crate::data::{Recording, mean_and_deviation};
+use crate::data::{Channel, Recording, mean_and_deviation};
 
 /// How to identify.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,17 +94,17 @@ const NEEDED: &str = "valve_command, displacement, acceleration, actuator_force 
 
 impl<'a> Channels<'a> {
     fn new(recording: &'a Recording) -> Result<Self, IdentificationError> {
-        let x = recording.require("displacement", NEEDED)?;
-        let a = recording.require("acceleration", NEEDED)?;
+        let x = recording.require(Channel::Displacement, NEEDED)?;
+        let a = recording.require(Channel::Acceleration, NEEDED)?;
         Ok(Self {
             recording,
-            velocity: velocity::velocity(x, a, recording.period)?,
+            velocity: velocity::velocity(x, a, recording.period())?,
         })
     }
 
     /// The band of the fit, Hz.
     fn band(&self, settings: &Settings) -> (f64, f64) {
-        let highest = 0.35 / self.recording.period;
+        let highest = 0.35 / self.recording.period();
         (settings.band.0, settings.band.1.min(highest))
     }
 
@@ -116,9 +116,9 @@ impl<'a> Channels<'a> {
         specimen: bool,
     ) -> Result<Bands, IdentificationError> {
         let recording = self.recording;
-        let period = recording.period;
-        let command = recording.require("valve_command", NEEDED)?;
-        let reference = recording.channel("reference").unwrap_or(command);
+        let period = recording.period();
+        let command = recording.require(Channel::ValveCommand, NEEDED)?;
+        let reference = recording.channel(Channel::Reference).unwrap_or(command);
         let band = self.band(settings);
         let nothing = vec![0.0; recording.len()];
         let mut friction = vec![nothing.clone(); 1 + SHAPE];
@@ -131,13 +131,13 @@ impl<'a> Channels<'a> {
         }
         let mut channels = vec![
             command,
-            recording.require("displacement", NEEDED)?,
-            recording.require("acceleration", NEEDED)?,
-            recording.require("actuator_force", NEEDED)?,
+            recording.require(Channel::Displacement, NEEDED)?,
+            recording.require(Channel::Acceleration, NEEDED)?,
+            recording.require(Channel::ActuatorForce, NEEDED)?,
             &friction[0],
         ];
         channels.push(if specimen {
-            recording.require("specimen_acceleration", NEEDED)?
+            recording.require(Channel::SpecimenAcceleration, NEEDED)?
         } else {
             &nothing
         });
@@ -201,7 +201,7 @@ pub fn identify(
         .collect::<Result<_, _>>()?;
     let specimen = recordings
         .iter()
-        .all(|r| r.channel("specimen_acceleration").is_some());
+        .all(|r| r.channel(Channel::SpecimenAcceleration).is_some());
     let bands = |shape| -> Result<Equations, IdentificationError> {
         let experiments = channels
             .iter()
@@ -217,14 +217,14 @@ pub fn identify(
         let sum: f64 = channels.iter().map(|c| of(c).powi(2)).sum();
         (sum / channels.len().max(1) as f64).sqrt()
     };
-    let size = |name: &'static str| {
+    let size = |channel: Channel| {
         root_mean_square(&|c: &Channels| {
             c.recording
-                .channel(name)
+                .channel(channel)
                 .map_or(0.0, |v| mean_and_deviation(v).1)
         })
     };
-    let (way, force) = (size("displacement"), size("actuator_force"));
+    let (way, force) = (size(Channel::Displacement), size(Channel::ActuatorForce));
 
     let mut shape = SealShape {
         presliding: 0.01 * way,
@@ -310,7 +310,7 @@ pub fn identify(
     let covariance = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
         excess * optimum.covariance[(i, j)] * slopes[i] * slopes[j]
     });
-    let floor = |channel: &str| {
+    let floor = |channel: Channel| {
         let own = channels.first().and_then(|c| c.recording.channel(channel));
         own.map_or(0.0, velocity::noise_floor)
     };
@@ -324,14 +324,14 @@ pub fn identify(
         specimen: specimen.then(|| carried(&channels, &equations)).flatten(),
         converged: optimum.converged,
         noise: [
-            "displacement",
-            "acceleration",
-            "actuator_force",
-            "specimen_acceleration",
-            "valve_command",
+            Channel::Displacement,
+            Channel::Acceleration,
+            Channel::ActuatorForce,
+            Channel::SpecimenAcceleration,
+            Channel::ValveCommand,
         ]
         .map(floor),
-        period: channels.first().map_or(0.0, |c| c.recording.period),
+        period: channels.first().map_or(0.0, |c| c.recording.period()),
         warnings: Vec::new(),
     };
     found.warnings = remarks(&found, recordings);
@@ -361,7 +361,7 @@ fn remarks(found: &Found, recordings: &[Recording]) -> Vec<String> {
         );
     }
     for recording in recordings {
-        if recording.channel("reference").is_none() {
+        if recording.channel(Channel::Reference).is_none() {
             all.push(format!(
                 "{}: no `reference` is recorded; the command stands in for it, so noise on the \
                  recorded command and what is fed back bias the result unseen",
@@ -382,11 +382,17 @@ fn remarks(found: &Found, recordings: &[Recording]) -> Vec<String> {
 /// The specimen of the recordings.
 fn carried(channels: &[Channels], equations: &Equations) -> Option<SpecimenFit> {
     let [damping, stiffness] = start::specimen(&equations.experiments)?;
-    let of = |name: &str| -> Option<Vec<&[f64]>> {
-        channels.iter().map(|c| c.recording.channel(name)).collect()
+    let of = |channel: Channel| -> Option<Vec<&[f64]>> {
+        channels
+            .iter()
+            .map(|c| c.recording.channel(channel))
+            .collect()
     };
-    let period = channels.first()?.recording.period;
-    let (base, mass) = (of("acceleration")?, of("specimen_acceleration")?);
+    let period = channels.first()?.recording.period();
+    let (base, mass) = (
+        of(Channel::Acceleration)?,
+        of(Channel::SpecimenAcceleration)?,
+    );
     specimen::fit(&base, &mass, period, damping, stiffness)
 }
 

@@ -121,6 +121,12 @@ pub fn table(
                 .into(),
         });
     }
+    if !(1e-3..1e6).contains(&mass) {
+        return Err(IdentificationError::Unstable {
+            what: format!("the table's mass comes out as {mass:.3e} kg"),
+            remedy: "check the units of actuator_force and acceleration in the header".into(),
+        });
+    }
     let mut rig = empty();
     rig.mass = mass;
     rig.damping = solution[1].max(0.0);

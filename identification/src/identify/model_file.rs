@@ -18,7 +18,8 @@ use units::constants::{INCH, LBF};
 
 use crate::IdentificationError;
 use crate::closed_loop::model_section::{HydraulicSection, UncertaintySection};
-use crate::identify::model::{DELAY, MASS, OUTPUT_NAMES, SPECIMEN};
+use crate::data::OUTPUT_NAMES;
+use crate::identify::model::{DELAY, MASS, SPECIMEN};
 use crate::identify::rig::RigIdentification;
 
 /// The name of the thesis's units, and the default of a file that names none.

@@ -23,9 +23,9 @@ use controllers::tuning::sliding_mode::{Hierarchy, SlidingModeTuning};
 use serde::{Deserialize, Serialize};
 use units::constants::SAMPLING_PERIOD;
 
-use super::connection::{Link, Origin};
 use super::control_model::ControlModel;
 use super::file::{ComponentFile, SystemFile};
+use super::link::{Link, Origin};
 use super::model::shake_table_values;
 use super::rule::Rule;
 
@@ -61,7 +61,9 @@ pub(super) fn apply(
     let own;
     let rules = match (wanted.tuning, wanted.model, plant.commissioned) {
         (Some(Tuning::Printed), Some(_), _) => {
-            return Err("printed parameters know no `--control-model`; expected one of the two".into());
+            return Err(
+                "printed parameters know no `--control-model`; expected one of the two".into(),
+            );
         }
         (Some(Tuning::Printed), None, _) | (None, None, false) => return Ok(()),
         (Some(Tuning::Tuned), None, false) => {
@@ -72,9 +74,8 @@ pub(super) fn apply(
             ));
         }
         (_, Some(path), _) => {
-            own = Rules::new(ControlModel::read(path)?).map_err(|error| {
-                format!("{}: {error}", path.display())
-            })?;
+            own = Rules::new(ControlModel::read(path)?)
+                .map_err(|error| format!("{}: {error}", path.display()))?;
             &own
         }
         (_, None, true) => {
@@ -177,19 +178,7 @@ impl Rules {
     }
 
     fn three_variable(&self, component: &mut ComponentFile) {
-        let g = &self.gains;
-        set(
-            component,
-            &[
-                ("proportional_gain", g.proportional),
-                ("integral_gain", g.integral),
-                ("velocity_feedback_gain", g.velocity_feedback),
-                ("acceleration_feedback_gain", g.acceleration_feedback),
-                ("displacement_feedforward_gain", g.displacement_feedforward),
-                ("velocity_feedforward_gain", g.velocity_feedforward),
-                ("acceleration_feedforward_gain", g.acceleration_feedforward),
-            ],
-        );
+        set(component, &self.gains.named());
     }
 
     fn force_pid(&self, component: &mut ComponentFile) {

@@ -1,0 +1,39 @@
+//! The rig of a built-in system, as options.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::system::built_in;
+use crate::system::tuning::Tuning;
+
+/// Options that choose a rig.
+#[derive(Debug, Default, Args)]
+pub struct RigArguments {
+    /// Plant of a built-in system: identified, servohydraulic [default: identified]
+    #[arg(long)]
+    pub plant: Option<String>,
+    /// Specimen of a built-in system: none, linear, yielding [default: linear]
+    #[arg(long)]
+    pub specimen: Option<String>,
+    /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
+    #[arg(long, value_enum)]
+    pub tuning: Option<Tuning>,
+    /// Model that the controllers are tuned on, as `shakebench identify` writes it
+    #[arg(long, value_name = "MODEL.toml")]
+    pub control_model: Option<PathBuf>,
+}
+
+impl RigArguments {
+    /// The plant, chosen or not.
+    pub fn plant(&self) -> String {
+        let plant = self.plant.as_deref();
+        plant.unwrap_or(built_in::DEFAULT_PLANT).to_string()
+    }
+
+    /// The specimen, chosen or not.
+    pub fn specimen(&self) -> String {
+        let specimen = self.specimen.as_deref();
+        specimen.unwrap_or(built_in::DEFAULT_SPECIMEN).to_string()
+    }
+}

@@ -1,0 +1,168 @@
+//! A rig identified from recordings: figures, model file and report.
+
+mod hydraulic;
+mod page;
+mod parameters;
+mod responses;
+mod summary;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use identification::IdentificationError;
+use identification::data::Recording;
+use identification::identify::model_file::ModelFile;
+use identification::identify::rig::{self, Options, RigIdentification};
+use identification::identify::specimen_file;
+
+pub use hydraulic::{EQUATION_COLUMNS, HydraulicIdentification, PARAMETER_COLUMNS};
+pub use parameters::parameters;
+pub use summary::Summary;
+
+use crate::error::Error;
+use crate::report;
+use crate::results::Results;
+
+/// What is identified from what.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Recordings of one rig.
+    pub data: Vec<PathBuf>,
+    /// Where the model goes.
+    pub model: PathBuf,
+    /// Part of each recording that is fitted before the rest validates it.
+    pub fit_part: f64,
+    /// File of a known specimen.
+    pub specimen: Option<PathBuf>,
+}
+
+/// What kind of rig explains the recordings.
+pub enum Form {
+    /// That of Eq 2-4 with linear table and specimen.
+    General(Box<RigIdentification>),
+    /// A hydraulic one with friction and late sensors.
+    Hydraulic(Box<HydraulicIdentification>),
+}
+
+/// An identified rig, with what it was identified from.
+pub struct Identified {
+    /// The rig.
+    pub form: Form,
+    /// Its figures.
+    pub summary: Summary,
+    recordings: Vec<Recording>,
+}
+
+/// Identifies a rig.
+///
+/// # Errors
+/// Data at fault.
+pub fn identify(request: &Request) -> Result<Identified, Error> {
+    let started = Instant::now();
+    let mut recordings = Vec::new();
+    let mut warnings = Vec::new();
+    for path in &request.data {
+        let measured = Recording::read(path, &path.display().to_string())?;
+        let (pieces, findings) = measured.on_even_base()?;
+        warnings.extend(findings.iter().map(ToString::to_string));
+        recordings.extend(long_enough(pieces, &mut warnings));
+    }
+    let specimen = match &request.specimen {
+        Some(path) => Some(specimen_file::read(path)?),
+        None => None,
+    };
+    let options = Options {
+        fit_part: request.fit_part,
+        specimen,
+        ..Options::default()
+    };
+    let form = form(&recordings, options)?;
+    let wall = started.elapsed().as_secs_f64();
+    let summary = match &form {
+        Form::General(found) => {
+            warnings.extend(found.warnings.iter().cloned());
+            Summary::new(&request.model, found, warnings, wall)
+        }
+        Form::Hydraulic(own) => own.summary(&request.model, warnings, wall),
+    };
+    Ok(Identified {
+        form,
+        summary,
+        recordings,
+    })
+}
+
+/// The general form where it explains the recordings, else a hydraulic rig where that does.
+fn form(recordings: &[Recording], options: Options) -> Result<Form, IdentificationError> {
+    let general = match rig::identify(recordings, options) {
+        Ok(found) if found.residuals.iter().all(|(_, _, test)| test.is_white()) => {
+            return Ok(Form::General(Box::new(found)));
+        }
+        // A specimen that is given is one of the general form.
+        other if options.specimen.is_some() => {
+            return other.map(|found| Form::General(Box::new(found)));
+        }
+        other => other,
+    };
+    match (
+        HydraulicIdentification::new(recordings, options.fit_part),
+        general,
+    ) {
+        (Ok(own), general) if own.holds() || general.is_err() => Ok(Form::Hydraulic(Box::new(own))),
+        (_, Ok(found)) => Ok(Form::General(Box::new(found))),
+        // The hydraulic form's fault says more than a search that came to no end.
+        (Err(own), Err(IdentificationError::NotConverged { .. })) => Err(own),
+        (_, Err(general)) => Err(general),
+    }
+}
+
+/// Leaves out pieces between gaps that are too short to fit, where longer ones remain.
+fn long_enough(pieces: Vec<Recording>, warnings: &mut Vec<String>) -> Vec<Recording> {
+    const SHORTEST: f64 = 5.0;
+    let longest = pieces.iter().map(Recording::duration).fold(0.0, f64::max);
+    let (kept, dropped): (Vec<_>, Vec<_>) = pieces
+        .into_iter()
+        .partition(|piece| piece.duration() >= SHORTEST.min(longest));
+    for piece in dropped {
+        warnings.push(format!(
+            "{}: left out, {:.2} s are too short",
+            piece.name,
+            piece.duration()
+        ));
+    }
+    kept
+}
+
+impl Identified {
+    /// Writes model and report beside each other, both or none.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn write(&self) -> Result<(), Error> {
+        let path = &self.summary.model;
+        let beside = path.with_extension("html");
+        let page = match &self.form {
+            Form::General(found) => page::report(found, &self.recordings, &self.summary),
+            Form::Hydraulic(own) => own.report(&self.summary),
+        };
+        let page = report::html(&page).map_err(|error| Error::File {
+            path: beside.clone(),
+            reason: error.to_string(),
+        })?;
+        let model = match &self.form {
+            Form::General(found) => ModelFile::from_identification(found).to_toml()?,
+            Form::Hydraulic(own) => own.file.to_toml()?,
+        };
+        let folder = match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let mut results = Results::begin(folder)?;
+        for (file, text) in [(path, &model), (&beside, &page)] {
+            let name = file.file_name().unwrap_or_default();
+            results.write_text(&name.to_string_lossy(), text)?;
+        }
+        results.finish()?;
+        Ok(())
+    }
+}
