@@ -4,7 +4,7 @@
 //! model, a specimen or an actuator from needless damage; whoever works at a rig is protected by
 //! the emergency stop, the pressure-off valve and the fence, none of which may depend on it.
 
-use units::constants::{G, INCH, LBF, SAMPLING_PERIOD, STROKE};
+use units::constants::{G, INCH, LBF, STROKE};
 
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};
@@ -118,8 +118,28 @@ impl Trip {
         Self::Activity,
     ];
 
+    /// Its short name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::NotFinite => "not-finite",
+            Self::Stale => "stale",
+            Self::Heartbeat => "heartbeat",
+            Self::Displacement => "displacement",
+            Self::StoppingDistance => "stopping-distance",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+            Self::Force => "force",
+            Self::TrackingError => "tracking-error",
+            Self::Saturation => "saturation",
+            Self::Stop => "stop",
+            Self::SpecimenLost => "specimen-lost",
+            Self::Activity => "activity",
+        }
+    }
+
     /// The cause in words.
-    pub fn words(self) -> &'static str {
+    pub const fn words(self) -> &'static str {
         match self {
             Self::None => "not tripped",
             Self::NotFinite => "an input is not a finite number",
@@ -451,9 +471,6 @@ impl Controller for Interlock {
         };
     }
 }
-
-/// Longest time from a trip to the valve at null with the default settings, s.
-pub const TIME_TO_NULL: f64 = 0.02 + SAMPLING_PERIOD;
 
 #[cfg(test)]
 #[path = "interlock_tests.rs"]

@@ -1,5 +1,8 @@
 //! Hydraulic shake tables as FMI components, co-simulated
 
+#![warn(clippy::missing_errors_doc)]
+
+pub mod benchmark;
 pub mod cli;
 pub mod comparison;
 pub mod component_library;
@@ -8,6 +11,7 @@ pub mod diagnosis;
 pub mod error;
 pub mod extended_model;
 pub mod fmu;
+pub mod identify;
 pub mod library;
 pub mod master;
 pub mod metrics;

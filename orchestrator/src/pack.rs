@@ -4,99 +4,22 @@
 //! builds it, and the built library tells its own name, model descriptions and documentation.
 
 mod archive;
+pub(crate) mod error;
 mod variant;
 mod workspace;
 
 use std::{
-    io,
     path::{Path, PathBuf},
     sync::OnceLock,
 };
 
-use thiserror::Error;
-
 use crate::component_library::{ComponentLibrary, Descriptions};
 pub use crate::fmu::FmiVersion;
+pub use archive::PackedFmu;
+pub use error::PackError;
+pub(crate) use error::file_error;
 pub use variant::{StartValue, write_variant};
-use workspace::Workspace;
-
-/// An FMU that was packed.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PackedFmu {
-    /// The component's name.
-    pub name: String,
-    /// The version it is packed for.
-    pub version: FmiVersion,
-    /// The archive.
-    pub path: PathBuf,
-}
-
-/// Why FMUs could not be built or packed.
-#[derive(Debug, Error)]
-pub enum PackError {
-    /// The program does not run inside its workspace.
-    #[error(
-        "no workspace with `fmus/kit` found above {0}: components are built from source, so run \
-         this inside the project's folder"
-    )]
-    NoWorkspace(PathBuf),
-    /// Cargo could not be started.
-    #[error("cannot start `{cargo}`, which builds the components: {error}")]
-    NoCargo {
-        /// The command.
-        cargo: String,
-        /// What the system says.
-        error: io::Error,
-    },
-    /// Cargo failed.
-    #[error("`{command}` failed:\n{output}")]
-    Cargo {
-        /// The command.
-        command: String,
-        /// What it wrote to standard error.
-        output: String,
-    },
-    /// Cargo's answer has another form than expected.
-    #[error("`cargo {command}` answered in an unexpected form: {problem}")]
-    Answer {
-        /// The subcommand.
-        command: &'static str,
-        /// What was missing.
-        problem: String,
-    },
-    /// A library does not describe itself as a component does.
-    #[error("{library}: {problem}")]
-    Library {
-        /// The library.
-        library: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
-    /// A file could not be read or written.
-    #[error("{path}: {error}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        error: io::Error,
-    },
-    /// An FMU cannot be varied as asked.
-    #[error("{path}: {problem}")]
-    Variant {
-        /// The FMU.
-        path: PathBuf,
-        /// What is wrong and what was expected.
-        problem: String,
-    },
-    /// FMUs could not be packed earlier in this process.
-    #[error("{0}")]
-    Earlier(String),
-}
-
-pub(crate) fn file_error(path: &Path) -> impl FnOnce(io::Error) -> PackError {
-    let path = path.to_path_buf();
-    move |error| PackError::File { path, error }
-}
+use workspace::{Component, Workspace};
 
 /// Builds every component and packs it as `out/fmi2/NAME.fmu` and `out/fmi3/NAME.fmu`, as far as
 /// it is not there already. Sorted by name, then version.
@@ -104,22 +27,21 @@ pub(crate) fn file_error(path: &Path) -> impl FnOnce(io::Error) -> PackError {
 /// # Errors
 /// When the workspace, cargo or the folder is not usable, or a component does not compile.
 pub fn build_fmus(out: &Path, versions: &[FmiVersion]) -> Result<Vec<PackedFmu>, PackError> {
-    let workspace = Workspace::find()?;
-    let packages = workspace.packages_under("fmus")?;
-    workspace.pack(&packages, out, versions)
+    Workspace::find()?.pack(Workspace::published, out, versions)
 }
 
-/// Builds and packs one package of the workspace that [`build_fmus`] does not list, such as a
-/// component made for tests.
+/// Builds and packs the component whose crate lies in a folder of the workspace, also one that
+/// [`build_fmus`] does not list, such as `tests/importers/faulty`.
 ///
 /// # Errors
 /// As [`build_fmus`].
-pub fn build_package(
-    package: &str,
+pub fn build_component(
+    folder: &str,
     out: &Path,
     versions: &[FmiVersion],
 ) -> Result<Vec<PackedFmu>, PackError> {
-    Workspace::find()?.pack(&[package.to_string()], out, versions)
+    let component = |workspace: &Workspace| Ok(vec![workspace.component_in(folder)?]);
+    Workspace::find()?.pack(component, out, versions)
 }
 
 /// All FMUs of both versions in `target/fmus`, built at most once in a process.
@@ -149,10 +71,8 @@ pub fn default_folder() -> Result<PathBuf, PackError> {
 /// # Errors
 /// As [`build_fmus`].
 pub fn model_descriptions() -> Result<Vec<(PathBuf, String)>, PackError> {
-    let workspace = Workspace::find()?;
-    let packages = workspace.packages_under("fmus")?;
     let mut files = Vec::new();
-    for library in workspace.build(&packages)? {
+    for Component { library, .. } in Workspace::find()?.published()? {
         let Descriptions {
             name, fmi2, fmi3, ..
         } = ComponentLibrary::open(&library)?.describe()?;

@@ -21,10 +21,10 @@ use std::fmt;
 
 pub use error::MasterError;
 pub use record::Record;
-pub use run::{Ended, LogLine, Outcome, Pace};
+pub use run::{Ended, Ending, LogLine, Outcome, Pace};
 
-use crate::fmu::{Instance, State};
-use action::Action;
+use crate::fmu::{Instance, Item, State};
+use action::{Action, Moment};
 use reference::Reference;
 use transfer::{Inputs, Outputs};
 
@@ -49,7 +49,7 @@ pub enum Algorithm {
     #[default]
     GaussSeidel,
     /// In dependency order; loops of direct feedthrough and the coupling over a step are repeated
-    /// until the values stand still (the FMUs must be able to save their state).
+    /// until the values converge (the FMUs must be able to save their state).
     Iterative,
 }
 
@@ -78,16 +78,24 @@ pub struct Simulation {
     reference: Reference,
     parts: Vec<Part>,
     actions: Vec<Action>,
-    /// The signal that ends the run when it is not 0, and how long the run goes on then, s.
-    end_when: Option<(usize, f64)>,
+    /// What ends the run early.
+    end: Option<EndSignals>,
     /// The part and input that is set when a sampled component fails.
     stop: Option<(usize, u32)>,
-    /// The output that says why the run was ended, beside that of `end_when`.
-    cause: Option<usize>,
     /// The signals at the tick before; in [`Algorithm::Iterative`] those of the last repetition.
     last_signals: Vec<f64>,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
     next_signals: Vec<f64>,
+}
+
+/// What ends a run early.
+struct EndSignals {
+    /// The signal that ends the run when it is not 0.
+    when: usize,
+    /// The signal that says why, and what its values mean.
+    cause: Option<(usize, Vec<Item>)>,
+    /// How long the run goes on then, s.
+    after: f64,
 }
 
 /// A component in a simulation.
@@ -158,7 +166,7 @@ impl Simulation {
     /// Makes the outputs at the present tick known; due sampled components are called.
     ///
     /// # Errors
-    /// A call that an FMU did not complete, or a loop that does not settle.
+    /// A call that an FMU did not complete, or a loop that does not converge.
     pub fn observe(&mut self) -> Result<(), MasterError> {
         self.reference
             .sample(self.tick / self.ticks_per_row, &mut self.signals);
@@ -168,10 +176,18 @@ impl Simulation {
         }
     }
 
+    /// Carries out all actions.
+    fn perform(&mut self, at: Moment) -> Result<(), MasterError> {
+        for action in &mut self.actions {
+            action.perform(at, &mut self.parts, &mut self.signals, &self.names)?;
+        }
+        Ok(())
+    }
+
     /// Steps over `[t_k, t_k + h]`.
     ///
     /// # Errors
-    /// A call that an FMU did not complete, or a coupling that does not settle.
+    /// A call that an FMU did not complete, or a coupling that does not converge.
     pub fn advance(&mut self) -> Result<(), MasterError> {
         match self.algorithm {
             Algorithm::Jacobi => jacobi::advance(self)?,

@@ -127,9 +127,9 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
     let motion = motion(request, &file)?;
     let mut library = FmuLibrary::new(request.fmi, file.directory.as_deref());
     let system = system::assemble(&file, &request.set, &mut |name| library.find(name))?;
-    let step = request.step_s.or(file.time("step")?).unwrap_or(motion.dt);
+    let step = request.step_s.or(file.step()?).unwrap_or(motion.dt);
     let mut samples = motion.len();
-    if let Some(duration) = request.duration_s.or(file.time("duration")?) {
+    if let Some(duration) = request.duration_s.or(file.duration()?) {
         if !(duration >= motion.dt && duration.is_finite()) {
             let reason = format!("{duration} s is shorter than a sample of {} s", motion.dt);
             return Err(Error::Option {
@@ -148,13 +148,15 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
 }
 
 fn motion(request: &Request, file: &SystemFile) -> Result<Motion, Error> {
+    let usual = motion::Options::default();
     let options = motion::Options {
+        sample_time: file.sampling()?.unwrap_or(usual.sample_time),
         scaling: request.scaling.map(|scale| match scale {
             Scale::Factor(factor) => Scaling::Factor(factor),
             Scale::PeakAcceleration(peak) => Scaling::PeakAcceleration(peak),
             Scale::PeakDisplacement(peak) => Scaling::PeakDisplacement(peak),
         }),
-        ..motion::Options::default()
+        ..usual
     };
     let beside = |path: &String| {
         file.directory

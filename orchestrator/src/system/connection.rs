@@ -1,162 +1,42 @@
-//! `"table.displacement -> control.measured_displacement"`.
+//! Connections checked against the FMUs: names, types and units.
 
-use super::assemble::{component_index, find};
-use super::{Component, Connection, hint};
+use super::checked::{Component, Connection, Source};
+use super::link::{Link, Origin};
+use super::lookup::{component_index, find};
 use crate::fmu::{Causality, Kind, Variable};
 use crate::units::Unit;
 
-/// Where a connection's value comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Source {
-    /// The motion that the table is asked for.
-    Reference {
-        /// What of it.
-        quantity: Quantity,
-        /// How many samples ahead of the present one; negative: before it.
-        ahead: isize,
-    },
-    /// An output of a component.
-    Output {
-        /// The component.
-        component: usize,
-        /// Position of the variable.
-        variable: usize,
-    },
-}
-
-/// What of the reference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Quantity {
-    /// Displacement, m.
-    Displacement,
-    /// Velocity, m/s.
-    Velocity,
-    /// Acceleration, m/s².
-    Acceleration,
-}
-
-impl Quantity {
-    /// All of them, in the order of their results.
-    pub const ALL: [Self; 3] = [Self::Displacement, Self::Velocity, Self::Acceleration];
-
-    /// Its name as an output of `reference`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Displacement => "displacement",
-            Self::Velocity => "velocity",
-            Self::Acceleration => "acceleration",
-        }
-    }
-
-    /// Its unit.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Displacement => "m",
-            Self::Velocity => "m/s",
-            Self::Acceleration => "m/s2",
-        }
-    }
-}
-
-/// The two ends of a connection as written; `[a..b]` on both sides stands for several.
-///
-/// # Errors
-/// What was expected.
-pub(super) fn parse(text: &str) -> Result<Vec<(String, String)>, String> {
-    let (from, to) = text
-        .split_once("->")
-        .ok_or("expected \"component.output -> component.input\"")?;
-    let (from, to) = (expand(from.trim())?, expand(to.trim())?);
-    if from.len() != to.len() {
-        return Err(format!(
-            "{} values on the left and {} on the right",
-            from.len(),
-            to.len()
-        ));
-    }
-    Ok(from.into_iter().zip(to).collect())
-}
-
-fn expand(end: &str) -> Result<Vec<String>, String> {
-    let range = end
-        .strip_suffix(']')
-        .and_then(|rest| rest.rsplit_once('['))
-        .and_then(|(name, range)| Some((name, range.split_once("..")?)));
-    let Some((name, (first, last))) = range else {
-        return Ok(vec![end.to_string()]);
-    };
-    let bound = |text: &str| text.trim().parse::<usize>().ok().filter(|&n| n < 100_000);
-    match (bound(first), bound(last)) {
-        (Some(first), Some(last)) if first <= last => Ok((first..=last)
-            .map(|index| format!("{name}[{index}]"))
-            .collect()),
-        _ => Err(format!("`{end}` has no range such as [1..15]")),
-    }
-}
-
-/// `displacement` or `displacement[3]` of the reference.
-fn reference(variable: &str) -> Option<Source> {
-    let (name, ahead) = match variable.strip_suffix(']') {
-        None => (variable, 0),
-        Some(rest) => {
-            let (name, index) = rest.split_once('[')?;
-            (
-                name,
-                index
-                    .trim()
-                    .parse()
-                    .ok()
-                    .filter(|ahead: &isize| ahead.abs() < 100_000)?,
-            )
-        }
-    };
-    let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name)?;
-    Some(Source::Reference { quantity, ahead })
-}
-
-pub(super) fn split(end: &str) -> Result<(&str, &str), String> {
-    end.split_once('.')
-        .ok_or_else(|| format!("`{end}` should read component.variable"))
-}
-
-/// The connection of `from` to `to`, after its names, types and units were checked.
+/// The connection of a link, after its names, types and units were checked.
 ///
 /// # Errors
 /// What does not hold.
-pub(super) fn connect(
-    components: &[Component],
-    from: &str,
-    to: &str,
-) -> Result<Connection, String> {
-    let (component, variable) = split(to)?;
-    let component = component_index(components, component)?;
-    let input = find(&components[component].fmu, variable, Causality::Input)?;
+pub(super) fn connect(components: &[Component], link: &Link) -> Result<Connection, String> {
+    let Link { from, to, .. } = link;
+    let component = component_index(components, &to.component)?;
+    let input = find(&components[component].fmu, &to.variable, Causality::Input)?;
     let target = &components[component].fmu.description.variables[input];
 
-    let (name, variable) = split(from)?;
-    let (source, kind, unit) = if name == "reference" {
-        let source = reference(variable).ok_or_else(|| {
-            let known = Quantity::ALL.into_iter().map(Quantity::name);
-            format!(
-                "the reference has no `{variable}`{} (or `displacement[3]`, three samples ahead)",
-                hint(variable, known)
-            )
-        })?;
-        let Source::Reference { quantity, .. } = source else {
-            return Err(format!("`{from}` is no reference"));
-        };
-        (source, Kind::Float64, Some(quantity.unit()))
-    } else {
-        let component = component_index(components, name)?;
-        let variable = find(&components[component].fmu, variable, Causality::Output)?;
-        let output = &components[component].fmu.description.variables[variable];
-        let source = Source::Output {
-            component,
-            variable,
-        };
-        (source, output.kind.clone(), output.unit.as_deref())
+    let (source, kind, unit) = match from {
+        Origin::Reference { quantity, ahead } => {
+            let source = Source::Reference {
+                quantity: *quantity,
+                ahead: *ahead,
+            };
+            (source, &Kind::Float64, Some(quantity.unit()))
+        }
+        Origin::Output(name) => {
+            let component = component_index(components, &name.component)?;
+            let fmu = &components[component].fmu;
+            let variable = find(fmu, &name.variable, Causality::Output)?;
+            let output = &fmu.description.variables[variable];
+            let source = Source::Output {
+                component,
+                variable,
+            };
+            (source, &output.kind, output.unit.as_deref())
+        }
     };
-    fits(&kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
+    fits(kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
     let factor = factor(unit, target.unit.as_deref())
         .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
     Ok(Connection {

@@ -7,7 +7,8 @@
 
 use std::collections::HashMap;
 
-use super::{Connection, Source, System, SystemError};
+use super::checked::{Connection, Source, System};
+use super::error::SystemError;
 use crate::fmu::Causality;
 
 /// A thing to do at a sample.
@@ -25,7 +26,7 @@ pub enum Operation {
         /// The component.
         component: usize,
     },
-    /// Repeat these until their values stand still.
+    /// Repeat these until their values converge.
     Iterate(Vec<Operation>),
 }
 
@@ -43,7 +44,17 @@ struct Node {
     output: Option<usize>,
 }
 
-pub(super) fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
+impl System {
+    /// The order in which outputs become known and components are called at a sample.
+    ///
+    /// # Errors
+    /// A loop of direct feedthrough, unless `iterate` is set.
+    pub fn schedule(&self, iterate: bool) -> Result<Schedule, SystemError> {
+        schedule(self, iterate)
+    }
+}
+
+fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
     let nodes = nodes(system);
     let place: HashMap<Node, usize> = nodes.iter().enumerate().map(|(i, &n)| (n, i)).collect();
     let predecessors: Vec<Vec<usize>> = nodes
@@ -259,8 +270,9 @@ fn cycle(
         let connection = drivers(system, &nodes[node])
             .find(|c| source_node(system, c.source) == Some(nodes[from]));
         if let Some(connection) = connection {
-            variables.push(system.source_name(connection.source));
-            variables.push(system.variable_name(connection.component, connection.input));
+            variables.push(system.origin(connection.source).to_string());
+            let input = system.variable_name(connection.component, connection.input);
+            variables.push(input.to_string());
         }
     }
     variables.extend(variables.first().cloned());
