@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use super::connection::{self, connect, split};
 use super::file::{ComponentFile, SystemFile};
-use super::{Component, DEFAULT_PERIOD, System, SystemError, Value, hint, model, value};
+use super::{Component, DEFAULT_PERIOD, System, SystemError, Value, model, value};
+use crate::units::hint;
 use crate::fmu::{Causality, Fmu, Kind, Variability};
 
 /// Finds the FMU of a component by what the system file calls it.

@@ -2,7 +2,8 @@
 //! of their own; a system is a controller on a rig.
 
 use super::tuning::{self, Tuning};
-use super::{SystemError, SystemFile, hint};
+use super::{SystemError, SystemFile};
+use crate::units::hint;
 
 macro_rules! parts {
     ($($name:literal),* $(,)?) => {

@@ -1,9 +1,9 @@
 //! `"table.displacement -> control.measured_displacement"`.
 
 use super::assemble::{component_index, find};
-use super::{Component, Connection, hint};
+use super::{Component, Connection};
 use crate::fmu::{Causality, Kind, Variable};
-use crate::units::Unit;
+use crate::units::{Unit, hint};
 
 /// Where a connection's value comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

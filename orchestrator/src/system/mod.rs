@@ -109,18 +109,3 @@ impl System {
         files.map(|component| component.fmu.path.clone()).collect()
     }
 }
-
-/// ` (did you mean ...?)` with the nearest of the known names, or the known names themselves.
-pub(crate) fn hint<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
-    let known: Vec<&str> = known.collect();
-    let nearest = known
-        .iter()
-        .map(|candidate| (strsim::jaro_winkler(name, candidate), candidate))
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    match nearest {
-        Some((likeness, nearest)) if likeness > 0.75 => format!("; did you mean `{nearest}`?"),
-        Some(_) if known.len() <= 12 => format!("; there is `{}`", known.join("`, `")),
-        Some((_, nearest)) => format!("; the nearest name is `{nearest}`"),
-        None => "; there is none".to_string(),
-    }
-}

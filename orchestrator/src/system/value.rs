@@ -3,7 +3,7 @@
 use crate::fmu::{Kind, Variable};
 use crate::units;
 
-use super::hint;
+use crate::units::hint;
 
 /// A value for a variable, in the variable's own unit.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
