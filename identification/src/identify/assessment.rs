@@ -6,7 +6,7 @@ use plant::identified::actuator::IdentifiedActuator;
 
 use crate::IdentificationError;
 use crate::data::OUTPUT_NAMES;
-use crate::estimation::gauss_newton::Estimate;
+use crate::estimation::gauss_newton::GaussNewtonEstimate;
 use crate::estimation::prediction::{Parameter, PredictionModel};
 use crate::estimation::residuals::{ResidualTest, residual_test};
 use crate::identify::model::{OUTPUTS, PHYSICAL, RigModel, rig_from};
@@ -18,7 +18,7 @@ pub(crate) fn assess(
     whole: &RigModel,
     fitted: &RigModel,
     parameters: &[Parameter],
-    estimate: &Estimate,
+    estimate: &GaussNewtonEstimate,
     identifiable: bool,
     mut warnings: Vec<String>,
 ) -> Result<RigIdentification, IdentificationError> {

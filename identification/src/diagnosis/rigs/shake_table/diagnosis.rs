@@ -7,16 +7,17 @@ use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
 use units::constants::INCH;
 
-use super::relations::{Relation, misfit, relations};
+use super::experiment;
+use super::gain::{Gain, gain};
+use super::health::{RelationReport, health};
+use super::relations::{misfit, relations};
 use super::sentence::sentence;
 use crate::data::{Channel, OUTPUT_NAMES, Recording};
 use crate::diagnosis::case::{
     Case, CaseError, Nominal, blind_spot, noise_ratios, problems, too_little_excitation,
 };
-use crate::diagnosis::engine::experiment;
-use crate::diagnosis::engine::gain::{Gain, gain};
-use crate::diagnosis::engine::{NamedEffect, Verdict, judge};
-use crate::diagnosis::engine::{Point, RigModel, Role, Test};
+use crate::diagnosis::engine::{ExtensibleModel, NamedEffect, Verdict, judge};
+use crate::diagnosis::engine::{Observer, Point, Role, Test};
 use crate::diagnosis::rigs::shake_table::catalogue::{
     NUISANCE, Prepared, ShakeTableModel, nominal_parameters,
 };
@@ -64,8 +65,8 @@ pub struct Diagnosis {
     pub extended_model: ExtendedModel,
     /// The effects in it: [`Self::effects`], and under `Unexplained` those that only help.
     pub modelled: Vec<NamedEffect>,
-    /// The five relations on the identification record, nominal model.
-    pub relations: Vec<Relation>,
+    /// The five relations on the identification record.
+    pub relations: BTreeMap<&'static str, RelationReport>,
     /// Traces left over, strongest first.
     pub remaining: Vec<Test>,
     /// Share of the nominal model's excess error that the effects explain.
@@ -83,27 +84,32 @@ pub struct Validation {
     pub period: f64,
     /// What acted and what was measured, SI.
     pub samples: Samples,
+    /// Whether the command that acted is what the stated law makes of the readings (R5), free of the
+    /// recorder's noise, rather than the recorded one.
+    pub by_law: bool,
     /// Errors of the nominal model, four channels a sample.
     pub before: Vec<f64>,
     /// Errors of the extended model.
     pub after: Vec<f64>,
 }
 
-/// The command that acted: by the law where it explains the recording, as recorded elsewhere.
-fn acting_command(recording: &Recording, nominal: &Nominal, notes: &mut Vec<String>) -> Vec<f64> {
-    let recorded = recording.samples(Channel::ValveCommand).to_vec();
-    let [reference, x, a] = [
+/// The command that the stated law made, where it explains the recorded one.
+fn command_by_law(
+    recording: &Recording,
+    nominal: &Nominal,
+    notes: &mut Vec<String>,
+) -> Option<Vec<f64>> {
+    let [recorded, reference, x, a] = [
+        Channel::ValveCommand,
         Channel::Reference,
         Channel::Displacement,
         Channel::Acceleration,
     ]
     .map(|channel| recording.samples(channel));
-    let Some(law) = nominal.controller else {
-        return recorded;
-    };
+    let law = nominal.controller?;
     let mut commands = law.commands(reference, x, a, 1.0 / nominal.sample_rate);
     if commands.len() != recorded.len() || commands.len() < 3 {
-        return recorded;
+        return None;
     }
     let last = commands.len() - 1;
     // The record's ends lack a neighbour of the reference.
@@ -111,7 +117,7 @@ fn acting_command(recording: &Recording, nominal: &Nominal, notes: &mut Vec<Stri
     commands[last] = recorded[last];
     let square: f64 = commands
         .iter()
-        .zip(&recorded)
+        .zip(recorded)
         .map(|(a, b)| (a - b).powi(2))
         .sum();
     let miss = (square / recorded.len() as f64).sqrt();
@@ -122,9 +128,9 @@ fn acting_command(recording: &Recording, nominal: &Nominal, notes: &mut Vec<Stri
             recording.name,
             miss / nominal.command_noise
         ));
-        return recorded;
+        return None;
     }
-    commands
+    Some(commands)
 }
 
 /// Model and recordings of a case, after its checks; sentences on what is missing go to `notes`.
@@ -175,11 +181,13 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
         Some((&case.validation, true)),
     ];
     for (recording, with_effects) in ordered.into_iter().flatten() {
-        let command = acting_command(recording, nominal, notes);
+        let by_law = command_by_law(recording, nominal, notes);
+        let recorded = || recording.samples(Channel::ValveCommand).to_vec();
         records.push(Prepared {
             name: recording.name.clone(),
             with_effects,
-            samples: Samples::of(recording, command),
+            by_law: by_law.is_some(),
+            samples: Samples::of(recording, by_law.unwrap_or_else(recorded)),
         });
     }
     Ok(ShakeTableModel::new(nominal, noise, records))
@@ -200,10 +208,11 @@ fn prediction(
         .then_some((predictor, out))
 }
 
-/// Diagnoses a case. `verbose` tells the search's steps on standard error.
+/// Diagnoses a case; `observer` is told the search's steps.
 ///
-/// Refuses records that would mislead, naming record, column and place.
-pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
+/// # Errors
+/// Records that would mislead, by record, column and place.
+pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseError> {
     let unfit = |problem: &str| CaseError::Unfit {
         problems: vec![problem.into()],
     };
@@ -216,7 +225,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     let held_out = model.records.len() - 1;
     let fitted: Vec<usize> = (0..held_out).collect();
     let origin = Point {
-        nuisance: vec![0.0; RigModel::nuisance(&model)],
+        nuisance: vec![0.0; ExtensibleModel::nuisance(&model)],
         effects: Vec::new(),
     };
     let lost = || {
@@ -227,7 +236,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     };
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
     let samples = &model.records[held_out].samples;
-    let mut judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
+    let mut judgement = judge(&model, &fitted, &[held_out], observer).ok_or_else(lost)?;
     for note in at_their_ends(&model, &judgement.best.point) {
         judgement.verdict = Verdict::Unexplained;
         notes.push(note);
@@ -326,7 +335,15 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
             sensors: rig.sensors,
             standard_errors,
         },
-        relations,
+        relations: health(
+            case,
+            &relations,
+            &Nominal {
+                shake_table: rig.shake_table,
+                specimen: rig.specimen,
+                ..case.nominal.clone()
+            },
+        ),
         remaining: judgement
             .tests
             .into_iter()
@@ -338,6 +355,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
         validation: Validation {
             period: model.period,
             samples: samples.clone(),
+            by_law: model.records[held_out].by_law,
             before: before.1,
             after: after.1,
         },
@@ -348,7 +366,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
 fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
     let mut notes = Vec::new();
     for (index, internal) in &point.effects {
-        let candidate = &RigModel::candidates(model)[*index];
+        let candidate = &ExtensibleModel::candidates(model)[*index];
         for (parameter, value) in candidate.parameters.iter().zip(candidate.values(internal)) {
             let (low, high) = parameter.bounds;
             let near = |end: f64| (value - end).abs() < 1e-3 * end.abs();

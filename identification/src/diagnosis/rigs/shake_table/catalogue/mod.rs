@@ -13,7 +13,7 @@ use plant::identified::shake_table::ShakeTable;
 
 use crate::data::OUTPUT_NAMES;
 use crate::diagnosis::case::Nominal;
-use crate::diagnosis::engine::{Candidate, Point, RigModel};
+use crate::diagnosis::engine::{Candidate, ExtensibleModel, Point};
 use crate::diagnosis::rigs::shake_table::predictor::{Disturbance, Predictor, Samples};
 
 /// A recording prepared for the predictor, and whether the effects were there when it was taken.
@@ -25,6 +25,8 @@ pub struct Prepared {
     pub samples: Samples,
     /// False for a baseline: the same rig before the effect.
     pub with_effects: bool,
+    /// Whether the command is that of the stated law rather than the recorded one.
+    pub by_law: bool,
 }
 
 /// The shake table of a case.
@@ -148,7 +150,7 @@ pub struct ShakeTablePredictor {
     without_effects: Option<Predictor>,
 }
 
-impl RigModel for ShakeTableModel {
+impl ExtensibleModel for ShakeTableModel {
     type Predictor = ShakeTablePredictor;
 
     fn nuisance(&self) -> usize {
@@ -274,7 +276,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::diagnosis::engine::{Judgement, judge};
+    use crate::diagnosis::engine::{Judgement, Observer, judge};
     use plant::identified::shake_table::ShakeTable;
     use plant::specimens::linear::LinearSpecimen;
 
@@ -319,6 +321,7 @@ mod tests {
                 name: name.into(),
                 samples,
                 with_effects: true,
+                by_law: false,
             }
         });
         ShakeTableModel::new(&nominal, nominal.noise, records.into())
@@ -340,7 +343,7 @@ mod tests {
             rig.effects.valve.dead_band = f64::from(hidden.contains(&"valve_dead_band")) * 0.12;
             rig.sensors.load_cell_bias = f64::from(hidden.contains(&"load_cell_bias")) * 8.0;
             let model = model(&rig, 31);
-            let straight = judge(&model, &[0], &[1], false).unwrap();
+            let straight = judge(&model, &[0], &[1], Observer::none()).unwrap();
             assert_eq!(said(&straight).1, hidden);
 
             let mut turned = model.clone();
@@ -349,7 +352,7 @@ mod tests {
             turned.candidates.rotate_left(7);
             turned.apply.rotate_left(7);
             assert_eq!(
-                said(&judge(&turned, &[0], &[1], false).unwrap()),
+                said(&judge(&turned, &[0], &[1], Observer::none()).unwrap()),
                 said(&straight)
             );
 
@@ -364,7 +367,7 @@ mod tests {
                 candidate.effect = mirror(candidate.effect);
                 candidate.contains = candidate.contains.map(mirror);
             }
-            let judgement = judge(&relabelled, &[0], &[1], false).unwrap();
+            let judgement = judge(&relabelled, &[0], &[1], Observer::none()).unwrap();
             let mut expected: Vec<_> = hidden.iter().map(|name| mirror(name)).collect();
             expected.sort_unstable();
             assert_eq!(said(&judgement), (straight.verdict, expected));

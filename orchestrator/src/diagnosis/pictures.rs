@@ -1,4 +1,4 @@
-//! The pictures of a diagnosis.
+//! The pictures of a case.
 
 use identification::data::{Channel, OUTPUT_NAMES};
 use identification::diagnosis::case::Case;

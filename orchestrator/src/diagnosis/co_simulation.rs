@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use identification::data::{Channel, OUTPUT_NAMES, Recording, mean_and_deviation};
 use identification::diagnosis::case::{ControlLaw, Nominal};
-use identification::diagnosis::engine::gain::{running, share_gone};
+use identification::diagnosis::engine::resampling::{running, share_gone};
+use identification::diagnosis::{GainAgainstNoise, GainReport};
 
-use super::GainReport;
 use crate::fmu::Fmu;
 use crate::master::{Algorithm, Ended, Pace, Simulation};
 use crate::motion::Motion;
@@ -282,7 +282,10 @@ fn gain(
         .iter()
         .map(|&i| {
             let errors = [rms(before, i), rms(after, i), floor[i]];
-            (OUTPUT_NAMES[i], errors.map(|error| error / scale(i)))
+            (
+                OUTPUT_NAMES[i].to_owned(),
+                errors.map(|error| error / scale(i)),
+            )
         })
         .collect();
     let overall = |of: &dyn Fn(usize) -> f64| {
@@ -299,11 +302,14 @@ fn gain(
     GainReport {
         before_nrmse: overall(&|i| rms(before, i) / scale(i)),
         after_nrmse: overall(&|i| rms(after, i) / scale(i)),
-        noise_floor_nrmse: overall(&|i| floor[i] / scale(i)),
-        interval_95: share_gone(&sums(before), &sums(after)),
-        record: "validation",
-        before_ratio: overall(&|i| rms(before, i) / floor[i]),
-        after_ratio: overall(&|i| rms(after, i) / floor[i]),
-        channels,
+        noise_floor_nrmse: Some(overall(&|i| floor[i] / scale(i))),
+        interval_95: share_gone(&sums(before), &sums(after)).into(),
+        interval_of: None,
+        record: "validation".to_owned(),
+        against_noise: Some(GainAgainstNoise {
+            before_ratio: overall(&|i| rms(before, i) / floor[i]),
+            after_ratio: overall(&|i| rms(after, i) / floor[i]),
+            channels,
+        }),
     }
 }
