@@ -242,7 +242,9 @@ fn modelica_unit(text: &str) -> Result<Unit, String> {
     }
     let below = text.split_once('/').map_or("", |(_, below)| below);
     if below.contains('/') || (below.contains('.') && !below.starts_with('(')) {
-        return Err(wrong("a product below the line stands in parentheses".into()));
+        return Err(wrong(
+            "a product below the line stands in parentheses".into(),
+        ));
     }
     let unit = Unit::parse(text).map_err(|error| wrong(error.to_string()))?;
     match unit.base_unit() {
@@ -384,7 +386,16 @@ mod tests {
         for unit in ["N.s/m", "lbf/(V.s2)", "1", "A.s-1/m", "Hz"] {
             assert!(modelica_unit(unit).is_ok(), "{unit}");
         }
-        for unit in ["N.furlong", "N/V.s", "m/s/s", "", "mx2", "N*m", "m^2", "V s"] {
+        for unit in [
+            "N.furlong",
+            "N/V.s",
+            "m/s/s",
+            "",
+            "mx2",
+            "N*m",
+            "m^2",
+            "V s",
+        ] {
             assert!(modelica_unit(unit).is_err(), "{unit}");
         }
     }

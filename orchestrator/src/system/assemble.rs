@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::connection::{self, connect, split};
 use super::file::{ComponentFile, SystemFile};
 use super::{Component, DEFAULT_PERIOD, System, SystemError, Value, model, value};
-use crate::units::hint;
 use crate::fmu::{Causality, Fmu, Kind, Variability};
+use crate::units::hint;
 
 /// Finds the FMU of a component by what the system file calls it.
 pub type Library<'a> = dyn FnMut(&str) -> Result<Arc<Fmu>, Box<dyn std::error::Error>> + 'a;

@@ -9,8 +9,8 @@ use plant::identified::table::Table;
 use plant::specimens::linear::LinearSpecimen;
 
 use super::Value;
-use crate::units::hint;
 use crate::fmu::{Causality, Description};
+use crate::units::hint;
 
 /// Published models of `ShakeTable`.
 const PUBLISHED: [(&str, PublishedActuator); 3] = [

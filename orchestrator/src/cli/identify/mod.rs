@@ -10,8 +10,9 @@ use std::time::Instant;
 
 use clap::Args;
 use identification::data::Recording;
+use identification::identify::identified::RigIdentification;
 use identification::identify::model_file::ModelFile;
-use identification::identify::rig::{self, Options, RigIdentification};
+use identification::identify::rig::{self, Options};
 use identification::identify::specimen_file;
 use serde::Serialize;
 

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use identification::data::Recording;
+use identification::identify::identified::RigIdentification;
 use identification::identify::model_file::{ModelFile, StandardErrors};
-use identification::identify::rig::RigIdentification;
 
 use super::{Summary, responses};
 use crate::report::columns::{aligned, significant};
