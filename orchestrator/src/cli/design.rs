@@ -20,7 +20,8 @@ use units::constants::SAMPLING_PERIOD;
 
 use crate::design::page as design_report;
 use crate::error::Error;
-use crate::report::columns::{aligned, significant};
+use crate::report::columns::aligned;
+use crate::report::number::significant;
 use crate::units::INCH;
 
 /// Options of `shakebench design`.

@@ -9,7 +9,8 @@ use crate::error::Error;
 use crate::fmu::{Causality, FmiVersion, Fmu};
 use crate::library::FmuLibrary;
 use crate::motion;
-use crate::report::columns::{aligned, significant};
+use crate::report::columns::aligned;
+use crate::report::number::significant;
 use crate::system::{self, Operation, SystemFile, built_in};
 use crate::units::STANDARD_GRAVITY;
 

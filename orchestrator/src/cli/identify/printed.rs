@@ -7,7 +7,8 @@ use identification::identify::identified::RigIdentification;
 use identification::identify::model_file::{ModelFile, StandardErrors};
 
 use super::{Summary, responses};
-use crate::report::columns::{aligned, significant};
+use crate::report::columns::aligned;
+use crate::report::number::significant;
 use crate::report::{Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units};
 
 /// Rows of name, value, standard error and unit, in inch and pound-force.
