@@ -7,8 +7,8 @@ use std::path::Path;
 
 use identification::data::DataError;
 
-use super::MotionError;
-use super::record::{Record, file_name, stem};
+use super::accelerogram::{Record, file_name, stem};
+use super::error::MotionError;
 use crate::units::{STANDARD_GRAVITY, Unit};
 
 /// Lines within which the header must end.

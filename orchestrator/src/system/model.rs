@@ -8,7 +8,7 @@ use plant::identified::shake_table::ShakeTable;
 use plant::identified::table::Table;
 use plant::specimens::linear::LinearSpecimen;
 
-use super::Value;
+use super::value::Value;
 use crate::fmu::{Causality, Description};
 use crate::units::hint;
 
