@@ -1,12 +1,10 @@
 //! Chapter 2 as a tool: the rig's parameters from noisy data taken in closed loop.
 
-mod identify_data;
-
+use acceptance::recordings::Test;
 use identification::data::Channel;
 use identification::identify::identified::RigIdentification;
 use identification::identify::parameters::Physical;
 use identification::identify::rig::{Options, identify};
-use identify_data::Test;
 use nalgebra::Complex;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;

@@ -46,6 +46,6 @@ fn published_model_descriptions_are_those_of_the_components() {
     assert!(
         different.is_empty(),
         "code and published interface differ in {different:#?}; if the change is meant, regenerate \
-         with `{REGENERATE}=1 cargo test --release -p acceptance --test model_descriptions`"
+         with `{REGENERATE}=1 cargo test --release -p acceptance --test components model_descriptions`"
     );
 }

@@ -1,12 +1,10 @@
 //! `shakebench identify` as scripts use it: JSON, files, exit status, and bad data refused by name.
 
-mod identify_data;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use identify_data::{Test, csv};
+use acceptance::recordings::{Test, csv};
 use serde_json::Value;
 
 /// The program, built once.

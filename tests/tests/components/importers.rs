@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use acceptance::python::run_script;
 use shakebench::pack::{
-    FmiVersion, PackedFmu, StartValue, all_fmus, build_package, default_folder, write_variant,
+    FmiVersion, PackedFmu, StartValue, all_fmus, build_component, default_folder, write_variant,
 };
 
 fn paths(wanted: impl Fn(&PackedFmu) -> bool) -> Vec<PathBuf> {
@@ -60,7 +60,7 @@ fn libcosim_steps_every_fmu_of_version_2_without_a_warning() {
 #[test]
 fn faults_inside_a_component_reach_the_importer_as_errors() {
     let out = default_folder().unwrap().with_file_name("fmus-for-tests");
-    let packed = build_package("faulty-component", &out, &FmiVersion::ALL).unwrap();
+    let packed = build_component("tests/importers/faulty", &out, &FmiVersion::ALL).unwrap();
     let paths: Vec<_> = packed.into_iter().map(|fmu| fmu.path).collect();
     gate("fmpy_faults.py", &paths);
     assert!(

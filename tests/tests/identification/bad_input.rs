@@ -1,10 +1,8 @@
 //! Data that give no model are refused by name, with what to measure instead.
 
-mod identify_data;
-
+use acceptance::recordings::{PERIOD, Test};
 use identification::data::{Channel, Recording};
 use identification::identify::rig::{Options, identify};
-use identify_data::{PERIOD, Test};
 
 fn refused(recording: Recording) -> String {
     identify(&[recording], Options::default())

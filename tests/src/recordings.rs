@@ -1,7 +1,5 @@
 //! Recordings of the identified rig under three-variable control, with seeded noise.
 
-#![allow(dead_code)]
-
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion};
 use identification::data::{Channel, Recording, mean_and_deviation};
@@ -49,6 +47,7 @@ impl Default for Test {
     }
 }
 
+/// Between samples, s.
 pub const PERIOD: f64 = 0.002;
 /// Rows of the rig's outputs: displacement, velocity, acceleration, force, specimen acceleration.
 const ROWS: [usize; 5] = [0, 1, 2, 3, 6];

@@ -1,8 +1,9 @@
 //! The hierarchy of Fig 4-3 on the identified rig, stepped without FMI: what the law claims about
 //! tracking, delay, bias and stability.
 
-mod native;
-
+use crate::native::{
+    Hierarchy, Law, PERIOD, Sensors, ThreeVariableLaw, band_limited, loop_shaping, run, run_biased,
+};
 use controllers::Motion;
 use controllers::allocation::ControlAllocation;
 use controllers::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
@@ -12,9 +13,6 @@ use controllers::prediction_over_delay::PredictionOverDelay;
 use controllers::sliding_mode::{IDENTIFIED_RATE, SlidingMode};
 use controllers::tuning::sliding_mode::rate_by_rule;
 use nalgebra::Complex;
-use native::{
-    Hierarchy, PERIOD, Sensors, ThreeVariableLaw, band_limited, loop_shaping, run, run_biased,
-};
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
@@ -90,9 +88,8 @@ fn sliding_mode_beats_three_variable_control_and_that_beats_loop_shaping() {
 fn a_sample_of_delay_destroys_the_law_unless_it_is_predicted() {
     for (name, rig) in rigs() {
         let motion = band_limited(4);
-        let error = |delay, law: &mut dyn native::Law| {
-            run(&rig, &motion, delay, law).time_domain_percent(&motion)
-        };
+        let error =
+            |delay, law: &mut dyn Law| run(&rig, &motion, delay, law).time_domain_percent(&motion);
         let three = error(1, &mut ThreeVariableLaw::default());
         let unpredicted = error(1, &mut Hierarchy::default());
         assert!(unpredicted > 100.0, "{unpredicted}");

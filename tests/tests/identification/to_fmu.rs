@@ -1,13 +1,11 @@
 //! Data, to a model file, to an FMU's parameters, to fmpy: the same response as the identified
 //! model without FMI.
 
-mod identify_data;
-
 use acceptance::python::run_script;
+use acceptance::recordings::{PERIOD, Test};
 use identification::data::{Channel, mean_and_deviation};
 use identification::identify::model_file::ModelFile;
 use identification::identify::rig::{Options, identify};
-use identify_data::{PERIOD, Test};
 use nalgebra::{DVector, dvector};
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
@@ -62,7 +60,7 @@ fn an_fmu_with_the_identified_model_moves_like_the_identified_rig() {
     let out = pack::default_folder()
         .unwrap()
         .with_file_name("fmus-for-tests");
-    let packed = pack::build_package("fmu-shake-table", &out, &pack::FmiVersion::ALL).unwrap();
+    let packed = pack::build_component("fmus/shake_table", &out, &pack::FmiVersion::ALL).unwrap();
     let command = &recording.channel(Channel::ValveCommand).unwrap()[..2500];
     let expected = native(found.rig().shake_table, command);
     for fmu in packed {
