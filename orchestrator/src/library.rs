@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::fmu::{FmiVersion, Fmu};
 use crate::pack;
-use crate::system::hint;
+use crate::units::hint;
 
 /// FMUs by the name that a system file gives them, each opened once.
 pub struct FmuLibrary {

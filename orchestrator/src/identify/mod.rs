@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use identification::data::Recording;
+use identification::identify::identified::RigIdentification;
 use identification::identify::model_file::ModelFile;
-use identification::identify::rig::{self, Options, RigIdentification};
+use identification::identify::rig::{self, Options};
 use identification::identify::specimen_file;
 
 pub use parameters::parameters;

@@ -1,8 +1,8 @@
 //! Components and variables by name.
 
 use super::checked::Component;
-use super::hint;
 use crate::fmu::{Causality, Fmu};
+use crate::units::hint;
 
 /// The position of a component.
 ///

@@ -8,9 +8,9 @@ use plant::identified::shake_table::ShakeTable;
 use plant::identified::table::Table;
 use plant::specimens::linear::LinearSpecimen;
 
-use super::hint;
 use super::value::Value;
 use crate::fmu::{Causality, Description};
+use crate::units::hint;
 
 /// Published models of `ShakeTable`.
 const PUBLISHED: [(&str, PublishedActuator); 3] = [

@@ -1,10 +1,10 @@
 //! Values as people write them, for variables with types and units.
 
+use crate::units::hint;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::hint;
 use crate::fmu::{Kind, Variable};
 use crate::units;
 
