@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::OneVersion;
 use crate::error::Error;
+use crate::fmu::{Options, Trace};
 use crate::master::{Algorithm, Ended, Pace};
 use crate::motion;
 use crate::results::Results;
@@ -80,6 +82,12 @@ pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    /// Write every call of every FMU, with its values, to this file
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Ask the FMUs for debug messages: all, or those of these categories
+    #[arg(long, value_name = "CATEGORY", num_args = 0.., value_delimiter = ',')]
+    log: Option<Vec<String>>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
         "system", "record", "reference", "plant", "specimen", "tuning", "set", "fmi", "algorithm", "step",
@@ -102,12 +110,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Some(manifest) => manifest.request.clone(),
         None => request(arguments)?,
     };
-    let prepared = prepare(&request)?;
+    let mut prepared = prepare(&request)?;
+    prepared.options = fmu_options(arguments)?;
     let Prepared {
         system,
         motion,
         step,
         samples,
+        ..
     } = &prepared;
     let folder = arguments.out.clone().unwrap_or_else(|| {
         let name = format!("{}-{}", system.name, motion.name);
@@ -151,12 +161,33 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
         eprintln!("the run was repeated to the bit");
     }
-    if matches!(outcome.ended, Ended::Complete) {
+    if outcome.ended.is_regular() {
+        if let Ended::Terminated { .. } = outcome.ended {
+            eprintln!("note: {}", outcome.ended.story());
+        }
         return Ok(ExitCode::SUCCESS);
     }
     eprintln!("error: the run ended early: {}", outcome.ended.story());
     eprintln!("what was computed until then is saved");
     Ok(ExitCode::from(1))
+}
+
+/// How FMUs are run.
+///
+/// # Errors
+/// A trace that cannot be written.
+fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
+    let trace = arguments.trace.as_deref().map(|path| {
+        let created = Trace::create(path).map_err(|error| Error::File {
+            path: path.to_path_buf(),
+            reason: error.to_string(),
+        });
+        created.map(Arc::new)
+    });
+    Ok(Options {
+        trace: trace.transpose()?,
+        log_categories: arguments.log.clone(),
+    })
 }
 
 /// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.

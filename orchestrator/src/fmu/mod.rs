@@ -2,10 +2,15 @@
 //! instances look the same whether they are FMI 2.0 or 3.0.
 
 mod archive;
+mod call;
+mod convert;
 mod description;
 mod error;
 mod instance;
 mod messages;
+mod native;
+mod options;
+mod trace;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,8 +19,10 @@ use sha2::{Digest, Sha256};
 
 pub use description::{Causality, Description, FmiVersion, Kind, Variability, Variable};
 pub use error::{CallError, FmuError};
-pub use instance::{Instance, State};
+pub use instance::{Instance, Progress, State};
 pub use messages::Message;
+pub use options::Options;
+pub use trace::Trace;
 
 /// `fmi-rs` checks variable names with a parser that keeps its state in globals: one at a time.
 static PARSER: Mutex<()> = Mutex::new(());

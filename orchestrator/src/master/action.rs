@@ -55,7 +55,7 @@ impl Action {
                 inputs,
                 outputs,
             } => {
-                let instance = &parts[*part].instance;
+                let instance = &mut parts[*part].instance;
                 inputs.transfer(signals, instance)?;
                 outputs.read(signals, instance)?;
             }
@@ -67,9 +67,9 @@ impl Action {
                 if part.failure.is_some() {
                     return Ok(());
                 }
-                part.inputs.transfer(signals, &part.instance)?;
+                part.inputs.transfer(signals, &mut part.instance)?;
                 if !at.calls {
-                    return Ok(part.outputs.read(signals, &part.instance)?);
+                    return Ok(part.outputs.read(signals, &mut part.instance)?);
                 }
                 part.step(at.time, every as f64 * at.step)?;
                 if part.failure.is_none() {

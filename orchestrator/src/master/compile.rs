@@ -6,7 +6,7 @@ use super::action::Action;
 use super::reference::Reference;
 use super::transfer::{Inputs, Outputs};
 use super::{Algorithm, MasterError, Part, Simulation, start};
-use crate::fmu::{Causality, Instance, Kind, State, Variability};
+use crate::fmu::{Causality, Instance, Kind, Options, State, Variability};
 use crate::motion::Motion;
 use crate::system::{Operation, Quantity, Source, System};
 
@@ -21,6 +21,22 @@ impl Simulation {
         motion: &Motion,
         algorithm: Algorithm,
         step: f64,
+    ) -> Result<Self, MasterError> {
+        let stop = motion.len() as f64 * motion.dt;
+        Self::with(system, motion, algorithm, (step, stop), &Options::default())
+    }
+
+    /// As [`Simulation::new`], for a run that ends at `stop` seconds, with FMUs run as `options`
+    /// say.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn with(
+        system: &System,
+        motion: &Motion,
+        algorithm: Algorithm,
+        (step, stop): (f64, f64),
+        options: &Options,
     ) -> Result<Self, MasterError> {
         let ticks_per_row = ticks(motion.dt, step, "the sample time of the motion")?;
         let schedule = system.schedule(algorithm == Algorithm::Iterative)?;
@@ -39,8 +55,8 @@ impl Simulation {
             if algorithm == Algorithm::Iterative && !component.fmu.description.saves_state {
                 return Err(MasterError::NoState(component.name.clone()));
             }
-            let instance = Instance::new(&component.fmu, &component.name)?;
-            start::prepare(&instance, component)?;
+            let mut instance = Instance::new(&component.fmu, &component.name, options)?;
+            start::prepare(&mut instance, component)?;
             let every = component
                 .period
                 .map(|period| ticks(period, step, &format!("the period of `{}`", component.name)));
@@ -53,6 +69,7 @@ impl Simulation {
                 may_fail: component.period.is_some()
                     && system.stop.is_some_and(|(guard, _)| guard != index),
                 failure: None,
+                ended: None,
             });
         }
         let actions = schedule
@@ -72,7 +89,7 @@ impl Simulation {
             let variable = description.position("trip_cause")?;
             plan.places.get(&(component, variable)).copied()
         });
-        let stop = system.stop.map(|(part, variable)| {
+        let guard = system.stop.map(|(part, variable)| {
             let variables = &system.components[part].fmu.description.variables;
             (part, variables[variable].reference)
         });
@@ -90,10 +107,10 @@ impl Simulation {
             parts,
             actions,
             end_when,
-            stop,
+            stop: guard,
             cause,
         };
-        start::initialize(&mut simulation, motion.len() as f64 * motion.dt)?;
+        start::initialize(&mut simulation, stop)?;
         Ok(simulation)
     }
 }

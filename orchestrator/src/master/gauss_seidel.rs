@@ -38,8 +38,8 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
         .filter(|part| part.every.is_none())
     {
         part.inputs
-            .transfer_between(now, last, -0.5, &part.instance)?;
-        part.instance.do_step(time, step)?;
+            .transfer_between(now, last, -0.5, &mut part.instance)?;
+        part.step(time, step)?;
     }
     last.copy_from_slice(now);
     Ok(())

@@ -32,8 +32,8 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
         last.copy_from_slice(next);
         for part in parts.iter_mut().filter(|part| part.every.is_none()) {
             part.inputs
-                .transfer_between(signals, next, 0.5, &part.instance)?;
-            part.instance.do_step(time, step)?;
+                .transfer_between(signals, next, 0.5, &mut part.instance)?;
+            part.step(time, step)?;
         }
         for action in actions.iter_mut().filter(|action| action.is_continuous()) {
             action.perform(end, parts, next, names)?;

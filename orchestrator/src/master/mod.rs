@@ -23,7 +23,7 @@ pub use error::MasterError;
 pub use record::Record;
 pub use run::{Ended, LogLine, Outcome, Pace};
 
-use crate::fmu::{Instance, State};
+use crate::fmu::{Instance, Progress, State};
 use action::Action;
 use reference::Reference;
 use transfer::{Inputs, Outputs};
@@ -105,24 +105,30 @@ struct Part {
     may_fail: bool,
     /// Why it is called no more; its outputs keep their last values.
     failure: Option<MasterError>,
+    /// When it asked to end the run, s.
+    ended: Option<f64>,
 }
 
 impl Part {
     /// Steps it; a failure that may be is kept instead of given.
     fn step(&mut self, time: f64, length: f64) -> Result<(), MasterError> {
-        if self.failure.is_some() {
+        if self.failure.is_some() || self.ended.is_some() {
             return Ok(());
         }
         match self.instance.do_step(time, length) {
             Err(error) if self.may_fail => self.failure = Some(error.into()),
-            done => done?,
+            done => {
+                if let Progress::Ended(at) = done? {
+                    self.ended = Some(at);
+                }
+            }
         }
         Ok(())
     }
 
     /// Reads its outputs into the signals; a failure that may be is kept instead of given.
     fn read(&mut self, signals: &mut [f64]) -> Result<(), MasterError> {
-        match self.outputs.read(signals, &self.instance) {
+        match self.outputs.read(signals, &mut self.instance) {
             Err(error) if self.may_fail => self.failure = Some(error.into()),
             done => done?,
         }

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use controllers::interlock::Trip;
 
+use super::action::Moment;
 use super::{MasterError, Record, Simulation};
 use crate::fmu::{Kind, Message};
 
@@ -21,6 +22,13 @@ pub enum Ended {
         /// Why, in words, where the component says it.
         cause: Option<&'static str>,
     },
+    /// A component asked to end the run, as the standard lets it.
+    Terminated {
+        /// The component.
+        component: String,
+        /// When, s.
+        time: f64,
+    },
     /// A component failed.
     Failed(MasterError),
     /// A sampled component failed and the interlock brought the valve to null.
@@ -33,11 +41,12 @@ pub enum Ended {
 }
 
 impl Ended {
-    /// `complete`, `interlock` or `failed`.
+    /// `complete`, `interlock`, `terminated` or `failed`.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Complete => "complete",
             Self::Interlock { .. } => "interlock",
+            Self::Terminated { .. } => "terminated",
             Self::Failed(_) | Self::Stopped { .. } => "failed",
         }
     }
@@ -45,9 +54,16 @@ impl Ended {
     /// When the run was stopped before its end, s.
     pub fn time(&self) -> Option<f64> {
         match self {
-            Self::Interlock { time, .. } | Self::Stopped { time, .. } => Some(*time),
+            Self::Interlock { time, .. }
+            | Self::Stopped { time, .. }
+            | Self::Terminated { time, .. } => Some(*time),
             Self::Complete | Self::Failed(_) => None,
         }
+    }
+
+    /// Whether the run came to its regular end.
+    pub fn is_regular(&self) -> bool {
+        matches!(self, Self::Complete | Self::Terminated { .. })
     }
 
     /// What happened, for people.
@@ -61,6 +77,9 @@ impl Ended {
             } => {
                 let cause = cause.map_or(String::new(), |cause| format!(": {cause}"));
                 format!("`{signal}` became true at {time:.3} s{cause}")
+            }
+            Self::Terminated { component, time } => {
+                format!("`{component}` asked to end the run at {time} s")
             }
             Self::Stopped { error, time } => format!(
                 "{error}; the interlock was told to stop at {time:.3} s and brought the valve to null"
@@ -115,6 +134,7 @@ impl Simulation {
         let ended = self.play(samples, pace, progress, &mut record);
         let wall = begin.elapsed().as_secs_f64();
         progress(record.len());
+        self.close();
         let messages = self.parts.iter().flat_map(|part| {
             let component = &part.instance.name;
             part.instance
@@ -180,6 +200,9 @@ impl Simulation {
                 }
             }
             self.advance()?;
+            if let Some(ended) = self.terminated(record)? {
+                return Ok(ended);
+            }
         }
         let time = tripped.map_or(self.time(), |(time, _, _)| time);
         if let Some(error) = self.parts.iter_mut().find_map(|part| part.failure.take()) {
@@ -201,11 +224,49 @@ impl Simulation {
     }
 }
 
-impl Drop for Simulation {
-    fn drop(&mut self) {
+impl Simulation {
+    /// Whether a component has asked to end the run; the values at that moment are recorded.
+    fn terminated(&mut self, record: &mut Record) -> Result<Option<Ended>, MasterError> {
+        let mut asked = self.parts.iter().filter_map(|part| {
+            let time = part.ended?;
+            Some((part.instance.name.clone(), time))
+        });
+        let Some((component, time)) = asked.next() else {
+            return Ok(None);
+        };
+        // The others are at the end of the step: a row in between would mix two times.
+        let is_alone = self.parts.len() == 1;
+        let at_end = (time - self.time()).abs() <= 1e-9 * self.step;
+        if (is_alone && time > self.time() - self.step) || at_end {
+            let time = if at_end { self.time() } else { time };
+            let at = Moment {
+                tick: self.tick,
+                time,
+                step: self.step,
+                calls: false,
+            };
+            self.reference
+                .sample(self.tick / self.ticks_per_row, &mut self.signals);
+            for action in &mut self.actions {
+                action.perform(at, &mut self.parts, &mut self.signals, &self.names)?;
+            }
+            record.push(time, &self.signals);
+        }
+        Ok(Some(Ended::Terminated { component, time }))
+    }
+
+    /// Gives states back and terminates the instances.
+    fn close(&mut self) {
         for part in &mut self.parts {
             // A state that cannot be given back is lost with its instance.
             let _ = part.instance.free_state(std::mem::take(&mut part.state));
+            part.instance.terminate();
         }
+    }
+}
+
+impl Drop for Simulation {
+    fn drop(&mut self) {
+        self.close();
     }
 }

@@ -7,7 +7,7 @@ use crate::fmu::{Instance, Kind};
 use crate::system::{Component, Value};
 
 /// Sets what the system gives a component before it is initialized.
-pub(super) fn prepare(instance: &Instance, component: &Component) -> Result<(), MasterError> {
+pub(super) fn prepare(instance: &mut Instance, component: &Component) -> Result<(), MasterError> {
     for (position, value) in component.parameters.iter().chain(&component.inputs) {
         let variable = &component.fmu.description.variables[*position];
         match value {
@@ -18,7 +18,12 @@ pub(super) fn prepare(instance: &Instance, component: &Component) -> Result<(), 
     Ok(())
 }
 
-fn set(instance: &Instance, kind: &Kind, reference: u32, number: f64) -> Result<(), MasterError> {
+fn set(
+    instance: &mut Instance,
+    kind: &Kind,
+    reference: u32,
+    number: f64,
+) -> Result<(), MasterError> {
     Ok(instance.set(kind, &[reference], &[number])?)
 }
 
@@ -46,14 +51,15 @@ pub(super) fn initialize(simulation: &mut Simulation, stop: f64) -> Result<(), M
             )?;
         }
         for part in &mut simulation.parts {
-            part.inputs.transfer(&simulation.signals, &part.instance)?;
+            part.inputs
+                .transfer(&simulation.signals, &mut part.instance)?;
         }
         // The first pass only replaces zeros.
         if pass > 1 && settled(0.0, pass, &last, &simulation.signals, &simulation.names)? {
             break;
         }
     }
-    for part in &simulation.parts {
+    for part in &mut simulation.parts {
         part.instance.exit_initialization()?;
     }
     Ok(())

@@ -60,7 +60,7 @@ impl Inputs {
     }
 
     /// Sets the inputs from the signals.
-    pub(super) fn transfer(&mut self, signals: &[f64], instance: &Instance) -> Outcome {
+    pub(super) fn transfer(&mut self, signals: &[f64], instance: &mut Instance) -> Outcome {
         for group in &mut self.0 {
             for (value, source) in group.values.iter_mut().zip(&group.sources) {
                 *value = source.factor * signals[source.signal];
@@ -77,7 +77,7 @@ impl Inputs {
         now: &[f64],
         other: &[f64],
         share: f64,
-        instance: &Instance,
+        instance: &mut Instance,
     ) -> Outcome {
         for group in &mut self.0 {
             for (value, source) in group.values.iter_mut().zip(&group.sources) {
@@ -109,7 +109,7 @@ impl Outputs {
     }
 
     /// Reads the outputs into the signals, which keep their values where the instance fails.
-    pub(super) fn read(&mut self, signals: &mut [f64], instance: &Instance) -> Outcome {
+    pub(super) fn read(&mut self, signals: &mut [f64], instance: &mut Instance) -> Outcome {
         for group in &mut self.0 {
             instance.get(&group.kind, &group.references, &mut group.values)?;
         }

@@ -67,6 +67,7 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
     Ok(Description {
         version: FmiVersion::V2,
         model_identifier: interface.modelIdentifier.clone(),
+        log_categories: file.logCategories.iter().map(|c| c.name.clone()).collect(),
         saves_state: interface.canGetAndSetFMUstate,
         variable_step: interface.canHandleVariableCommunicationStepSize,
         offers_model_exchange: file.modelExchange.is_some(),

@@ -74,6 +74,7 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
     Ok(Description {
         version: FmiVersion::V3,
         model_identifier: interface.modelIdentifier.clone(),
+        log_categories: file.logCategories.iter().map(|c| c.name.clone()).collect(),
         saves_state: interface.canGetAndSetFMUState,
         variable_step: interface.canHandleVariableCommunicationStepSize,
         offers_model_exchange: file.modelExchange.is_some(),

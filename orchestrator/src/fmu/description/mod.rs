@@ -159,6 +159,8 @@ pub struct Description {
     pub about: String,
     /// The tool that made it.
     pub generation_tool: String,
+    /// Categories of messages that it can be asked for.
+    pub log_categories: Vec<String>,
     /// Whether its state can be saved and restored.
     pub saves_state: bool,
     /// Whether it offers model exchange, too.
