@@ -4,6 +4,7 @@ pub mod cli;
 pub mod comparison;
 pub mod component_library;
 pub mod design;
+pub mod diagnosis;
 pub mod error;
 pub mod extended_model;
 pub mod fmu;

@@ -103,6 +103,18 @@ impl Results {
         self.write(name, |file| file.write_all(text.as_bytes()))
     }
 
+    /// Where files lie until [`Results::finish`]; one that is made there is told by
+    /// [`Results::adopt`].
+    #[must_use]
+    pub fn staging(&self) -> &Path {
+        self.staging.path()
+    }
+
+    /// Takes the file `name` that was made in [`Results::staging`] along.
+    pub fn adopt(&mut self, name: &str) {
+        self.names.push(name.to_string());
+    }
+
     /// Moves the files into their folder; files of the same name are replaced, others stay.
     ///
     /// # Errors

@@ -2,9 +2,13 @@
 
 pub mod catalogue;
 mod diagnosis;
+pub mod experiment;
+pub mod gain;
+mod health;
 pub mod predictor;
 pub mod relations;
 mod sentence;
 
 pub use diagnosis::*;
-pub use sentence::{amount, laboratory_unit, said};
+pub use health::RelationReport;
+pub use sentence::{amount, laboratory_unit, said, with_error};

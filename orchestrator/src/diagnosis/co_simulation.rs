@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use identification::diagnosis::case::{CHANNELS, ControlLaw, Nominal, Record};
-use identification::diagnosis::engine::gain::{running, share_gone};
+use identification::diagnosis::engine::resampling::{running, share_gone};
+use identification::diagnosis::{GainAgainstNoise, GainReport};
 
-use super::GainReport;
 use crate::fmu::Fmu;
 use crate::master::{Algorithm, Ended, Pace, Simulation};
 use crate::motion::Motion;
@@ -278,7 +278,7 @@ fn gain(record: &Record, before: &Channels, after: &Channels, floor: &[f64; 4]) 
         .iter()
         .map(|&i| {
             let errors = [rms(before, i), rms(after, i), floor[i]];
-            (CHANNELS[i], errors.map(|error| error / scale(i)))
+            (CHANNELS[i].to_owned(), errors.map(|error| error / scale(i)))
         })
         .collect();
     let overall = |of: &dyn Fn(usize) -> f64| {
@@ -295,11 +295,14 @@ fn gain(record: &Record, before: &Channels, after: &Channels, floor: &[f64; 4]) 
     GainReport {
         before_nrmse: overall(&|i| rms(before, i) / scale(i)),
         after_nrmse: overall(&|i| rms(after, i) / scale(i)),
-        noise_floor_nrmse: overall(&|i| floor[i] / scale(i)),
-        interval_95: share_gone(&sums(before), &sums(after)),
-        record: "validation",
-        before_ratio: overall(&|i| rms(before, i) / floor[i]),
-        after_ratio: overall(&|i| rms(after, i) / floor[i]),
-        channels,
+        noise_floor_nrmse: Some(overall(&|i| floor[i] / scale(i))),
+        interval_95: share_gone(&sums(before), &sums(after)).into(),
+        interval_of: None,
+        record: "validation".to_owned(),
+        against_noise: Some(GainAgainstNoise {
+            before_ratio: overall(&|i| rms(before, i) / floor[i]),
+            after_ratio: overall(&|i| rms(after, i) / floor[i]),
+            channels,
+        }),
     }
 }
