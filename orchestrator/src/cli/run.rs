@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::OneVersion;
 use crate::error::Error;
-use crate::fmu::{Options, Trace};
+use crate::fmu::{Isolation, Options, Trace};
 use crate::master::{Algorithm, Ended, Pace};
 use crate::motion;
 use crate::results::Results;
@@ -82,6 +83,12 @@ pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    /// FMUs in a process of their own; foreign ones are those that are given as files
+    #[arg(long, value_enum, default_value_t = Isolation::Foreign)]
+    isolate: Isolation,
+    /// How long a call of an FMU in a process of its own may take [default: 120 s]
+    #[arg(long, value_name = "T")]
+    call_limit: Option<String>,
     /// Write every call of every FMU, with its values, to this file
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
@@ -184,7 +191,17 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
         });
         created.map(Arc::new)
     });
+    let limit = arguments.call_limit.as_deref();
+    let limit = limit.map(|text| {
+        let seconds = quantity("--call-limit", text, "s")?;
+        Duration::try_from_secs_f64(seconds).map_err(|error| Error::Option {
+            option: "--call-limit",
+            reason: error.to_string(),
+        })
+    });
     Ok(Options {
+        isolation: arguments.isolate,
+        call_limit: limit.transpose()?.unwrap_or(Options::CALL_LIMIT),
         trace: trace.transpose()?,
         log_categories: arguments.log.clone(),
     })

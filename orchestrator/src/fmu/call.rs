@@ -201,6 +201,15 @@ pub(super) struct Call<'a> {
     pub numbers: [f64; 3],
     pub flags: [bool; 5],
     pub handle: u64,
+    /// The call that the outcome belongs to, if it is an earlier one.
+    pub culprit: Option<Box<Culprit>>,
+}
+
+/// A call whose outcome came back with that of a later one.
+#[derive(Debug)]
+pub(super) struct Culprit {
+    pub function: Function,
+    pub references: Vec<u32>,
 }
 
 /// Values of a call.
@@ -224,6 +233,7 @@ impl Call<'_> {
             numbers: [0.0; 3],
             flags: [false; 5],
             handle: 0,
+            culprit: None,
         }
     }
 }

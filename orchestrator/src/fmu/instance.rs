@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use super::call::{Call, Endpoint, Function, Lost, Scalar, Values};
+use super::call::{Call, Endpoint, Function, Lost, Scalar, Texts, Values};
+use super::isolation::Remote;
 use super::messages::{Messages, STATUS, TELLING};
 use super::native::{self, FATAL, Mode, Setup, Sink};
+use super::processes::{Processes, refused};
 use super::{
-    CallError, FmiVersion, Fmu, FmuError, Kind, Message, Options, Trace, archive, convert,
+    CallError, Datum, FmiVersion, Fmu, FmuError, Interface, Kind, Message, Options, Trace, archive,
+    convert,
 };
 
 type Outcome<T = ()> = Result<T, Box<CallError>>;
@@ -25,6 +28,8 @@ pub struct Instance {
     trace: Option<Arc<Trace>>,
     time: f64,
     phase: Phase,
+    /// Whether its events are handled from outside.
+    has_events: bool,
     /// Values on their way, aligned for every type.
     scratch: Vec<u64>,
 }
@@ -43,6 +48,9 @@ enum Phase {
 #[derive(Debug, Default)]
 pub struct State(u64);
 
+/// How often events may follow each other at one moment.
+const MOST_EVENT_ITERATIONS: usize = 1000;
+
 /// How a step ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress {
@@ -59,7 +67,41 @@ impl Instance {
     /// No library for this platform, a library that cannot be loaded or lacks a function, or an
     /// FMU that refuses.
     pub fn new(fmu: &Arc<Fmu>, name: &str, options: &Options) -> Result<Self, FmuError> {
+        Self::within(fmu, name, &mut Processes::new(options), false)
+    }
+
+    /// As [`Instance::new`], in the process that `processes` has for it; `alone` where its end must
+    /// not take others along.
+    ///
+    /// # Errors
+    /// As [`Instance::new`], or no process can be started.
+    pub fn within(
+        fmu: &Arc<Fmu>,
+        name: &str,
+        processes: &mut Processes,
+        alone: bool,
+    ) -> Result<Self, FmuError> {
         let description = &fmu.description;
+        // Clocks tick in events only; without them an FMU handles its events itself.
+        let has_clocks = description.variables.iter().any(|v| v.kind == Kind::Clock);
+        let has_events = description.has_event_mode && has_clocks;
+        let mode = match description.interface {
+            Interface::CoSimulation => Mode::CoSimulation {
+                event_mode: has_events,
+            },
+            Interface::ModelExchange => {
+                let reason = "it offers model exchange only, no co-simulation";
+                return Err(refused(fmu, name, reason.to_string()));
+            }
+            Interface::ScheduledExecution => {
+                let reason = "it offers scheduled execution only: its parts have to be called by a \
+                              scheduler in real time, which a co-simulation has not";
+                return Err(refused(fmu, name, reason.to_string()));
+            }
+        };
+        let place = processes.place(fmu, alone);
+        let place = place.map_err(|reason| refused(fmu, name, reason))?;
+        let options = processes.options();
         let directory = fmu.unpacked.path();
         let identifier = &description.model_identifier;
         let version = description.version;
@@ -79,13 +121,17 @@ impl Instance {
             resources: directory.join("resources"),
             name: name.to_string(),
             token: description.token.clone(),
-            mode: Mode::CoSimulation { event_mode: false },
+            mode,
             logging: options.log_categories.is_some() || !told.is_empty(),
         };
         if let Some(trace) = &options.trace {
             trace.begin(name, version, &Call::plain(Function::Instantiate));
         }
-        let made = native::instantiate(&setup, messages.clone());
+        let made = match &place {
+            None => native::instantiate(&setup, messages.clone()),
+            Some(host) => Remote::new(host, &setup, messages.clone(), options.trace.is_some())
+                .map(|remote| Box::new(remote) as Box<dyn Endpoint>),
+        };
         if let Some(trace) = &options.trace {
             let outcome = match &made {
                 Ok(_) => Ok(0),
@@ -97,11 +143,7 @@ impl Instance {
             for message in messages.take() {
                 reason += &format!("; it says: {}", message.text);
             }
-            FmuError::Instantiation {
-                fmu: fmu.path.clone(),
-                instance: name.to_string(),
-                reason,
-            }
+            refused(fmu, name, reason)
         })?;
         let mut instance = Self {
             name: name.to_string(),
@@ -111,6 +153,7 @@ impl Instance {
             trace: options.trace.clone(),
             time: 0.0,
             phase: Phase::Instantiated,
+            has_events,
             scratch: Vec::new(),
         };
         if setup.logging {
@@ -165,6 +208,10 @@ impl Instance {
     /// The FMU's refusal, for instance of a parameter.
     pub fn exit_initialization(&mut self) -> Outcome {
         self.plain(Function::ExitInitializationMode)?;
+        if self.has_events {
+            self.update_discrete_states()?;
+            self.plain(Function::EnterStepMode)?;
+        }
         self.phase = Phase::Stepping;
         Ok(())
     }
@@ -176,6 +223,9 @@ impl Instance {
     #[inline]
     pub fn do_step(&mut self, time: f64, step: f64) -> Outcome<Progress> {
         self.time = time;
+        if self.has_events {
+            return self.step_with_events(time, step);
+        }
         let mut call = Call::plain(Function::DoStep);
         call.numbers = [time, step, 0.0];
         let done = self.carry_out(&mut call);
@@ -190,6 +240,43 @@ impl Instance {
             }
             Ok(2) => self.discarded(end, last),
             outcome => self.judge(outcome, &call).map(|()| Progress::Whole),
+        }
+    }
+
+    /// As [`Instance::do_step`], handling the events on the way.
+    #[cold]
+    fn step_with_events(&mut self, time: f64, step: f64) -> Outcome<Progress> {
+        let (end_time, mut now) = (time + step, time);
+        let mut standing = 0;
+        loop {
+            let mut call = Call::plain(Function::DoStep);
+            call.numbers = [now, end_time - now, 0.0];
+            self.time = now;
+            let done = self.carry_out(&mut call);
+            let [event, end, early, ..] = call.flags;
+            let last = if early { call.numbers[0] } else { end_time };
+            match done {
+                Ok(0 | 1) if end => return Ok(Progress::Ended(call.numbers[0])),
+                Ok(0 | 1) => {}
+                Ok(2) => return self.discarded(end, last),
+                outcome => self.judge(outcome, &call)?,
+            }
+            if event || early {
+                self.plain(Function::EnterEventMode)?;
+                if self.update_discrete_states()? {
+                    return Ok(Progress::Ended(last));
+                }
+                self.plain(Function::EnterStepMode)?;
+            }
+            if end_time - last <= 1e-9 * step {
+                return Ok(Progress::Whole);
+            }
+            standing = if last > now { 0 } else { standing + 1 };
+            if standing > MOST_EVENT_ITERATIONS {
+                let outcome = format!("returned early again and again at {last} s");
+                return Err(self.failure(Function::DoStep, &[], outcome));
+            }
+            now = last;
         }
     }
 
@@ -238,7 +325,10 @@ impl Instance {
             None => Ok(()),
             Some(at) => {
                 let outcome = format!("gave {}", values[at]);
-                let one = references.get(at..=at).unwrap_or(references);
+                let one = match values.len() == references.len() {
+                    true => &references[at..=at],
+                    false => references,
+                };
                 Err(self.failure(Function::Get(scalar), one, outcome))
             }
         }
@@ -268,18 +358,123 @@ impl Instance {
         done
     }
 
-    /// Sets a text.
+    /// Reads variables of a type that an `f64` does not hold ([`Kind::is_exact`]).
     ///
     /// # Errors
     /// The FMU's refusal.
-    pub fn set_text(&mut self, reference: u32, text: &str) -> Outcome {
-        let texts = vec![text.as_bytes().to_vec()];
-        let references = [reference];
-        let mut call = Call::plain(Function::Set(Scalar::String));
-        call.references = &references;
-        call.count = 1;
-        call.values = Values::TextsIn(&texts);
+    pub fn get_exact(&mut self, kind: &Kind, references: &[u32], data: &mut [Datum]) -> Outcome {
+        let scalar = self.scalar(kind);
+        let mut call = Call::plain(Function::Get(scalar));
+        call.references = references;
+        call.count = data.len();
+        if matches!(scalar, Scalar::String | Scalar::Binary) {
+            let mut texts = Texts::new();
+            call.values = Values::TextsOut(&mut texts);
+            self.call(&mut call)?;
+            for (datum, text) in data.iter_mut().zip(texts) {
+                *datum = match scalar {
+                    Scalar::String => Datum::Text(text),
+                    _ => Datum::Bytes(text),
+                };
+            }
+            return Ok(());
+        }
+        let mut scratch = vec![0_u64; data.len()];
+        call.values = Values::Out(bytemuck::cast_slice_mut(&mut scratch));
+        self.call(&mut call)?;
+        for (datum, bits) in data.iter_mut().zip(scratch) {
+            *datum = match scalar {
+                Scalar::UInt64 => Datum::Unsigned(bits),
+                _ => Datum::Signed(bits.cast_signed()),
+            };
+        }
+        Ok(())
+    }
+
+    /// Sets variables of a type that an `f64` does not hold.
+    ///
+    /// # Errors
+    /// The FMU's refusal.
+    pub fn set_exact(&mut self, kind: &Kind, references: &[u32], data: &[Datum]) -> Outcome {
+        let scalar = self.scalar(kind);
+        let mut call = Call::plain(Function::Set(scalar));
+        call.references = references;
+        call.count = data.len();
+        if matches!(scalar, Scalar::String | Scalar::Binary) {
+            let texts = data.iter().map(|datum| match datum {
+                Datum::Text(bytes) | Datum::Bytes(bytes) => bytes.clone(),
+                number => number.to_string().into_bytes(),
+            });
+            let texts = texts.collect();
+            call.values = Values::TextsIn(&texts);
+            return self.call(&mut call);
+        }
+        let numbers = data.iter().map(|datum| match datum {
+            Datum::Signed(value) => value.cast_unsigned(),
+            Datum::Unsigned(value) => *value,
+            Datum::Number(value) => *value as i64 as u64,
+            Datum::Text(_) | Datum::Bytes(_) => 0,
+        });
+        let numbers: Vec<u64> = numbers.collect();
+        call.values = Values::In(bytemuck::cast_slice(&numbers));
         self.call(&mut call)
+    }
+
+    /// Enters the mode in which structural parameters are set.
+    ///
+    /// # Errors
+    /// The FMU's refusal.
+    pub fn enter_configuration(&mut self) -> Outcome {
+        self.plain(Function::EnterConfigurationMode)
+    }
+
+    /// Leaves the mode in which structural parameters are set.
+    ///
+    /// # Errors
+    /// The FMU's refusal.
+    pub fn exit_configuration(&mut self) -> Outcome {
+        self.plain(Function::ExitConfigurationMode)
+    }
+
+    /// Lets an instance whose events are handled from outside take in what was set, as an event at
+    /// the present time; nothing for others.
+    ///
+    /// # Errors
+    /// The FMU's refusal.
+    pub fn begin_event(&mut self) -> Outcome {
+        if !self.has_events || self.phase != Phase::Stepping {
+            return Ok(());
+        }
+        self.plain(Function::EnterEventMode)
+    }
+
+    /// Ends what [`Instance::begin_event`] began; gives whether the FMU asked to end the run.
+    ///
+    /// # Errors
+    /// The FMU's refusal.
+    pub fn end_event(&mut self) -> Outcome<bool> {
+        if !self.has_events || self.phase != Phase::Stepping {
+            return Ok(false);
+        }
+        let end = self.update_discrete_states()?;
+        if !end {
+            self.plain(Function::EnterStepMode)?;
+        }
+        Ok(end)
+    }
+
+    /// Until nothing changes any more; gives whether the FMU asked to end the run.
+    fn update_discrete_states(&mut self) -> Outcome<bool> {
+        for _ in 0..MOST_EVENT_ITERATIONS {
+            let mut call = Call::plain(Function::UpdateDiscreteStates);
+            self.call(&mut call)?;
+            let [again, end, ..] = call.flags;
+            if end || !again {
+                return Ok(end);
+            }
+        }
+        let outcome = format!("wants to go on after {MOST_EVENT_ITERATIONS} repetitions");
+        Err(self.failure(Function::UpdateDiscreteStates, &[], outcome))
     }
 
     /// Keeps the present state in `state`, in place of what was kept there.
@@ -329,18 +524,38 @@ impl Instance {
         }
     }
 
+    /// As [`Instance::terminate`], and frees it: what it logs to the very end can be taken then.
+    pub fn close(&mut self) {
+        self.terminate();
+        self.phase = Phase::Over;
+        self.endpoint = Box::new(Closed);
+    }
+
     fn version(&self) -> FmiVersion {
         self.fmu.description.version
     }
 
     #[inline]
     fn scalar(&self, kind: &Kind) -> Scalar {
-        match (kind, self.version()) {
-            (Kind::Float64, _) => Scalar::Float64,
-            (Kind::Boolean, _) => Scalar::Boolean,
-            (Kind::String, _) => Scalar::String,
-            (Kind::Enumeration(_), FmiVersion::V3) => Scalar::Int64,
-            _ => Scalar::Int32,
+        match kind {
+            Kind::Float64 => Scalar::Float64,
+            Kind::Float32 => Scalar::Float32,
+            Kind::Int8 => Scalar::Int8,
+            Kind::UInt8 => Scalar::UInt8,
+            Kind::Int16 => Scalar::Int16,
+            Kind::UInt16 => Scalar::UInt16,
+            Kind::Int32 => Scalar::Int32,
+            Kind::UInt32 => Scalar::UInt32,
+            Kind::Int64 => Scalar::Int64,
+            Kind::UInt64 => Scalar::UInt64,
+            Kind::Boolean => Scalar::Boolean,
+            Kind::String => Scalar::String,
+            Kind::Binary => Scalar::Binary,
+            Kind::Clock => Scalar::Clock,
+            Kind::Enumeration(_) => match self.version() {
+                FmiVersion::V2 => Scalar::Int32,
+                FmiVersion::V3 => Scalar::Int64,
+            },
         }
     }
 
@@ -395,7 +610,10 @@ impl Instance {
                 reason
             }
         };
-        Err(self.failure(call.function, call.references, outcome))
+        Err(match &call.culprit {
+            Some(earlier) => self.failure(earlier.function, &earlier.references, outcome),
+            None => self.failure(call.function, call.references, outcome),
+        })
     }
 
     #[cold]
@@ -421,6 +639,15 @@ impl Instance {
             outcome,
             messages: messages.into_iter().map(|message| message.text).collect(),
         })
+    }
+}
+
+/// In place of an instance that has been freed.
+struct Closed;
+
+impl Endpoint for Closed {
+    fn call(&mut self, _call: &mut Call) -> Result<i32, Lost> {
+        Err(Lost("came after the instance was freed".to_string()))
     }
 }
 

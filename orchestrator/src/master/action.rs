@@ -1,5 +1,6 @@
 //! What is done at a tick, prepared for doing it many times.
 
+use super::signals::Signals;
 use super::transfer::{Inputs, Outputs};
 use super::{MasterError, Part};
 
@@ -46,7 +47,7 @@ impl Action {
         &mut self,
         at: Moment,
         parts: &mut [Part],
-        signals: &mut [f64],
+        signals: &mut Signals,
         names: &[String],
     ) -> Result<(), MasterError> {
         match self {
@@ -89,11 +90,11 @@ impl Action {
                     part.instance.save_state(&mut part.state)?;
                 }
                 for pass in 1.. {
-                    last.copy_from_slice(signals);
+                    last.copy_from_slice(&signals.numbers);
                     for action in actions.iter_mut() {
                         action.perform(at, parts, signals, names)?;
                     }
-                    if settled(at.time, pass, last, signals, names)? {
+                    if settled(at.time, pass, last, &signals.numbers, names)? {
                         break;
                     }
                     for &part in called.iter().filter(|_| at.calls) {

@@ -1,14 +1,15 @@
 //! From a checked system to a simulation: loads the FMUs and prepares every exchange of values.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::action::Action;
 use super::reference::Reference;
-use super::transfer::{Inputs, Outputs};
+use super::signals::{Place, Signals};
+use super::transfer::{Drive, Inputs, Outputs};
 use super::{Algorithm, MasterError, Part, Simulation, start};
-use crate::fmu::{Causality, Instance, Kind, Options, State, Variability};
+use crate::fmu::{Causality, Datum, Instance, Kind, Options, Processes, State, Variability};
 use crate::motion::Motion;
-use crate::system::{Operation, Quantity, Source, System};
+use crate::system::{Connection, Operation, Quantity, Source, System};
 
 impl Simulation {
     /// Loads and initializes `system` under `motion`, with a coupling step of `step` seconds.
@@ -50,12 +51,16 @@ impl Simulation {
             }
         }
         let mut plan = Plan::new(system, &mut reference, &schedule.operations);
+        let mut processes = Processes::new(options);
         let mut parts = Vec::with_capacity(system.components.len());
         for (index, component) in system.components.iter().enumerate() {
             if algorithm == Algorithm::Iterative && !component.fmu.description.saves_state {
                 return Err(MasterError::NoState(component.name.clone()));
             }
-            let mut instance = Instance::new(&component.fmu, &component.name, options)?;
+            let may_fail =
+                component.period.is_some() && system.stop.is_some_and(|(guard, _)| guard != index);
+            let (fmu, name) = (&component.fmu, &component.name);
+            let mut instance = Instance::within(fmu, name, &mut processes, may_fail)?;
             start::prepare(&mut instance, component)?;
             let every = component
                 .period
@@ -66,8 +71,7 @@ impl Simulation {
                 inputs: plan.inputs(&mut reference, index, |_| true),
                 outputs: std::mem::take(&mut plan.outputs[index]),
                 state: State::default(),
-                may_fail: component.period.is_some()
-                    && system.stop.is_some_and(|(guard, _)| guard != index),
+                may_fail,
                 failure: None,
                 ended: None,
             });
@@ -82,18 +86,29 @@ impl Simulation {
                 component,
                 variable,
             };
-            (plan.signal(&mut reference, source), system.end_after)
+            match plan.signal(&mut reference, source) {
+                Place::Number(signal) => Some((signal, system.end_after)),
+                Place::Exact(_) => None,
+            }
         });
+        let end_when = end_when.flatten();
         let cause = system.end_when.and_then(|(component, _)| {
             let description = &system.components[component].fmu.description;
             let variable = description.position("trip_cause")?;
-            plan.places.get(&(component, variable)).copied()
+            match plan.places.get(&(component, variable)) {
+                Some(Place::Number(signal)) => Some(*signal),
+                _ => None,
+            }
         });
         let guard = system.stop.map(|(part, variable)| {
             let variables = &system.components[part].fmu.description.variables;
             (part, variables[variable].reference)
         });
-        let signals = vec![0.0; plan.names.len()];
+        let (exact_names, exact) = plan.exact.into_iter().unzip();
+        let signals = Signals {
+            numbers: vec![0.0; plan.names.len()],
+            exact,
+        };
         let mut simulation = Self {
             algorithm,
             step,
@@ -103,8 +118,10 @@ impl Simulation {
             last_signals: signals.clone(),
             signals,
             names: plan.names,
+            exact_names,
             reference,
             parts,
+            diverted: processes.diverted(),
             actions,
             end_when,
             stop: guard,
@@ -133,12 +150,16 @@ fn ticks(period: f64, step: f64, what: &str) -> Result<usize, MasterError> {
 /// Where each signal stands.
 struct Plan<'a> {
     system: &'a System,
-    places: HashMap<(usize, usize), usize>,
+    places: HashMap<(usize, usize), Place>,
     names: Vec<String>,
+    /// Names and empty values of signals that numbers do not hold.
+    exact: Vec<(String, Datum)>,
     /// The outputs of each component.
     outputs: Vec<Outputs>,
     /// The outputs of each operation, by component and first output.
     groups: HashMap<(usize, usize), Outputs>,
+    /// Connections to each component, in their order.
+    incoming: Vec<Vec<&'a Connection>>,
 }
 
 impl<'a> Plan<'a> {
@@ -148,17 +169,21 @@ impl<'a> Plan<'a> {
             let source = Source::Reference { quantity, ahead: 0 };
             names[reference.tap(quantity, 0)] = system.source_name(source);
         }
+        let mut incoming = vec![Vec::new(); system.components.len()];
         for connection in &system.connections {
             if let Source::Reference { quantity, ahead } = connection.source {
                 names[reference.tap(quantity, ahead)] = system.source_name(connection.source);
             }
+            incoming[connection.component].push(connection);
         }
         let mut plan = Self {
             system,
             places: HashMap::new(),
             names,
+            exact: Vec::new(),
             outputs: vec![Outputs::default(); system.components.len()],
             groups: HashMap::new(),
+            incoming,
         };
         for operation in operations {
             plan.place(operation);
@@ -177,8 +202,8 @@ impl<'a> Plan<'a> {
             Operation::Call { component } => {
                 let description = &self.system.components[*component].fmu.description;
                 let outputs = description.of(Causality::Output);
-                let numeric = outputs.filter(|&v| description.variables[v].kind.is_numeric());
-                (*component, numeric.collect())
+                let travelling = outputs.filter(|&v| description.variables[v].kind.travels());
+                (*component, travelling.collect())
             }
         };
         let variables = &self.system.components[component].fmu.description.variables;
@@ -190,31 +215,38 @@ impl<'a> Plan<'a> {
         }
         let mut group = Outputs::default();
         for kind in kinds {
-            let first = self.names.len();
-            let alike = outputs
-                .iter()
-                .copied()
-                .filter(|&v| variables[v].kind == *kind);
-            let alike: Vec<usize> = alike.collect();
-            for &output in &alike {
-                self.places.insert((component, output), self.names.len());
-                self.names
-                    .push(self.system.variable_name(component, output));
+            let first = match kind.is_exact() {
+                true => self.exact.len(),
+                false => self.names.len(),
+            };
+            let (mut references, mut count) = (Vec::new(), 0);
+            let alike = outputs.iter().filter(|&&v| variables[v].kind == *kind);
+            for &output in alike {
+                let name = self.system.variable_name(component, output);
+                let place = if kind.is_exact() {
+                    self.exact.push((name, Datum::empty(kind)));
+                    Place::Exact(first + count)
+                } else {
+                    self.names.push(name);
+                    Place::Number(first + count)
+                };
+                self.places.insert((component, output), place);
+                // The elements of an array stand side by side.
+                if variables[output].element.0 == 0 {
+                    references.push(variables[output].reference);
+                }
+                count += 1;
             }
-            group.add(
-                kind,
-                alike.iter().map(|&v| variables[v].reference).collect(),
-                first,
-            );
+            group.add(kind, references, count, first);
         }
         self.outputs[component].extend(&group);
         self.groups
             .insert((component, outputs.first().copied().unwrap_or(0)), group);
     }
 
-    fn signal(&self, reference: &mut Reference, source: Source) -> usize {
+    fn signal(&self, reference: &mut Reference, source: Source) -> Place {
         match source {
-            Source::Reference { quantity, ahead } => reference.tap(quantity, ahead),
+            Source::Reference { quantity, ahead } => Place::Number(reference.tap(quantity, ahead)),
             Source::Output {
                 component,
                 variable,
@@ -237,23 +269,49 @@ impl<'a> Plan<'a> {
         }
     }
 
+    /// The driven inputs of a component among the chosen ones; arrays as a whole.
     fn inputs(
         &self,
         reference: &mut Reference,
         component: usize,
         chosen: impl Fn(usize) -> bool,
     ) -> Inputs {
-        let variables = &self.system.components[component].fmu.description.variables;
+        let part = &self.system.components[component];
+        let variables = &part.fmu.description.variables;
         let mut inputs = Inputs::default();
-        for connection in &self.system.connections {
-            if connection.component == component && chosen(connection.input) {
-                let signal = self.signal(reference, connection.source);
-                let input = &variables[connection.input];
-                let is_smooth = self.is_smooth(connection.source)
-                    && input.kind == Kind::Float64
-                    && input.variability == Variability::Continuous;
-                inputs.add(input, signal, connection.factor, is_smooth);
+        // Elements of arrays, by the position of the first.
+        let mut arrays: HashMap<usize, Vec<Option<Drive>>> = HashMap::new();
+        let mut order = Vec::new();
+        for connection in &self.incoming[component] {
+            let input = &variables[connection.input];
+            let (element, size) = input.element;
+            let first = connection.input - element;
+            if !(first..first + size).any(&chosen) {
+                continue;
             }
+            let is_smooth = self.is_smooth(connection.source)
+                && input.kind == Kind::Float64
+                && input.variability == Variability::Continuous;
+            let drive = Drive {
+                signal: self.signal(reference, connection.source),
+                factor: connection.factor,
+                offset: connection.offset,
+                is_smooth,
+            };
+            let drives = arrays.entry(first).or_insert_with(|| {
+                order.push(first);
+                vec![None; size]
+            });
+            drives[element] = Some(drive);
+        }
+        let given = part.given();
+        for first in order {
+            let elements: Vec<_> = arrays[&first]
+                .iter()
+                .zip(first..)
+                .map(|(drive, position)| (*drive, part.start_value(&given, position)))
+                .collect();
+            inputs.add(&variables[first], &elements);
         }
         inputs
     }
@@ -263,15 +321,17 @@ impl<'a> Plan<'a> {
             Operation::Call { component } => Action::Call { part: *component },
             Operation::Read { component, outputs } => {
                 let variables = &self.system.components[*component].fmu.description.variables;
-                let needed = |input| {
-                    outputs
-                        .iter()
-                        .any(|&v| variables[v].dependencies.contains(&input))
-                };
+                // Outputs mostly share their lists of dependencies.
+                let mut known = HashSet::new();
+                let lists = outputs
+                    .iter()
+                    .map(|&output| &variables[output].dependencies);
+                let lists = lists.filter(|list| known.insert(list.as_ptr()));
+                let needed: HashSet<usize> = lists.flat_map(|list| list.iter().copied()).collect();
                 let group = (*component, outputs.first().copied().unwrap_or(0));
                 Action::Read {
                     part: *component,
-                    inputs: self.inputs(reference, *component, needed),
+                    inputs: self.inputs(reference, *component, |input| needed.contains(&input)),
                     outputs: self.groups.get(&group).cloned().unwrap_or_default(),
                 }
             }

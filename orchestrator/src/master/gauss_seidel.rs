@@ -30,7 +30,7 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     let (tick, time, step) = (simulation.tick, simulation.time(), simulation.step);
     let (now, last) = (&mut simulation.signals, &mut simulation.last_signals);
     if tick == 0 {
-        last.copy_from_slice(now);
+        last.copy_from(now);
     }
     for part in simulation
         .parts
@@ -41,6 +41,6 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
             .transfer_between(now, last, -0.5, &mut part.instance)?;
         part.step(time, step)?;
     }
-    last.copy_from_slice(now);
+    last.copy_from(now);
     Ok(())
 }

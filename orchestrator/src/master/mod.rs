@@ -14,6 +14,7 @@ mod jacobi;
 mod record;
 mod reference;
 mod run;
+mod signals;
 mod start;
 mod transfer;
 
@@ -23,9 +24,10 @@ pub use error::MasterError;
 pub use record::Record;
 pub use run::{Ended, LogLine, Outcome, Pace};
 
-use crate::fmu::{Instance, Progress, State};
+use crate::fmu::{Diverted, Instance, Progress, State};
 use action::Action;
 use reference::Reference;
+use signals::Signals;
 use transfer::{Inputs, Outputs};
 
 /// The order in which components are called and values are exchanged.
@@ -72,11 +74,15 @@ pub struct Simulation {
     /// Ticks from one row of the record to the next: one sample of the motion.
     ticks_per_row: usize,
     /// The latest value of every source of connections and every output.
-    signals: Vec<f64>,
-    /// Their names.
+    signals: Signals,
+    /// Names of the numbers.
     names: Vec<String>,
+    /// Names of the values that numbers do not hold.
+    exact_names: Vec<String>,
     reference: Reference,
     parts: Vec<Part>,
+    /// While foreign FMUs live in this process, what they print does not go among the results.
+    diverted: Option<Diverted>,
     actions: Vec<Action>,
     /// The signal that ends the run when it is not 0, and how long the run goes on then, s.
     end_when: Option<(usize, f64)>,
@@ -85,9 +91,9 @@ pub struct Simulation {
     /// The output that says why the run was ended, beside that of `end_when`.
     cause: Option<usize>,
     /// The signals at the tick before; in [`Algorithm::Iterative`] those of the last repetition.
-    last_signals: Vec<f64>,
+    last_signals: Signals,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
-    next_signals: Vec<f64>,
+    next_signals: Signals,
 }
 
 /// A component in a simulation.
@@ -127,7 +133,7 @@ impl Part {
     }
 
     /// Reads its outputs into the signals; a failure that may be is kept instead of given.
-    fn read(&mut self, signals: &mut [f64]) -> Result<(), MasterError> {
+    fn read(&mut self, signals: &mut Signals) -> Result<(), MasterError> {
         match self.outputs.read(signals, &mut self.instance) {
             Err(error) if self.may_fail => self.failure = Some(error.into()),
             done => done?,
@@ -158,7 +164,7 @@ impl Simulation {
 
     /// The latest values, SI.
     pub fn signals(&self) -> &[f64] {
-        &self.signals
+        &self.signals.numbers
     }
 
     /// Makes the outputs at the present tick known; due sampled components are called.
@@ -167,7 +173,7 @@ impl Simulation {
     /// A call that an FMU did not complete, or a loop that does not settle.
     pub fn observe(&mut self) -> Result<(), MasterError> {
         self.reference
-            .sample(self.tick / self.ticks_per_row, &mut self.signals);
+            .sample(self.tick / self.ticks_per_row, &mut self.signals.numbers);
         match self.algorithm {
             Algorithm::Jacobi => Ok(()),
             Algorithm::GaussSeidel | Algorithm::Iterative => gauss_seidel::observe(self),

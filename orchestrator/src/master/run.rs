@@ -129,7 +129,7 @@ impl Simulation {
     /// Plays `samples` samples; `progress` is told the number of samples reached now and then.
     /// What was computed is returned however the run ends.
     pub fn run(mut self, samples: usize, pace: Pace, progress: &mut dyn FnMut(usize)) -> Outcome {
-        let mut record = Record::with_capacity(&self.names, samples);
+        let mut record = Record::with_capacity(&self.names, samples).beside(&self.exact_names);
         let begin = Instant::now();
         let ended = self.play(samples, pace, progress, &mut record);
         let wall = begin.elapsed().as_secs_f64();
@@ -175,7 +175,7 @@ impl Simulation {
             }
             self.observe()?;
             if self.tick.is_multiple_of(self.ticks_per_row) {
-                record.push(self.time(), &self.signals);
+                record.push(self.time(), &self.signals.numbers, &self.signals.exact);
                 let sample = self.tick / self.ticks_per_row;
                 if sample.is_multiple_of(1024) {
                     progress(sample);
@@ -192,7 +192,7 @@ impl Simulation {
                 stopped = true;
             }
             if let Some((signal, after)) = self.end_when {
-                if tripped.is_none() && self.signals[signal] != 0.0 {
+                if tripped.is_none() && self.signals.numbers[signal] != 0.0 {
                     tripped = Some((self.time(), self.time() + after, self.cause_in_words()));
                 }
                 if tripped.is_some_and(|(_, end, _)| self.time() >= end) {
@@ -219,7 +219,7 @@ impl Simulation {
     }
 
     fn cause_in_words(&self) -> Option<&'static str> {
-        let number = self.signals[self.cause?] as usize;
+        let number = self.signals.numbers[self.cause?] as usize;
         Trip::ALL.get(number).map(|cause| cause.words())
     }
 }
@@ -246,22 +246,25 @@ impl Simulation {
                 calls: false,
             };
             self.reference
-                .sample(self.tick / self.ticks_per_row, &mut self.signals);
+                .sample(self.tick / self.ticks_per_row, &mut self.signals.numbers);
             for action in &mut self.actions {
                 action.perform(at, &mut self.parts, &mut self.signals, &self.names)?;
             }
-            record.push(time, &self.signals);
+            record.push(time, &self.signals.numbers, &self.signals.exact);
         }
         Ok(Some(Ended::Terminated { component, time }))
     }
 
-    /// Gives states back and terminates the instances.
+    /// Gives states back, terminates the instances and frees them.
     fn close(&mut self) {
         for part in &mut self.parts {
             // A state that cannot be given back is lost with its instance.
             let _ = part.instance.free_state(std::mem::take(&mut part.state));
-            part.instance.terminate();
         }
+        for part in &mut self.parts {
+            part.instance.close();
+        }
+        self.diverted = None;
     }
 }
 

@@ -11,6 +11,7 @@ pub mod model;
 pub mod tuning;
 mod value;
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -21,7 +22,7 @@ pub use file::{ComponentFile, ExperimentFile, SystemFile};
 pub use graph::{Operation, Schedule};
 pub use value::Value;
 
-use crate::fmu::Fmu;
+use crate::fmu::{Datum, Fmu};
 
 /// Sampling period of a controller for which nothing else is said, s (Section 5.3.1: 500 Hz).
 pub const DEFAULT_PERIOD: f64 = units::constants::SAMPLING_PERIOD;
@@ -41,6 +42,8 @@ pub struct System {
     pub end_when: Option<(usize, usize)>,
     /// How long the run goes on after that, s.
     pub end_after: f64,
+    /// What the user should know of it.
+    pub notes: Vec<String>,
     /// The Boolean input that is set when a sampled component fails, as component and variable.
     pub stop: Option<(usize, usize)>,
 }
@@ -60,7 +63,28 @@ pub struct Component {
     pub inputs: Vec<(usize, Value)>,
 }
 
-/// A connection of a [`System`]: an input takes `factor` times the source's value.
+impl Component {
+    /// What the system gives, by position.
+    pub(crate) fn given(&self) -> HashMap<usize, &Value> {
+        let given = self.parameters.iter().chain(&self.inputs);
+        given.map(|(position, value)| (*position, value)).collect()
+    }
+
+    /// The value of a variable before the run: what the system gives, or its own start value.
+    pub(crate) fn start_value(&self, given: &HashMap<usize, &Value>, position: usize) -> Datum {
+        let variable = &self.fmu.description.variables[position];
+        match given.get(&position) {
+            Some(value) => value.datum(&variable.kind),
+            None => variable
+                .start
+                .as_deref()
+                .and_then(|text| Datum::read(&variable.kind, text))
+                .unwrap_or_else(|| Datum::empty(&variable.kind)),
+        }
+    }
+}
+
+/// A connection of a [`System`]: an input takes `factor` times the source's value plus `offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Connection {
     /// Where the value comes from.
@@ -71,6 +95,8 @@ pub struct Connection {
     pub input: usize,
     /// Conversion between the units, 1 where they are the same.
     pub factor: f64,
+    /// Added after the factor, in the input's unit; 0 but for temperatures and the like.
+    pub offset: f64,
 }
 
 impl System {

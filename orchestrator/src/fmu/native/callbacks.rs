@@ -48,6 +48,8 @@ impl Callbacks {
 }
 
 unsafe extern "C" {
+    pub(super) fn shakebench_print_by_the_line();
+
     fn shakebench_fmi2_logger(
         environment: *mut c_void,
         instance: *const c_char,

@@ -4,6 +4,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+void shakebench_print_by_the_line(void) {
+    setvbuf(stdout, NULL, _IOLBF, BUFSIZ);
+}
+
 struct environment {
     void (*log)(void *environment, int status, const char *category, const char *text);
 };

@@ -8,6 +8,7 @@ mod callbacks;
 mod fmi2;
 mod fmi3;
 mod library;
+pub(super) mod printing;
 
 use std::ffi::{CString, c_char, c_void};
 use std::path::PathBuf;
@@ -80,6 +81,12 @@ struct Handle(*mut c_void);
 unsafe impl Send for Handle {}
 // SAFETY: callbacks and environment are not changed while an instance lives.
 unsafe impl Send for Kept {}
+
+/// Lets what FMUs print through C come out line by line.
+pub(super) fn print_by_the_line() {
+    // SAFETY: it only sets how the standard output is buffered.
+    unsafe { callbacks::shakebench_print_by_the_line() }
+}
 
 fn text_for_c(text: &str) -> Result<CString, String> {
     CString::new(text).map_err(|_| format!("`{}` has a zero in it", text.escape_debug()))
