@@ -1,5 +1,7 @@
 //! Hydraulic shake tables as FMI components, co-simulated
 
+#![warn(clippy::missing_errors_doc)]
+
 pub mod cli;
 pub mod comparison;
 pub mod component_library;

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::comparison::tables as compare_tables;
+use crate::comparison;
 use crate::diagnosis;
 use crate::error::Error;
 use crate::results::Results;
@@ -43,8 +43,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let report = folder.join(diagnosis::REPORT);
     let (kind, page) = if has("manifest.json") || has("results.csv") {
         ("run", summary::page_again(folder)?)
-    } else if has(compare_tables::COMPARISON) {
-        ("comparison", compare_tables::page_again(folder)?)
+    } else if has(comparison::COMPARISON) {
+        ("comparison", comparison::page_again(folder)?)
     } else if has(diagnosis::DIAGNOSIS) {
         ("diagnosis", diagnosis::page_again(folder)?)
     } else {

@@ -23,7 +23,7 @@ use sha2::{Digest, Sha256};
 
 pub use datum::Datum;
 pub use description::{
-    BaseUnit, Causality, Description, FmiVersion, Interface, Kind, Variability, Variable,
+    BaseUnit, Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable,
 };
 pub use error::{CallError, FmuError};
 pub use instance::{Instance, Progress, State};

@@ -6,7 +6,7 @@ use super::action::Action;
 use super::reference::Reference;
 use super::signals::{Place, Signals};
 use super::transfer::{Drive, Inputs, Outputs};
-use super::{Algorithm, MasterError, Part, Simulation, start};
+use super::{Algorithm, EndSignals, MasterError, Part, Simulation, start};
 use crate::fmu::{Causality, Datum, Instance, Kind, Options, Processes, State, Variability};
 use crate::motion::Motion;
 use crate::system::{Connection, Operation, Quantity, Source, System};
@@ -81,24 +81,25 @@ impl Simulation {
             .iter()
             .map(|operation| plan.action(&mut reference, operation))
             .collect();
-        let end_when = system.end_when.map(|(component, variable)| {
-            let source = Source::Output {
-                component,
-                variable,
-            };
-            match plan.signal(&mut reference, source) {
-                Place::Number(signal) => Some((signal, system.end_after)),
-                Place::Exact(_) => None,
-            }
-        });
-        let end_when = end_when.flatten();
-        let cause = system.end_when.and_then(|(component, _)| {
-            let description = &system.components[component].fmu.description;
-            let variable = description.position("trip_cause")?;
-            match plan.places.get(&(component, variable)) {
-                Some(Place::Number(signal)) => Some(*signal),
-                _ => None,
-            }
+        // What ends a run is Boolean, and its cause an enumeration: both are numbers.
+        let number = |place: &(usize, usize)| match plan.places.get(place) {
+            Some(Place::Number(signal)) => Some(*signal),
+            _ => None,
+        };
+        let end = system.end.and_then(|end| {
+            let cause = end.cause.and_then(|(component, variable)| {
+                let variables = &system.components[component].fmu.description.variables;
+                let items = match &variables[variable].kind {
+                    Kind::Enumeration(items) => items.clone(),
+                    _ => Vec::new(),
+                };
+                Some((number(&(component, variable))?, items))
+            });
+            Some(EndSignals {
+                when: number(&end.when)?,
+                cause,
+                after: end.after,
+            })
         });
         let guard = system.stop.map(|(part, variable)| {
             let variables = &system.components[part].fmu.description.variables;
@@ -123,9 +124,8 @@ impl Simulation {
             parts,
             diverted: processes.diverted(),
             actions,
-            end_when,
+            end,
             stop: guard,
-            cause,
         };
         start::initialize(&mut simulation, stop)?;
         Ok(simulation)

@@ -22,9 +22,9 @@ use std::fmt;
 
 pub use error::MasterError;
 pub use record::Record;
-pub use run::{Ended, LogLine, Outcome, Pace};
+pub use run::{Ended, Ending, LogLine, Outcome, Pace};
 
-use crate::fmu::{Diverted, Instance, Progress, State};
+use crate::fmu::{Diverted, Instance, Item, Progress, State};
 use action::Action;
 use reference::Reference;
 use signals::Signals;
@@ -84,16 +84,24 @@ pub struct Simulation {
     /// While foreign FMUs live in this process, what they print does not go among the results.
     diverted: Option<Diverted>,
     actions: Vec<Action>,
-    /// The signal that ends the run when it is not 0, and how long the run goes on then, s.
-    end_when: Option<(usize, f64)>,
+    /// What ends the run early.
+    end: Option<EndSignals>,
     /// The part and input that is set when a sampled component fails.
     stop: Option<(usize, u32)>,
-    /// The output that says why the run was ended, beside that of `end_when`.
-    cause: Option<usize>,
     /// The signals at the tick before; in [`Algorithm::Iterative`] those of the last repetition.
     last_signals: Signals,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
     next_signals: Signals,
+}
+
+/// What ends a run early.
+struct EndSignals {
+    /// The signal that ends the run when it is not 0.
+    when: usize,
+    /// The signal that says why, and what its values mean.
+    cause: Option<(usize, Vec<Item>)>,
+    /// How long the run goes on then, s.
+    after: f64,
 }
 
 /// A component in a simulation.

@@ -8,7 +8,8 @@ use plant::identified::shake_table::ShakeTable;
 use plant::identified::table::Table;
 use plant::specimens::linear::LinearSpecimen;
 
-use super::{Value, hint};
+use super::hint;
+use super::value::Value;
 use crate::fmu::{Causality, Description};
 
 /// Published models of `ShakeTable`.

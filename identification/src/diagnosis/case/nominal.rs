@@ -28,6 +28,9 @@ pub struct Nominal {
 }
 
 /// Relation R5: three-variable control as sampled by the rig's computer, SI.
+///
+/// Its arithmetic is not that of `controllers::three_variable`: velocities are differences, and the
+/// integral runs on at the limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlLaw {
     /// V/m.

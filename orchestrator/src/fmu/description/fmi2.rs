@@ -6,7 +6,7 @@ use fmi_rs::model_description::fmi2;
 
 use super::structure::Dependencies;
 use super::{
-    BaseUnit, Causality, Description, FmiVersion, Interface, Kind, Variability, Variable,
+    BaseUnit, Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable,
     preferred_step,
 };
 
@@ -29,7 +29,11 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
         let items = |declared: &str| match types.get(declared) {
             Some(fmi2::SimpleType::Enumeration { items, .. }) => items
                 .iter()
-                .map(|item| (item.name.clone(), i64::from(item.value)))
+                .map(|item| Item {
+                    name: item.name.clone(),
+                    value: i64::from(item.value),
+                    description: item.description.clone().unwrap_or_default(),
+                })
                 .collect(),
             _ => Vec::new(),
         };

@@ -6,8 +6,8 @@ use fmi_rs::model_description::fmi3;
 
 use super::structure::{Dependencies, MOST_ELEMENTS, element_names};
 use super::{
-    BaseUnit, Causality, Description, FmiVersion, Interface, Kind, Sizes, Variability, Variable,
-    preferred_step,
+    BaseUnit, Causality, Description, FmiVersion, Interface, Item, Kind, Sizes, Variability,
+    Variable, preferred_step,
 };
 
 /// Reads the text; structural parameters have the values in `sizes` where there are some.
@@ -173,7 +173,11 @@ fn scalar(
     let items = |declared: &str| match types.get(declared) {
         Some(fmi3::TypeDefinition::Enumeration { items, .. }) => items
             .iter()
-            .map(|item| (item.name.clone(), item.value))
+            .map(|item| Item {
+                name: item.name.clone(),
+                value: item.value,
+                description: item.description.clone().unwrap_or_default(),
+            })
             .collect(),
         _ => Vec::new(),
     };

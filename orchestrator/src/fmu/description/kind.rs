@@ -1,5 +1,16 @@
 //! Types of variables.
 
+/// One of the choices of an enumeration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Item {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: i64,
+    /// What it means; may be empty.
+    pub description: String,
+}
+
 /// The type of a variable, named as in FMI 3.0.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
@@ -23,8 +34,8 @@ pub enum Kind {
     Int64,
     /// A whole number of 64 bits, not negative.
     UInt64,
-    /// A choice: names and values.
-    Enumeration(Vec<(String, i64)>),
+    /// A choice.
+    Enumeration(Vec<Item>),
     /// True or false.
     Boolean,
     /// Text.

@@ -12,7 +12,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-pub use kind::Kind;
+pub use kind::{Item, Kind};
 pub use structure::BaseUnit;
 
 use super::FmuError;
