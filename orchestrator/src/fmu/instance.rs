@@ -89,10 +89,10 @@ impl Instance {
             Interface::CoSimulation => Mode::CoSimulation {
                 event_mode: has_events,
             },
-            Interface::ModelExchange => {
-                let reason = "it offers model exchange only, no co-simulation";
-                return Err(refused(fmu, name, reason.to_string()));
-            }
+            Interface::ModelExchange => Mode::ModelExchange {
+                states: description.states,
+                indicators: description.event_indicators,
+            },
             Interface::ScheduledExecution => {
                 let reason = "it offers scheduled execution only: its parts have to be called by a \
                               scheduler in real time, which a co-simulation has not";

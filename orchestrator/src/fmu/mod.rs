@@ -7,6 +7,7 @@ mod convert;
 mod datum;
 mod description;
 mod error;
+mod folder;
 mod instance;
 pub mod isolation;
 mod messages;
@@ -49,7 +50,7 @@ pub struct Fmu {
     pub is_own: bool,
     /// Platforms it has binaries for, as its folders are named.
     pub platforms: Vec<String>,
-    unpacked: Arc<tempfile::TempDir>,
+    unpacked: Arc<folder::Folder>,
 }
 
 impl Fmu {
@@ -110,6 +111,16 @@ impl Fmu {
             description: description::read(&self.path, self.unpacked.path(), &sizes)?,
             ..self.clone()
         }))
+    }
+
+    /// The same FMU as if no output depended directly on an input.
+    pub(crate) fn without_feedthrough(&self) -> Self {
+        let mut fmu = self.clone();
+        let none: Arc<[usize]> = [].into();
+        for variable in &mut fmu.description.variables {
+            variable.dependencies = none.clone();
+        }
+        fmu
     }
 
     /// The file's name, as messages give it.

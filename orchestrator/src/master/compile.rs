@@ -6,7 +6,7 @@ use super::action::Action;
 use super::reference::Reference;
 use super::signals::{Place, Signals};
 use super::transfer::{Drive, Inputs, Outputs};
-use super::{Algorithm, EndSignals, MasterError, Part, Simulation, start};
+use super::{Algorithm, EndSignals, MasterError, Part, Simulation, order, start};
 use crate::fmu::{Causality, Datum, Instance, Kind, Options, Processes, State, Variability};
 use crate::motion::Motion;
 use crate::system::{Connection, Operation, Quantity, Source, System};
@@ -39,6 +39,12 @@ impl Simulation {
         (step, stop): (f64, f64),
         options: &Options,
     ) -> Result<Self, MasterError> {
+        // A Jacobi master sets, steps and reads: every FMU bears that.
+        let (system, notes) = match algorithm {
+            Algorithm::Jacobi => (system.clone(), Vec::new()),
+            _ => order::bearable(system, step, stop, options),
+        };
+        let system = &system;
         let ticks_per_row = ticks(motion.dt, step, "the sample time of the motion")?;
         let schedule = system.schedule(algorithm == Algorithm::Iterative)?;
         let mut reference = Reference::new(motion);
@@ -124,6 +130,7 @@ impl Simulation {
             parts,
             diverted: processes.diverted(),
             actions,
+            notes,
             end,
             stop: guard,
         };
@@ -132,8 +139,16 @@ impl Simulation {
     }
 }
 
+/// Shorter coupling steps are mistakes, s.
+const SHORTEST_STEP: f64 = 1e-9;
+
 /// How many steps make a period.
 fn ticks(period: f64, step: f64, what: &str) -> Result<usize, MasterError> {
+    if step.is_finite() && step < SHORTEST_STEP {
+        return Err(MasterError::Step(format!(
+            "--step: a coupling step of {step:e} s is shorter than a nanosecond"
+        )));
+    }
     let count = (period / step).round();
     if !step.is_finite() || step <= 0.0 || count < 1.0 || (count * step / period - 1.0).abs() > 1e-9
     {

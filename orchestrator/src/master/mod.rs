@@ -11,6 +11,7 @@ mod error;
 mod gauss_seidel;
 mod iterative;
 mod jacobi;
+mod order;
 mod record;
 mod reference;
 mod run;
@@ -84,6 +85,8 @@ pub struct Simulation {
     /// While foreign FMUs live in this process, what they print does not go among the results.
     diverted: Option<Diverted>,
     actions: Vec<Action>,
+    /// What the user should know of the order of calls.
+    notes: Vec<String>,
     /// What ends the run early.
     end: Option<EndSignals>,
     /// The part and input that is set when a sampled component fails.

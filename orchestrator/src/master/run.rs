@@ -8,6 +8,9 @@ use super::action::Moment;
 use super::{EndSignals, MasterError, Record, Simulation};
 use crate::fmu::{Kind, Message};
 
+/// A run with a value of this size diverges.
+const DIVERGED: f64 = 1e30;
+
 /// How a run ended, in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -136,6 +139,8 @@ pub struct Outcome {
     pub wall: f64,
     /// What the FMUs logged.
     pub messages: Vec<LogLine>,
+    /// What the user should know of the order of calls.
+    pub notes: Vec<String>,
 }
 
 /// A line logged by a component's FMU.
@@ -167,6 +172,7 @@ impl Simulation {
         let wall = begin.elapsed().as_secs_f64();
         progress(record.len());
         self.close();
+        let notes = std::mem::take(&mut self.notes);
         let messages = self.parts.iter().flat_map(|part| {
             let component = &part.instance.name;
             part.instance
@@ -183,6 +189,7 @@ impl Simulation {
             step: self.step,
             wall,
             messages: messages.collect(),
+            notes,
             ended: match ended {
                 Ok(ended) => ended,
                 Err(error) => Ended::Failed(error),
@@ -208,6 +215,7 @@ impl Simulation {
             self.observe()?;
             if self.tick.is_multiple_of(self.ticks_per_row) {
                 record.push(self.time(), &self.signals.numbers, &self.signals.exact);
+                self.check_bounds()?;
                 let sample = self.tick / self.ticks_per_row;
                 if sample.is_multiple_of(1024) {
                     progress(sample);
@@ -278,6 +286,20 @@ impl EndSignals {
 }
 
 impl Simulation {
+    /// Values that no physical quantity has are a run that diverges.
+    fn check_bounds(&self) -> Result<(), MasterError> {
+        let numbers = &self.signals.numbers;
+        if numbers.iter().all(|value| value.abs() < DIVERGED) {
+            return Ok(());
+        }
+        let place = numbers.iter().position(|value| value.abs() >= DIVERGED);
+        Err(MasterError::Diverged {
+            time: self.time(),
+            variable: place.map_or(String::new(), |place| self.names[place].clone()),
+            value: place.map_or(0.0, |place| numbers[place]),
+        })
+    }
+
     /// Whether a component has asked to end the run; the values at that moment are recorded.
     fn terminated(&mut self, record: &mut Record) -> Result<Option<Ended>, MasterError> {
         let mut asked = self.parts.iter().filter_map(|part| {

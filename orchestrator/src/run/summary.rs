@@ -65,7 +65,8 @@ impl Summary {
                 format!("`{}` logged: {}{times}", line.component, line.message.text)
             })
             .collect();
-        warnings.splice(0..0, system.notes.iter().cloned());
+        let notes = system.notes.iter().chain(&outcome.notes);
+        warnings.splice(0..0, notes.cloned());
         let tracking = Table::find(manifest, &outcome.record).and_then(|table| {
             let displacement = outcome.record.column(&table.name("displacement"))?;
             let acceleration = outcome.record.column(&table.name("acceleration"))?;

@@ -262,3 +262,87 @@ fn a_process_of_its_own_changes_no_bit() {
         assert!(calls.contains(call), "{call}");
     }
 }
+
+#[test]
+fn an_fmu_that_refuses_get_after_set_runs_and_says_so_once() {
+    for isolate in ["none", "foreign"] {
+        let folder = tempfile::tempdir().unwrap();
+        pack(folder.path(), "STRICT", "");
+        let run = run(folder.path(), ALONE, &["--isolate", isolate]);
+        assert_eq!(run.status, Some(0), "{isolate}: {}", run.said);
+        assert_eq!(
+            run.said.matches("refuses to give outputs").count(),
+            1,
+            "{}",
+            run.said
+        );
+        // y = 2 u of the step before.
+        let [reference, y] =
+            [1, 4].map(|at| -> Vec<f64> { run.rows.iter().map(|row| row[at]).collect() });
+        assert!(
+            y[2..]
+                .iter()
+                .zip(&reference[1..])
+                .all(|(y, u)| *y == 2.0 * u)
+        );
+    }
+}
+
+#[test]
+fn an_fmu_that_computes_in_its_step_only_is_reported_and_called_without_delay_on_demand() {
+    let folder = tempfile::tempdir().unwrap();
+    pack(folder.path(), "LATE", "");
+    let run_late = run(folder.path(), ALONE, &[]);
+    assert_eq!(run_late.status, Some(0), "{}", run_late.said);
+    assert!(
+        run_late.said.contains("computes it in its steps only"),
+        "{}",
+        run_late.said
+    );
+    let sampled = ALONE.replace("fmu = ", "period = \"2 ms\"\n    fmu = ");
+    let run_sampled = run(folder.path(), &sampled, &[]);
+    assert!(
+        !run_sampled.said.contains("in its steps only"),
+        "{}",
+        run_sampled.said
+    );
+    assert!(run_sampled.rows.iter().all(|row| row[4] == 2.0 * row[1]));
+    // What gives its outputs at once, or says that they do not depend directly, is not reported.
+    pack(folder.path(), "DIRECT", "");
+    let direct = run(folder.path(), ALONE, &[]);
+    assert!(
+        !direct.said.contains("in its steps only"),
+        "{}",
+        direct.said
+    );
+    assert!(direct.rows.iter().all(|row| row[4] == 2.0 * row[1]));
+    pack_as(
+        folder.path(),
+        "hostile.fmu",
+        "LATE",
+        "",
+        "dependencies=\"\"",
+    );
+    let declared = run(folder.path(), ALONE, &[]);
+    assert!(
+        !declared.said.contains("in its steps only"),
+        "{}",
+        declared.said
+    );
+}
+
+#[test]
+fn an_open_input_keeps_its_start_value_and_a_line_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    pack(folder.path(), "DIRECT", "");
+    let system = ALONE.replace("connections = [\"reference.displacement -> it.u\"]", "");
+    let run = run(folder.path(), &system, &[]);
+    assert_eq!(run.status, Some(0), "{}", run.said);
+    assert!(
+        run.said
+            .contains("`it`: the open input `u` (0.25) keeps its start value"),
+        "{}",
+        run.said
+    );
+    assert!(run.rows.iter().all(|row| row[4] == 0.5));
+}

@@ -101,7 +101,7 @@ impl Fmi2 {
             );
             let do_step = match setup.mode {
                 Mode::CoSimulation { .. } => f.needed("DoStep"),
-                Mode::ModelExchange => None,
+                Mode::ModelExchange { .. } => None,
             };
             let names = ["Real", "Integer", "Boolean", "String"];
             let (Some(setup_experiment), Some(enter), Some(exit), Some(free)) = needed else {
@@ -146,7 +146,7 @@ impl Fmi2 {
         let (name, token) = (text_for_c(&setup.name)?, text_for_c(&setup.token)?);
         let resources = text_for_c(&uri(&setup.resources))?;
         let kind = match setup.mode {
-            Mode::ModelExchange => 0,
+            Mode::ModelExchange { .. } => 0,
             Mode::CoSimulation { .. } => 1,
         };
         // SAFETY: all pointers live; the callbacks do until the instance is freed.

@@ -122,7 +122,7 @@ impl Fmi3 {
         let table = unsafe {
             let do_step = match setup.mode {
                 Mode::CoSimulation { .. } => f.needed("DoStep"),
-                Mode::ModelExchange => None,
+                Mode::ModelExchange { .. } => None,
             };
             let needed = (
                 f.needed("EnterInitializationMode"),
@@ -195,7 +195,7 @@ impl Fmi3 {
                     );
                     (instance, library)
                 }
-                Mode::ModelExchange => {
+                Mode::ModelExchange { .. } => {
                     let make = f.needed::<InstantiateModelExchange>("InstantiateModelExchange");
                     let library = f.finish()?;
                     let make = make.ok_or("the library lacks functions")?;

@@ -5,6 +5,7 @@
 #![allow(unsafe_code, reason = "functions of a library are called")]
 
 mod callbacks;
+mod exchange;
 mod fmi2;
 mod fmi3;
 mod library;
@@ -34,7 +35,12 @@ pub(super) enum Mode {
         event_mode: bool,
     },
     /// It gives derivatives and is stepped by a solver.
-    ModelExchange,
+    ModelExchange {
+        /// Continuous states (FMI 2.0).
+        states: usize,
+        /// Event indicators (FMI 2.0).
+        indicators: usize,
+    },
 }
 
 /// What is needed to make an instance.
@@ -59,9 +65,16 @@ pub(super) const FATAL: i32 = 4;
 /// # Errors
 /// The loader's reason, functions that are missing, or an FMU that refuses.
 pub(super) fn instantiate(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Box<dyn Endpoint>, String> {
-    Ok(match setup.version {
+    let endpoint: Box<dyn Endpoint> = match setup.version {
         FmiVersion::V2 => Box::new(fmi2::Fmi2::new(setup, sink)?),
         FmiVersion::V3 => Box::new(fmi3::Fmi3::new(setup, sink)?),
+    };
+    Ok(match setup.mode {
+        Mode::CoSimulation { .. } => endpoint,
+        Mode::ModelExchange { states, indicators } => {
+            let counts = setup.version == FmiVersion::V3;
+            Box::new(exchange::Stepped::new(endpoint, counts, states, indicators))
+        }
     })
 }
 
