@@ -4,6 +4,7 @@
 //! pound-force, second, volt) beside their conversion. No control and no FMI.
 
 pub mod error;
+pub mod hybrid;
 pub mod identified;
 pub mod integration;
 pub mod linear;

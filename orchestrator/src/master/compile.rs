@@ -182,12 +182,13 @@ impl<'a> Plan<'a> {
         let mut names = vec![String::new(); reference.len()];
         for quantity in Quantity::ALL {
             let source = Source::Reference { quantity, ahead: 0 };
-            names[reference.tap(quantity, 0)] = system.source_name(source);
+            names[reference.tap(quantity, 0)] = system.origin(source).to_string();
         }
         let mut incoming = vec![Vec::new(); system.components.len()];
         for connection in &system.connections {
             if let Source::Reference { quantity, ahead } = connection.source {
-                names[reference.tap(quantity, ahead)] = system.source_name(connection.source);
+                names[reference.tap(quantity, ahead)] =
+                    system.origin(connection.source).to_string();
             }
             incoming[connection.component].push(connection);
         }
@@ -237,7 +238,7 @@ impl<'a> Plan<'a> {
             let (mut references, mut count) = (Vec::new(), 0);
             let alike = outputs.iter().filter(|&&v| variables[v].kind == *kind);
             for &output in alike {
-                let name = self.system.variable_name(component, output);
+                let name = self.system.variable_name(component, output).to_string();
                 let place = if kind.is_exact() {
                     self.exact.push((name, Datum::empty(kind)));
                     Place::Exact(first + count)

@@ -1,9 +1,9 @@
-//! Initialization: parameters are set, and values travel along the connections until they stand
-//! still.
+//! Initialization: parameters are set, and values travel along the connections until they
+//! converge.
 
 use std::collections::HashSet;
 
-use super::action::{Moment, settled};
+use super::action::{Moment, converged};
 use super::{MasterError, Simulation};
 use crate::fmu::{Datum, Instance};
 use crate::system::Component;
@@ -65,21 +65,14 @@ pub(super) fn initialize(simulation: &mut Simulation, stop: f64) -> Result<(), M
     let mut last = simulation.signals.numbers.clone();
     for pass in 1.. {
         last.copy_from_slice(&simulation.signals.numbers);
-        for action in &mut simulation.actions {
-            action.perform(
-                at,
-                &mut simulation.parts,
-                &mut simulation.signals,
-                &simulation.names,
-            )?;
-        }
+        simulation.perform(at)?;
         for part in &mut simulation.parts {
             part.inputs
                 .transfer(&simulation.signals, &mut part.instance)?;
         }
         // The first pass only replaces zeros.
         if pass > 1
-            && settled(
+            && converged(
                 0.0,
                 pass,
                 &last,

@@ -5,9 +5,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::checked::{Component, DEFAULT_PERIOD, End, System};
-use super::connection::{Link, Origin, VariableName, connect};
+use super::connection::connect;
 use super::error::SystemError;
 use super::file::{ComponentFile, SystemFile};
+use super::link::{Link, Origin, VariableName};
 use super::lookup::{component_index, find, find_settable};
 use super::model;
 use super::value::{self, Setting, Value};
@@ -60,7 +61,7 @@ pub fn assemble(
         .flat_map(|link| whole_arrays(&components, link))
         .collect();
     for link in &links {
-        let wrong = |reason| file.fault(&link.to_string(), reason);
+        let wrong = |reason| file.fault(&link.place(), reason);
         let connection = connect(&components, link).map_err(wrong)?;
         let input = (connection.component, connection.input);
         if let Some(first) = driven.insert(input, link) {

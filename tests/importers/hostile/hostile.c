@@ -46,6 +46,7 @@ void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *
     i->name = callbacks->allocate(strlen(name) + 1, 1);
     strcpy(i->name, name);
     i->at = 1.0;
+    i->u = 0.25;
     return i;
 }
 
