@@ -16,8 +16,9 @@ use crate::report::number::significant;
 #[command(after_help = "Example:\n  \
     shakebench identify bare.csv payload.csv --out MODEL.toml\n\n\
     Columns: time, valve_command, displacement, acceleration, actuator_force and, with a specimen\n\
-    on the table, specimen_acceleration; each header cell is `name [unit]`. A bare table alone\n\
-    does not determine the actuator: measure with a specimen or two payloads.")]
+    on the table, specimen_acceleration; each header cell is `name [unit]` or `name (unit)`, parted\n\
+    by comma, semicolon or tab. A bare table alone does not determine the actuator: measure with a\n\
+    specimen or two payloads.")]
 pub struct Arguments {
     /// Recordings of one rig
     #[arg(value_name = "DATA.csv", required = true)]

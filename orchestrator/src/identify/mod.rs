@@ -1,6 +1,5 @@
 //! A rig identified from recordings: figures, model file and report.
 
-pub mod measured;
 mod page;
 mod parameters;
 mod responses;
@@ -52,7 +51,8 @@ pub fn identify(request: &Request) -> Result<Identified, Error> {
     let mut recordings = Vec::new();
     let mut warnings = Vec::new();
     for path in &request.data {
-        let (pieces, findings) = measured::read(path)?;
+        let measured = Recording::read(path, &path.display().to_string())?;
+        let (pieces, findings) = measured.on_even_base()?;
         warnings.extend(findings.iter().map(ToString::to_string));
         recordings.extend(long_enough(pieces, &mut warnings));
     }
