@@ -105,7 +105,7 @@ fn difference(fmu: &Path, step: f64, stop: f64, kind: &str) -> f64 {
         ours.ended.is_regular(),
         "{}: {}",
         fmu.display(),
-        ours.ended.story()
+        ours.ended.message()
     );
     assert_eq!(ours.record.len(), rows.len(), "{}", fmu.display());
     let mut largest: f64 = 0.0;
@@ -238,7 +238,7 @@ fn every_type_goes_through_parameters_and_connections() {
     assert!(
         matches!(outcome.ended, Ended::Complete),
         "{}",
-        outcome.ended.story()
+        outcome.ended.message()
     );
     let record = &outcome.record;
     for (name, written) in types {
@@ -282,7 +282,7 @@ fn arrays_follow_structural_parameters() {
     assert!(
         matches!(outcome.ended, Ended::Complete),
         "{}",
-        outcome.ended.story()
+        outcome.ended.message()
     );
     for (name, expected) in [("it.y[1]", 12.0), ("it.y[2]", 34.0), ("it.y[3]", 56.0)] {
         assert_eq!(
@@ -328,7 +328,7 @@ fn foreign_fmus_run_among_each_other_and_with_ours() {
     assert!(
         matches!(outcome.ended, Ended::Complete),
         "{}",
-        outcome.ended.story()
+        outcome.ended.message()
     );
     let record = &outcome.record;
     let heights = record.column("ball.h").unwrap();
