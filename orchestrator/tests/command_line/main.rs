@@ -6,6 +6,7 @@ mod archives;
 mod contract;
 mod diagnosis;
 mod failures;
+mod hostile;
 mod motions;
 mod physical_rig;
 mod reports;
