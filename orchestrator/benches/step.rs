@@ -16,10 +16,10 @@ use controllers::{Controller, Motion as Sample};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use plant::identified::shake_table::{ShakeTable, ShakeTableState};
 use plant::specimens::linear::{LinearSpecimen, SpecimenState};
-use shakebench::experiment::{Prepared, Request, prepare};
 use shakebench::fmu::FmiVersion;
 use shakebench::master::{Algorithm, Pace};
 use shakebench::motion::Motion;
+use shakebench::run::experiment::{Prepared, Request, prepare};
 
 /// 20 s of the built-in motion.
 fn prepared(fmi: FmiVersion) -> Prepared {

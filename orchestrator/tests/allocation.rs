@@ -10,9 +10,9 @@ use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion};
 use plant::identified::shake_table::{ShakeTable, ShakeTableState};
 use plant::specimens::linear::{LinearSpecimen, SpecimenState};
-use shakebench::experiment::{Request, prepare};
 use shakebench::fmu::FmiVersion;
 use shakebench::master::Algorithm;
+use shakebench::run::experiment::{Request, prepare};
 
 struct Counting;
 

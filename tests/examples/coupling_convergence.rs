@@ -6,9 +6,9 @@
 use std::path::Path;
 
 use acceptance::monolithic::{table_acceleration, worst_error};
-use shakebench::experiment::{Request, prepare};
 use shakebench::master::Algorithm;
 use shakebench::report::{Abscissa, Axis, Panel, Series, Units, svg};
+use shakebench::run::experiment::{Request, prepare};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let steps = [0.002, 0.001, 0.0005, 0.00025];

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Command;
 
 use hidden_effects::case::{Case, Kind, Settings};
-use shakebench::commands::diagnose::{REPORT, diagnose};
+use shakebench::cli::diagnose::{REPORT, diagnose};
 
 /// Seed of the case.
 const SEED: u64 = 7;

@@ -4,9 +4,9 @@
 
 use std::path::Path;
 
-use shakebench::experiment::{Request, prepare};
 use shakebench::master::Algorithm;
 use shakebench::report::{Abscissa, Axis, Panel, Series, Units, svg};
+use shakebench::run::experiment::{Request, prepare};
 
 /// Seconds shown.
 const WINDOW: [f64; 2] = [7.0, 9.0];

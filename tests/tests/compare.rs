@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use acceptance::shared;
-use shakebench::experiment::{Request, prepare};
 use shakebench::metrics::tracking;
+use shakebench::run::experiment::{Request, prepare};
 
 fn records() -> Option<Vec<PathBuf>> {
     let records = shared::records();

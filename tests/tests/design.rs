@@ -1,7 +1,7 @@
 //! `shakebench design` against the same figures computed with SciPy from the printed equations.
 
 use acceptance::python::python;
-use shakebench::commands::design::{NAMES, design};
+use shakebench::cli::design::{NAMES, design};
 
 fn scipy(script: &str, json: &serde_json::Value) -> (bool, String) {
     let file = tempfile::NamedTempFile::new().unwrap();

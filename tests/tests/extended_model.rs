@@ -12,7 +12,7 @@ use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
 use identification::diagnosis::rigs::shake_table::catalogue::catalogue;
 use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
 use plant::specimens::linear::LinearSpecimen;
-use shakebench::commands::diagnose::co_simulation::{Channels, RigFmus, play};
+use shakebench::cli::diagnose::co_simulation::{Channels, RigFmus, play};
 use shakebench::extended_model::ExtendedModel;
 use shakebench::fmu::{FmiVersion, Fmu};
 use shakebench::library::FmuLibrary;

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 use acceptance::shared;
 use rayon::prelude::*;
-use shakebench::experiment::{Request, prepare};
 use shakebench::fmu::FmiVersion;
 use shakebench::master::{Algorithm, Ended, Record};
+use shakebench::run::experiment::{Request, prepare};
 
 fn play(request: &Request) -> Record {
     let prepared = prepare(request).unwrap();

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use acceptance::monolithic::{table_acceleration, worst_error};
 use acceptance::shared;
-use shakebench::experiment::{Prepared, Request, prepare};
 use shakebench::master::{Algorithm, Ended};
+use shakebench::run::experiment::{Prepared, Request, prepare};
 
 fn request(record: Option<&Path>, specimen: &str, step: f64) -> Prepared {
     let request = Request {

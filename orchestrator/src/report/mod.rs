@@ -6,6 +6,7 @@
 
 mod bars;
 mod chart_data;
+pub(crate) mod columns;
 mod html;
 mod number;
 mod run;

@@ -1,7 +1,7 @@
 //! Tables of text with aligned columns.
 
 /// Rows of cells; the first column is aligned left, the others right.
-pub(super) fn aligned(rows: &[Vec<String>]) -> String {
+pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
         let cells = rows.iter().filter_map(|row| row.get(column));
@@ -29,7 +29,7 @@ pub(super) fn aligned(rows: &[Vec<String>]) -> String {
 }
 
 /// A number with so many significant digits, without exponent where it can be read so.
-pub(super) fn significant(value: f64, digits: usize) -> String {
+pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }

@@ -7,8 +7,8 @@ use identification::diagnosis::rigs::shake_table::Diagnosis;
 
 use super::co_simulation::Comparison;
 use super::{DIAGNOSIS, DiagnosisReport, GainReport, pictures, text};
-use crate::commands::table::significant;
 use crate::extended_model::ExtendedModel;
+use crate::report::columns::significant;
 use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Report, Section, Table};
 use crate::system::model::{shake_table_values, specimen_values};
 

@@ -13,7 +13,7 @@ use plant::identified::shake_table::ShakeTable;
 use plant::linear::{FrequencyResponse, log_space};
 use units::constants::SAMPLING_PERIOD;
 
-use super::design::{NAMES, NamedLoop};
+use crate::cli::design::{NAMES, NamedLoop};
 use crate::error::Error;
 use crate::report::{
     self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units,
@@ -24,7 +24,7 @@ const POINTS: usize = 600;
 const FIRST_HZ: f64 = 0.01;
 
 /// Writes `report.html` into `folder`; says where.
-pub(super) fn write(
+pub(crate) fn write(
     folder: &Path,
     loops: &[NamedLoop],
     design: &LoopShapingDesign,

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::experiment::Request;
 use crate::error::Error;
-use crate::experiment::Request;
 use crate::fmu::{Causality, hexadecimal};
 use crate::master::{Algorithm, Record};
 use crate::motion::Motion;

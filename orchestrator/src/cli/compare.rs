@@ -8,13 +8,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::compare_tables;
+use crate::comparison::tables as compare_tables;
 use crate::error::Error;
-use crate::experiment::{Request, prepare};
 use crate::fmu::FmiVersion;
 use crate::master::{Algorithm, Ended};
 use crate::metrics;
 use crate::motion;
+use crate::run::experiment::{Request, prepare};
 use crate::system::built_in;
 use crate::system::tuning::Tuning;
 
@@ -52,38 +52,38 @@ pub struct Arguments {
 
 /// A run of the comparison.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Row {
-    pub(super) record: String,
-    pub(super) controller: String,
-    pub(super) time_domain_percent: Option<f64>,
-    pub(super) frequency_domain_percent: Option<f64>,
-    pub(super) peak_displacement_m: Option<f64>,
+pub(crate) struct Row {
+    pub(crate) record: String,
+    pub(crate) controller: String,
+    pub(crate) time_domain_percent: Option<f64>,
+    pub(crate) frequency_domain_percent: Option<f64>,
+    pub(crate) peak_displacement_m: Option<f64>,
     /// `complete`, `interlock` or `failed`.
-    pub(super) ended: String,
+    pub(crate) ended: String,
     /// Why it ended early.
-    pub(super) ended_because: Option<String>,
+    pub(crate) ended_because: Option<String>,
     /// When it was stopped, s.
-    pub(super) ended_s: Option<f64>,
+    pub(crate) ended_s: Option<f64>,
     /// For the plots, of the first motion only.
     #[serde(skip)]
-    pub(super) history: Option<History>,
+    pub(crate) history: Option<History>,
 }
 
 impl Row {
-    pub(super) fn is_complete(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         self.ended == "complete"
     }
 }
 
 /// How far the table was from its reference, a value a sample.
 #[derive(Debug, Clone)]
-pub(super) struct History {
+pub(crate) struct History {
     /// Sample time, s.
-    pub(super) dt: f64,
+    pub(crate) dt: f64,
     /// m.
-    pub(super) displacement_error: Vec<f64>,
+    pub(crate) displacement_error: Vec<f64>,
     /// m/s².
-    pub(super) acceleration_error: Vec<f64>,
+    pub(crate) acceleration_error: Vec<f64>,
 }
 
 /// What is played.

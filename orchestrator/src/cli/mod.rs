@@ -1,10 +1,20 @@
-//! The command line.
+//! The command line: one file a command, which parses, calls and prints.
+
+pub mod build;
+pub mod compare;
+pub mod design;
+pub mod diagnose;
+pub mod diagnose_rig;
+pub mod identify;
+pub mod info;
+pub mod report;
+pub mod run;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Parser, Subcommand, ValueEnum};
 
-use crate::commands::{build, compare, design, diagnose_rig, identify, info, report, run};
+use crate::fmu::FmiVersion;
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -58,4 +68,25 @@ pub fn main() -> ExitCode {
         eprintln!("error: {error}");
         ExitCode::from(2)
     })
+}
+
+/// `--fmi` where one version is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum OneVersion {
+    /// FMI 2.0
+    #[value(name = "2")]
+    Two,
+    /// FMI 3.0
+    #[default]
+    #[value(name = "3")]
+    Three,
+}
+
+impl From<OneVersion> for FmiVersion {
+    fn from(version: OneVersion) -> Self {
+        match version {
+            OneVersion::Two => Self::V2,
+            OneVersion::Three => Self::V3,
+        }
+    }
 }

@@ -4,7 +4,7 @@ use identification::diagnosis::engine::Estimate;
 use identification::diagnosis::rigs::shake_table::{amount, laboratory_unit};
 
 use super::{DiagnosisReport, GainReport, ParameterReport};
-use crate::commands::table::{aligned, significant};
+use crate::report::columns::{aligned, significant};
 
 fn in_unit(name: &str, parameter: &ParameterReport, unit: &str) -> String {
     let estimate = Estimate {

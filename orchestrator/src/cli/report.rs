@@ -5,9 +5,11 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{compare_tables, diagnose, summary};
+use super::diagnose;
+use crate::comparison::tables as compare_tables;
 use crate::error::Error;
 use crate::results::Results;
+use crate::run::summary;
 
 /// Options of `shakebench report`.
 #[derive(Debug, Args)]

@@ -6,13 +6,14 @@ use std::process::ExitCode;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{OneVersion, summary};
+use super::OneVersion;
 use crate::error::Error;
-use crate::experiment::{Prepared, Request, Scale, is_file, prepare};
-use crate::manifest::Manifest;
 use crate::master::{Algorithm, Ended, Pace};
 use crate::motion;
 use crate::results::Results;
+use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
+use crate::run::manifest::Manifest;
+use crate::run::summary;
 use crate::system::built_in;
 use crate::system::tuning::Tuning;
 use crate::units::{self, STANDARD_GRAVITY};

@@ -18,9 +18,9 @@ use plant::specimens::linear::LinearSpecimen;
 use serde::Serialize;
 use units::constants::SAMPLING_PERIOD;
 
-use super::design_report;
-use super::table::{aligned, significant};
+use crate::design::page as design_report;
 use crate::error::Error;
+use crate::report::columns::{aligned, significant};
 use crate::units::INCH;
 
 /// Options of `shakebench design`.
@@ -54,10 +54,10 @@ const LOWEST: f64 = 1e-3;
 const BAND: f64 = std::f64::consts::TAU * 0.25;
 
 /// A loop with its name.
-pub(super) struct NamedLoop {
-    pub(super) name: &'static str,
-    pub(super) about: &'static str,
-    pub(super) rig_loop: Loop,
+pub(crate) struct NamedLoop {
+    pub(crate) name: &'static str,
+    pub(crate) about: &'static str,
+    pub(crate) rig_loop: Loop,
 }
 
 /// Names of the loops.

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::compare::{History, Row};
-use super::compare_errors;
-use super::table::aligned;
+use super::errors as compare_errors;
+use crate::cli::compare::{History, Row};
 use crate::error::Error;
+use crate::report::columns::aligned;
 use crate::report::{self, Axis, Cell, Panel, Report, Section, Series, Units};
 use crate::results::Results;
 
@@ -96,16 +96,16 @@ const PRINTED_FREQUENCY: [[f64; 3]; 2] = [[0.65, 0.52, 0.19], [0.62, 0.42, 0.08]
 const PRINTED_TIME: [[f64; 3]; 2] = [[13.19, 10.70, 4.76], [4.49, 4.14, 2.06]];
 
 /// File with the errors by run.
-pub(super) const COMPARISON: &str = "comparison.json";
+pub(crate) const COMPARISON: &str = "comparison.json";
 
 /// A table as words.
-pub(super) struct Words {
+pub(crate) struct Words {
     caption: String,
     rows: Vec<Vec<String>>,
 }
 
 #[derive(Debug, Serialize)]
-pub(super) struct Median {
+pub(crate) struct Median {
     time_domain_percent: Option<f64>,
     frequency_domain_percent: Option<f64>,
     /// Runs that were stopped or failed; they count as worse than any other.
@@ -115,7 +115,7 @@ pub(super) struct Median {
 type Measure = fn(&Row) -> Option<f64>;
 
 /// Medians of each controller over the motions; none where half of the runs ended early.
-pub(super) fn medians(rows: &[Row], controllers: &[String]) -> BTreeMap<String, Median> {
+pub(crate) fn medians(rows: &[Row], controllers: &[String]) -> BTreeMap<String, Median> {
     let of = |controller: &str, measure: Measure| median(&column(rows, controller, measure));
     controllers
         .iter()
@@ -131,7 +131,7 @@ pub(super) fn medians(rows: &[Row], controllers: &[String]) -> BTreeMap<String, 
 }
 
 /// Errors in time and in frequency, a row for each motion, then median and standard deviation.
-pub(super) fn tables(rows: &[Row], controllers: &[String]) -> [Words; 2] {
+pub(crate) fn tables(rows: &[Row], controllers: &[String]) -> [Words; 2] {
     [
         words(
             "Error in time, % (printed values of Table 4-1 and 5-2 in brackets)",
@@ -221,7 +221,7 @@ fn words(
 
 impl Words {
     /// For the terminal.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         format!("{}\n{}", self.caption, aligned(&self.rows))
     }
 
@@ -238,7 +238,7 @@ impl Words {
 }
 
 /// Writes `report.html`, `comparison.json` and `errors.csv`; says where.
-pub(super) fn write(
+pub(crate) fn write(
     folder: &Path,
     rows: &[Row],
     controllers: &[String],
@@ -281,7 +281,7 @@ fn page(folder: &Path, rows: &[Row], controllers: &[String]) -> Result<String, E
 ///
 /// # Errors
 /// A file that cannot be read or is none of a comparison.
-pub(super) fn page_again(folder: &Path) -> Result<String, Error> {
+pub(crate) fn page_again(folder: &Path) -> Result<String, Error> {
     #[derive(Deserialize)]
     struct Comparison {
         rows: Vec<Row>,

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::table::{aligned, significant};
 use crate::error::Error;
 use crate::fmu::{Causality, FmiVersion, Fmu};
 use crate::library::FmuLibrary;
 use crate::motion;
+use crate::report::columns::{aligned, significant};
 use crate::system::{self, Operation, SystemFile, built_in};
 use crate::units::STANDARD_GRAVITY;
 

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::table::{aligned, significant};
+use super::experiment::{Prepared, Request};
+use super::manifest::Manifest;
 use crate::error::Error;
-use crate::experiment::{Prepared, Request};
-use crate::manifest::Manifest;
 use crate::master::{Ended, Outcome, Record};
 use crate::metrics::{self, Tracking};
 use crate::motion::Motion;
+use crate::report::columns::{aligned, significant};
 use crate::report::{self, Cell, Whole};
 use crate::results::{Results, read_csv, write_csv};
 use crate::units::{INCH, STANDARD_GRAVITY};
@@ -33,7 +33,7 @@ pub struct Summary {
     seeds: BTreeMap<String, serde_json::Value>,
     tracking: Option<Tracking>,
     /// What the user should know.
-    pub(super) warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -46,7 +46,7 @@ struct MotionSummary {
 
 impl Summary {
     /// Measures a run.
-    pub(super) fn new(
+    pub(crate) fn new(
         request: &Request,
         prepared: &Prepared,
         outcome: &Outcome,
@@ -120,7 +120,7 @@ impl Summary {
     }
 
     /// The figures as a table for people.
-    pub(super) fn table(&self, motion: &Motion) -> String {
+    pub(crate) fn table(&self, motion: &Motion) -> String {
         let mut text = format!("{} on {}\n", self.system, self.motion.name);
         for note in &motion.notes {
             text += &format!("  {note}\n");
@@ -234,7 +234,7 @@ impl<'a> Table<'a> {
 }
 
 /// Writes the files of a run and says where they are.
-pub(super) fn write(
+pub(crate) fn write(
     folder: &Path,
     prepared: &Prepared,
     outcome: &Outcome,
@@ -312,7 +312,7 @@ fn page(
 ///
 /// # Errors
 /// A file that is missing or is none of a run.
-pub(super) fn page_again(folder: &Path) -> Result<String, Error> {
+pub(crate) fn page_again(folder: &Path) -> Result<String, Error> {
     let manifest = Manifest::read(&folder.join("manifest.json"))?;
     let place = folder.join("summary.json");
     let fault = |reason: String| Error::File {

@@ -7,7 +7,7 @@ use identification::identify::model_file::{ModelFile, StandardErrors};
 use identification::identify::rig::RigIdentification;
 
 use super::{Summary, responses};
-use crate::commands::table::{aligned, significant};
+use crate::report::columns::{aligned, significant};
 use crate::report::{Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units};
 
 /// Rows of name, value, standard error and unit, in inch and pound-force.

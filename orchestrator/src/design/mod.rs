@@ -1,0 +1,3 @@
+//! The loops' margins and frequency responses.
+
+pub(crate) mod page;

@@ -1,0 +1,5 @@
+//! A run of a system on a motion: what is asked for, what is played, what is kept.
+
+pub mod experiment;
+pub mod manifest;
+pub mod summary;
