@@ -26,7 +26,7 @@ use units::constants::SAMPLING_PERIOD;
 
 use super::SystemFile;
 use super::file::ComponentFile;
-use super::model::shake_table_values;
+use plant::identified::nominal::shake_table_values;
 
 /// Samples by which the sensors of the physical rig are late.
 const DELAY: usize = 1;

@@ -1,5 +1,6 @@
 //! The nominal parameters of the identified rig, listed once.
 
+use crate::identified::effects::Component;
 use crate::identified::shake_table::ShakeTable;
 use crate::specimens::linear::LinearSpecimen;
 
@@ -33,6 +34,16 @@ macro_rules! parameters {
     ($($kind:ident $name:literal $variable:literal $field:expr;)*) => {
         &[$(NominalParameter { name: $name, variable: $variable, field: Field::$kind($field) }),*]
     };
+}
+
+impl NominalParameter {
+    /// The component whose FMU has it.
+    pub fn component(&self) -> Component {
+        match self.field {
+            Field::Table(_) => Component::ShakeTable,
+            Field::Specimen(_) => Component::Specimen,
+        }
+    }
 }
 
 /// All of them: actuator, table, specimen.

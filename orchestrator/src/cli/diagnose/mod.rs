@@ -209,7 +209,8 @@ pub fn diagnose(case: &Path, folder: &Path) -> Result<DiagnosisReport, Error> {
         Ok((built, _staged)) => {
             let home = |fmu: &&(PackedFmu, PathBuf)| {
                 let first = diagnosis.modelled.first();
-                let component = first.map_or("ShakeTable", |named| component_of(named.effect));
+                let component =
+                    first.map_or("ShakeTable", |named| component_of(named.effect).name());
                 fmu.0.version == FmiVersion::V3 && fmu.0.name == component
             };
             report.extended_fmu = built.iter().find(home).map(|fmu| fmu.1.clone());

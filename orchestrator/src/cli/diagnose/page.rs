@@ -10,7 +10,7 @@ use super::{DIAGNOSIS, DiagnosisReport, GainReport, pictures, text};
 use crate::extended_model::ExtendedModel;
 use crate::report::columns::significant;
 use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Report, Section, Table};
-use crate::system::model::{shake_table_values, specimen_values};
+use plant::identified::nominal::{shake_table_values, specimen_values};
 
 fn table(caption: &str, columns: &[&str], rows: Vec<Vec<String>>) -> Table {
     Table {
@@ -302,7 +302,7 @@ fn errors(case: &Case, diagnosis: &Diagnosis) -> [Section; 3] {
 }
 
 fn extended(case: &Case, model: &ExtendedModel) -> Section {
-    let mut nominal = shake_table_values(&case.nominal.shake_table).to_vec();
+    let mut nominal = shake_table_values(&case.nominal.shake_table);
     if let Some(specimen) = &case.nominal.specimen {
         nominal.extend(specimen_values(specimen));
     }

@@ -110,7 +110,7 @@ pub enum Variable {
 /// What depends on a parameter at the start of a run, besides what the standing states tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AtStart {
-    /// The table's acceleration.
+    /// The acceleration of table or specimen.
     Acceleration,
     /// The rates of the actuator's states.
     ActuatorRates,
@@ -428,19 +428,21 @@ impl Effect {
         switches.filter_map(|p| p.field)
     }
 
-    /// Values (SI) of a plain strength for records whose largest command is `peak_command` (V): the
-    /// last start, or twice the weakest where that is off.
-    pub fn plain_values(&self, peak_command: f64) -> Vec<f64> {
-        let start = self.starts.last().copied().unwrap_or_default();
-        let pairs = self.estimated().zip(start);
-        pairs
-            .map(|(parameter, &value)| {
-                let value = match parameter.role {
-                    Role::Size { weak, .. } if value == 0.0 => 2.0 * weak,
-                    _ => value,
-                };
-                parameter.basis_value(peak_command) * value
-            })
-            .collect()
+    /// Values (SI) of plain strengths for records whose largest command is `peak_command` (V): the
+    /// starts, with twice the weakest where a size is off.
+    pub fn examples(&self, peak_command: f64) -> Vec<Vec<f64>> {
+        let example = |start: &&[f64]| {
+            let pairs = self.estimated().zip(start.iter());
+            pairs
+                .map(|(parameter, &value)| {
+                    let value = match parameter.role {
+                        Role::Size { weak, .. } if value == 0.0 => 2.0 * weak,
+                        _ => value,
+                    };
+                    parameter.basis_value(peak_command) * value
+                })
+                .collect()
+        };
+        self.starts.iter().map(example).collect()
     }
 }

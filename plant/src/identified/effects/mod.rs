@@ -152,6 +152,23 @@ pub fn of(component: Component) -> impl Iterator<Item = &'static Effect> {
     all().filter(move |effect| effect.component == component)
 }
 
+/// Every parameter of `component` that its FMU has, with the variable's name `effect.parameter`.
+pub fn variables(component: Component) -> impl Iterator<Item = (String, &'static Parameter)> {
+    of(component).flat_map(|effect| {
+        let own = effect.parameters.iter();
+        own.filter(|p| p.variable == Variable::Own)
+            .map(|p| (format!("{}.{}", effect.name, p.name), p))
+    })
+}
+
+/// The variables of `component` on which `what` depends at the start of a run.
+pub fn acting_at_start(component: Component, what: AtStart) -> Vec<String> {
+    variables(component)
+        .filter(|(_, parameter)| parameter.at_start == Some(what))
+        .map(|(name, _)| name)
+        .collect()
+}
+
 /// The first effect of `component` that is on and that continuous states alone do not tell.
 pub fn needing_co_simulation(component: Component, effects: &Effects) -> Option<&'static Effect> {
     let sensors = Instrumentation::default();

@@ -1,7 +1,7 @@
 //! A specimen that is not the linear one of Appendix A.
 
 use super::quantity::{FREQUENCY, LENGTH, RATIO};
-use super::{Component, Effect, Family, Parameter, Scale};
+use super::{AtStart, Component, Effect, Family, Parameter, Scale};
 use crate::ModelError;
 use crate::specimens::hysteresis::elastic_share;
 use units::constants::INCH;
@@ -260,7 +260,8 @@ impl Family for SpecimenEffects {
                 .on_specimen(|s| &mut s.absent)
                 .min(0.0)
                 .max(1.0)
-                .switch(),
+                .switch()
+                .at_start(AtStart::Acceleration),
             ],
             starts: &[&[0.0]],
             is_linear: true,

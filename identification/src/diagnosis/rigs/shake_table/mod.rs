@@ -7,4 +7,5 @@ pub mod relations;
 mod sentence;
 
 pub use diagnosis::*;
-pub use sentence::{amount, laboratory_unit, said};
+pub use plant::identified::effects::quantity::laboratory_unit;
+pub use sentence::{amount, said};
