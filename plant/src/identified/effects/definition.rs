@@ -293,6 +293,18 @@ impl Parameter {
         self
     }
 
+    /// Says what it means, in one line.
+    pub const fn about(mut self, about: &'static str) -> Self {
+        self.about = about;
+        self
+    }
+
+    /// A size of which zero does not turn the effect off.
+    pub const fn without_switch(mut self) -> Self {
+        self.is_switch = false;
+        self
+    }
+
     /// Makes zero turn the effect off.
     pub const fn switch(mut self) -> Self {
         self.is_switch = true;
