@@ -122,6 +122,7 @@ families! {
     table: TableEffects,
     foundation: FoundationEffects,
     specimen: SpecimenEffects,
+    directional_friction: DirectionalFriction,
 }
 
 const fn is_on_specimen<F: Family>() -> bool {
