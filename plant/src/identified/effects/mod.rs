@@ -123,6 +123,7 @@ families! {
     foundation: FoundationEffects,
     specimen: SpecimenEffects,
     directional_friction: DirectionalFriction,
+    fading_friction: FadingFriction,
 }
 
 const fn is_on_specimen<F: Family>() -> bool {
