@@ -48,6 +48,7 @@ fn hidden_effects_are_found_and_nothing_where_nothing_is() {
     let plan = Plan {
         seed: seed.and_then(|text| text.parse().ok()).unwrap_or(SEED),
         one: 10,
+        effect: None,
         two: 6,
         nothing: 3,
         outside: 5,
