@@ -118,8 +118,28 @@ impl Trip {
         Self::Activity,
     ];
 
+    /// Its short name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::NotFinite => "not-finite",
+            Self::Stale => "stale",
+            Self::Heartbeat => "heartbeat",
+            Self::Displacement => "displacement",
+            Self::StoppingDistance => "stopping-distance",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+            Self::Force => "force",
+            Self::TrackingError => "tracking-error",
+            Self::Saturation => "saturation",
+            Self::Stop => "stop",
+            Self::SpecimenLost => "specimen-lost",
+            Self::Activity => "activity",
+        }
+    }
+
     /// The cause in words.
-    pub fn words(self) -> &'static str {
+    pub const fn words(self) -> &'static str {
         match self {
             Self::None => "not tripped",
             Self::NotFinite => "an input is not a finite number",

@@ -3,7 +3,10 @@
 //! One law, one file; every law meets [`Controller`]. Laws are sampled: they are called once a
 //! period with what the sensors gave, and the command they return is held until the next call.
 
+#![warn(clippy::missing_errors_doc)]
+
 pub mod allocation;
+pub mod hierarchy;
 pub mod interlock;
 pub mod loop_shaping;
 pub mod loops;
@@ -24,7 +27,10 @@ pub trait Controller {
     /// What it commands until the next sample, SI.
     type Output;
 
-    /// Refuses parameters with which the law cannot run, by name.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// A parameter with which the law cannot run, by name.
     fn validate(&self) -> Result<(), ModelError>;
 
     /// Computes the command of this sample and advances the memory by `period` seconds.

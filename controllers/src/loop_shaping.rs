@@ -56,7 +56,10 @@ impl LoopShapingCoefficients {
         }
     }
 
-    /// Refuses coefficients without which there is no such controller, by name.
+    /// Checks the coefficients.
+    ///
+    /// # Errors
+    /// A coefficient with which there is no such controller, by name.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_positive("gain", self.gain)?;
         ModelError::require_finite("numerator_rate", self.numerator_rate)?;

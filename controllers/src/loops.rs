@@ -70,7 +70,8 @@ pub enum Time {
 impl LinearLaw {
     /// Displacement or force PID without its derivative part (Eq 3-6, 3-7).
     ///
-    /// Refuses a derivative gain.
+    /// # Errors
+    /// A derivative gain, or a period that is not positive.
     pub fn pid(pid: &Pid, controlled: Controlled, period: f64) -> Result<Self, ModelError> {
         let mut error = Signals::zeros();
         error[MEASURED] = 1.0;
@@ -84,6 +85,9 @@ impl LinearLaw {
     }
 
     /// A controller of the form of Eq 3-10.
+    ///
+    /// # Errors
+    /// Coefficients with which there is none.
     pub fn loop_shaping(
         coefficients: &LoopShapingCoefficients,
         period: f64,
@@ -131,6 +135,9 @@ impl LinearLaw {
     }
 
     /// Three-variable control (Fig 3-5).
+    ///
+    /// # Errors
+    /// A period that is not positive.
     pub fn three_variable(gains: &ThreeVariableGains, period: f64) -> Result<Self, ModelError> {
         let (reference, feedback) = gains.reference_and_feedback();
         let mut direct = Signals::zeros();
@@ -155,6 +162,9 @@ impl LinearLaw {
     }
 
     /// The hierarchy of Fig 4-3: sliding mode over a displacement and a force loop.
+    ///
+    /// # Errors
+    /// A derivative gain, or a period that is not positive.
     pub fn hierarchy(
         sliding: &SlidingMode,
         displacement: &Pid,

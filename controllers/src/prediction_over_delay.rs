@@ -13,8 +13,8 @@ use plant::linear::{discrete_riccati, zero_order_hold};
 use units::constants::{INCH, LBF};
 
 use crate::allocation::{ControlAllocation, LoopCommands};
+use crate::hierarchy::{LowLevelReferences, SlidingModeInput, displacement_loop, force_loop};
 use crate::pid::{Pid, PidInput};
-use crate::sliding_mode::{LowLevelReferences, SlidingModeInput, displacement_loop, force_loop};
 use crate::{Controller, ModelError, Motion};
 
 /// Largest delay that can be predicted over, samples.
@@ -85,8 +85,9 @@ pub struct Foreseen {
 impl PredictionOverDelay {
     /// For a table sampled with `period`, the low-level loops and shares of Section 4.3.
     ///
-    /// Refuses delays out of range by name, and a table that its displacement, velocity and force
-    /// do not show (no stabilising Riccati solution).
+    /// # Errors
+    /// A delay out of range, by name; a table that its displacement, velocity and force do not show
+    /// (no stabilising Riccati solution).
     pub fn new(
         shake_table: &ShakeTable,
         period: f64,
@@ -114,7 +115,10 @@ impl PredictionOverDelay {
         Ok(prediction)
     }
 
-    /// Refuses delays out of range and low-level loops that cannot run.
+    /// Checks delays and loops.
+    ///
+    /// # Errors
+    /// A delay out of range, a low-level loop that cannot run.
     pub fn validate(&self) -> Result<(), ModelError> {
         let delay = self.loop_delay_samples;
         if delay > MOST_DELAY_SAMPLES {

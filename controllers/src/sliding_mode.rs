@@ -18,42 +18,17 @@
 //! `lambda = K`: the surface is reached as fast as it is slid along (a double pole, no overshoot).
 //! Both lie a decade below the highest crossover of the sampled force loop with its share of the
 //! valve, so that the loop that has to make `F` adds less than 6 degrees of lag at the rate at which
-//! the law relies on it: [`rate_by_rule`].
-//!
-//! # Two integrators, one valve
-//! Displacement and force loop both integrate (Eq 3-6, 3-7) and act through one valve, so that their
-//! difference is seen by nothing: a pole at z = 1, and a bias of any sensor makes the two integrals
-//! drift apart without end. Here the displacement loop's integral leaks at the lower edge of the
-//! band of the motions ([`DISPLACEMENT_INTEGRAL_LEAK`]); the force loop's, which is eight times
-//! as strong, stays whole and takes the valve's null shift. In steady state the force error is then
-//! zero: a bias `b` of the force cell offsets the table by `b / (m lambda K)`, and nothing drifts.
-//!
-//! # Limits
-//! A low-level loop that stops at the valve's 10 V reaches, through its share of one half, 5 V of the
-//! valve: too little for a strong motion under a specimen. The loops' limits are therefore the
-//! valve's over their shares, and the allocation limits the sum.
+//! the law relies on it: [`rate_by_rule`](crate::tuning::sliding_mode::rate_by_rule). The low-level
+//! loops are those of [`hierarchy`](crate::hierarchy).
 
-use std::f64::consts::TAU;
-
-use plant::identified::coupled::Rig;
 use plant::identified::table::Table;
-use plant::linear::margins::{crossovers, nyquist};
 use plant::specimens::linear::LinearSpecimen;
 
-use crate::allocation::ControlAllocation;
-use crate::loops::{Controlled, LinearLaw, Loop, Time};
-use crate::pid::Pid;
+use crate::hierarchy::{LowLevelReferences, SlidingModeInput};
 use crate::prediction_over_delay::PredictionOverDelay;
 use crate::{Controller, ModelError, Motion};
 
-/// Leak of the displacement loop's integral under sliding mode, 1/s: the lower edge of the band
-/// of the motions, 0.25 Hz.
-pub const DISPLACEMENT_INTEGRAL_LEAK: f64 = TAU * 0.25;
-
-/// Crossover of the force loop over the rates of the sliding mode.
-const SEPARATION: f64 = 10.0;
-
-/// `lambda = K` of [`rate_by_rule`] on the identified table at 500 Hz with `beta = 0.5`, 1/s.
+/// `lambda = K` of [`rate_by_rule`](crate::tuning::sliding_mode::rate_by_rule) on the identified table at 500 Hz with `beta = 0.5`, 1/s.
 pub const IDENTIFIED_RATE: f64 = 69.6;
 
 /// The sliding-mode law.
@@ -73,28 +48,6 @@ pub struct SlidingMode {
     pub boundary_layer: f64,
     /// Prediction over transport delay; absent where the loop has none.
     pub prediction: Option<PredictionOverDelay>,
-}
-
-/// What sliding mode is told.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub struct SlidingModeInput {
-    /// Wanted motion.
-    pub reference: Motion,
-    /// Measured motion; the law needs no measured acceleration.
-    pub measured: Motion,
-    /// Measured force of the actuator, N; used by the prediction alone.
-    pub measured_force: f64,
-    /// Absolute acceleration of the specimen, m/s².
-    pub specimen_acceleration: f64,
-}
-
-/// What sliding mode asks of the low-level loops.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub struct LowLevelReferences {
-    /// Reference of the displacement loop, m.
-    pub displacement: f64,
-    /// Reference of the force loop, N.
-    pub force: f64,
 }
 
 impl SlidingMode {
@@ -217,53 +170,4 @@ impl Controller for SlidingMode {
             prediction.reset();
         }
     }
-}
-
-/// Displacement control of Eq 3-6 as it runs under sliding mode: its integral leaks, and its limit
-/// leaves the limiting of the valve to the allocation.
-pub fn displacement_loop(allocation: &ControlAllocation) -> Pid {
-    Pid {
-        integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
-        limit: allocation.limit / allocation.displacement_share,
-        ..Pid::equation_3_6()
-    }
-}
-
-/// Force control of Eq 3-7 as it runs under sliding mode: its limit leaves the limiting of the
-/// valve to the allocation.
-pub fn force_loop(allocation: &ControlAllocation) -> Pid {
-    Pid {
-        limit: allocation.limit / allocation.force_share,
-        ..Pid::equation_3_7()
-    }
-}
-
-/// `lambda = K` in 1/s: a tenth of the highest crossover of the force loop that runs with
-/// `force_share` of the valve, sampled with `period`.
-///
-/// Fails where that loop never has a gain of one.
-pub fn rate_by_rule(
-    rig: &Rig,
-    force: &Pid,
-    force_share: f64,
-    period: f64,
-) -> Result<f64, ModelError> {
-    let shared = Pid {
-        proportional: force.proportional * force_share,
-        integral: force.integral * force_share,
-        ..*force
-    };
-    let law = LinearLaw::pid(&shared, Controlled::Force, period)?;
-    let force_loop = Loop::new(rig, law);
-    crossovers(
-        |omega| force_loop.open(Time::Sampled, omega),
-        1.0,
-        nyquist(period),
-    )
-    .last()
-    .map(|crossover| crossover / SEPARATION)
-    .ok_or(ModelError::NoSolution {
-        equation: "the rule for surface_rate and reaching_rate",
-        reason: "the force loop has no crossover".into(),
-    })
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use identification::diagnosis::case::Case;
-use identification::diagnosis::engine::Verdict;
+use identification::diagnosis::engine::{Observer, Verdict};
 use identification::diagnosis::rigs::shake_table::diagnose;
 
 fn shared() -> PathBuf {
@@ -55,13 +55,10 @@ fn every_practice_case_is_right() {
         let text = std::fs::read_to_string(folder.join(format!("truth/{name}.json"))).unwrap();
         let hidden = truth(&text);
         let case = Case::read(&folder.join("cases").join(&name)).unwrap();
-        let diagnosis = diagnose(&case, false).unwrap();
+        let diagnosis = diagnose(&case, Observer::none()).unwrap();
         println!("{name}: {}", diagnosis.sentence);
-        for relation in &diagnosis.relations {
-            println!(
-                "    {}: {:.2} times its noise",
-                relation.name, relation.ratio
-            );
+        for (name, relation) in &diagnosis.relations {
+            println!("    {name}: {:.2} times its noise", relation.nominal);
         }
         let mut found: Vec<&str> = diagnosis.effects.iter().map(|e| e.effect).collect();
         found.sort_unstable();

@@ -8,7 +8,7 @@ use std::{
 
 use libloading::Library;
 
-use crate::pack::PackError;
+use crate::pack::error::PackError;
 
 /// Texts that go into an FMU.
 #[derive(Debug, Clone)]

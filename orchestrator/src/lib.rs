@@ -1,9 +1,12 @@
 //! Hydraulic shake tables as FMI components, co-simulated
 
+#![warn(clippy::missing_errors_doc)]
+
 pub mod cli;
 pub mod comparison;
 pub mod component_library;
 pub mod design;
+pub mod diagnosis;
 pub mod error;
 pub mod extended_model;
 pub mod fmu;

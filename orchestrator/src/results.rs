@@ -1,11 +1,8 @@
-//! The files of a run, written as a whole or not at all.
+//! The files of a command, written as a whole or not at all.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-
-use crate::error::Error;
-use crate::master::Record;
 
 /// Why results cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -103,6 +100,18 @@ impl Results {
         self.write(name, |file| file.write_all(text.as_bytes()))
     }
 
+    /// Where files lie until [`Results::finish`]; one that is made there is told by
+    /// [`Results::adopt`].
+    #[must_use]
+    pub fn staging(&self) -> &Path {
+        self.staging.path()
+    }
+
+    /// Takes the file `name` that was made in [`Results::staging`] along.
+    pub fn adopt(&mut self, name: &str) {
+        self.names.push(name.to_string());
+    }
+
     /// Moves the files into their folder; files of the same name are replaced, others stay.
     ///
     /// # Errors
@@ -130,54 +139,4 @@ impl Results {
         }
         Ok(files)
     }
-}
-
-/// Writes a record as CSV: a line of names, then a line a sample; every number reads back to the
-/// same bits.
-///
-/// # Errors
-/// A disk that is full, and the like.
-pub fn write_csv(record: &Record, file: impl Write) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(file);
-    csv.write_record(&record.columns)?;
-    for row in record.rows() {
-        csv.serialize(row).map_err(io::Error::other)?;
-    }
-    csv.flush()
-}
-
-/// Reads a record that [`write_csv`] wrote.
-///
-/// # Errors
-/// A file that cannot be read or holds anything but a line of names, `time` first, and numbers, with
-/// the line.
-pub fn read_csv(path: &Path) -> Result<Record, Error> {
-    let fault = |reason: String| Error::File {
-        path: path.to_path_buf(),
-        reason,
-    };
-    let file = File::open(path).map_err(|error| fault(error.to_string()))?;
-    let mut csv = csv::Reader::from_reader(file);
-    let names = csv.headers().map_err(|error| fault(error.to_string()))?;
-    let names: Vec<String> = names.iter().map(String::from).collect();
-    let Some(("time", names)) = names
-        .split_first()
-        .map(|(time, rest)| (time.as_str(), rest))
-    else {
-        return Err(fault("the first column is not `time`".into()));
-    };
-    let mut record = Record::with_capacity(names, 0);
-    for (row, line) in csv.records().zip(2..) {
-        let row = row.map_err(|error| fault(error.to_string()))?;
-        let number = |cell: &str| {
-            let wrong = |_| fault(format!("line {line}: `{cell}` is no number"));
-            cell.trim().parse::<f64>().map_err(wrong)
-        };
-        let values: Vec<f64> = row.iter().map(number).collect::<Result<_, _>>()?;
-        // Every row is as long as the line of names, the reader sees to it.
-        if let Some((time, signals)) = values.split_first() {
-            record.push(*time, signals);
-        }
-    }
-    Ok(record)
 }

@@ -8,7 +8,8 @@ use std::path::Path;
 use std::process::Command;
 
 use hidden_effects::case::{Case, Kind, Settings};
-use shakebench::cli::diagnose::{REPORT, diagnose};
+use identification::diagnosis::engine::Observer;
+use shakebench::diagnosis::{REPORT, diagnose};
 
 /// Seed of the case.
 const SEED: u64 = 7;
@@ -18,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = root.canonicalize()?.join("target/diagnosis-walkthrough");
     let case = folder.join(format!("cases/case-{SEED:05}"));
     Case::draw(SEED, &Settings::new(Kind::This("valve_dead_band"))).write(&case)?;
-    let report = diagnose(&case, &folder.join("results"))?;
+    let report = diagnose(&case, &[], &folder.join("results"), Observer::none())?;
     println!("{}", report.sentence);
     let page = folder.join("results").join(REPORT);
     let picture = root.join("docs/diagnosis-report.png");

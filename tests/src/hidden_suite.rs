@@ -7,6 +7,7 @@ use std::time::UNIX_EPOCH;
 use hidden_effects::score::{Estimate, NamedEffect, outcome, parameter_errors, wilson};
 use hidden_effects::{Case, Kind, Outcome, Settings, Truth, Verdict};
 use identification::diagnosis::case::Case as Laboratory;
+use identification::diagnosis::engine::{Observer, Progress};
 use identification::diagnosis::rigs::shake_table::{Diagnosis, diagnose};
 use rayon::prelude::*;
 
@@ -65,7 +66,13 @@ pub fn run(seed: u64, kind: &'static str, settings: &Settings, verbose: bool) ->
         .expect("a case that can be written");
     let laboratory = Laboratory::read(folder.path()).expect("a case that can be read");
     let begin = core_seconds();
-    let diagnosis = diagnose(&laboratory, verbose);
+    let told = |event: &Progress| eprintln!("{event}");
+    let observer = if verbose {
+        Observer::new(&told)
+    } else {
+        Observer::none()
+    };
+    let diagnosis = diagnose(&laboratory, observer);
     let seconds = core_seconds() - begin;
     if verbose && let Ok(diagnosis) = &diagnosis {
         eprintln!("truth: {:?}\n{}", case.truth, diagnosis.sentence);
@@ -120,7 +127,7 @@ pub fn as_scored(diagnosis: &Diagnosis) -> Verdict {
             .collect(),
     });
     Verdict {
-        verdict: diagnosis.verdict.word().into(),
+        verdict: diagnosis.verdict.to_string(),
         effects: effects.collect(),
         alternatives: diagnosis
             .alternatives

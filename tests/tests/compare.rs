@@ -23,7 +23,7 @@ fn request(system: &str, specimen: &str, record: &Path) -> Request {
 fn time_domain_percent(request: &Request) -> f64 {
     let prepared = prepare(request).unwrap();
     let outcome = prepared.run(request.algorithm).unwrap();
-    assert_eq!(outcome.ended.word(), "complete");
+    assert_eq!(outcome.ended.kind().word(), "complete");
     let column = |name| outcome.record.column(name).unwrap();
     let displacement = column("table.displacement");
     let acceleration = column("table.acceleration");

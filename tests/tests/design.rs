@@ -1,7 +1,7 @@
 //! `shakebench design` against the same figures computed with SciPy from the printed equations.
 
 use acceptance::python::python;
-use shakebench::cli::design::{NAMES, design};
+use shakebench::design::{Design, LoopName, Options, Specimen, design};
 
 fn scipy(script: &str, json: &serde_json::Value) -> (bool, String) {
     let file = tempfile::NamedTempFile::new().unwrap();
@@ -17,9 +17,13 @@ fn scipy(script: &str, json: &serde_json::Value) -> (bool, String) {
     )
 }
 
+fn json(design: &Design) -> serde_json::Value {
+    serde_json::json!(design)
+}
+
 #[test]
 fn margins_crossovers_bandwidths_and_gamma_agree_with_scipy() {
-    let json = design(None, None, None).unwrap().json();
+    let json = json(&design(&Options::default()).unwrap());
     let (agrees, report) = scipy("design_margins.py", &json);
     println!("{report}");
     assert!(agrees, "{report}");
@@ -32,7 +36,12 @@ fn margins_crossovers_bandwidths_and_gamma_agree_with_scipy() {
 
 #[test]
 fn the_force_loop_is_reported_as_stable_in_continuous_time_only() {
-    let json = design(Some("force-pid"), None, None).unwrap().json();
+    let only = Some(LoopName::ForcePid);
+    let options = Options {
+        only,
+        ..Options::default()
+    };
+    let json = json(&design(&options).unwrap());
     let row = &json["loops"][0];
     assert_eq!(row["name"], "force-pid");
     assert_eq!(row["stable"], true);
@@ -43,31 +52,39 @@ fn the_force_loop_is_reported_as_stable_in_continuous_time_only() {
 
 #[test]
 fn under_the_specimen_the_force_loop_alone_is_unstable() {
-    let json = design(None, None, Some("linear")).unwrap().json();
-    for (row, name) in json["loops"].as_array().unwrap().iter().zip(NAMES) {
-        assert_eq!(row["name"], name);
+    let options = Options {
+        specimen: Specimen::Linear,
+        ..Options::default()
+    };
+    let json = json(&design(&options).unwrap());
+    for (row, name) in json["loops"].as_array().unwrap().iter().zip(LoopName::ALL) {
+        assert_eq!(row["name"], name.name());
         // The specimen's resonance turns the force loop's phase where its gain is one; in the
         // hierarchy the displacement loop holds it.
-        assert_eq!(row["stable"], name != "force-pid", "{row}");
-        assert_eq!(row["sampled"]["stable"], name != "force-pid", "{row}");
+        assert_eq!(row["stable"], name != LoopName::ForcePid, "{row}");
+        assert_eq!(
+            row["sampled"]["stable"],
+            name != LoopName::ForcePid,
+            "{row}"
+        );
     }
 }
 
 #[test]
-fn what_cannot_be_designed_is_refused_with_its_option() {
-    for (refused, words) in [
-        (design(Some("pid"), None, None), "--loop: `pid` is no loop"),
-        (
-            design(None, Some(-1.0), None),
-            "--crossover: parameter `crossover` is -1",
-        ),
-        (design(None, Some(1e4), None), "does not stabilise"),
-        (
-            design(None, None, Some("yielding")),
-            "--specimen: `yielding`",
-        ),
+fn what_cannot_be_designed_is_refused() {
+    let refused = "pid".parse::<LoopName>().unwrap_err();
+    assert!(refused.contains("`pid` is no loop"), "{refused}");
+    let refused = "yielding".parse::<Specimen>().unwrap_err();
+    assert!(refused.contains("`yielding`"), "{refused}");
+    for (crossover, words) in [
+        (-1.0, "parameter `crossover` is -1"),
+        (1e4, "does not stabilise"),
     ] {
-        let error = refused.err().unwrap().to_string();
+        let options = Options {
+            crossover: Some(crossover),
+            ..Options::default()
+        };
+        let error = design(&options).err().unwrap().to_string();
         assert!(error.contains(words), "{error}");
     }
 }

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use acceptance::python::run_script;
 use hidden_effects::case::{Case as Generated, Kind, Settings};
 use identification::diagnosis::case::{CHANNELS, ControlLaw, Nominal, deviation};
-use identification::diagnosis::engine::{Estimate, NamedEffect, Role};
+use identification::diagnosis::engine::{NamedEffect, ParameterEstimate, Role};
 use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
 use identification::diagnosis::rigs::shake_table::catalogue::catalogue;
 use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
 use plant::specimens::linear::LinearSpecimen;
-use shakebench::cli::diagnose::co_simulation::{Channels, RigFmus, play};
+use shakebench::diagnosis::co_simulation::{Channels, RigFmus, play};
 use shakebench::extended_model::ExtendedModel;
 use shakebench::fmu::{FmiVersion, Fmu};
 use shakebench::library::FmuLibrary;
@@ -32,8 +32,8 @@ fn with_effect(name: &str) -> (IdentifiedRig, NamedEffect) {
     };
     effect.apply(&mut rig.effects, &mut rig.sensors, &values);
     let parameters = candidate.parameters.iter().zip(&values);
-    let mut parameters: Vec<Estimate> = parameters
-        .map(|(p, &value)| Estimate {
+    let mut parameters: Vec<ParameterEstimate> = parameters
+        .map(|(p, &value)| ParameterEstimate {
             name: p.name.into(),
             value,
             unit: p.unit,

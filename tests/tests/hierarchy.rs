@@ -5,12 +5,12 @@ mod native;
 
 use controllers::Motion;
 use controllers::allocation::ControlAllocation;
+use controllers::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
 use controllers::loops::{Controlled, LinearLaw, Loop, Time};
 use controllers::pid::Pid;
 use controllers::prediction_over_delay::PredictionOverDelay;
-use controllers::sliding_mode::{
-    DISPLACEMENT_INTEGRAL_LEAK, IDENTIFIED_RATE, SlidingMode, rate_by_rule,
-};
+use controllers::sliding_mode::{IDENTIFIED_RATE, SlidingMode};
+use controllers::tuning::sliding_mode::rate_by_rule;
 use nalgebra::Complex;
 use native::{
     Hierarchy, PERIOD, Sensors, ThreeVariableLaw, band_limited, loop_shaping, run, run_biased,

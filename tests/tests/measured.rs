@@ -4,8 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use acceptance::shared;
+use identification::diagnosis::engine::{Observer, Verdict};
 use identification::diagnosis::rigs::{
-    Description, Measurement, PartReport, Report, Series, diagnose,
+    Description, Measurement, PartReport, RigDiagnosis, Series, diagnose,
 };
 
 /// Description and data of a rig; none where the data are missing.
@@ -29,14 +30,14 @@ fn rig(name: &str) -> Option<(Description, Measurement)> {
     Some((description, measurement))
 }
 
-fn report(name: &str) -> Option<Report> {
+fn report(name: &str) -> Option<RigDiagnosis> {
     let (description, measurement) = rig(name)?;
-    let report = diagnose(&description, &measurement, false).unwrap();
+    let report = diagnose(&description, &measurement, Observer::none()).unwrap();
     print(&report);
     Some(report)
 }
 
-fn print(report: &Report) {
+fn print(report: &RigDiagnosis) {
     println!(
         "{}: {} {:?}, on one part only {:?}",
         report.name, report.verdict, report.named, report.not_confirmed
@@ -51,7 +52,7 @@ fn print(report: &Report) {
     }
 }
 
-fn names(report: &Report, effects: &[&str]) {
+fn names(report: &RigDiagnosis, effects: &[&str]) {
     for effect in effects {
         assert!(
             report.named.iter().any(|name| name == effect),
@@ -93,7 +94,7 @@ fn the_drive_has_asymmetric_friction() {
             "force_ripple",
         ],
     );
-    assert_eq!(report.verdict, "named");
+    assert_eq!(report.verdict, Verdict::Named);
     assert!(report.as_described.nominal_error > 0.045);
     assert!(
         report.as_described.extended_error < 0.03,
@@ -117,7 +118,7 @@ fn the_press_has_delay_and_unequal_areas() {
         return;
     };
     names(&report, &["delay", "asymmetric_gain", "shared_disturbance"]);
-    assert_eq!(report.verdict, "named");
+    assert_eq!(report.verdict, Verdict::Named);
     assert!(
         report.as_described.extended_error < 0.034,
         "{}",
@@ -146,7 +147,7 @@ fn the_damper_has_asymmetric_friction_free_play_and_a_memory() {
             "excursion_memory",
         ],
     );
-    assert_eq!(three.verdict, "named");
+    assert_eq!(three.verdict, Verdict::Named);
     assert!(
         three.as_described.extended_error < 0.11,
         "{}",
@@ -187,7 +188,7 @@ fn the_coupon_hardens_and_its_halves_differ() {
     for gone in ["isotropic_hardening", "initial_softening"] {
         assert!(report.not_confirmed.iter().any(|name| name == gone));
     }
-    assert_ne!(report.verdict, "named");
+    assert_ne!(report.verdict, Verdict::Named);
 }
 
 #[test]
@@ -195,13 +196,13 @@ fn four_more_milliseconds_of_delay_are_found_on_the_press() {
     let Some((description, measurement)) = rig("servohydraulic_press") else {
         return;
     };
-    let before = diagnose(&description, &measurement, false).unwrap();
+    let before = diagnose(&description, &measurement, Observer::none()).unwrap();
     let late = changed(&measurement, |series, k| series.output[k.saturating_sub(4)]);
-    let after = diagnose(&description, &late, false).unwrap();
+    let after = diagnose(&description, &late, Observer::none()).unwrap();
     print(&after);
     names(&after, &["delay", "asymmetric_gain"]);
     // The nominal lag of the command shares what it can with the delay.
-    let time = |report: &Report| {
+    let time = |report: &RigDiagnosis| {
         let lag = report
             .as_described
             .parameters
@@ -221,7 +222,7 @@ fn a_bent_transducer_is_found_on_the_press() {
     let bent = changed(&measurement, |s, k| {
         s.output[k] * (1.0 + 40.0 * s.output[k])
     });
-    let after = diagnose(&description, &bent, false).unwrap();
+    let after = diagnose(&description, &bent, Observer::none()).unwrap();
     print(&after);
     names(&after, &["delay", "asymmetric_gain", "sensor_curvature"]);
     let curvature = value(&after.as_described, "sensor_curvature", "curvature");
@@ -234,7 +235,7 @@ fn viscous_friction_put_on_the_damper_is_found() {
         return;
     };
     let thick = changed(&measurement, |s, k| s.output[k] + 4e4 * s.inputs[1][k]);
-    let after = diagnose(&description, &thick, false).unwrap();
+    let after = diagnose(&description, &thick, Observer::none()).unwrap();
     print(&after);
     names(&after, &["asymmetric_coulomb_friction", "free_play"]);
     let damping = value(&after.as_described, "viscous", "damping");
@@ -254,7 +255,7 @@ fn a_delay_put_on_the_damper_is_found() {
     // must come out.
     let [less, more] = [31, 62].map(|samples| {
         let late = changed(&measurement, |s, k| s.output[k.saturating_sub(samples)]);
-        let after = diagnose(&description, &late, false).unwrap();
+        let after = diagnose(&description, &late, Observer::none()).unwrap();
         print(&after);
         names(
             &after,
@@ -284,7 +285,7 @@ fn misalignment_put_on_the_drive_is_found() {
         };
         s.output[k] + 20.39 * SLOPE * (s.inputs[0][k] - s.middle) * side / 35.15065
     });
-    let after = diagnose(&description, &misaligned, false).unwrap();
+    let after = diagnose(&description, &misaligned, Observer::none()).unwrap();
     print(&after);
     names(
         &after,
@@ -299,13 +300,13 @@ fn misalignment_put_on_the_drive_is_found() {
 fn put_on_top(
     description: &Description,
     series: &Series,
-    report: &Report,
+    report: &RigDiagnosis,
     effect: &str,
     values: &[f64],
 ) -> Vec<f64> {
     let rig = description.rig().unwrap();
     let mut nominal: Vec<f64> = description
-        .nominal(rig.as_ref())
+        .nominal(rig)
         .unwrap()
         .iter()
         .map(|(value, _)| *value)
@@ -344,7 +345,7 @@ fn a_strength_differential_put_on_the_coupon_is_found() {
     let Some((description, measurement)) = rig("steel_coupon") else {
         return;
     };
-    let before = diagnose(&description, &measurement, false).unwrap();
+    let before = diagnose(&description, &measurement, Observer::none()).unwrap();
     assert!(
         !before
             .named
@@ -361,7 +362,7 @@ fn a_strength_differential_put_on_the_coupon_is_found() {
         &[0.15],
     );
     let stronger = changed(&measurement, |s, k| s.output[k] + more[k]);
-    let after = diagnose(&description, &stronger, false).unwrap();
+    let after = diagnose(&description, &stronger, Observer::none()).unwrap();
     print(&after);
     names(&after, &["strength_differential"]);
     let found = value(&after.as_described, "strength_differential", "asymmetry");

@@ -24,7 +24,10 @@ impl OutputDisturbance {
         }
     }
 
-    /// Refuses gains that are not positive: a walk that nothing drives can't be estimated.
+    /// Checks the gains.
+    ///
+    /// # Errors
+    /// A gain that is not positive: a walk that nothing drives cannot be estimated.
     pub fn validate(&self) -> Result<(), ModelError> {
         for value in self.input {
             ModelError::require_positive("disturbance_input_gain", value)?;

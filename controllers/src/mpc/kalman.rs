@@ -21,7 +21,10 @@ pub struct SteadyStateKalmanFilter {
 
 impl SteadyStateKalmanFilter {
     /// Solves Eq 5-8 for transition `a` (n x n), measurement `c` (p x n), process noise covariance
-    /// `q` (n x n) and measurement noise covariance `r` (p x p, diagonal). Fails where there is no stabilising solution, or none to 1e-10.
+    /// `q` (n x n) and measurement noise covariance `r` (p x p, diagonal).
+    ///
+    /// # Errors
+    /// No stabilising solution, or none to 1e-10.
     pub fn new(
         a: &DMatrix<f64>,
         c: &DMatrix<f64>,

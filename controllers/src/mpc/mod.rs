@@ -55,7 +55,8 @@ pub struct ModelPredictiveInput {
 impl ModelPredictiveInput {
     /// Window of a reference that starts at `sample`; its last sample stays beyond the end.
     ///
-    /// Fails on an empty reference.
+    /// # Errors
+    /// An empty reference.
     pub fn window(
         reference: &[Motion],
         sample: usize,
@@ -76,8 +77,11 @@ impl ModelPredictiveInput {
 }
 
 impl ModelPredictiveControl {
-    /// Builds prediction, filter and problem. Fails by name on what [`Parameters::validate`]
-    /// refuses and on a Riccati equation without a stabilising solution.
+    /// Builds prediction, filter and problem.
+    ///
+    /// # Errors
+    /// What [`Parameters::validate`] refuses, by name; a Riccati equation without a stabilising
+    /// solution.
     pub fn new(parameters: Parameters) -> Result<Self, ModelError> {
         parameters.validate()?;
         let p = &parameters;

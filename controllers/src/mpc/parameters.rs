@@ -250,7 +250,10 @@ fn count_within(
 }
 
 impl Parameters {
-    /// Refuses by name what no controller can be built from.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// What no controller can be built from, by name.
     pub fn validate(&self) -> Result<(), ModelError> {
         crate::Controller::validate(&self.low_level)?;
         self.validate_plant()?;

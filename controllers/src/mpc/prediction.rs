@@ -169,6 +169,9 @@ impl LoopModel {
     ///
     /// `importance` are the weights of the three outputs in the cost; only [`Self::continuous`]
     /// needs them.
+    ///
+    /// # Errors
+    /// A continuous law whose leading directions cannot be told.
     pub fn respond(
         &self,
         p: usize,

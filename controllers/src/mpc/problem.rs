@@ -74,7 +74,10 @@ pub enum Found {
 impl ReducedProblem {
     /// Builds the problem of `horizon` samples; `valve_limit` (V) bounds the valve sequence where
     /// the model has one. That limit is hard, as the valve's is, and always leaves a solution; the
-    /// output limits are soft. Fails where the Hessian is not positive definite.
+    /// output limits are soft.
+    ///
+    /// # Errors
+    /// A Hessian that is not positive definite.
     pub fn new(
         model: &LoopModel,
         horizon: usize,

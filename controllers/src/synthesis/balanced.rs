@@ -10,6 +10,9 @@ use super::no_solution;
 use crate::ModelError;
 
 /// Controllability and observability Gramians of a stable system.
+///
+/// # Errors
+/// A Lyapunov equation that is singular.
 pub fn gramians(system: &StateSpace) -> Result<(DMatrix<f64>, DMatrix<f64>), ModelError> {
     let StateSpace { a, b, c, .. } = system;
     Ok((
@@ -19,6 +22,9 @@ pub fn gramians(system: &StateSpace) -> Result<(DMatrix<f64>, DMatrix<f64>), Mod
 }
 
 /// `X` of `A X + X A' + Q = 0`, by its Kronecker form: for the few states of a controller.
+///
+/// # Errors
+/// Two eigenvalues of `A` whose sum is zero.
 pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
     let n = a.nrows();
     let one = DMatrix::identity(n, n);
@@ -33,7 +39,8 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Mode
 
 /// The stable `system` with `order` states, and all its Hankel singular values, descending.
 ///
-/// Refuses a system that is not stable, and an order of zero or beyond the system's.
+/// # Errors
+/// A system that is not stable, an order of zero or beyond the system's.
 pub fn residualise(
     system: &StateSpace,
     order: usize,

@@ -22,6 +22,9 @@ pub struct RobustController {
 
 /// Both Riccati solutions of a strictly proper system: `(X, Z)` of
 /// `A'X + XA - XBB'X + C'C = 0` and `AZ + ZA' - ZC'CZ + BB' = 0`.
+///
+/// # Errors
+/// An equation without a stabilising solution.
 pub fn riccati_pair(system: &StateSpace) -> Result<(DMatrix<f64>, DMatrix<f64>), ModelError> {
     let StateSpace { a, b, c, .. } = system;
     let one = |size: usize| DMatrix::identity(size, size);
@@ -38,7 +41,9 @@ pub fn riccati_pair(system: &StateSpace) -> Result<(DMatrix<f64>, DMatrix<f64>),
 /// Stabilises the strictly proper `system` with `gamma = factor * gamma_min`, where
 /// `gamma_min = sqrt(1 + largest eigenvalue of X Z)`.
 ///
-/// Refuses a factor that is not above one and a system with feedthrough.
+/// # Errors
+/// A factor that is not above one, a system with feedthrough, a Riccati equation without a
+/// stabilising solution.
 pub fn stabilise(system: &StateSpace, factor: f64) -> Result<RobustController, ModelError> {
     if !(factor > 1.0 && factor.is_finite()) {
         return Err(ModelError::Parameter {

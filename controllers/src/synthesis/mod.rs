@@ -79,7 +79,8 @@ pub fn transfer_function(coefficients: &LoopShapingCoefficients) -> TransferFunc
 
 /// Designs the displacement controller of `plant` (V to m) for the target `crossover / s`.
 ///
-/// Refuses a crossover that is not positive, a plant without three poles and a real slowest zero
+/// # Errors
+/// A crossover that is not positive, a plant without three poles and a real slowest zero
 /// in the left half plane, and a target at which the reduced controller does not stabilise the
 /// plant.
 pub fn loop_shaping(

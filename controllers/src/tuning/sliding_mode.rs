@@ -1,14 +1,17 @@
-//! Force loop and rates of sliding mode for a rig with late measurements, by a stated rule.
+//! Rates of sliding mode, and force loop and rates for a rig with late measurements, by stated rules.
 
 use nalgebra::DVector;
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
 use plant::linear::StateSpace;
+use plant::linear::margins::{crossovers, nyquist};
 
 use crate::allocation::{ControlAllocation, LoopCommands};
+use crate::hierarchy::{SlidingModeInput, force_loop};
+use crate::loops::{Controlled, LinearLaw, Loop, Time};
 use crate::pid::{Pid, PidInput};
 use crate::prediction_over_delay::PredictionOverDelay;
-use crate::sliding_mode::{SlidingMode, SlidingModeInput, force_loop, rate_by_rule};
+use crate::sliding_mode::SlidingMode;
 use crate::{Controller, ModelError, Motion};
 
 /// The hierarchy of Fig 4-3 around a linear rig: what a stability margin is asked of.
@@ -39,6 +42,8 @@ pub struct SlidingModeTuning {
 /// Displacement, velocity and actuator force, SI.
 type Measured = [f64; 3];
 
+/// Crossover of the force loop over the rates of the sliding mode.
+const SEPARATION: f64 = 10.0;
 /// The gain margin that the rule leaves, 6 dB.
 const MARGIN: f64 = 2.0;
 /// Rates over those of [`rate_by_rule`]: a fifth of the force loop's crossover, the lower end of what
@@ -170,10 +175,41 @@ impl Hierarchy<'_> {
     }
 }
 
+/// `lambda = K` in 1/s: a tenth of the highest crossover of the force loop that runs with
+/// `force_share` of the valve, sampled with `period`.
+///
+/// # Errors
+/// A loop that never has a gain of one.
+pub fn rate_by_rule(
+    rig: &Rig,
+    force: &Pid,
+    force_share: f64,
+    period: f64,
+) -> Result<f64, ModelError> {
+    let shared = Pid {
+        proportional: force.proportional * force_share,
+        integral: force.integral * force_share,
+        ..*force
+    };
+    let law = LinearLaw::pid(&shared, Controlled::Force, period)?;
+    let force_loop = Loop::new(rig, law);
+    crossovers(
+        |omega| force_loop.open(Time::Sampled, omega),
+        1.0,
+        nyquist(period),
+    )
+    .last()
+    .map(|crossover| crossover / SEPARATION)
+    .ok_or(ModelError::NoSolution {
+        equation: "the rule for surface_rate and reaching_rate",
+        reason: "the force loop has no crossover".into(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sliding_mode::DISPLACEMENT_INTEGRAL_LEAK;
+    use crate::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
     use crate::three_variable::ThreeVariableGains;
     use plant::servo_hydraulic::{SealFriction, ServoHydraulicInput, ServoHydraulicTable};
     use units::constants::SAMPLING_PERIOD as PERIOD;

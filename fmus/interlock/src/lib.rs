@@ -3,8 +3,31 @@
 
 use controllers::Controller;
 use controllers::interlock::{Interlock as Law, InterlockInput, Trip};
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Variable};
 use serde::{Deserialize, Serialize};
+
+/// Why it tripped, by the numbers of [`Trip`].
+const CAUSES: Enumeration = Enumeration {
+    name: "TripCause",
+    items: &{
+        let mut items = [Item {
+            name: "",
+            value: 0,
+            description: "",
+        }; Trip::ALL.len()];
+        let mut i = 0;
+        while i < items.len() {
+            let cause = Trip::ALL[i];
+            items[i] = Item {
+                name: cause.name(),
+                value: cause as i32,
+                description: cause.words(),
+            };
+            i += 1;
+        }
+        items
+    },
+};
 
 /// Passes the controller's command on to the valve, or brings the valve to null.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -79,7 +102,7 @@ impl Component for Interlock {
                 .discrete().nominal(10.0).depends_on(&INPUTS, Dependent)
                 .depends_on(&["measurement_valid", "heartbeat", "stop", "reset"], Dependent);
             output("tripped", s.tripped, "Whether the interlock has tripped");
-            output("trip_cause", s.trip_cause, "Why it tripped, by its number in the documentation, 0 if it did not");
+            output("trip_cause", s.trip_cause, "Why it tripped").choices(CAUSES);
             output("trip_time", s.law.memory.trip_time, "When it tripped, 0 if it did not", "s").discrete();
             parameter("displacement_limit", s.law.displacement_limit, "Largest displacement, measured or predicted", "m" => "in");
             parameter("velocity_limit", s.law.velocity_limit, "Largest velocity", "m/s" => "in/s");

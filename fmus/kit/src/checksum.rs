@@ -10,6 +10,22 @@ pub(crate) fn checksum(seed: u64, bytes: &[u8]) -> u64 {
     })
 }
 
+/// A token in the form of a GUID: two sums of the text.
+pub(crate) fn fingerprint(text: &str) -> String {
+    let second = checksum(SEED, b"second");
+    let sum = |seed| checksum(seed, text.as_bytes());
+    let digits = format!("{:016x}{:016x}", sum(SEED), sum(second));
+    let part = |from: usize, to: usize| &digits[from..to];
+    format!(
+        "{{{}-{}-{}-{}-{}}}",
+        part(0, 8),
+        part(8, 12),
+        part(12, 16),
+        part(16, 20),
+        part(20, 32)
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

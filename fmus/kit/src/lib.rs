@@ -37,6 +37,8 @@
 //! }
 //! ```
 
+#![warn(clippy::missing_errors_doc)]
+
 mod checksum;
 mod component;
 mod derivative;

@@ -3,15 +3,13 @@
 use std::{
     any::{Any, TypeId},
     collections::HashMap,
-    sync::{Mutex, PoisonError},
+    sync::{Mutex, OnceLock, PoisonError},
 };
 
 use thiserror::Error;
 
 use crate::{
-    checksum::{SEED, checksum},
     component::Component,
-    description,
     fault::{Fault, Outcome},
     units::Unit,
     variable::{Access, Causality, Dependency, Variability, Variable},
@@ -48,8 +46,8 @@ pub struct Model<C: Component> {
     pub initial_dependencies: Vec<Vec<usize>>,
     /// The continuous states, empty if there is no model exchange.
     pub states: Vec<State>,
-    /// The instantiation token (FMI 3.0) and GUID (FMI 2.0).
-    pub token: String,
+    /// The instantiation token, kept by [`crate::description::token`] when it is first asked for.
+    pub(crate) token: OnceLock<String>,
 }
 
 impl<C: Component> Model<C> {
@@ -111,15 +109,14 @@ impl<C: Component> Model<C> {
         for State { state, .. } in &states {
             dependencies[*state] = vec![(*state, Dependency::Constant)];
         }
-        let mut model = Self {
+        let model = Self {
             variables,
             dependencies,
             initial_dependencies,
             states,
-            token: String::new(),
+            token: OnceLock::new(),
         };
         model.check_structure()?;
-        model.token = fingerprint(&description::fmi3(&model));
         Ok(model)
     }
 
@@ -269,22 +266,6 @@ fn check_kind<C>(variable: &Variable<C>, start: &mut C) -> Result<(), String> {
     Ok(())
 }
 
-/// A token in the form of a GUID: two sums of the text.
-pub(crate) fn fingerprint(text: &str) -> String {
-    let second = checksum(SEED, b"second");
-    let sum = |seed| checksum(seed, text.as_bytes());
-    let digits = format!("{:016x}{:016x}", sum(SEED), sum(second));
-    let part = |from: usize, to: usize| &digits[from..to];
-    format!(
-        "{{{}-{}-{}-{}-{}}}",
-        part(0, 8),
-        part(8, 12),
-        part(12, 16),
-        part(16, 20),
-        part(20, 32)
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -360,13 +341,5 @@ mod tests {
             assert!(problem.contains(expected), "`{problem}` lacks `{expected}`");
         }
         assert_eq!(problem::<9>(), "");
-    }
-
-    #[test]
-    fn token_changes_with_the_interface() {
-        let token = Model::<Wrong<9>>::new().unwrap().token;
-        assert_eq!(token, Model::<Wrong<9>>::new().unwrap().token);
-        assert_ne!(token, fingerprint(""));
-        assert_eq!(token.len(), 38);
     }
 }

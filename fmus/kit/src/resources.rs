@@ -13,8 +13,9 @@ use std::{
 use percent_encoding::percent_decode_str;
 
 use crate::{
+    checksum::fingerprint,
     component::Component,
-    model::{Model, fingerprint},
+    model::Model,
     variable::{Access, Causality},
 };
 

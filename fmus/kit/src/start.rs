@@ -9,6 +9,7 @@ use std::{
 
 use crate::{
     component::Component,
+    description,
     fault::Status,
     guard::catch,
     instance::Instance,
@@ -60,8 +61,8 @@ fn prepare<C: Component>(
     }
     let start_values = resources::start_values(location)?;
     let expected = match &start_values {
-        Some((_, text)) => resources::variant_token(&model.token, text),
-        None => model.token.clone(),
+        Some((_, text)) => resources::variant_token(description::token(model), text),
+        None => description::token(model).to_string(),
     };
     let token = token.map(CStr::to_string_lossy).unwrap_or_default();
     if token != expected {

@@ -212,11 +212,15 @@ impl<C> Variable<C> {
 
     /// A parameter that takes one of the choices of an enumeration.
     pub fn choice(name: &str, choices: Enumeration, field: fn(&mut C) -> &mut i32) -> Self {
-        Self::new(
-            name.into(),
-            Causality::Parameter,
-            Access::Choice(field, choices),
-        )
+        Self::parameter(name, field).choices(choices)
+    }
+
+    /// Makes an integer variable one of the choices of an enumeration.
+    pub fn choices(mut self, choices: Enumeration) -> Self {
+        if let Access::Integer(field) = self.access {
+            self.access = Access::Choice(field, choices);
+        }
+        self
     }
 
     /// The elements `name[1]` to `name[count]` of an array.

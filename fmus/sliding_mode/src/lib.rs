@@ -4,9 +4,10 @@
 use controllers::{
     Controller,
     allocation::ControlAllocation,
+    hierarchy::{self, LowLevelReferences, SlidingModeInput},
     pid::Pid,
     prediction_over_delay::PredictionOverDelay,
-    sliding_mode::{self, LowLevelReferences, SlidingMode as Law, SlidingModeInput},
+    sliding_mode::SlidingMode as Law,
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
 use plant::ModelError;
@@ -44,8 +45,8 @@ impl Default for SlidingMode {
             reference_ahead: false,
             sampling_period: SAMPLING_PERIOD,
             actuator: ShakeTable::default().actuator,
-            displacement_loop: sliding_mode::displacement_loop(&allocation),
-            force_loop: sliding_mode::force_loop(&allocation),
+            displacement_loop: hierarchy::displacement_loop(&allocation),
+            force_loop: hierarchy::force_loop(&allocation),
             allocation,
         }
     }

@@ -13,7 +13,7 @@ use crate::IdentificationError;
 
 /// A frequency response with its quality.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
+pub struct FrequencyResponseEstimate {
     /// Frequencies, Hz.
     pub frequency: Vec<f64>,
     /// Response, output unit over input unit.
@@ -98,7 +98,7 @@ pub fn direct(
     output: &[f64],
     period: f64,
     segment: usize,
-) -> Result<Estimate, IdentificationError> {
+) -> Result<FrequencyResponseEstimate, IdentificationError> {
     joint_input_output(input, input, output, period, segment)
 }
 
@@ -113,9 +113,9 @@ pub fn joint_input_output(
     output: &[f64],
     period: f64,
     segment: usize,
-) -> Result<Estimate, IdentificationError> {
+) -> Result<FrequencyResponseEstimate, IdentificationError> {
     let spectra = Spectra::new(&[reference, input, output], period, segment)?;
-    let mut estimate = Estimate {
+    let mut estimate = FrequencyResponseEstimate {
         frequency: Vec::new(),
         response: Vec::new(),
         coherence: Vec::new(),
@@ -209,7 +209,7 @@ mod tests {
         };
         let joint = joint_input_output(&r, &u, &y, 0.002, 1000).unwrap();
         let direct = direct(&u, &y, 0.002, 1000).unwrap();
-        let error = |estimate: &Estimate| {
+        let error = |estimate: &FrequencyResponseEstimate| {
             let lines = 10..80;
             let sum: f64 = lines
                 .clone()

@@ -15,7 +15,7 @@ use crate::estimation::prediction::{Parameter, PredictionModel, cost, scoring};
 
 /// Where the scoring ended.
 #[derive(Debug, Clone)]
-pub struct Estimate {
+pub struct GaussNewtonEstimate {
     /// All parameters, held ones included.
     pub parameters: Vec<f64>,
     /// Covariance of all parameters; zero rows for held ones and those at a bound.
@@ -29,7 +29,7 @@ pub struct Estimate {
     pub flat_directions: Vec<DVector<f64>>,
 }
 
-impl Estimate {
+impl GaussNewtonEstimate {
     /// Standard error of a parameter.
     pub fn standard_error(&self, index: usize) -> f64 {
         self.covariance[(index, index)].max(0.0).sqrt()
@@ -116,7 +116,7 @@ pub fn fit<const P: usize>(
     model: &impl PredictionModel<P>,
     parameters: &[Parameter],
     search: Search,
-) -> Result<Estimate, IdentificationError> {
+) -> Result<GaussNewtonEstimate, IdentificationError> {
     let (estimate, converged) = fit_within(model, parameters, search)?;
     if converged {
         return Ok(estimate);
@@ -135,7 +135,7 @@ pub fn fit_within<const P: usize>(
     model: &impl PredictionModel<P>,
     parameters: &[Parameter],
     search: Search,
-) -> Result<(Estimate, bool), IdentificationError> {
+) -> Result<(GaussNewtonEstimate, bool), IdentificationError> {
     let mut values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
     let mut least = cost(model, &values).ok_or(IdentificationError::NotConverged {
         method: "the Gauss-Newton refinement",
@@ -175,7 +175,7 @@ pub fn fit_within<const P: usize>(
             damping *= if damping < 1e-4 { 100.0 } else { 10.0 };
         }
         if settled || iteration >= search.iterations {
-            let mut estimate = Estimate {
+            let mut estimate = GaussNewtonEstimate {
                 parameters: values,
                 covariance: DMatrix::zeros(0, 0),
                 flat_directions: Vec::new(),

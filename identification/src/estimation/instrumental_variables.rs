@@ -37,7 +37,7 @@ impl<'a> Signal<'a> {
 
 /// Transfer functions from several inputs to one output over one denominator.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
+pub struct InstrumentalVariablesEstimate {
     /// Monic, descending powers.
     pub denominator: Vec<f64>,
     /// One polynomial an input, descending powers.
@@ -68,7 +68,7 @@ pub fn regress(
     period: f64,
     filter_denominator: &[f64],
     known: &[(usize, f64)],
-) -> Result<Estimate, IdentificationError> {
+) -> Result<InstrumentalVariablesEstimate, IdentificationError> {
     let order = filter_denominator.len() - 1;
     let shared = order + powers.iter().map(Vec::len).sum::<usize>();
     let columns = shared + experiments.len();
@@ -155,7 +155,7 @@ pub fn regress(
         }
         numerators.push(numerator);
     }
-    Ok(Estimate {
+    Ok(InstrumentalVariablesEstimate {
         denominator,
         numerators,
     })
@@ -217,7 +217,7 @@ pub fn refine_open_loop(
     numerator_order: usize,
     cutoff: f64,
     between: Between,
-) -> Result<Estimate, IdentificationError> {
+) -> Result<InstrumentalVariablesEstimate, IdentificationError> {
     let powers = [(0..=numerator_order).rev().collect::<Vec<_>>()];
     let mut denominator = equal_lags(cutoff, order);
     let mut instrument = output.to_vec();
@@ -235,12 +235,14 @@ pub fn refine_open_loop(
         let next = regress(&[signals], &powers, period, &denominator, &[])?;
         denominator = stabilised(&next.denominator);
         instrument = simulate(&next.numerators[0], &denominator, input, period, between);
-        let done = estimate.as_ref().is_some_and(|before: &Estimate| {
-            let pairs = before.denominator.iter().zip(&next.denominator);
-            pairs
-                .into_iter()
-                .all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs())
-        });
+        let done = estimate
+            .as_ref()
+            .is_some_and(|before: &InstrumentalVariablesEstimate| {
+                let pairs = before.denominator.iter().zip(&next.denominator);
+                pairs
+                    .into_iter()
+                    .all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs())
+            });
         estimate = Some(next);
         if done {
             break;

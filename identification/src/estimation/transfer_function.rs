@@ -28,7 +28,7 @@ pub struct Structure {
 
 /// The transfer function found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
+pub struct TransferFunctionEstimate {
     /// Descending powers.
     pub numerator: Vec<f64>,
     /// Monic, descending powers.
@@ -46,7 +46,7 @@ pub struct Estimate {
     pub simulated: Vec<f64>,
 }
 
-impl Estimate {
+impl TransferFunctionEstimate {
     /// The output from an input alone, from rest, for data that were not fitted.
     pub fn simulate(&self, input: &[f64], period: f64, between: Between) -> Vec<f64> {
         let late = delayed(input, self.delay / period);
@@ -162,7 +162,7 @@ pub fn identify(
     output: &[f64],
     period: f64,
     structure: Structure,
-) -> Result<Estimate, IdentificationError> {
+) -> Result<TransferFunctionEstimate, IdentificationError> {
     let (_, moves) = mean_and_deviation(input);
     let (mean, size) = mean_and_deviation(output);
     if moves == 0.0 || size == 0.0 {
@@ -238,7 +238,7 @@ pub fn identify(
         .zip(&simulated)
         .map(|(y, m)| (y - m).powi(2))
         .sum();
-    Ok(Estimate {
+    Ok(TransferFunctionEstimate {
         numerator: p[..=zeros].to_vec(),
         denominator,
         delay: p[zeros + 1 + order],

@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use plant::identified::actuator::IdentifiedActuator;
 
 use crate::IdentificationError;
-use crate::estimation::gauss_newton::Estimate;
+use crate::estimation::gauss_newton::GaussNewtonEstimate;
 use crate::estimation::prediction::{Parameter, PredictionModel};
 use crate::estimation::residuals::{ResidualTest, residual_test};
 use crate::identify::model::{OUTPUT_NAMES, OUTPUTS, PHYSICAL, RigModel, rig_from};
@@ -17,7 +17,7 @@ pub(crate) fn assess(
     whole: &RigModel,
     fitted: &RigModel,
     parameters: &[Parameter],
-    estimate: &Estimate,
+    estimate: &GaussNewtonEstimate,
     identifiable: bool,
     mut warnings: Vec<String>,
 ) -> Result<RigIdentification, IdentificationError> {

@@ -9,7 +9,7 @@ use plant::specimens::linear::LinearSpecimen;
 
 use crate::IdentificationError;
 use crate::data::Recording;
-use crate::estimation::gauss_newton::{self, Estimate, FINE, Search};
+use crate::estimation::gauss_newton::{self, FINE, GaussNewtonEstimate, Search};
 use crate::estimation::prediction::{Parameter, cost};
 use crate::estimation::residuals::ResidualTest;
 use crate::identify::assessment::{assess, response_error};
@@ -96,7 +96,7 @@ impl RigIdentification {
     }
 
     /// Takes over the numbers of an estimate.
-    pub(crate) fn take(&mut self, parameters: &[Parameter], estimate: Estimate) {
+    pub(crate) fn take(&mut self, parameters: &[Parameter], estimate: GaussNewtonEstimate) {
         self.physical = estimate.parameters[..PHYSICAL].to_vec();
         self.covariance = estimate
             .covariance
@@ -210,7 +210,11 @@ const B0: usize = 5;
 const FITTED: f64 = 0.3;
 
 /// Holds a delay that is not clearly above zero at zero, and says whether it did.
-fn drop_no_delay(model: &RigModel, parameters: &mut [Parameter], estimate: &Estimate) -> bool {
+fn drop_no_delay(
+    model: &RigModel,
+    parameters: &mut [Parameter],
+    estimate: &GaussNewtonEstimate,
+) -> bool {
     let delay = parameters[DELAY].start;
     let least = 1e-3 * model.experiments[0].period;
     let none = delay < least.max(4.0 * estimate.standard_error(DELAY));
@@ -303,7 +307,7 @@ fn move_delay(model: &RigModel, parameters: &mut [Parameter]) -> bool {
     parameters[DELAY].start != here
 }
 
-fn restart(parameters: &mut [Parameter], estimate: &Estimate) {
+fn restart(parameters: &mut [Parameter], estimate: &GaussNewtonEstimate) {
     for (parameter, value) in parameters.iter_mut().zip(&estimate.parameters) {
         parameter.start = *value;
     }
@@ -314,9 +318,9 @@ fn restart(parameters: &mut [Parameter], estimate: &Estimate) {
 fn hold_undetermined_slow_zero(
     model: &RigModel,
     parameters: &mut [Parameter],
-    estimate: Estimate,
+    estimate: GaussNewtonEstimate,
     warnings: &mut Vec<String>,
-) -> Result<Estimate, IdentificationError> {
+) -> Result<GaussNewtonEstimate, IdentificationError> {
     let lost = [A0, B0]
         .iter()
         .any(|&i| estimate.standard_error(i) > 0.5 * estimate.parameters[i].abs());

@@ -4,7 +4,6 @@ pub mod build;
 pub mod compare;
 pub mod design;
 pub mod diagnose;
-pub mod diagnose_rig;
 pub mod identify;
 pub mod info;
 pub mod report;
@@ -40,7 +39,7 @@ enum Command {
     /// Print margins of the loops and draw their frequency responses
     Design(design::Arguments),
     /// Name what a model gets wrong, from records of the rig
-    Diagnose(diagnose_rig::Arguments),
+    Diagnose(diagnose::Arguments),
     /// Find a rig's parameters from measured data
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
@@ -58,7 +57,7 @@ pub fn main() -> ExitCode {
         Some(Command::Build(arguments)) => build::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::Design(arguments)) => design::execute(&arguments),
-        Some(Command::Diagnose(arguments)) => diagnose_rig::execute(&arguments),
+        Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::diagnose;
-use crate::comparison::tables as compare_tables;
+use crate::comparison;
+use crate::diagnosis;
 use crate::error::Error;
 use crate::results::Results;
 use crate::run::summary;
@@ -40,19 +40,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ));
     }
     let has = |name: &str| folder.join(name).is_file();
-    let report = folder.join(diagnose::REPORT);
+    let report = folder.join(diagnosis::REPORT);
     let (kind, page) = if has("manifest.json") || has("results.csv") {
         ("run", summary::page_again(folder)?)
-    } else if has(compare_tables::COMPARISON) {
-        ("comparison", compare_tables::page_again(folder)?)
-    } else if has(diagnose::DIAGNOSIS) {
-        if report.is_file() {
-            return Err(fault(
-                "its report.html has pictures that diagnosis.json does not hold; move it away to \
-                 have one without them, or run `shakebench diagnose` on the case again",
-            ));
-        }
-        ("diagnosis", diagnose::page_again(folder)?)
+    } else if has(comparison::COMPARISON) {
+        ("comparison", comparison::page_again(folder)?)
+    } else if has(diagnosis::DIAGNOSIS) {
+        ("diagnosis", diagnosis::page_again(folder)?)
     } else {
         return Err(fault(
             "holds no results; expected results.csv, summary.json and manifest.json of a run, \
@@ -60,7 +54,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ));
     };
     let mut results = Results::begin(folder)?;
-    results.write_text(diagnose::REPORT, &page)?;
+    results.write_text(diagnosis::REPORT, &page)?;
     results.finish()?;
     if arguments.json {
         println!("{}", serde_json::json!({"of": kind, "report": report}));

@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use crate::cli::compare::{History, Row};
+use super::result::{History, Row};
 use crate::error::Error;
 
 /// Name of the file.
-pub(crate) const FILE: &str = "errors.csv";
+pub(super) const FILE: &str = "errors.csv";
 /// Its columns, after the controller's name.
 const COLUMNS: [&str; 2] = ["displacement_error", "acceleration_error"];
 
 /// Errors over time on the first motion as CSV: `time`, then two columns a controller; a run that
 /// ended early leaves cells empty.
-pub(crate) fn written(rows: &[Row]) -> String {
+pub(super) fn written(rows: &[Row]) -> String {
     let kept: Vec<(&str, &History)> = rows
         .iter()
         .filter_map(|row| Some((row.controller.as_str(), row.history.as_ref()?)))
@@ -45,7 +45,7 @@ pub(crate) fn written(rows: &[Row]) -> String {
 ///
 /// # Errors
 /// A file that cannot be read or a cell that is no number, with its line.
-pub(crate) fn read(path: &Path, controller: &str) -> Result<Option<History>, Error> {
+pub(super) fn read(path: &Path, controller: &str) -> Result<Option<History>, Error> {
     let fault = |reason: String| Error::File {
         path: path.to_path_buf(),
         reason,

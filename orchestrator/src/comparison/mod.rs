@@ -1,4 +1,13 @@
-//! A comparison of controllers on records.
+//! A comparison of controllers on motions, beside the values that the thesis prints.
 
-pub(crate) mod errors;
-pub(crate) mod tables;
+mod errors;
+mod page;
+mod play;
+mod result;
+mod tables;
+mod thesis;
+
+pub use page::{COMPARISON, page_again, write};
+pub use play::{Plan, Played, Progress, compare};
+pub use result::{Comparison, History, Median, Row};
+pub use tables::{ErrorTable, tables};

@@ -1,3 +1,144 @@
-//! The loops' margins and frequency responses.
+//! Margins and frequency responses of the loops, and the loop-shaping synthesis.
 
-pub(crate) mod page;
+mod figures;
+mod loops;
+mod page;
+mod table;
+
+use std::str::FromStr;
+
+use controllers::ModelError;
+use controllers::sliding_mode;
+use controllers::synthesis::{self, EQUATION_3_10_CROSSOVER, LoopShapingDesign};
+use plant::identified::coupled::Rig;
+use plant::identified::shake_table::ShakeTable;
+use plant::specimens::linear::LinearSpecimen;
+use serde::Serialize;
+
+pub use figures::{Figures, LoopFigures};
+pub use loops::LoopName;
+use loops::NamedLoop;
+pub use page::write;
+pub use table::table;
+
+/// What is designed.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Options {
+    /// One loop; none: all.
+    pub only: Option<LoopName>,
+    /// Target crossover of the synthesis, rad/s; none: that of Eq 3-10.
+    pub crossover: Option<f64>,
+    /// What stands on the table.
+    pub specimen: Specimen,
+}
+
+/// What stands on the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Specimen {
+    /// Nothing.
+    #[default]
+    None,
+    /// The linear specimen of Appendix A.
+    Linear,
+}
+
+impl FromStr for Specimen {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "none" => Ok(Self::None),
+            "linear" => Ok(Self::Linear),
+            other => Err(format!(
+                "`{other}` has no linear model; expected none or linear"
+            )),
+        }
+    }
+}
+
+/// Loops with their figures: what `--json` prints.
+#[derive(Debug, Clone, Serialize)]
+pub struct Design {
+    /// The loops.
+    pub loops: Vec<LoopFigures>,
+    /// What stands on the table.
+    pub specimen: Specimen,
+    /// The loop-shaping synthesis.
+    pub synthesis: Synthesis,
+    /// `lambda = K` of sliding mode.
+    pub sliding_mode_rate_1_s: f64,
+    /// For the plots.
+    #[serde(skip)]
+    drawn: Vec<NamedLoop>,
+    #[serde(skip)]
+    shaping: LoopShapingDesign,
+}
+
+/// The loop-shaping synthesis.
+#[derive(Debug, Clone, Serialize)]
+pub struct Synthesis {
+    /// Target crossover.
+    pub crossover_rad_s: f64,
+    /// Smallest bound that a controller can reach.
+    pub gamma_min: f64,
+    /// Bound of the controller.
+    pub gamma: f64,
+    /// Gain of the second-order controller (Eq 3-10), V/m.
+    pub gain_v_m: f64,
+    /// `n1` of its numerator `s² + n1 s + n0`.
+    pub numerator_rate_1_s: f64,
+    /// `n0` of it.
+    pub numerator_constant_1_s2: f64,
+    /// `p` of its denominator `s (s + p)`.
+    pub pole_1_s: f64,
+    /// Of the controller of full order.
+    pub hankel_singular_values: Vec<f64>,
+}
+
+/// Finds the figures of the loops on the identified rig.
+///
+/// # Errors
+/// A crossover for which there is no controller.
+pub fn design(options: &Options) -> Result<Design, ModelError> {
+    let rig = Rig {
+        specimen: match options.specimen {
+            Specimen::None => None,
+            Specimen::Linear => Some(LinearSpecimen::appendix_a()),
+        },
+        ..Rig::default()
+    };
+    let shaping = synthesis::loop_shaping(
+        &ShakeTable::default().voltage_to_displacement(),
+        options.crossover.unwrap_or(EQUATION_3_10_CROSSOVER),
+    )?;
+    let chosen = LoopName::ALL.into_iter();
+    let drawn = chosen
+        .filter(|name| options.only.is_none_or(|only| only == *name))
+        .map(|name| NamedLoop::new(name, &rig, &shaping))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(Design {
+        loops: drawn.iter().map(LoopFigures::of).collect(),
+        specimen: options.specimen,
+        synthesis: Synthesis::from(&shaping),
+        sliding_mode_rate_1_s: sliding_mode::IDENTIFIED_RATE,
+        drawn,
+        shaping,
+    })
+}
+
+impl From<&LoopShapingDesign> for Synthesis {
+    fn from(design: &LoopShapingDesign) -> Self {
+        let c = design.coefficients;
+        Self {
+            crossover_rad_s: design.crossover,
+            gamma_min: design.robust.gamma_min,
+            gamma: design.robust.gamma,
+            gain_v_m: c.gain,
+            numerator_rate_1_s: c.numerator_rate,
+            numerator_constant_1_s2: c.numerator_constant,
+            pole_1_s: c.pole,
+            hankel_singular_values: design.hankel_singular_values.clone(),
+        }
+    }
+}

@@ -13,36 +13,38 @@ use plant::identified::shake_table::ShakeTable;
 use plant::linear::{FrequencyResponse, log_space};
 use units::constants::SAMPLING_PERIOD;
 
-use crate::cli::design::{NAMES, NamedLoop};
+use super::Design;
+use super::loops::{LoopName, NamedLoop};
+use super::table::table;
 use crate::error::Error;
 use crate::report::{
     self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units,
 };
+use crate::results::Results;
 
+const REPORT: &str = "report.html";
 const POINTS: usize = 600;
 /// Drawn from 0.01 Hz to the Nyquist frequency.
 const FIRST_HZ: f64 = 0.01;
 
 /// Writes `report.html` into `folder`; says where.
-pub(crate) fn write(
-    folder: &Path,
-    loops: &[NamedLoop],
-    design: &LoopShapingDesign,
-    table: &[Vec<String>],
-) -> Result<PathBuf, Error> {
-    let path = folder.join("report.html");
-    let fault = |reason: String| Error::File {
-        path: path.clone(),
-        reason,
-    };
-    let page = report::html(&report(loops, design, table));
-    let page = page.map_err(|error| fault(error.to_string()))?;
-    std::fs::create_dir_all(folder).map_err(|error| fault(error.to_string()))?;
-    std::fs::write(&path, page).map_err(|error| fault(error.to_string()))?;
-    Ok(path)
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write(design: &Design, folder: &Path) -> Result<PathBuf, Error> {
+    let page = report::html(&report(design)).map_err(|error| Error::File {
+        path: folder.join(REPORT),
+        reason: error.to_string(),
+    })?;
+    let mut results = Results::begin(folder)?;
+    results.write_text(REPORT, &page)?;
+    results.finish()?;
+    Ok(folder.join(REPORT))
 }
 
-fn report(loops: &[NamedLoop], design: &LoopShapingDesign, table: &[Vec<String>]) -> Report {
+fn report(design: &Design) -> Report {
+    let loops = &design.drawn;
+    let table = table(&design.loops);
     let mut heads = table.iter().take(2);
     let (names, units) = (heads.next(), heads.next());
     let columns = names.into_iter().flatten().zip(units.into_iter().flatten());
@@ -72,9 +74,9 @@ fn report(loops: &[NamedLoop], design: &LoopShapingDesign, table: &[Vec<String>]
         ..Section::default()
     }];
     sections.extend(loops.iter().map(loop_section));
-    if loops.len() == NAMES.len() {
+    if loops.len() == LoopName::ALL.len() {
         sections.push(comparison(loops));
-        sections.push(shaping(design));
+        sections.push(shaping(&design.shaping));
     }
     Report {
         title: "Loops of the shake table".into(),
@@ -98,15 +100,11 @@ fn loop_section(one: &NamedLoop) -> Section {
         ]
     };
     let (closed_continuous, closed_sampled) = (closed(Time::Continuous), closed(Time::Sampled));
-    let figure = match one.name {
-        "displacement-pid" => " (Fig 3-3)",
-        "force-pid" => " (Fig 3-4)",
-        "loop-shaping" => " (Fig 3-9)",
-        _ => "",
-    };
+    let figure = one.name.figure();
+    let figure = figure.map_or(String::new(), |figure| format!(" ({figure})"));
     Section {
-        heading: one.name.into(),
-        text: vec![format!("{}{figure}.", one.about)],
+        heading: one.name.to_string(),
+        text: vec![format!("{}{figure}.", one.name.about())],
         panels: vec![
             gain_panel(
                 "Open loop, gain",
@@ -131,20 +129,20 @@ fn loop_section(one: &NamedLoop) -> Section {
 
 /// Fig 3-7 and 3-10: what the loops make of their reference.
 fn comparison(all: &[NamedLoop]) -> Section {
-    let series = |names: &[&str], values: fn(&FrequencyResponse) -> Vec<f64>| {
+    let series = |names: &[LoopName], values: fn(&FrequencyResponse) -> Vec<f64>| {
         all.iter()
             .filter(|one| names.contains(&one.name))
             .map(|one| {
                 let closed = response(|omega| one.rig_loop.closed(Time::Sampled, omega));
-                line(one.name, &closed, values(&closed))
+                line(one.name.name(), &closed, values(&closed))
             })
             .collect()
     };
     let tracking = [
-        "displacement-pid",
-        "loop-shaping",
-        "three-variable",
-        "sliding-mode",
+        LoopName::DisplacementPid,
+        LoopName::LoopShaping,
+        LoopName::ThreeVariable,
+        LoopName::SlidingMode,
     ];
     Section {
         heading: "Comparison of the closed loops".into(),
@@ -153,14 +151,14 @@ fn comparison(all: &[NamedLoop]) -> Section {
             gain_panel(
                 "Three-variable control and PID (Fig 3-7)",
                 series(
-                    &["displacement-pid", "three-variable"],
+                    &[LoopName::DisplacementPid, LoopName::ThreeVariable],
                     FrequencyResponse::gain_db,
                 ),
             ),
             gain_panel(
                 "Loop shaping and PID (Fig 3-10)",
                 series(
-                    &["displacement-pid", "loop-shaping"],
+                    &[LoopName::DisplacementPid, LoopName::LoopShaping],
                     FrequencyResponse::gain_db,
                 ),
             ),

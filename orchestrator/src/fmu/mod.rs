@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use sha2::{Digest, Sha256};
 
-pub use description::{Causality, Description, FmiVersion, Kind, Variability, Variable};
+pub use description::{Causality, Description, FmiVersion, Item, Kind, Variability, Variable};
 pub use error::{CallError, FmuError};
 pub use instance::{Instance, State};
 pub use messages::Message;

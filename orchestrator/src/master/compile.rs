@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::action::Action;
 use super::reference::Reference;
 use super::transfer::{Inputs, Outputs};
-use super::{Algorithm, MasterError, Part, Simulation, start};
+use super::{Algorithm, EndSignals, MasterError, Part, Simulation, start};
 use crate::fmu::{Causality, Instance, Kind, State, Variability};
 use crate::motion::Motion;
 use crate::system::{Operation, Quantity, Source, System};
@@ -60,17 +60,17 @@ impl Simulation {
             .iter()
             .map(|operation| plan.action(&mut reference, operation))
             .collect();
-        let end_when = system.end_when.map(|(component, variable)| {
-            let source = Source::Output {
-                component,
-                variable,
-            };
-            (plan.signal(&mut reference, source), system.end_after)
-        });
-        let cause = system.end_when.and_then(|(component, _)| {
-            let description = &system.components[component].fmu.description;
-            let variable = description.position("trip_cause")?;
-            plan.places.get(&(component, variable)).copied()
+        let end = system.end.map(|end| EndSignals {
+            when: plan.places[&end.when],
+            cause: end.cause.map(|(component, variable)| {
+                let variables = &system.components[component].fmu.description.variables;
+                let items = match &variables[variable].kind {
+                    Kind::Enumeration(items) => items.clone(),
+                    _ => Vec::new(),
+                };
+                (plan.places[&(component, variable)], items)
+            }),
+            after: end.after,
         });
         let stop = system.stop.map(|(part, variable)| {
             let variables = &system.components[part].fmu.description.variables;
@@ -89,9 +89,8 @@ impl Simulation {
             reference,
             parts,
             actions,
-            end_when,
+            end,
             stop,
-            cause,
         };
         start::initialize(&mut simulation, motion.len() as f64 * motion.dt)?;
         Ok(simulation)

@@ -21,9 +21,9 @@ use std::fmt;
 
 pub use error::MasterError;
 pub use record::Record;
-pub use run::{Ended, LogLine, Outcome, Pace};
+pub use run::{Ended, Ending, LogLine, Outcome, Pace};
 
-use crate::fmu::{Instance, State};
+use crate::fmu::{Instance, Item, State};
 use action::Action;
 use reference::Reference;
 use transfer::{Inputs, Outputs};
@@ -78,16 +78,24 @@ pub struct Simulation {
     reference: Reference,
     parts: Vec<Part>,
     actions: Vec<Action>,
-    /// The signal that ends the run when it is not 0, and how long the run goes on then, s.
-    end_when: Option<(usize, f64)>,
+    /// What ends the run early.
+    end: Option<EndSignals>,
     /// The part and input that is set when a sampled component fails.
     stop: Option<(usize, u32)>,
-    /// The output that says why the run was ended, beside that of `end_when`.
-    cause: Option<usize>,
     /// The signals at the tick before; in [`Algorithm::Iterative`] those of the last repetition.
     last_signals: Vec<f64>,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
     next_signals: Vec<f64>,
+}
+
+/// What ends a run early.
+struct EndSignals {
+    /// The signal that ends the run when it is not 0.
+    when: usize,
+    /// The signal that says why, and what its values mean.
+    cause: Option<(usize, Vec<Item>)>,
+    /// How long the run goes on then, s.
+    after: f64,
 }
 
 /// A component in a simulation.

@@ -2,10 +2,33 @@
 
 use std::time::{Duration, Instant};
 
-use controllers::interlock::Trip;
+use serde::{Deserialize, Serialize};
 
-use super::{MasterError, Record, Simulation};
+use super::{EndSignals, MasterError, Record, Simulation};
 use crate::fmu::{Kind, Message};
+
+/// How a run ended, in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Ending {
+    /// It was played to its end.
+    Complete,
+    /// The system asked to end it.
+    Interlock,
+    /// A component failed.
+    Failed,
+}
+
+impl Ending {
+    /// `complete`, `interlock` or `failed`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Complete => "complete",
+            Self::Interlock => "interlock",
+            Self::Failed => "failed",
+        }
+    }
+}
 
 /// How a run ended.
 #[derive(Debug)]
@@ -19,7 +42,7 @@ pub enum Ended {
         /// When, s.
         time: f64,
         /// Why, in words, where the component says it.
-        cause: Option<&'static str>,
+        cause: Option<String>,
     },
     /// A component failed.
     Failed(MasterError),
@@ -33,13 +56,18 @@ pub enum Ended {
 }
 
 impl Ended {
-    /// `complete`, `interlock` or `failed`.
-    pub fn word(&self) -> &'static str {
+    /// In a word.
+    pub fn kind(&self) -> Ending {
         match self {
-            Self::Complete => "complete",
-            Self::Interlock { .. } => "interlock",
-            Self::Failed(_) | Self::Stopped { .. } => "failed",
+            Self::Complete => Ending::Complete,
+            Self::Interlock { .. } => Ending::Interlock,
+            Self::Failed(_) | Self::Stopped { .. } => Ending::Failed,
         }
+    }
+
+    /// Why it ended early; none where it is complete.
+    pub fn reason(&self) -> Option<String> {
+        (self.kind() != Ending::Complete).then(|| self.story())
     }
 
     /// When the run was stopped before its end, s.
@@ -59,6 +87,7 @@ impl Ended {
                 time,
                 cause,
             } => {
+                let cause = cause.as_ref();
                 let cause = cause.map_or(String::new(), |cause| format!(": {cause}"));
                 format!("`{signal}` became true at {time:.3} s{cause}")
             }
@@ -146,7 +175,7 @@ impl Simulation {
         record: &mut Record,
     ) -> Result<Ended, MasterError> {
         let begin = Instant::now();
-        let mut tripped: Option<(f64, f64, Option<&'static str>)> = None;
+        let mut tripped: Option<Tripped> = None;
         let mut stopped = false;
         while self.tick < samples * self.ticks_per_row {
             if pace == Pace::RealTime {
@@ -171,33 +200,53 @@ impl Simulation {
                     .set(&Kind::Boolean, &[input], &[1.0])?;
                 stopped = true;
             }
-            if let Some((signal, after)) = self.end_when {
-                if tripped.is_none() && self.signals[signal] != 0.0 {
-                    tripped = Some((self.time(), self.time() + after, self.cause_in_words()));
+            if let Some(end) = &self.end {
+                if tripped.is_none() && self.signals[end.when] != 0.0 {
+                    tripped = Some(Tripped {
+                        time: self.time(),
+                        end: self.time() + end.after,
+                        signal: self.names[end.when].clone(),
+                        cause: end.cause_in_words(&self.signals),
+                    });
                 }
-                if tripped.is_some_and(|(_, end, _)| self.time() >= end) {
+                if tripped.as_ref().is_some_and(|t| self.time() >= t.end) {
                     break;
                 }
             }
             self.advance()?;
         }
-        let time = tripped.map_or(self.time(), |(time, _, _)| time);
+        let time = tripped.as_ref().map_or(self.time(), |t| t.time);
         if let Some(error) = self.parts.iter_mut().find_map(|part| part.failure.take()) {
             return Ok(Ended::Stopped { error, time });
         }
-        Ok(match (tripped, self.end_when) {
-            (Some((time, _, cause)), Some((signal, _))) => Ended::Interlock {
-                signal: self.names[signal].clone(),
-                time,
-                cause,
-            },
-            _ => Ended::Complete,
-        })
+        Ok(tripped.map_or(Ended::Complete, |t| Ended::Interlock {
+            signal: t.signal,
+            time: t.time,
+            cause: t.cause,
+        }))
     }
+}
 
-    fn cause_in_words(&self) -> Option<&'static str> {
-        let number = self.signals[self.cause?] as usize;
-        Trip::ALL.get(number).map(|cause| cause.words())
+/// The system asked to end the run.
+struct Tripped {
+    /// When, s.
+    time: f64,
+    /// When it ends, s.
+    end: f64,
+    signal: String,
+    cause: Option<String>,
+}
+
+impl EndSignals {
+    fn cause_in_words(&self, signals: &[f64]) -> Option<String> {
+        let (signal, items) = self.cause.as_ref()?;
+        let value = signals[*signal];
+        let item = items.iter().find(|item| item.value as f64 == value)?;
+        Some(if item.description.is_empty() {
+            item.name.clone()
+        } else {
+            item.description.clone()
+        })
     }
 }
 

@@ -5,8 +5,8 @@
 
 use std::path::Path;
 
-use super::MotionError;
-use super::record::{Record, file_name, stem};
+use super::accelerogram::{Record, file_name, stem};
+use super::error::MotionError;
 use crate::units::{STANDARD_GRAVITY, Unit};
 
 /// Lines within which the header must end.

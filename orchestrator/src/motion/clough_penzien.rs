@@ -12,7 +12,8 @@ use rand_distr::StandardNormal;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 
-use super::{Record, peak};
+use super::accelerogram::Record;
+use super::playable::peak;
 use crate::units::STANDARD_GRAVITY;
 
 /// The seed of the built-in motion when none is asked for.

@@ -24,8 +24,11 @@ use std::f64::consts::TAU;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 
+use super::accelerogram::Record;
 use super::csv_file::rounded;
-use super::{Motion, MotionError, Options, Record, Scaling, peak};
+use super::error::MotionError;
+use super::options::{Options, Scaling};
+use super::playable::{Motion, peak};
 use crate::units::{INCH, STANDARD_GRAVITY};
 
 /// Poles of each of the two Butterworth filters.

@@ -1,24 +1,11 @@
-//! A record of ground acceleration, as read.
+//! Reading a record of ground acceleration.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use super::accelerogram::{Record, file_name, stem};
+use super::at2;
 use super::csv_file::{CsvFile, Kind};
-use super::{MotionError, at2};
-
-/// An accelerogram: evenly sampled ground acceleration, not processed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Record {
-    /// Short name: the stem of the file.
-    pub name: String,
-    /// Sample time, s.
-    pub dt: f64,
-    /// Acceleration, m/s^2.
-    pub acceleration: Vec<f64>,
-    /// Where it comes from, for people.
-    pub origin: String,
-    /// The seed, when it was generated.
-    pub seed: Option<u64>,
-}
+use super::error::MotionError;
 
 /// Longest record that is accepted, s: one hour.
 const LONGEST: f64 = 3600.0;
@@ -87,14 +74,6 @@ pub(super) fn read_text(path: &Path) -> Result<String, MotionError> {
     Ok(text.into_owned())
 }
 
-/// The stem of a file name.
-pub(super) fn stem(path: &Path) -> String {
-    path.file_stem().map_or_else(
-        || "motion".to_string(),
-        |stem| stem.to_string_lossy().into(),
-    )
-}
-
 fn from_csv(path: &Path, text: &str) -> Result<Record, MotionError> {
     let file = CsvFile::parse(path, text, Kind::Record)?;
     let dt = file.sample_time()?;
@@ -105,12 +84,4 @@ fn from_csv(path: &Path, text: &str) -> Result<Record, MotionError> {
         origin: format!("{} (CSV)", file_name(path)),
         seed: None,
     })
-}
-
-/// The last part of a path, for people.
-pub(super) fn file_name(path: &Path) -> String {
-    path.file_name().map_or_else(
-        || PathBuf::from(path).display().to_string(),
-        |name| name.to_string_lossy().into_owned(),
-    )
 }

@@ -2,10 +2,13 @@
 
 use std::path::Path;
 
+use super::accelerogram::{file_name, stem};
 use super::csv_file::{CsvFile, Kind, rounded};
+use super::error::MotionError;
+use super::options::{Options, Scaling};
+use super::playable::{Motion, peak};
 use super::process::{check_options, check_stroke};
-use super::record::{file_name, read_text, stem};
-use super::{Motion, MotionError, Options, Scaling, peak};
+use super::record::read_text;
 use crate::units::{INCH, STANDARD_GRAVITY};
 
 /// Reads a reference. Its numbers are played as they stand, unless `options.scaling` asks for

@@ -3,14 +3,26 @@
 use std::{
     fs::{self, File},
     io::{self, Write},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use sha2::{Digest, Sha256};
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
-use super::{FmiVersion, PackError, file_error};
+use super::error::{PackError, file_error};
 use crate::component_library::Descriptions;
+use crate::fmu::FmiVersion;
+
+/// An FMU that was packed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PackedFmu {
+    /// The component's name.
+    pub name: String,
+    /// The version it is packed for.
+    pub version: FmiVersion,
+    /// The archive.
+    pub path: PathBuf,
+}
 
 const LICENCE: &str = "This FMU is licensed under either of the Apache License, Version 2.0, or \
                        the MIT license, at your option; both texts lie beside this file.\n";

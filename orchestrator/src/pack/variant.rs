@@ -12,7 +12,8 @@ use fmu_kit::resources::{START_VALUES, variant_token};
 use roxmltree::{Document, Node};
 use zip::ZipArchive;
 
-use super::{PackError, archive::write_archive, file_error};
+use super::archive::write_archive;
+use super::error::{PackError, file_error};
 
 /// A parameter that starts differently.
 #[derive(Debug, Clone, PartialEq)]

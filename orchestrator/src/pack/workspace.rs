@@ -8,12 +8,10 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use super::{
-    FmiVersion, PackError, PackedFmu,
-    archive::{entries, write_archive},
-    file_error,
-};
+use super::archive::{PackedFmu, entries, write_archive};
+use super::error::{PackError, file_error};
 use crate::component_library::ComponentLibrary;
+use crate::fmu::FmiVersion;
 
 /// The project's folder.
 pub(super) struct Workspace {

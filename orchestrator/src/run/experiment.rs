@@ -127,9 +127,9 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
     let motion = motion(request, &file)?;
     let mut library = FmuLibrary::new(request.fmi, file.directory.as_deref());
     let system = system::assemble(&file, &request.set, &mut |name| library.find(name))?;
-    let step = request.step_s.or(file.time("step")?).unwrap_or(motion.dt);
+    let step = request.step_s.or(file.step()?).unwrap_or(motion.dt);
     let mut samples = motion.len();
-    if let Some(duration) = request.duration_s.or(file.time("duration")?) {
+    if let Some(duration) = request.duration_s.or(file.duration()?) {
         if !(duration >= motion.dt && duration.is_finite()) {
             let reason = format!("{duration} s is shorter than a sample of {} s", motion.dt);
             return Err(Error::Option {

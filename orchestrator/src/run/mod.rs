@@ -2,4 +2,5 @@
 
 pub mod experiment;
 pub mod manifest;
+pub mod signals;
 pub mod summary;

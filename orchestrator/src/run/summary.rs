@@ -7,13 +7,14 @@ use serde::{Deserialize, Serialize};
 
 use super::experiment::{Prepared, Request};
 use super::manifest::Manifest;
+use super::signals::{read_csv, write_csv};
 use crate::error::Error;
-use crate::master::{Ended, Outcome, Record};
+use crate::master::{Ending, Outcome, Record};
 use crate::metrics::{self, Tracking};
 use crate::motion::Motion;
 use crate::report::columns::{aligned, significant};
 use crate::report::{self, Cell, Whole};
-use crate::results::{Results, read_csv, write_csv};
+use crate::results::Results;
 use crate::units::{INCH, STANDARD_GRAVITY};
 
 /// `summary.json` of a run, and what `--json` prints.
@@ -27,7 +28,7 @@ pub struct Summary {
     algorithm: String,
     wall_s: f64,
     real_time_factor: f64,
-    ended: String,
+    ended: Ending,
     ended_because: Option<String>,
     /// Seeds of random components (such as sensors' noise), by instance.
     seeds: BTreeMap<String, serde_json::Value>,
@@ -101,11 +102,8 @@ impl Summary {
             algorithm: request.algorithm.to_string(),
             wall_s: outcome.wall,
             real_time_factor: simulated / outcome.wall,
-            ended: outcome.ended.word().to_string(),
-            ended_because: match &outcome.ended {
-                Ended::Complete => None,
-                ended => Some(ended.story()),
-            },
+            ended: outcome.ended.kind(),
+            ended_because: outcome.ended.reason(),
             seeds: manifest
                 .components
                 .iter()
@@ -137,7 +135,7 @@ impl Summary {
             self.fmi,
             self.algorithm,
             significant(self.real_time_factor, 2),
-            self.ended,
+            self.ended.word(),
         );
         let Some(tracking) = &self.tracking else {
             return text;
@@ -297,7 +295,10 @@ fn page(
         acceleration: &column("acceleration"),
         valve_command: valve.as_deref(),
         tracking: summary.tracking.as_ref(),
-        ended: summary.ended_because.as_deref().unwrap_or(&summary.ended),
+        ended: summary
+            .ended_because
+            .as_deref()
+            .unwrap_or(summary.ended.word()),
         settings,
         footer: format!(
             "shakebench {}; repeat with: shakebench run --manifest manifest.json",

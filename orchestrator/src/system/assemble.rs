@@ -3,9 +3,13 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::connection::{self, connect, split};
+use super::checked::{Component, DEFAULT_PERIOD, End, System};
+use super::connection::{Link, VariableName, connect};
+use super::error::SystemError;
 use super::file::{ComponentFile, SystemFile};
-use super::{Component, DEFAULT_PERIOD, System, SystemError, Value, hint, model, value};
+use super::lookup::{component_index, find};
+use super::model;
+use super::value::{self, Setting, Value};
 use crate::fmu::{Causality, Fmu, Kind, Variability};
 
 /// Finds the FMU of a component by what the system file calls it.
@@ -22,11 +26,7 @@ pub fn assemble(
     settings: &[String],
     library: &mut Library,
 ) -> Result<System, SystemError> {
-    let at = |place: String, reason: String| SystemError::Place {
-        origin: file.origin.clone(),
-        place,
-        reason,
-    };
+    let at = |place: String, reason: String| file.fault(&place, reason);
     if file.components.is_empty() {
         return Err(at("components".to_string(), "there is none".to_string()));
     }
@@ -53,18 +53,16 @@ pub fn assemble(
         })?;
     }
     let mut connections = Vec::new();
-    let mut driven: HashMap<(usize, usize), String> = HashMap::new();
-    for (text, line) in file.connections.iter().zip(&file.lines) {
-        let text = text.get_ref();
-        let wrong = |reason| at(format!("connection `{text}` (line {line})"), reason);
-        for (from, to) in connection::parse(text).map_err(wrong)? {
-            let connection = connect(&components, &from, &to).map_err(wrong)?;
-            let input = (connection.component, connection.input);
-            if let Some(first) = driven.insert(input, from.clone()) {
-                return Err(wrong(format!("`{to}` is driven by `{first}` already")));
-            }
-            connections.push(connection);
+    let mut driven: HashMap<(usize, usize), &Link> = HashMap::new();
+    for link in &file.connections {
+        let wrong = |reason| file.fault(&link.to_string(), reason);
+        let connection = connect(&components, link).map_err(wrong)?;
+        let input = (connection.component, connection.input);
+        if let Some(first) = driven.insert(input, link) {
+            let (to, first) = (&link.to, &first.from);
+            return Err(wrong(format!("`{to}` is driven by `{first}` already")));
         }
+        connections.push(connection);
     }
     for (index, part) in components.iter_mut().enumerate() {
         let variables = &part.fmu.description.variables;
@@ -84,15 +82,14 @@ pub fn assemble(
             }
         }
     }
-    let (end_when, end_after) = end(file, &components)?;
+    let end = end(file, &components)?;
     let stop = stop(file, &components)?;
     Ok(System {
         name: file.name.clone(),
         description: file.description.clone(),
         components,
         connections,
-        end_when,
-        end_after,
+        end,
         stop,
     })
 }
@@ -103,11 +100,7 @@ fn component(
     part: &ComponentFile,
     fmu: Arc<Fmu>,
 ) -> Result<Component, SystemError> {
-    let at = |place: &str, reason| SystemError::Place {
-        origin: file.origin.clone(),
-        place: format!("components.{name}{place}"),
-        reason,
-    };
+    let at = |place: &str, reason| file.fault(&format!("components.{name}{place}"), reason);
     let description = &fmu.description;
     let mut parameters = Vec::new();
     if let Some(model) = &part.model {
@@ -170,46 +163,6 @@ fn put(values: &mut Vec<(usize, Value)>, position: usize, value: Value) {
     }
 }
 
-/// The position of the variable `name`, which has to be of that causality.
-///
-/// # Errors
-/// Another causality, or no such name (with the nearest one).
-pub(super) fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, String> {
-    let description = &fmu.description;
-    let word = words(causality);
-    let Some(position) = description.position(name) else {
-        let known = description
-            .of(causality)
-            .map(|index| description.variables[index].name.as_str());
-        return Err(format!(
-            "{} ({}) has no {word} `{name}`{}",
-            description.model_name,
-            fmu.file_name(),
-            hint(name, known)
-        ));
-    };
-    let found = description.variables[position].causality;
-    if found != causality {
-        return Err(format!("`{name}` is {}, expected {word}", article(found)));
-    }
-    Ok(position)
-}
-
-fn words(causality: Causality) -> &'static str {
-    match causality {
-        Causality::Parameter => "parameter",
-        Causality::Input => "input",
-        Causality::Output => "output",
-        Causality::Local => "local variable",
-    }
-}
-
-fn article(causality: Causality) -> String {
-    let word = words(causality);
-    let vowel = word.starts_with(['i', 'o']);
-    format!("{} {word}", if vowel { "an" } else { "a" })
-}
-
 /// Carries out `component.variable=VALUE` of the command line; `component.model=NAME` sets all
 /// that a published model or a model file gives to the component.
 fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
@@ -237,82 +190,75 @@ fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
     let variable = &fmu.description.variables[position];
     let text = text.trim();
     let written = match (&variable.kind, text.parse::<i64>()) {
-        (Kind::String, _) => toml::Value::String(text.to_string()),
-        (_, Ok(number)) => toml::Value::Integer(number),
+        (Kind::String, _) => Setting::from(text),
+        (_, Ok(number)) => Setting::from(number),
         _ => match text {
-            "true" => toml::Value::Boolean(true),
-            "false" => toml::Value::Boolean(false),
-            _ => toml::Value::String(text.to_string()),
+            "true" => Setting::from(true),
+            "false" => Setting::from(false),
+            _ => Setting::from(text),
         },
     };
     put(values, position, value::read(variable, &written)?);
     Ok(())
 }
 
-/// The position of a component.
-///
-/// # Errors
-/// No such name (with the nearest one).
-pub(super) fn component_index(components: &[Component], name: &str) -> Result<usize, String> {
-    components
-        .iter()
-        .position(|part| part.name == name)
-        .ok_or_else(|| {
-            let known = components.iter().map(|part| part.name.as_str());
-            format!("there is no component `{name}`{}", hint(name, known))
-        })
-}
-
-fn end(
-    file: &SystemFile,
-    components: &[Component],
-) -> Result<(Option<(usize, usize)>, f64), SystemError> {
-    let at = |place: &str, reason| SystemError::Place {
-        origin: file.origin.clone(),
-        place: format!("experiment.{place}"),
-        reason,
+/// What ends the run early.
+fn end(file: &SystemFile, components: &[Component]) -> Result<Option<End>, SystemError> {
+    let at = |place: &str| {
+        let place = format!("experiment.{place}");
+        move |reason| file.fault(&place, reason)
     };
     let experiment = &file.experiment;
     let after = experiment.end_after.as_ref().map(value::time).transpose();
-    let after = after
-        .map_err(|reason| at("end_after", reason))?
-        .unwrap_or(0.0);
+    let after = after.map_err(at("end_after"))?.unwrap_or(0.0);
     let Some(name) = &experiment.end_when else {
-        return Ok((None, after));
+        return Ok(None);
     };
-    let output = truth(components, name, Causality::Output);
-    let output = output.map_err(|reason| at("end_when", reason))?;
-    Ok((Some(output), after))
+    let when = truth(components, name, Causality::Output).map_err(at("end_when"))?;
+    let cause = experiment.end_cause.as_ref();
+    let cause = cause.map(|name| {
+        let (component, variable) = position(components, name, Causality::Output)?;
+        match &components[component].fmu.description.variables[variable].kind {
+            Kind::Enumeration(_) => Ok((component, variable)),
+            _ => Err(format!("`{name}` is no enumeration")),
+        }
+    });
+    let cause = cause.transpose().map_err(at("end_cause"))?;
+    Ok(Some(End { when, cause, after }))
 }
 
+/// The input that is set when a sampled component fails.
 fn stop(
     file: &SystemFile,
     components: &[Component],
 ) -> Result<Option<(usize, usize)>, SystemError> {
-    let Some(name) = &file.experiment.stop else {
-        return Ok(None);
-    };
-    truth(components, name, Causality::Input)
-        .map(Some)
-        .map_err(|reason| SystemError::Place {
-            origin: file.origin.clone(),
-            place: "experiment.stop".to_string(),
-            reason,
-        })
+    let name = file.experiment.stop.as_ref();
+    let found = name.map(|name| truth(components, name, Causality::Input));
+    found
+        .transpose()
+        .map_err(|reason| file.fault("experiment.stop", reason))
 }
 
 /// A Boolean output or input, by its name.
 fn truth(
     components: &[Component],
-    name: &str,
+    name: &VariableName,
     causality: Causality,
 ) -> Result<(usize, usize), String> {
-    let (component, variable) = split(name)?;
-    let component = component_index(components, component)?;
-    let fmu = &components[component].fmu;
-    let variable = find(fmu, variable, causality)?;
-    match fmu.description.variables[variable].kind {
+    let (component, variable) = position(components, name, causality)?;
+    match components[component].fmu.description.variables[variable].kind {
         Kind::Boolean => Ok((component, variable)),
         _ => Err(format!("`{name}` is not Boolean")),
     }
+}
+
+/// Component and variable, by its name.
+fn position(
+    components: &[Component],
+    name: &VariableName,
+    causality: Causality,
+) -> Result<(usize, usize), String> {
+    let component = component_index(components, &name.component)?;
+    let variable = find(&components[component].fmu, &name.variable, causality)?;
+    Ok((component, variable))
 }

@@ -1,27 +1,54 @@
 //! The systems that come with the program. A rig (plant and specimen) and a controller are files
 //! of their own; a system is a controller on a rig.
 
-use super::tuning::{self, Tuning};
-use super::{SystemError, SystemFile, hint};
+use plant::specimens::YieldingSpecimen;
+use plant::specimens::linear::LinearSpecimen;
 
-macro_rules! parts {
-    ($($name:literal),* $(,)?) => {
-        [$(($name, include_str!(concat!("../../systems/", $name, ".toml")))),*]
+use super::error::SystemError;
+use super::file::SystemFile;
+use super::hint;
+use super::tuning::{self, Tuning};
+
+/// A part of a built-in system.
+struct Part {
+    name: &'static str,
+    /// TOML.
+    text: &'static str,
+}
+
+macro_rules! part {
+    ($folder:literal, $name:literal) => {
+        Part {
+            name: $name,
+            text: include_str!(concat!("../../systems/", $folder, $name, ".toml")),
+        }
     };
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [(&str, &str); 5] = parts![
-    "displacement-pid",
-    "three-variable",
-    "loop-shaping",
-    "sliding-mode",
-    "mpc",
+const CONTROLLERS: [Part; 5] = [
+    part!("", "displacement-pid"),
+    part!("", "three-variable"),
+    part!("", "loop-shaping"),
+    part!("", "sliding-mode"),
+    part!("", "mpc"),
 ];
 /// Tables with their actuators.
-const PLANTS: [(&str, &str); 2] = parts!["plant/identified", "plant/servohydraulic"];
-/// What stands on the table.
-const SPECIMENS: [(&str, &str); 2] = parts!["specimen/linear", "specimen/yielding"];
+const PLANTS: [Part; 2] = [
+    part!("plant/", "identified"),
+    part!("plant/", "servohydraulic"),
+];
+/// What stands on the table, with its mass in kg.
+const SPECIMENS: [(Part, fn() -> f64); 2] = [
+    (part!("specimen/", "linear"), || {
+        LinearSpecimen::appendix_a().mass
+    }),
+    (part!("specimen/", "yielding"), || {
+        YieldingSpecimen::default().mass
+    }),
+];
+/// No specimen.
+const NONE: &str = "none";
 
 /// The system run when none is named.
 pub const DEFAULT_SYSTEM: &str = "three-variable";
@@ -32,17 +59,17 @@ pub const DEFAULT_SPECIMEN: &str = "linear";
 
 /// Names of the built-in systems.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    CONTROLLERS.iter().map(|(name, _)| *name)
+    CONTROLLERS.iter().map(|part| part.name)
 }
 
 /// Names of the plants.
 pub fn plants() -> impl Iterator<Item = &'static str> {
-    PLANTS.iter().map(|(name, _)| short(name))
+    PLANTS.iter().map(|part| part.name)
 }
 
 /// Names of the specimens, `none` among them.
 pub fn specimens() -> impl Iterator<Item = &'static str> {
-    std::iter::once("none").chain(SPECIMENS.iter().map(|(name, _)| short(name)))
+    std::iter::once(NONE).chain(SPECIMENS.iter().map(|(part, _)| part.name))
 }
 
 /// A built-in system: the controller `name` on a rig of `plant` and `specimen` (or `none`), with the
@@ -56,52 +83,49 @@ pub fn system(
     specimen: &str,
     tuning: Option<Tuning>,
 ) -> Result<SystemFile, SystemError> {
-    let mut file = part("system", &CONTROLLERS, name, names())?;
-    let rig = part("plant", &PLANTS, plant, plants())?;
-    if specimen == "none" {
+    let controller = CONTROLLERS.iter().find(|part| part.name == name);
+    let mut file = read("system", controller, name, names())?;
+    file.origin = format!("{name} (built-in)");
+    let rig = PLANTS.iter().find(|part| part.name == plant);
+    let rig = read("plant", rig, plant, plants())?;
+    let mut on_table = None;
+    if specimen != NONE {
+        let found = SPECIMENS.iter().find(|(part, _)| part.name == specimen);
+        let part = read(
+            "specimen",
+            found.map(|found| &found.0),
+            specimen,
+            specimens(),
+        )?;
+        on_table = Some((part, found.map(|found| found.1())));
+    }
+    if on_table.is_none() {
         file.disconnect("specimen");
     }
-    tuning::apply(&mut file, plant, specimen, tuning).map_err(|reason| SystemError::Place {
-        origin: format!("{name} (built-in)"),
-        place: "tuning".to_string(),
-        reason,
-    })?;
+    let mass = on_table.as_ref().and_then(|(_, mass)| *mass);
+    tuning::apply(&mut file, &rig, mass, tuning).map_err(|reason| file.fault("tuning", reason))?;
     file.redirect(&rig.instead);
     file.extend(rig);
-    if specimen == "none" {
-        file.disconnect("specimen");
-    } else {
-        file.extend(part("specimen", &SPECIMENS, specimen, specimens())?);
-    }
-    // The specimen of half a second is stiff enough for a missing answer to mean something.
-    if specimen == "yielding"
-        && let Some(interlock) = file.components.get_mut("interlock")
-    {
-        let silence = toml::Value::String("0.012 g".into());
-        interlock
-            .parameters
-            .insert("specimen_silence".into(), silence);
+    match on_table {
+        None => file.disconnect("specimen"),
+        Some((specimen, _)) => file.extend(specimen),
     }
     file.name = name.to_string();
-    file.origin = format!("{name} (built-in)");
     Ok(file)
 }
 
-fn part(
+fn read(
     what: &'static str,
-    known: &[(&'static str, &'static str)],
+    part: Option<&Part>,
     name: &str,
-    names: impl Iterator<Item = &'static str>,
+    known: impl Iterator<Item = &'static str>,
 ) -> Result<SystemFile, SystemError> {
-    let found = known.iter().find(|(known, _)| short(known) == name);
-    let (path, text) = found.ok_or_else(|| SystemError::Unknown {
+    let part = part.ok_or_else(|| SystemError::Unknown {
         what,
         name: name.to_string(),
-        hint: hint(name, names),
+        hint: hint(name, known),
     })?;
-    SystemFile::parse(&format!("systems/{path}.toml"), text)
-}
-
-fn short(name: &'static str) -> &'static str {
-    name.rsplit('/').next().unwrap_or(name)
+    let mut file = SystemFile::parse(&format!("the built-in {what} {name}"), part.text)?;
+    file.name = name.to_string();
+    Ok(file)
 }

@@ -1,13 +1,29 @@
-//! `"table.displacement -> control.measured_displacement"`.
+//! Connections as written, `"table.displacement -> control.measured_displacement"`, and their check.
 
-use super::assemble::{component_index, find};
-use super::{Component, Connection, hint};
+use std::fmt;
+use std::str::FromStr;
+
+use serde::Deserialize;
+
+use super::checked::{Component, Connection, Source};
+use super::hint;
+use super::lookup::{component_index, find};
 use crate::fmu::{Causality, Kind, Variable};
 use crate::units::Unit;
 
-/// Where a connection's value comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Source {
+/// A variable of a component, `component.variable`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[serde(try_from = "String")]
+pub struct VariableName {
+    /// The component's name in the system.
+    pub component: String,
+    /// The variable's name, which may have points in it.
+    pub variable: String,
+}
+
+/// Where a connection begins.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Origin {
     /// The motion that the table is asked for.
     Reference {
         /// What of it.
@@ -16,16 +32,11 @@ pub enum Source {
         ahead: isize,
     },
     /// An output of a component.
-    Output {
-        /// The component.
-        component: usize,
-        /// Position of the variable.
-        variable: usize,
-    },
+    Output(VariableName),
 }
 
 /// What of the reference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Quantity {
     /// Displacement, m.
     Displacement,
@@ -58,11 +69,113 @@ impl Quantity {
     }
 }
 
-/// The two ends of a connection as written; `[a..b]` on both sides stands for several.
+/// A connection by names, before they are looked up in the FMUs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Link {
+    /// Where the value comes from.
+    pub from: Origin,
+    /// The input that takes it.
+    pub to: VariableName,
+    /// Line of the file that it stands in.
+    pub line: Option<usize>,
+}
+
+/// Samples further ahead or behind are mistakes.
+const FARTHEST: isize = 100_000;
+
+impl VariableName {
+    /// The variable of a component.
+    pub fn new(component: &str, variable: &str) -> Self {
+        Self {
+            component: component.to_string(),
+            variable: variable.to_string(),
+        }
+    }
+}
+
+impl FromStr for VariableName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (component, variable) = text
+            .split_once('.')
+            .ok_or_else(|| format!("`{text}` should read component.variable"))?;
+        Ok(Self::new(component, variable))
+    }
+}
+
+impl TryFrom<String> for VariableName {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl fmt::Display for VariableName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.component, self.variable)
+    }
+}
+
+impl Origin {
+    /// An output of a component.
+    pub fn output(component: &str, variable: &str) -> Self {
+        Self::Output(VariableName::new(component, variable))
+    }
+
+    /// The reference at the present sample.
+    pub fn reference(quantity: Quantity) -> Self {
+        Self::Reference { quantity, ahead: 0 }
+    }
+}
+
+impl FromStr for Origin {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let name: VariableName = text.parse()?;
+        if name.component != "reference" {
+            return Ok(Self::Output(name));
+        }
+        reference(&name.variable).ok_or_else(|| {
+            let known = Quantity::ALL.into_iter().map(Quantity::name);
+            format!(
+                "the reference has no `{0}`{1} (or `displacement[3]`, three samples ahead)",
+                name.variable,
+                hint(&name.variable, known)
+            )
+        })
+    }
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Reference { quantity, ahead: 0 } => write!(f, "reference.{}", quantity.name()),
+            Self::Reference { quantity, ahead } => {
+                write!(f, "reference.{}[{ahead}]", quantity.name())
+            }
+            Self::Output(name) => name.fmt(f),
+        }
+    }
+}
+
+impl fmt::Display for Link {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "connection `{} -> {}`", self.from, self.to)?;
+        match self.line {
+            Some(line) => write!(f, " (line {line})"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The connections that a text stands for; `[a..b]` on both sides stands for several.
 ///
 /// # Errors
 /// What was expected.
-pub(super) fn parse(text: &str) -> Result<Vec<(String, String)>, String> {
+pub(super) fn parse(text: &str, line: usize) -> Result<Vec<Link>, String> {
     let (from, to) = text
         .split_once("->")
         .ok_or("expected \"component.output -> component.input\"")?;
@@ -74,7 +187,14 @@ pub(super) fn parse(text: &str) -> Result<Vec<(String, String)>, String> {
             to.len()
         ));
     }
-    Ok(from.into_iter().zip(to).collect())
+    let link = |(from, to): (String, String)| {
+        Ok(Link {
+            from: from.parse()?,
+            to: to.parse()?,
+            line: Some(line),
+        })
+    };
+    from.into_iter().zip(to).map(link).collect()
 }
 
 fn expand(end: &str) -> Result<Vec<String>, String> {
@@ -95,68 +215,50 @@ fn expand(end: &str) -> Result<Vec<String>, String> {
 }
 
 /// `displacement` or `displacement[3]` of the reference.
-fn reference(variable: &str) -> Option<Source> {
+fn reference(variable: &str) -> Option<Origin> {
     let (name, ahead) = match variable.strip_suffix(']') {
         None => (variable, 0),
         Some(rest) => {
             let (name, index) = rest.split_once('[')?;
-            (
-                name,
-                index
-                    .trim()
-                    .parse()
-                    .ok()
-                    .filter(|ahead: &isize| ahead.abs() < 100_000)?,
-            )
+            let ahead: isize = index.trim().parse().ok()?;
+            (name, Some(ahead).filter(|ahead| ahead.abs() < FARTHEST)?)
         }
     };
     let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name)?;
-    Some(Source::Reference { quantity, ahead })
+    Some(Origin::Reference { quantity, ahead })
 }
 
-pub(super) fn split(end: &str) -> Result<(&str, &str), String> {
-    end.split_once('.')
-        .ok_or_else(|| format!("`{end}` should read component.variable"))
-}
-
-/// The connection of `from` to `to`, after its names, types and units were checked.
+/// The connection of a link, after its names, types and units were checked.
 ///
 /// # Errors
 /// What does not hold.
-pub(super) fn connect(
-    components: &[Component],
-    from: &str,
-    to: &str,
-) -> Result<Connection, String> {
-    let (component, variable) = split(to)?;
-    let component = component_index(components, component)?;
-    let input = find(&components[component].fmu, variable, Causality::Input)?;
+pub(super) fn connect(components: &[Component], link: &Link) -> Result<Connection, String> {
+    let Link { from, to, .. } = link;
+    let component = component_index(components, &to.component)?;
+    let input = find(&components[component].fmu, &to.variable, Causality::Input)?;
     let target = &components[component].fmu.description.variables[input];
 
-    let (name, variable) = split(from)?;
-    let (source, kind, unit) = if name == "reference" {
-        let source = reference(variable).ok_or_else(|| {
-            let known = Quantity::ALL.into_iter().map(Quantity::name);
-            format!(
-                "the reference has no `{variable}`{} (or `displacement[3]`, three samples ahead)",
-                hint(variable, known)
-            )
-        })?;
-        let Source::Reference { quantity, .. } = source else {
-            return Err(format!("`{from}` is no reference"));
-        };
-        (source, Kind::Float64, Some(quantity.unit()))
-    } else {
-        let component = component_index(components, name)?;
-        let variable = find(&components[component].fmu, variable, Causality::Output)?;
-        let output = &components[component].fmu.description.variables[variable];
-        let source = Source::Output {
-            component,
-            variable,
-        };
-        (source, output.kind.clone(), output.unit.as_deref())
+    let (source, kind, unit) = match from {
+        Origin::Reference { quantity, ahead } => {
+            let source = Source::Reference {
+                quantity: *quantity,
+                ahead: *ahead,
+            };
+            (source, &Kind::Float64, Some(quantity.unit()))
+        }
+        Origin::Output(name) => {
+            let component = component_index(components, &name.component)?;
+            let fmu = &components[component].fmu;
+            let variable = find(fmu, &name.variable, Causality::Output)?;
+            let output = &fmu.description.variables[variable];
+            let source = Source::Output {
+                component,
+                variable,
+            };
+            (source, &output.kind, output.unit.as_deref())
+        }
     };
-    fits(&kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
+    fits(kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
     let factor = factor(unit, target.unit.as_deref())
         .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
     Ok(Connection {

@@ -1,4 +1,28 @@
-//! The TOML of a system, as people write it.
+//! A system by names: read from TOML as people write it, or put together in code.
+//!
+//! ```
+//! use shakebench::system::{ComponentFile, Origin, Quantity, SystemFile, VariableName};
+//!
+//! let mut system = SystemFile::new("bare table");
+//! system.add("table", ComponentFile::new("ShakeTable").input("specimen_force", 0.0));
+//! system.add(
+//!     "control",
+//!     ComponentFile::new("DisplacementPid").period("2 ms"),
+//! );
+//! system.connect(
+//!     Origin::reference(Quantity::Displacement),
+//!     VariableName::new("control", "reference_displacement"),
+//! );
+//! system.connect(
+//!     Origin::output("table", "displacement"),
+//!     VariableName::new("control", "measured_displacement"),
+//! );
+//! system.connect(
+//!     Origin::output("control", "valve_command"),
+//!     VariableName::new("table", "valve_command"),
+//! );
+//! assert_eq!(system.components.len(), 2);
+//! ```
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,44 +30,62 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{SystemError, value};
+use super::connection::{self, Link, Origin, VariableName};
+use super::error::SystemError;
+use super::rule::Rule;
+use super::value::{self, Setting};
 
-/// A system file.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A system by names, before they are looked up in its FMUs.
+#[derive(Debug, Clone, Default)]
 pub struct SystemFile {
     /// Name of the system; for a file its stem when not given.
-    #[serde(default)]
     pub name: String,
     /// One line for people.
-    #[serde(default)]
     pub description: String,
-    /// `"component.output -> component.input"`, in any order.
-    #[serde(default)]
-    pub connections: Vec<Spanned<String>>,
+    /// The connections, in any order.
+    pub connections: Vec<Link>,
     /// The components by name.
-    #[serde(default)]
     pub components: BTreeMap<String, ComponentFile>,
     /// In a plant: what controllers are connected to in place of `table.` and `specimen.`
     /// variables, such as the sensors' readings.
-    #[serde(default)]
-    pub instead: BTreeMap<String, String>,
+    pub instead: BTreeMap<VariableName, VariableName>,
+    /// In a part of a system: parameters of a component of another part, where there is one.
+    pub adjust: BTreeMap<String, BTreeMap<String, Setting>>,
+    /// In a plant with sensors: what controllers tuned for it know of their measurements.
+    pub measurements: Option<MeasurementsFile>,
     /// What is done with it.
-    #[serde(default)]
     pub experiment: ExperimentFile,
-    /// Where the text came from: a file's name, or the name of a built-in system.
-    #[serde(skip)]
+    /// Where it came from: a file's name, or the name of a built-in system.
     pub origin: String,
-    /// Lines of the connections, in their order.
-    #[serde(skip)]
-    pub lines: Vec<usize>,
     /// The file's directory, from which paths in it count.
-    #[serde(skip)]
     pub directory: Option<PathBuf>,
 }
 
+/// The TOML of a system.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    #[serde(default)]
+    name: String,
+    #[serde(default)]
+    description: String,
+    /// `"component.output -> component.input"`.
+    #[serde(default)]
+    connections: Vec<Spanned<String>>,
+    #[serde(default)]
+    components: BTreeMap<String, ComponentFile>,
+    #[serde(default)]
+    instead: BTreeMap<VariableName, VariableName>,
+    #[serde(default)]
+    adjust: BTreeMap<String, BTreeMap<String, Setting>>,
+    #[serde(default)]
+    measurements: Option<MeasurementsFile>,
+    #[serde(default)]
+    experiment: ExperimentFile,
+}
+
 /// A component in a system file.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ComponentFile {
     /// Name of a component of this project (`"ShakeTable"`), or a path to an `.fmu` file, relative
@@ -53,15 +95,31 @@ pub struct ComponentFile {
     /// as `shakebench identify` writes it.
     #[serde(default)]
     pub model: Option<String>,
+    /// In a built-in system: how it is tuned for a plant that it was not made for.
+    #[serde(default)]
+    pub tuning: Option<Rule>,
     /// Sampling period; it makes the component a sampled one.
     #[serde(default)]
-    pub period: Option<toml::Value>,
+    pub period: Option<Setting>,
     /// Parameters, as SI numbers or texts with units.
     #[serde(default)]
-    pub parameters: BTreeMap<String, toml::Value>,
+    pub parameters: BTreeMap<String, Setting>,
     /// Values of inputs that no connection drives.
     #[serde(default)]
-    pub inputs: BTreeMap<String, toml::Value>,
+    pub inputs: BTreeMap<String, Setting>,
+}
+
+/// What tuned controllers know of a plant's measurements: one standard deviation of the noise,
+/// each a value or the parameter of a component that holds it (`"sensors.displacement_noise"`).
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeasurementsFile {
+    /// Of the displacement.
+    pub displacement_noise: Setting,
+    /// Of the velocity.
+    pub velocity_noise: Setting,
+    /// Of the acceleration.
+    pub acceleration_noise: Setting,
 }
 
 /// The experiment in a system file; the command line goes before it.
@@ -70,10 +128,10 @@ pub struct ComponentFile {
 pub struct ExperimentFile {
     /// Coupling step, such as `"2 ms"`.
     #[serde(default)]
-    pub step: Option<toml::Value>,
+    pub step: Option<Setting>,
     /// How much of the motion is played, such as `"20 s"`.
     #[serde(default)]
-    pub duration: Option<toml::Value>,
+    pub duration: Option<Setting>,
     /// A record, relative to the system file.
     #[serde(default)]
     pub record: Option<String>,
@@ -82,33 +140,113 @@ pub struct ExperimentFile {
     pub reference: Option<String>,
     /// A Boolean output that ends the run when it becomes true, such as `"interlock.tripped"`.
     #[serde(default)]
-    pub end_when: Option<String>,
+    pub end_when: Option<VariableName>,
+    /// An enumeration output that says why, such as `"interlock.trip_cause"`.
+    #[serde(default)]
+    pub end_cause: Option<VariableName>,
     /// How long the run goes on after that, such as `"0.5 s"`.
     #[serde(default)]
-    pub end_after: Option<toml::Value>,
+    pub end_after: Option<Setting>,
     /// A Boolean input that is set when a sampled component fails, such as `"interlock.stop"`; the
     /// run then goes on, with the failed component's last outputs, until `end_when` ends it.
     #[serde(default)]
-    pub stop: Option<String>,
+    pub stop: Option<VariableName>,
+}
+
+impl ComponentFile {
+    /// A component without parameters; `fmu` as in [`ComponentFile::fmu`].
+    #[must_use]
+    pub fn new(fmu: &str) -> Self {
+        Self {
+            fmu: fmu.to_string(),
+            ..Self::default()
+        }
+    }
+
+    /// The same, sampled with a period in s or with a unit.
+    #[must_use]
+    pub fn period(mut self, period: impl Into<Setting>) -> Self {
+        self.period = Some(period.into());
+        self
+    }
+
+    /// The same with a parameter.
+    #[must_use]
+    pub fn parameter(mut self, name: &str, value: impl Into<Setting>) -> Self {
+        self.set(name, value);
+        self
+    }
+
+    /// The same with a value for an input that nothing drives.
+    #[must_use]
+    pub fn input(mut self, name: &str, value: impl Into<Setting>) -> Self {
+        self.inputs.insert(name.to_string(), value.into());
+        self
+    }
+
+    /// Gives it a parameter.
+    pub fn set(&mut self, name: &str, value: impl Into<Setting>) {
+        self.parameters.insert(name.to_string(), value.into());
+    }
 }
 
 impl SystemFile {
+    /// A system without components.
+    #[must_use]
+    pub fn new(name: &str) -> Self {
+        Self {
+            name: name.to_string(),
+            origin: name.to_string(),
+            ..Self::default()
+        }
+    }
+
+    /// Adds a component, in place of one of the same name.
+    pub fn add(&mut self, name: &str, component: ComponentFile) {
+        self.components.insert(name.to_string(), component);
+    }
+
+    /// Adds a connection.
+    pub fn connect(&mut self, from: Origin, to: VariableName) {
+        self.connections.push(Link {
+            from,
+            to,
+            line: None,
+        });
+    }
+
     /// Reads a system from its text.
     ///
     /// # Errors
-    /// Text that is no TOML or has unknown keys, with line and column.
+    /// Text that is no TOML, has unknown keys, or connections that cannot be read, with the line.
     pub fn parse(origin: &str, text: &str) -> Result<Self, SystemError> {
-        let mut file: Self = toml::from_str(text).map_err(|error| SystemError::Syntax {
+        let written: Written = toml::from_str(text).map_err(|error| SystemError::Syntax {
             origin: origin.to_string(),
             reason: error.to_string().trim_end().to_string(),
         })?;
-        file.origin = origin.to_string();
-        file.lines = file
-            .connections
-            .iter()
-            .map(|connection| 1 + text[..connection.span().start].matches('\n').count())
-            .collect();
-        Ok(file)
+        let mut connections = Vec::new();
+        for connection in &written.connections {
+            let line = 1 + text[..connection.span().start].matches('\n').count();
+            let connection = connection.get_ref();
+            let links = connection::parse(connection, line);
+            connections.extend(links.map_err(|reason| SystemError::Place {
+                origin: origin.to_string(),
+                place: format!("connection `{connection}` (line {line})"),
+                reason,
+            })?);
+        }
+        Ok(Self {
+            name: written.name,
+            description: written.description,
+            connections,
+            components: written.components,
+            instead: written.instead,
+            adjust: written.adjust,
+            measurements: written.measurements,
+            experiment: written.experiment,
+            origin: origin.to_string(),
+            directory: None,
+        })
     }
 
     /// Reads a system file.
@@ -130,63 +268,91 @@ impl SystemFile {
         Ok(file)
     }
 
-    /// `step` or `duration` of the experiment, s.
+    /// Coupling step of the experiment, s.
     ///
     /// # Errors
     /// What stands there is no time.
-    pub fn time(&self, name: &str) -> Result<Option<f64>, SystemError> {
-        let written = match name {
-            "step" => &self.experiment.step,
-            _ => &self.experiment.duration,
-        };
-        let time = written.as_ref().map(value::time).transpose();
-        time.map_err(|reason| SystemError::Place {
+    pub fn step(&self) -> Result<Option<f64>, SystemError> {
+        self.time("step", self.experiment.step.as_ref())
+    }
+
+    /// How much of the motion is played, s.
+    ///
+    /// # Errors
+    /// What stands there is no time.
+    pub fn duration(&self) -> Result<Option<f64>, SystemError> {
+        self.time("duration", self.experiment.duration.as_ref())
+    }
+
+    fn time(&self, name: &str, written: Option<&Setting>) -> Result<Option<f64>, SystemError> {
+        let time = written.map(value::time).transpose();
+        time.map_err(|reason| self.fault(&format!("experiment.{name}"), reason))
+    }
+
+    /// What does not hold at a place in this file.
+    pub(super) fn fault(&self, place: &str, reason: String) -> SystemError {
+        SystemError::Place {
             origin: self.origin.clone(),
-            place: format!("experiment.{name}"),
+            place: place.to_string(),
             reason,
-        })
+        }
+    }
+
+    /// A value in `unit` that stands in the file, or in the parameter of a component that is named
+    /// instead.
+    ///
+    /// # Errors
+    /// What was expected.
+    pub(super) fn number(&self, written: &Setting, unit: &str) -> Result<f64, String> {
+        let named = match written {
+            Setting::Text(text) => text.parse::<VariableName>().ok(),
+            _ => None,
+        };
+        let held = named.and_then(|name| {
+            let component = self.components.get(&name.component)?;
+            component.parameters.get(&name.variable)
+        });
+        held.unwrap_or(written).number(unit)
     }
 
     /// Takes out the connections that come from the component `name`.
     pub fn disconnect(&mut self, name: &str) {
-        let from_it = |text: &str| {
-            text.trim_start()
-                .strip_prefix(name)
-                .is_some_and(|rest| rest.starts_with('.'))
-        };
-        let kept = self
-            .connections
-            .iter()
-            .zip(&self.lines)
-            .filter(|(text, _)| !from_it(text.get_ref()));
-        (self.connections, self.lines) = kept.map(|(text, line)| (text.clone(), *line)).unzip();
+        self.connections.retain(
+            |link| !matches!(&link.from, Origin::Output(output) if output.component == name),
+        );
     }
 
     /// Connects to what `instead` names in place of its keys, on either side.
-    pub fn redirect(&mut self, instead: &BTreeMap<String, String>) {
-        for connection in &mut self.connections {
-            let text = connection.get_mut();
-            if let Some((from, to)) = text.split_once("->") {
-                let end = |end: &str| {
-                    let end = end.trim();
-                    instead.get(end).map_or(end, String::as_str).to_string()
-                };
-                *text = format!("{} -> {}", end(from), end(to));
+    pub fn redirect(&mut self, instead: &BTreeMap<VariableName, VariableName>) {
+        let change = |name: &mut VariableName| {
+            if let Some(other) = instead.get(name) {
+                name.clone_from(other);
             }
+        };
+        for link in &mut self.connections {
+            if let Origin::Output(name) = &mut link.from {
+                change(name);
+            }
+            change(&mut link.to);
         }
     }
 
     /// Adds the components, connections and experiment of `part`; what `part` says goes before.
     pub fn extend(&mut self, part: Self) {
         self.connections.extend(part.connections);
-        self.lines.extend(part.lines);
         self.components.extend(part.components);
+        for (name, parameters) in part.adjust {
+            if let Some(component) = self.components.get_mut(&name) {
+                component.parameters.extend(parameters);
+            }
+        }
         let (own, other) = (&mut self.experiment, part.experiment);
         own.step = other.step.or(own.step.take());
         own.duration = other.duration.or(own.duration.take());
         own.record = other.record.or(own.record.take());
         own.reference = other.reference.or(own.reference.take());
         own.end_when = other.end_when.or(own.end_when.take());
+        own.end_cause = other.end_cause.or(own.end_cause.take());
         own.stop = other.stop.or(own.stop.take());
         own.end_after = other.end_after.or(own.end_after.take());
     }

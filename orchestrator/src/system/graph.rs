@@ -7,7 +7,8 @@
 
 use std::collections::HashMap;
 
-use super::{Connection, Source, System, SystemError};
+use super::checked::{Connection, Source, System};
+use super::error::SystemError;
 use crate::fmu::Causality;
 
 /// A thing to do at a sample.
@@ -43,7 +44,17 @@ struct Node {
     output: Option<usize>,
 }
 
-pub(super) fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
+impl System {
+    /// The order in which outputs become known and components are called at a sample.
+    ///
+    /// # Errors
+    /// A loop of direct feedthrough, unless `iterate` is set.
+    pub fn schedule(&self, iterate: bool) -> Result<Schedule, SystemError> {
+        schedule(self, iterate)
+    }
+}
+
+fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
     let nodes = nodes(system);
     let place: HashMap<Node, usize> = nodes.iter().enumerate().map(|(i, &n)| (n, i)).collect();
     let predecessors: Vec<Vec<usize>> = nodes

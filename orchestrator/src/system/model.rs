@@ -9,7 +9,8 @@ use plant::identified::nominal::{shake_table_values, specimen_values};
 use plant::identified::shake_table::ShakeTable;
 use plant::identified::table::Table;
 
-use super::{Value, hint};
+use super::hint;
+use super::value::Value;
 use crate::fmu::{Causality, Description};
 
 /// Published models of `ShakeTable`.

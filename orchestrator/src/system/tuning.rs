@@ -14,18 +14,18 @@
 
 use std::sync::OnceLock;
 
+use controllers::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
 use controllers::pid::Pid;
-use controllers::sliding_mode::DISPLACEMENT_INTEGRAL_LEAK;
 use controllers::three_variable::ThreeVariableGains;
 use controllers::tuning::sliding_mode::{Hierarchy, SlidingModeTuning};
 use plant::identified::shake_table::ShakeTable;
 use plant::servo_hydraulic::ServoHydraulicTable;
-use plant::specimens::YieldingSpecimen;
 use serde::{Deserialize, Serialize};
 use units::constants::SAMPLING_PERIOD;
 
-use super::SystemFile;
-use super::file::ComponentFile;
+use super::connection::{Link, Origin};
+use super::file::{ComponentFile, SystemFile};
+use super::rule::Rule;
 use plant::identified::nominal::shake_table_values;
 
 /// Samples by which the sensors of the physical rig are late.
@@ -41,71 +41,71 @@ pub enum Tuning {
     Tuned,
 }
 
-/// Gives the controllers in `file` the parameters for a rig.
+/// Gives the controllers in `file` the parameters for `plant` with a specimen of that mass (kg).
 ///
 /// # Errors
-/// A plant for which there is no tuning.
+/// A plant for which there is no tuning, one without measurements of its own; a noise that cannot
+/// be read.
 pub(super) fn apply(
     file: &mut SystemFile,
-    plant: &str,
-    specimen: &str,
+    plant: &SystemFile,
+    specimen_mass: Option<f64>,
     tuning: Option<Tuning>,
 ) -> Result<(), String> {
-    let is_physical = plant == "servohydraulic";
-    match tuning {
-        Some(Tuning::Tuned) if !is_physical => {
+    let measurements = match (tuning, &plant.measurements) {
+        (Some(Tuning::Tuned), None) => {
             return Err(format!(
-                "there is no tuning for the plant `{plant}`: the printed one was made for it; \
-                 expected `--plant servohydraulic` or `--tuning printed`"
+                "there is no tuning for the plant `{}`: the printed one was made for it; \
+                 expected `--plant servohydraulic` or `--tuning printed`",
+                plant.name
             ));
         }
-        Some(Tuning::Printed) => return Ok(()),
-        None if !is_physical => return Ok(()),
-        _ => {}
-    }
+        (Some(Tuning::Printed), _) | (None, None) => return Ok(()),
+        (_, Some(measurements)) => measurements,
+    };
     static RULES: OnceLock<Result<Rules, String>> = OnceLock::new();
     let rules = RULES.get_or_init(|| Rules::new().map_err(|error| error.to_string()));
     let rules = rules.as_ref().map_err(Clone::clone)?;
-    let mut late_references = Vec::new();
+    let noise = Noise {
+        displacement: plant.number(&measurements.displacement_noise, "m")?,
+        velocity: plant.number(&measurements.velocity_noise, "m/s")?,
+        acceleration: plant.number(&measurements.acceleration_noise, "m/s2")?,
+    };
     for (name, component) in &mut file.components {
-        match component.fmu.as_str() {
-            "DisplacementPid" => rules.displacement_pid(component),
-            "LoopShaping" => rules.loop_shaping(component),
-            "ThreeVariableControl" => rules.three_variable(component),
-            "ForcePid" => rules.force_pid(component),
-            "SlidingMode" => rules.sliding_mode(component, specimen),
-            "ModelPredictive" => {
-                rules.model_predictive(component);
-                late_references.push(name.clone());
+        match component.tuning {
+            None => {}
+            Some(Rule::DisplacementPid) => rules.displacement_pid(component),
+            Some(Rule::ForcePid) => rules.force_pid(component),
+            Some(Rule::LoopShaping) => rules.loop_shaping(component),
+            Some(Rule::ModelPredictive) => {
+                rules.model_predictive(component, &noise);
+                delay_references(&mut file.connections, name);
             }
-            _ => {}
+            Some(Rule::SlidingMode) => {
+                rules.sliding_mode(component, specimen_mass);
+            }
+            Some(Rule::ThreeVariable) => rules.three_variable(component),
         }
-    }
-    for name in late_references {
-        delay_references(file, &name);
     }
     Ok(())
 }
 
 /// The component `name` compares late measurements with the reference of the same time.
-fn delay_references(file: &mut SystemFile, name: &str) {
-    for connection in &mut file.connections {
-        let text = connection.get_mut();
-        let Some((from, to)) = text.split_once("->") else {
-            continue;
-        };
-        let (from, to) = (from.trim(), to.trim());
-        let own = to.strip_prefix(name).is_some_and(|r| r.starts_with('.'));
-        let Some(quantity) = from.strip_prefix("reference.").filter(|_| own) else {
-            continue;
-        };
-        let (quantity, ahead) = match quantity.strip_suffix(']').and_then(|r| r.split_once('[')) {
-            Some((quantity, ahead)) => (quantity, ahead.parse().unwrap_or(0)),
-            None => (quantity, 0isize),
-        };
-        let ahead = ahead - DELAY as isize;
-        *text = format!("reference.{quantity}[{ahead}] -> {to}");
+fn delay_references(connections: &mut [Link], name: &str) {
+    for link in connections {
+        if let Origin::Reference { ahead, .. } = &mut link.from
+            && link.to.component == name
+        {
+            *ahead -= DELAY as isize;
+        }
     }
+}
+
+/// One standard deviation of what is measured, SI.
+struct Noise {
+    displacement: f64,
+    velocity: f64,
+    acceleration: f64,
 }
 
 /// What all rules use.
@@ -119,17 +119,7 @@ struct Rules {
 
 fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
     for (name, value) in values {
-        component
-            .parameters
-            .insert((*name).to_string(), toml::Value::Float(*value));
-    }
-}
-
-fn set_count(component: &mut ComponentFile, values: &[(&str, usize)]) {
-    for (name, value) in values {
-        component
-            .parameters
-            .insert((*name).to_string(), toml::Value::Integer(*value as i64));
+        component.set(name, *value);
     }
 }
 
@@ -206,7 +196,7 @@ impl Rules {
         );
     }
 
-    fn sliding_mode(&self, component: &mut ComponentFile, specimen: &str) {
+    fn sliding_mode(&self, component: &mut ComponentFile, specimen_mass: Option<f64>) {
         self.model(component);
         let (displacement, force) = (Pid::equation_3_6(), &self.sliding.force);
         set(
@@ -226,20 +216,15 @@ impl Rules {
                 ("force_loop_integral_gain", force.integral),
             ],
         );
-        if specimen == "yielding" {
-            set(
-                component,
-                &[("specimen_mass", YieldingSpecimen::default().mass)],
-            );
+        if let Some(mass) = specimen_mass {
+            component.set("specimen_mass", mass);
         }
-        set_count(component, &[("loop_delay_samples", DELAY)]);
+        component.set("loop_delay_samples", DELAY as i64);
         // The valve moves when the reference is due; only the measurements are late.
-        component
-            .parameters
-            .insert("reference_ahead".to_string(), toml::Value::Boolean(true));
+        component.set("reference_ahead", true);
     }
 
-    fn model_predictive(&self, component: &mut ComponentFile) {
+    fn model_predictive(&self, component: &mut ComponentFile, noise: &Noise) {
         self.model(component);
         self.three_variable(component);
         // The sensors' noise, and outputs in units of the stroke, 20 in/s and 1 g: with the printed
@@ -247,15 +232,15 @@ impl Rules {
         set(
             component,
             &[
-                ("displacement_measurement_noise", 1.27e-5),
-                ("velocity_measurement_noise", 2e-3),
-                ("acceleration_measurement_noise", 0.04),
+                ("displacement_measurement_noise", noise.displacement),
+                ("velocity_measurement_noise", noise.velocity),
+                ("acceleration_measurement_noise", noise.acceleration),
                 ("displacement_scale", 0.0381),
                 ("velocity_scale", 0.508),
                 ("acceleration_scale", 9.80665),
             ],
         );
-        set_count(component, &[("loop_delay_samples", DELAY)]);
+        component.set("loop_delay_samples", DELAY as i64);
     }
 
     fn model(&self, component: &mut ComponentFile) {

@@ -1,12 +1,15 @@
 //! Values as people write them, for variables with types and units.
 
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::hint;
 use crate::fmu::{Kind, Variable};
 use crate::units;
 
-use super::hint;
-
 /// A value for a variable, in the variable's own unit.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Value {
     /// A number; an integer, a choice or a truth value as a number too.
@@ -15,51 +18,122 @@ pub enum Value {
     Text(String),
 }
 
+/// A value as given to a variable of a system, before its type and unit are known.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a number, true, false, or a text such as \"1.5 in\""
+)]
+pub enum Setting {
+    /// A truth value.
+    Boolean(bool),
+    /// A whole number; for a variable with a unit, in that unit.
+    Integer(i64),
+    /// A number in the variable's unit.
+    Number(f64),
+    /// A number with a unit, the name of a choice, or a text.
+    Text(String),
+}
+
+impl From<bool> for Setting {
+    fn from(truth: bool) -> Self {
+        Self::Boolean(truth)
+    }
+}
+
+impl From<f64> for Setting {
+    fn from(number: f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl From<i64> for Setting {
+    fn from(number: i64) -> Self {
+        Self::Integer(number)
+    }
+}
+
+impl From<&str> for Setting {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_string())
+    }
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Boolean(truth) => truth.fmt(f),
+            Self::Integer(number) => number.fmt(f),
+            // With its point, as it was written.
+            Self::Number(number) => write!(f, "{number:?}"),
+            Self::Text(text) => text.fmt(f),
+        }
+    }
+}
+
+impl Setting {
+    /// As a number in `unit`.
+    ///
+    /// # Errors
+    /// What is wrong and what was expected.
+    pub(super) fn number(&self, unit: &str) -> Result<f64, String> {
+        match self {
+            Self::Number(number) => Ok(*number),
+            Self::Integer(number) => Ok(*number as f64),
+            Self::Text(text) => number(text, Some(unit)),
+            Self::Boolean(truth) => Err(format!("`{truth}` is no number in {unit}")),
+        }
+    }
+}
+
 /// Reads what was written for `variable`.
 ///
 /// # Errors
 /// What is wrong and what was expected.
-pub(super) fn read(variable: &Variable, written: &toml::Value) -> Result<Value, String> {
-    use toml::Value as Toml;
+pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, String> {
     let unit = variable.unit.as_deref();
     let misfit = |expected: &str| {
         Err(format!(
-            "`{}` is no value for a {}; expected {expected}",
-            shown(written),
+            "`{written}` is no value for a {}; expected {expected}",
             variable.kind.name()
         ))
     };
     match (&variable.kind, written) {
-        (Kind::Float64, Toml::Float(number)) if number.is_finite() => Ok(Value::Number(*number)),
-        (Kind::Float64, Toml::Integer(number)) => Ok(Value::Number(*number as f64)),
-        (Kind::Float64, Toml::String(text)) => number(text, unit).map(Value::Number),
+        (Kind::Float64, Setting::Number(number)) if number.is_finite() => {
+            Ok(Value::Number(*number))
+        }
+        (Kind::Float64, Setting::Integer(number)) => Ok(Value::Number(*number as f64)),
+        (Kind::Float64, Setting::Text(text)) => number(text, unit).map(Value::Number),
         (Kind::Float64, _) => misfit("a finite number, or a text with a unit such as \"1.5 in\""),
-        (Kind::Int32, Toml::Integer(number)) if i32::try_from(*number).is_ok() => {
+        (Kind::Int32, Setting::Integer(number)) if i32::try_from(*number).is_ok() => {
             Ok(Value::Number(*number as f64))
         }
         (Kind::Int32, _) => misfit("a whole number"),
-        (Kind::Boolean, Toml::Boolean(truth)) => Ok(Value::Number(f64::from(u8::from(*truth)))),
+        (Kind::Boolean, Setting::Boolean(truth)) => Ok(Value::Number(f64::from(u8::from(*truth)))),
         (Kind::Boolean, _) => misfit("true or false"),
-        (Kind::Enumeration(items), Toml::Integer(number)) => {
-            if items.iter().any(|(_, value)| value == number) {
+        (Kind::Enumeration(items), Setting::Integer(number)) => {
+            if items.iter().any(|item| item.value == *number) {
                 return Ok(Value::Number(*number as f64));
             }
-            let names: Vec<String> = items.iter().map(|(n, v)| format!("{v} ({n})")).collect();
+            let names: Vec<String> = items
+                .iter()
+                .map(|item| format!("{} ({})", item.value, item.name))
+                .collect();
             misfit(&format!("one of {}", names.join(", ")))
         }
-        (Kind::Enumeration(items), Toml::String(name)) => {
+        (Kind::Enumeration(items), Setting::Text(name)) => {
             let found = items
                 .iter()
-                .find(|(item, _)| item.eq_ignore_ascii_case(name));
+                .find(|item| item.name.eq_ignore_ascii_case(name));
             found
-                .map(|(_, value)| Value::Number(*value as f64))
+                .map(|item| Value::Number(item.value as f64))
                 .ok_or_else(|| {
-                    let known = items.iter().map(|(item, _)| item.as_str());
+                    let known = items.iter().map(|item| item.name.as_str());
                     format!("`{name}` is no choice{}", hint(name, known))
                 })
         }
         (Kind::Enumeration(_), _) => misfit("the name of a choice"),
-        (Kind::String, Toml::String(text)) => Ok(Value::Text(text.clone())),
+        (Kind::String, Setting::Text(text)) => Ok(Value::Text(text.clone())),
         (Kind::String, _) => misfit("a text"),
         (Kind::Other(_), _) => misfit("nothing: variables of this type cannot be set"),
     }
@@ -69,12 +143,10 @@ pub(super) fn read(variable: &Variable, written: &toml::Value) -> Result<Value, 
 ///
 /// # Errors
 /// What was expected.
-pub(super) fn time(written: &toml::Value) -> Result<f64, String> {
+pub(super) fn time(written: &Setting) -> Result<f64, String> {
     let seconds = match written {
-        toml::Value::Float(number) => *number,
-        toml::Value::Integer(number) => *number as f64,
-        toml::Value::String(text) => number(text, Some("s"))?,
-        other => return Err(format!("`{}` is no time, expected \"2 ms\"", shown(other))),
+        Setting::Boolean(_) => return Err(format!("`{written}` is no time, expected \"2 ms\"")),
+        _ => written.number("s")?,
     };
     if seconds.is_finite() && seconds > 0.0 {
         return Ok(seconds);
@@ -85,11 +157,4 @@ pub(super) fn time(written: &toml::Value) -> Result<f64, String> {
 /// A number in `unit`, which may stand behind it.
 fn number(text: &str, unit: Option<&str>) -> Result<f64, String> {
     units::value_in(text, unit.unwrap_or("")).map_err(|error| error.to_string())
-}
-
-fn shown(written: &toml::Value) -> String {
-    match written {
-        toml::Value::String(text) => text.clone(),
-        other => other.to_string(),
-    }
 }

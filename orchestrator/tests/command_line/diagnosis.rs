@@ -24,8 +24,13 @@ fn practice(name: &str) -> Option<PathBuf> {
 
 fn diagnosed(folder: &Path, case: &Path) -> Value {
     let case = case.to_str().unwrap();
-    let output = shakebench(folder, &["diagnose", case, "--out", "out", "--json"]);
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let output = shakebench(
+        folder,
+        &["diagnose", case, "--out", "out", "--json", "--verbose"],
+    );
+    let told = stderr(&output);
+    assert_eq!(output.status.code(), Some(0), "{told}");
+    assert!(told.contains("nominal; score"), "{told}");
     serde_json::from_str(&stdout(&output)).unwrap()
 }
 
@@ -200,4 +205,179 @@ fn a_case_that_cannot_be_read_is_refused_by_name() {
     copied(&case, &broken, str::to_string);
     fs::remove_file(broken.join("validation.csv")).unwrap();
     refused(folder.path(), &["diagnose", "broken"], &["validation.csv"]);
+}
+
+/// A description of a press whose output comes `delay` samples later than its nominal model says, and
+/// its data, in `folder`.
+fn press(folder: &Path, delay: usize, left_out: &str) {
+    let (step, gain) = (1e-3, 50.0);
+    let command = |k: usize| {
+        let t = step * k as f64;
+        // A sweep from 1 to 7 Hz.
+        2e-3 * (std::f64::consts::TAU * (1.0 + t) * t).sin()
+    };
+    let mut text = String::from("t,command,displacement\n");
+    let (mut x, mut seed) = (0.0, 1_u32);
+    for k in 0..3000 {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let noise = 2e-6 * (f64::from(seed) / f64::from(u32::MAX) - 0.5);
+        text += &format!("{},{},{}\n", step * k as f64, command(k), x + noise);
+        let late = if k < delay { 0.0 } else { command(k - delay) };
+        x += step * gain * (late - x);
+    }
+    fs::write(folder.join("data.csv"), text).unwrap();
+    let description = format!(
+        r#"
+name = "Press"
+kind = "closed_loop_actuator"
+data = ["data.csv"]
+[columns]
+time = {{ column = "t", unit = "s" }}
+command = {{ column = "command", unit = "m" }}
+displacement = {{ column = "displacement", unit = "m" }}
+[nominal]
+loop_gain = {{ value = 48.0, plus_minus = 5.0, unit = "1/s" }}
+command_lag = {{ value = 0.0, unit = "s" }}
+scale = {{ value = 1.0, unit = "1" }}
+offset = {{ value = 0.0, plus_minus = 1e-5, unit = "m" }}
+[left_out]
+{left_out}
+"#
+    );
+    fs::write(folder.join("press.toml"), description).unwrap();
+}
+
+const BLOCKS: &str = r#"every_second_block = { value = 0.25, unit = "s" }"#;
+
+#[test]
+fn a_rig_is_reported_as_a_case_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    press(folder, 6, BLOCKS);
+    let output = shakebench(
+        folder,
+        &[
+            "diagnose",
+            "press.toml",
+            "--json",
+            "--verbose",
+            "--out",
+            "out",
+        ],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let told = stderr(&output);
+    assert!(
+        told.contains("fitting left out") && told.contains("delay ["),
+        "{told}"
+    );
+    let found: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!(found["verdict"], "named", "{found:#}");
+    let effect = &found["effects"][0];
+    assert_eq!(effect["effect"], "delay");
+    let delay = &effect["parameters"]["delay"];
+    assert!(
+        (delay["value"].as_f64().unwrap() - 6e-3).abs() < 1e-3,
+        "{delay}"
+    );
+    assert_eq!(delay["unit"], "s");
+    assert!(delay["standard_error"].is_number());
+    assert!(effect["confidence"].is_number());
+    for name in [
+        "alternatives",
+        "separating_experiment",
+        "extended_fmu",
+        "wall_s",
+    ] {
+        assert!(found.get(name).is_some(), "{name}");
+    }
+    let gain = &found["gain"];
+    assert!(gain["before_nrmse"].as_f64() > gain["after_nrmse"].as_f64());
+    assert!(gain["noise_floor_nrmse"].is_null());
+    assert_eq!(gain["interval_95"].as_array().unwrap().len(), 2);
+    assert_eq!(gain["record"], "left out");
+    // Every file, and the JSON that was printed.
+    let out = folder.join("out");
+    for name in ["report.html", "curves.csv", "error.svg", "close.svg"] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    let written = fs::read_to_string(out.join("diagnosis.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&written).unwrap(), found);
+    let model = fs::read_to_string(out.join("extended_model.toml")).unwrap();
+    let model: toml::Table = model.parse().unwrap();
+    let estimate = &model["effects"]["delay"]["delay"];
+    assert_eq!(estimate["value"].as_float(), delay["value"].as_f64());
+    assert_eq!(model["nominal"]["loop_gain"]["unit"].as_str(), Some("1/s"));
+    // The page again, with its pictures as long as the curves are there.
+    let page = || fs::read_to_string(out.join("report.html")).unwrap();
+    let first = page();
+    assert!(first.contains("where the nominal model is worst"));
+    let again = || shakebench(folder, &["report", "out"]);
+    assert_eq!(again().status.code(), Some(0), "{}", stderr(&again()));
+    assert_eq!(first.replace("press.toml", "diagnosis.json in out"), page());
+    fs::remove_file(out.join("curves.csv")).unwrap();
+    let refusal = again();
+    assert_eq!(refusal.status.code(), Some(2));
+    assert!(
+        stderr(&refusal).contains("pictures"),
+        "{}",
+        stderr(&refusal)
+    );
+    fs::remove_file(out.join("report.html")).unwrap();
+    assert_eq!(again().status.code(), Some(0));
+    assert!(page().contains("loop_gain") && !page().contains("nominal model is worst"));
+}
+
+#[test]
+fn a_rig_that_cannot_be_diagnosed_is_refused_by_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    press(folder, 6, "second_half = false");
+    refused(
+        folder,
+        &["diagnose", "press.toml"],
+        &["press.toml", "second_half", "leaves nothing out"],
+    );
+    press(folder, 6, "third_half = true");
+    refused(
+        folder,
+        &["diagnose", "press.toml"],
+        &["press.toml", "line 16", "third_half"],
+    );
+    press(folder, 6, BLOCKS);
+    let path = folder.join("press.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace("kind =", "units = \"SI\"\nkind =")).unwrap();
+    refused(
+        folder,
+        &["diagnose", "press.toml"],
+        &["press.toml", "line 3", "units"],
+    );
+    fs::write(&path, text).unwrap();
+    let data = fs::read_to_string(folder.join("data.csv")).unwrap();
+    fs::write(
+        folder.join("data.csv"),
+        data.replacen("\n0.001,", "\nsoon,", 1),
+    )
+    .unwrap();
+    refused(
+        folder,
+        &["diagnose", "press.toml"],
+        &["data.csv", "line 3", "soon"],
+    );
+}
+
+#[test]
+fn data_of_a_case_and_unknown_keys_of_its_model_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::create_dir(folder.join("case")).unwrap();
+    let arguments = ["diagnose", "case", "--data", "other.csv"];
+    refused(folder, &arguments, &["--data", "identification.csv"]);
+    fs::write(folder.join("case/nominal.toml"), "units = \"SI\"\n").unwrap();
+    refused(
+        folder,
+        &["diagnose", "case"],
+        &["nominal.toml", "line 1", "units"],
+    );
 }

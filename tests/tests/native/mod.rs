@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 
 use controllers::allocation::{ControlAllocation, LoopCommands};
+use controllers::hierarchy::{SlidingModeInput, displacement_loop, force_loop};
 use controllers::loop_shaping::LoopShaping;
 use controllers::pid::{Pid, PidInput};
-use controllers::sliding_mode::{SlidingMode, SlidingModeInput, displacement_loop, force_loop};
+use controllers::sliding_mode::SlidingMode;
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion};
 use nalgebra::{DVector, dvector};

@@ -32,6 +32,9 @@ fn dense(matrix: &DMatrix<f64>) -> CscMatrix<f64> {
 impl Clarabel {
     /// Hessian (n x n, positive definite) and constraint rows (m x n); gives up after
     /// `iteration_limit` iterations or `time_limit` seconds.
+    ///
+    /// # Errors
+    /// A Hessian that is not positive definite.
     pub fn new(
         hessian: &DMatrix<f64>,
         constraints: &DMatrix<f64>,

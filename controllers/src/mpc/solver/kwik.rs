@@ -48,6 +48,9 @@ const REFINEMENTS: usize = 2;
 impl Kwik {
     /// Hessian (n x n, positive definite) and constraint rows (m x n); gives up after
     /// `iteration_limit` iterations or `time_limit` seconds (infinite: never).
+    ///
+    /// # Errors
+    /// A Hessian that is not positive definite.
     pub fn new(
         hessian: &DMatrix<f64>,
         constraints: &DMatrix<f64>,

@@ -20,6 +20,9 @@ pub(super) struct Metric {
 
 impl Metric {
     /// Hessian (n x n, positive definite) and constraint rows (m x n).
+    ///
+    /// # Errors
+    /// A Hessian that is not positive definite.
     pub fn new(hessian: &DMatrix<f64>, constraints: &DMatrix<f64>) -> Result<Self, ModelError> {
         let no_solution = |reason: &str| ModelError::NoSolution {
             equation: "the quadratic program",

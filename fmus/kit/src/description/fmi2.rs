@@ -5,7 +5,7 @@
 
 use super::{
     causality, default_experiment, enumerations, initial, initial_unknown, initial_unknowns, items,
-    log_categories, range, start, unit_definitions, unknown, variability, xml::Element,
+    log_categories, range, start, token, unit_definitions, unknown, variability, xml::Element,
 };
 use crate::{
     component::Component,
@@ -18,7 +18,7 @@ pub fn fmi2<C: Component>(model: &Model<C>) -> String {
     let mut root = Element::new("fmiModelDescription")
         .attribute("fmiVersion", "2.0")
         .attribute("modelName", C::NAME)
-        .attribute("guid", &model.token)
+        .attribute("guid", token(model))
         .attribute("description", C::DESCRIPTION)
         .attribute("version", C::VERSION)
         .attribute("license", env!("CARGO_PKG_LICENSE"))

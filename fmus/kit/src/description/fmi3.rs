@@ -2,7 +2,7 @@
 
 use super::{
     causality, default_experiment, enumerations, initial, initial_unknown, initial_unknowns, items,
-    log_categories, range, start, unit_definitions, unknown, variability, xml::Element,
+    log_categories, range, start, token, unit_definitions, unknown, variability, xml::Element,
 };
 use crate::{
     component::Component,
@@ -12,10 +12,15 @@ use crate::{
 
 /// The model description of FMI 3.0.
 pub fn fmi3<C: Component>(model: &Model<C>) -> String {
+    with_token(model, token(model))
+}
+
+/// The same with any token.
+pub(super) fn with_token<C: Component>(model: &Model<C>, token: &str) -> String {
     let mut root = Element::new("fmiModelDescription")
         .attribute("fmiVersion", "3.0")
         .attribute("modelName", C::NAME)
-        .attribute("instantiationToken", &model.token)
+        .attribute("instantiationToken", token)
         .attribute("description", C::DESCRIPTION)
         .attribute("version", C::VERSION)
         .attribute("license", env!("CARGO_PKG_LICENSE"))

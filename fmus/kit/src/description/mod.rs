@@ -12,6 +12,7 @@ pub use html::html;
 use std::collections::BTreeMap;
 
 use crate::{
+    checksum::fingerprint,
     component::Component,
     model::Model,
     units::{BASE, Unit},
@@ -21,6 +22,13 @@ use xml::Element;
 
 /// End of the default experiment, s.
 const STOP_TIME: f64 = 10.0;
+
+/// The instantiation token (FMI 3.0) and GUID (FMI 2.0): a fingerprint of the interface.
+pub fn token<C: Component>(model: &Model<C>) -> &str {
+    model
+        .token
+        .get_or_init(|| fingerprint(&fmi3::with_token(model, "")))
+}
 
 fn causality(causality: Causality) -> &'static str {
     match causality {
@@ -233,7 +241,7 @@ mod tests {
             let document = Document::parse(&text).unwrap();
             assert_eq!(
                 document.root_element().attribute(token),
-                Some(model().token.as_str())
+                Some(super::token(model()))
             );
             let note = named(&document, "note");
             assert_eq!(note.attribute("description"), Some("Free text <&>"));
@@ -241,6 +249,16 @@ mod tests {
             let text = start.attribute("start").or(start.attribute("value"));
             assert_eq!(text, Some("a < b & \"c\""));
         }
+    }
+
+    #[test]
+    fn token_changes_with_the_interface() {
+        let token = super::token(model());
+        assert_eq!(token, super::token(&Model::<Oscillator>::new().unwrap()));
+        let mut other = Model::<Oscillator>::new().unwrap();
+        other.variables[0].description += "!";
+        assert_ne!(token, super::token(&other));
+        assert_eq!(token.len(), 38);
     }
 
     #[test]

@@ -28,6 +28,9 @@ pub struct Nominal {
 }
 
 /// Relation R5: three-variable control as sampled by the rig's computer, SI.
+///
+/// Its arithmetic is not that of `controllers::three_variable`: velocities are differences, and the
+/// integral runs on at the limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlLaw {
     /// V/m.
@@ -49,6 +52,7 @@ pub struct ControlLaw {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct File {
     sample_rate: f64,
     actuator: Actuator,
@@ -60,6 +64,7 @@ struct File {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Actuator {
     denominator: [f64; 4],
     voltage_to_force: [f64; 3],
@@ -67,6 +72,7 @@ struct Actuator {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Oscillator {
     mass: f64,
     damping: f64,
@@ -74,6 +80,7 @@ struct Oscillator {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Controller {
     kind: String,
     proportional: f64,
@@ -87,6 +94,7 @@ struct Controller {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Noise {
     displacement: f64,
     acceleration: f64,
@@ -96,12 +104,16 @@ struct Noise {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Uncertainty {
     relative: f64,
 }
 
 impl Nominal {
     /// Reads the text of a `nominal.toml` in inch, lbf, s, V; a sentence says what is wrong.
+    ///
+    /// # Errors
+    /// What is no TOML or has an unknown key, with line and column; values out of range.
     pub fn parse(text: &str) -> Result<Self, String> {
         let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
         let lead = file.actuator.denominator[0];

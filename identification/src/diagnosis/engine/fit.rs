@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::model::{Point, RigModel};
+use super::model::{ExtensibleModel, Point};
 
 /// Internal coordinates move by this for a difference quotient.
 const DIFFERENCE: f64 = 1e-3;
@@ -29,7 +29,7 @@ pub struct Jacobian {
 }
 
 /// Whitened residuals and cost at `point` on `records`; nothing where it cannot be simulated.
-pub fn evaluate<M: RigModel>(model: &M, point: &Point, records: &[usize]) -> Option<Fit> {
+pub fn evaluate<M: ExtensibleModel>(model: &M, point: &Point, records: &[usize]) -> Option<Fit> {
     let predictor = model.predictor(point)?;
     let residuals = residuals(model, &predictor, point, records)?;
     let samples: usize = records.iter().map(|&r| model.sample_count(r)).sum();
@@ -44,7 +44,7 @@ pub fn evaluate<M: RigModel>(model: &M, point: &Point, records: &[usize]) -> Opt
 }
 
 /// Whitened residuals at `point` with the gain of `predictor`.
-pub fn residuals<M: RigModel>(
+pub fn residuals<M: ExtensibleModel>(
     model: &M,
     predictor: &M::Predictor,
     point: &Point,
@@ -87,7 +87,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Derivatives of the residuals at `fit` by the coordinates in `which` (nuisance first, then the
 /// effects'), with the gain of `predictor`.
-fn columns<M: RigModel>(
+fn columns<M: ExtensibleModel>(
     model: &M,
     predictor: &M::Predictor,
     fit: &Fit,
@@ -123,7 +123,7 @@ fn columns<M: RigModel>(
 
 impl Jacobian {
     /// All coordinates of `fit`.
-    pub fn at<M: RigModel>(model: &M, fit: &Fit, records: &[usize]) -> Option<Self> {
+    pub fn at<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usize]) -> Option<Self> {
         let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
         let predictor = model.predictor(&fit.point)?;
         Some(Self::of(columns(
@@ -137,7 +137,7 @@ impl Jacobian {
 
     /// As [`Self::at`] by central differences: twice the work, and no false information along
     /// directions in which the residuals do not change.
-    pub fn central<M: RigModel>(model: &M, fit: &Fit, records: &[usize]) -> Option<Self> {
+    pub fn central<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usize]) -> Option<Self> {
         let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
         let predictor = model.predictor(&fit.point)?;
         let columns = (0..count).map(|coordinate| {
@@ -176,7 +176,7 @@ impl Jacobian {
 
     /// How much `column` (in the residuals' space) would lower the cost of `fit` if it entered
     /// linearly with the best amplitude, everything in `self` estimated along; and that amplitude.
-    pub fn score<M: RigModel>(&self, model: &M, fit: &Fit, column: &[f64]) -> (f64, f64) {
+    pub fn score<M: ExtensibleModel>(&self, model: &M, fit: &Fit, column: &[f64]) -> (f64, f64) {
         let n = self.columns.len();
         let (hessian, gradient) = self.normal_equations(model, fit);
         let cross = DVector::from_fn(n, |i, _| dot(&self.columns[i], column));
@@ -191,7 +191,11 @@ impl Jacobian {
         (slope * slope / own, slope / own)
     }
 
-    fn normal_equations<M: RigModel>(&self, model: &M, fit: &Fit) -> (DMatrix<f64>, DVector<f64>) {
+    fn normal_equations<M: ExtensibleModel>(
+        &self,
+        model: &M,
+        fit: &Fit,
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let mut hessian = self.gram.clone();
         let n = self.columns.len();
         let mut gradient = DVector::from_fn(n, |i, _| -dot(&self.columns[i], &fit.residuals));
@@ -200,12 +204,23 @@ impl Jacobian {
     }
 
     /// Covariance of all coordinates at `fit`.
-    pub fn covariance<M: RigModel>(&self, model: &M, fit: &Fit) -> Option<DMatrix<f64>> {
+    pub fn covariance<M: ExtensibleModel>(&self, model: &M, fit: &Fit) -> Option<DMatrix<f64>> {
         self.normal_equations(model, fit).0.try_inverse()
+    }
+
+    /// Standard deviations of all coordinates at `fit`, nuisance first.
+    pub fn deviations<M: ExtensibleModel>(&self, model: &M, fit: &Fit) -> Option<Vec<f64>> {
+        let covariance = self.covariance(model, fit)?;
+        let variance = |i: usize| covariance[(i, i)].max(0.0);
+        Some(
+            (0..covariance.nrows())
+                .map(|i| variance(i).sqrt())
+                .collect(),
+        )
     }
 }
 
-fn add_priors<M: RigModel>(
+fn add_priors<M: ExtensibleModel>(
     model: &M,
     point: &Point,
     hessian: &mut DMatrix<f64>,
@@ -227,7 +242,7 @@ fn add_priors<M: RigModel>(
 
 /// Fits all coordinates of `start`. The first ones that `frozen` holds keep its derivatives; those
 /// of the others are taken anew in every iteration.
-pub fn fit<M: RigModel>(
+pub fn fit<M: ExtensibleModel>(
     model: &M,
     start: &Point,
     records: &[usize],
@@ -309,7 +324,7 @@ pub fn fit<M: RigModel>(
 }
 
 /// Fits with derivatives taken anew at every round until the cost settles.
-pub fn polish<M: RigModel>(
+pub fn polish<M: ExtensibleModel>(
     model: &M,
     start: &Fit,
     records: &[usize],
@@ -320,7 +335,7 @@ pub fn polish<M: RigModel>(
 
 /// As [`polish`]; a fit that is far from noise is settled when a round gains less than `share` of
 /// what is left above noise.
-pub(super) fn polish_to<M: RigModel>(
+pub(super) fn polish_to<M: ExtensibleModel>(
     model: &M,
     start: &Fit,
     records: &[usize],

@@ -1,7 +1,7 @@
 //! What the engine knows of a rig: parameters, candidates, whitened residuals.
 
 /// A rig with records, as the engine sees it. A new rig is one implementation of this.
-pub trait RigModel: Sync {
+pub trait ExtensibleModel: Sync {
     /// What stays fixed while derivatives are taken (a predictor's gain).
     type Predictor: Send + Sync;
 

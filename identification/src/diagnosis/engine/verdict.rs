@@ -2,14 +2,21 @@
 
 use super::adequacy::{self, Test};
 use super::fit::{Fit, Jacobian, evaluate, fit as refit, polish_to};
-use super::model::{Point, RigModel, Role};
-use super::search::{Found, Hypothesis, RIVAL_WITHIN, ROUNDS, SETTLED, Search};
+use super::likelihood::{Hypothesis, PenalisedLikelihood, RIVAL_WITHIN, ROUNDS, SETTLED};
+use super::model::{ExtensibleModel, Point, Role};
+use super::progress::Observer;
+use super::search::{Found, search};
+use serde::{Deserialize, Serialize};
 
-/// Largest deviate that noise alone may show among the few hundred tests.
+/// Largest deviate that noise alone may show among the few hundred tests. Were they exact, 4.5
+/// would be passed by chance once in a thousand cases (300 tests); what is above that allows for
+/// the constant gain of the predictor, which is the best one for the linear part only. Chosen on
+/// the generator's cases.
 pub const LARGEST_DEVIATE: f64 = 5.6;
 
 /// What came out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// The nominal model explains the records within its uncertainty.
     Adequate,
@@ -21,21 +28,20 @@ pub enum Verdict {
     Unexplained,
 }
 
-impl Verdict {
-    /// The word in reports.
-    pub fn word(self) -> &'static str {
-        match self {
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
             Self::Adequate => "adequate",
             Self::Named => "named",
             Self::Ambiguous => "ambiguous",
             Self::Unexplained => "unexplained",
-        }
+        })
     }
 }
 
 /// An estimated parameter, SI.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
+pub struct ParameterEstimate {
     /// Its name in the catalogue.
     pub name: String,
     /// The estimate.
@@ -54,7 +60,7 @@ pub struct NamedEffect {
     /// Its name in the catalogue.
     pub effect: &'static str,
     /// Its parameters.
-    pub parameters: Vec<Estimate>,
+    pub parameters: Vec<ParameterEstimate>,
     /// Posterior share against the models tried in its place, 0 to 1.
     pub confidence: f64,
 }
@@ -81,37 +87,39 @@ pub struct Judgement {
     pub share_explained: f64,
 }
 
-/// Estimates and standard errors of the effects of `fit`.
-pub fn estimates<M: RigModel>(model: &M, fit: &Fit, jacobian: &Jacobian) -> Vec<NamedEffect> {
-    let covariance = jacobian.covariance(model, fit);
-    let mut place = fit.point.nuisance.len();
-    let mut effects = Vec::new();
-    for (i, internal) in &fit.point.effects {
-        let candidate = &model.candidates()[*i];
-        let mut parameters = Vec::new();
-        for (parameter, &q) in candidate.parameters.iter().zip(internal) {
-            let deviation = covariance
-                .as_ref()
-                .map_or(f64::NAN, |c| c[(place, place)].max(0.0).sqrt());
-            place += 1;
-            parameters.push(Estimate {
-                name: parameter.name.into(),
-                value: parameter.scale.to_value(q),
-                unit: parameter.unit,
-                standard_error: deviation * parameter.scale.slope(q).abs(),
-                is_shape: matches!(parameter.role, Role::Shape { .. }),
-            });
-        }
-        effects.push(NamedEffect {
-            effect: candidate.effect,
-            parameters,
-            confidence: 1.0,
-        });
-    }
-    effects
+/// Estimates of the effects at `point`, with `deviations` of all coordinates, nuisance first; not a
+/// number where they are unknown.
+pub fn estimates<M: ExtensibleModel>(
+    model: &M,
+    point: &Point,
+    deviations: &[f64],
+) -> Vec<NamedEffect> {
+    let mut deviations = deviations.iter().skip(point.nuisance.len());
+    point
+        .effects
+        .iter()
+        .map(|(i, internal)| {
+            let candidate = &model.candidates()[*i];
+            let pairs = candidate.parameters.iter().zip(internal);
+            NamedEffect {
+                effect: candidate.effect,
+                parameters: pairs
+                    .map(|(parameter, &q)| ParameterEstimate {
+                        name: parameter.name.into(),
+                        value: parameter.scale.to_value(q),
+                        unit: parameter.unit,
+                        standard_error: deviations.next().copied().unwrap_or(f64::NAN)
+                            * parameter.scale.slope(q).abs(),
+                        is_shape: matches!(parameter.role, Role::Shape { .. }),
+                    })
+                    .collect(),
+                confidence: 1.0,
+            }
+        })
+        .collect()
 }
 
-fn names<M: RigModel>(model: &M, hypothesis: &Hypothesis) -> Vec<&'static str> {
+fn names<M: ExtensibleModel>(model: &M, hypothesis: &Hypothesis) -> Vec<&'static str> {
     let effects = hypothesis.effects();
     effects
         .iter()
@@ -120,21 +128,20 @@ fn names<M: RigModel>(model: &M, hypothesis: &Hypothesis) -> Vec<&'static str> {
 }
 
 /// Searches on the records `fitted`, judges on all of them and `held_out`.
-pub fn judge<M: RigModel>(
+pub fn judge<M: ExtensibleModel>(
     model: &M,
     fitted: &[usize],
     held_out: &[usize],
-    verbose: bool,
+    observer: Observer<'_>,
 ) -> Option<Judgement> {
-    let search = |model: &M| {
-        Search {
+    let searched = |model: &M| {
+        search(&mut PenalisedLikelihood {
             model,
             records: fitted.to_vec(),
-            verbose,
-        }
-        .run()
+            observer,
+        })
     };
-    let mut found = search(model)?;
+    let mut found = searched(model)?;
     let mut retuned = None;
     // The size of the unseen disturbance is known to a factor at best.
     let best = found.best.as_ref().unwrap_or(&found.nominal);
@@ -150,7 +157,7 @@ pub fn judge<M: RigModel>(
             .unwrap_or((1.0, f64::INFINITY));
         if factor != 1.0 && lowest.is_finite() {
             let tuned = model.disturbed(factor);
-            found = search(&tuned)?;
+            found = searched(&tuned)?;
             retuned = Some(tuned);
         }
     }
@@ -162,7 +169,12 @@ pub fn judge<M: RigModel>(
     ))
 }
 
-fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usize]) -> Judgement {
+fn weigh<M: ExtensibleModel>(
+    model: &M,
+    found: Found<Hypothesis>,
+    fitted: &[usize],
+    held_out: &[usize],
+) -> Judgement {
     let Found {
         nominal,
         best,
@@ -267,12 +279,10 @@ fn weigh<M: RigModel>(model: &M, found: Found, fitted: &[usize], held_out: &[usi
         Some(jacobian) => (joint_fit, jacobian),
         None => (best.fit.clone(), best.jacobian),
     };
-    let mut effects = estimates(model, &all, &jacobian);
-    let covariance = jacobian.covariance(model, &all);
-    let nuisance_errors = covariance.map_or_else(Vec::new, |c| {
-        let count = all.point.nuisance.len();
-        (0..count).map(|i| c[(i, i)].max(0.0).sqrt()).collect()
-    });
+    let deviations = jacobian.deviations(model, &all).unwrap_or_default();
+    let mut effects = estimates(model, &all.point, &deviations);
+    let mut nuisance_errors = deviations;
+    nuisance_errors.truncate(all.point.nuisance.len());
     for effect in &mut effects {
         effect.confidence = 1.0 / weight;
     }

@@ -3,113 +3,86 @@
 //! Nominal: `τ u' = g r + o - u`, `e = u - x`, `x' = K e` (Merritt, Hydraulic Control Systems,
 //! 1967: a valve-controlled cylinder integrates, the loop closes it to one pole).
 
-use super::{Effect, Named, Rig, Series, effect, size};
+use super::table::{effects, nominal_parameters, size};
+use super::{Equations, Named, Series};
 
 /// The rig.
 pub struct ClosedLoopActuator;
 
 const STEPS: usize = 1;
 
-impl Rig for ClosedLoopActuator {
-    fn inputs(&self) -> &'static [Named] {
-        &[("command", "m")]
-    }
+nominal_parameters! {
+    loop_gain: "1/s",
+    command_lag: "s",
+    scale: "1",
+    offset: "m",
+}
 
-    fn output(&self) -> Named {
-        ("displacement", "m")
-    }
+effects! {
+    /// r(t - T): conversion, computation and valve electronics.
+    delay: Delay {
+        delay: size("s", 1e-3, (0.0, 0.05)),
+    } from [[2e-3], [6e-3]], like ["valve_lag"];
+    /// Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
+    dead_band: DeadBand {
+        half_width: size("m", 5e-6, (0.0, 1e-3)),
+    } from [[3e-5], [2e-4]];
+    /// Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
+    /// of Hydraulic Servosystems, 1980).
+    asymmetric_gain: AsymmetricGain {
+        asymmetry: size("1", 0.01, (-0.8, 0.8)),
+    } from [[0.03], [-0.03]];
+    /// Spool: T w' = K e - w, x' = w.
+    valve_lag: ValveLag {
+        time_constant: size("s", 1e-3, (0.0, 0.02)),
+    } from [[2e-3]], like ["delay"];
+    /// Flow falls with speed as the load pressure rises: x' = w / (1 + |w| / s).
+    flow_saturation: FlowSaturation {
+        compression: size("s/m", 0.2, (0.0, 50.0)),
+    } from [[1.0]];
+    /// Transducer: y = x (1 + c x).
+    sensor_curvature: SensorCurvature {
+        curvature: size("1/m", 2.0, (-200.0, 200.0)),
+    } from [[3.0], [-3.0]];
+    /// Transducer linkage: y follows x only beyond a gap.
+    free_play: FreePlay {
+        gap: size("m", 1e-5, (0.0, 1e-3)),
+    } from [[4e-5]];
+    /// Disturbance n that command and output share in the recorder: the loop gets r - n, the
+    /// record y = x + c n; n is what a median of five samples takes out of the command.
+    shared_disturbance: SharedDisturbance {
+        coupling: size("1", 0.1, (-5.0, 5.0)),
+    } from [[1.0]];
+}
 
-    fn parameters(&self) -> &'static [Named] {
-        &[
-            ("loop_gain", "1/s"),
-            ("command_lag", "s"),
-            ("scale", "1"),
-            ("offset", "m"),
-        ]
-    }
+impl Equations for ClosedLoopActuator {
+    const KIND: &'static str = "closed_loop_actuator";
+    type Nominal = Nominal;
+    type Effects = Effects;
+    const INPUTS: &'static [Named] = &[("command", "m")];
+    const OUTPUT: Named = ("displacement", "m");
 
-    fn effects(&self) -> Vec<Effect> {
-        vec![
-            // r(t - T): conversion, computation and valve electronics.
-            effect(
-                "delay",
-                vec![size("delay", "s", 1e-3, (0.0, 0.05))],
-                &[0.0],
-                &[&[2e-3], &[6e-3]],
-            )
-            .like(&["valve_lag"]),
-            // Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
-            effect(
-                "dead_band",
-                vec![size("half_width", "m", 5e-6, (0.0, 1e-3))],
-                &[0.0],
-                &[&[3e-5], &[2e-4]],
-            ),
-            // Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
-            // of Hydraulic Servosystems, 1980).
-            effect(
-                "asymmetric_gain",
-                vec![size("asymmetry", "1", 0.01, (-0.8, 0.8))],
-                &[0.0],
-                &[&[0.03], &[-0.03]],
-            ),
-            // Spool: T w' = K e - w, x' = w.
-            effect(
-                "valve_lag",
-                vec![size("time_constant", "s", 1e-3, (0.0, 0.02))],
-                &[0.0],
-                &[&[2e-3]],
-            )
-            .like(&["delay"]),
-            // Flow falls with speed as the load pressure rises: x' = w / (1 + |w| / s).
-            effect(
-                "flow_saturation",
-                vec![size("compression", "s/m", 0.2, (0.0, 50.0))],
-                &[0.0],
-                &[&[1.0]],
-            ),
-            // Transducer: y = x (1 + c x).
-            effect(
-                "sensor_curvature",
-                vec![size("curvature", "1/m", 2.0, (-200.0, 200.0))],
-                &[0.0],
-                &[&[3.0], &[-3.0]],
-            ),
-            // Transducer linkage: y follows x only beyond a gap.
-            effect(
-                "free_play",
-                vec![size("gap", "m", 1e-5, (0.0, 1e-3))],
-                &[0.0],
-                &[&[4e-5]],
-            ),
-            // Disturbance n that command and output share in the recorder: the loop gets r - n, the
-            // record y = x + c n; n is what a median of five samples takes out of the command.
-            effect(
-                "shared_disturbance",
-                vec![size("coupling", "1", 0.1, (-5.0, 5.0))],
-                &[0.0],
-                &[&[1.0]],
-            ),
-        ]
-    }
-
-    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
-        let &[gain, lag, scale, offset] = nominal else {
-            return;
-        };
-        let &[
-            delay,
-            dead_band,
-            asymmetry,
-            valve,
-            compression,
-            curvature,
-            gap,
-            coupling,
-        ] = effects
-        else {
-            return;
-        };
+    fn simulate(&self, series: &Series, nominal: &Nominal, effects: &Effects, out: &mut [f64]) {
+        let Nominal {
+            loop_gain: gain,
+            command_lag: lag,
+            scale,
+            offset,
+        } = *nominal;
+        let Effects {
+            delay: Delay { delay },
+            dead_band: DeadBand {
+                half_width: dead_band,
+            },
+            asymmetric_gain: AsymmetricGain { asymmetry },
+            valve_lag: ValveLag {
+                time_constant: valve,
+            },
+            flow_saturation: FlowSaturation { compression },
+            sensor_curvature: SensorCurvature { curvature },
+            free_play: FreePlay { gap },
+            shared_disturbance: SharedDisturbance { coupling },
+        } = *effects;
         let command = &series.inputs[0];
         let clean = &series.cleaned;
         let loop_input = if coupling == 0.0 { command } else { clean };

@@ -6,7 +6,8 @@
 //! The strain may be sampled so coarsely that turns of a test of known amplitude lie between two
 //! samples; it then ran on to `strain_amplitude` (0: not known, the samples are all there is).
 
-use super::{Effect, Named, Rig, Series, effect, shape, size};
+use super::table::{effects, nominal_parameters, shape, size};
+use super::{Equations, Named, Series};
 
 /// The rig.
 pub struct CyclicMaterial;
@@ -14,134 +15,100 @@ pub struct CyclicMaterial;
 /// Strain of one substep.
 const SUBSTEP: f64 = 5e-5;
 
-impl Rig for CyclicMaterial {
-    fn inputs(&self) -> &'static [Named] {
-        &[("strain", "1")]
-    }
+nominal_parameters! {
+    modulus: "Pa",
+    yield_stress: "Pa",
+    hardening: "Pa",
+    recovery: "1",
+    strain_amplitude: "1",
+}
 
-    fn output(&self) -> Named {
-        ("stress", "Pa")
-    }
+effects! {
+    /// Another backstress.
+    second_backstress: SecondBackstress {
+        hardening: size("Pa", 1e8, (0.0, 1e12)),
+        recovery: shape("1", 200.0, 1.2),
+    } from [[1e9, 20.0], [1e10, 200.0], [5e10, 1000.0]];
+    /// A third one that hardly recovers.
+    lasting_backstress: LastingBackstress {
+        hardening: size("Pa", 1e8, (0.0, 1e12)),
+        recovery: shape("1", 5.0, 0.5),
+    } from [[1e9, 5.0]];
+    /// R = Q (1 - e^{-b p}), p the plastic path (Voce 1948).
+    isotropic_hardening: IsotropicHardening {
+        saturation: size("Pa", 5e6, (-3e8, 1e9)),
+        rate: shape("1", 10.0, 1.0),
+    } from [[5e7, 10.0], [-3e7, 10.0]];
+    /// R goes on with the plastic path, H p, where the first term is full (Voce 1948 as
+    /// extended by Palm, Trans. ASME 71, 1949).
+    lasting_hardening: LastingHardening {
+        slope: size("Pa", 3e6, (-1e9, 1e9)),
+    } from [[1e7], [-1e7]];
+    /// Yield plateau: a further R that falls within the first strain (Q < 0).
+    initial_softening: InitialSoftening {
+        drop: size("Pa", 5e6, (0.0, 4e8)),
+        rate: shape("1", 200.0, 0.7),
+    } from [[5e7, 200.0], [1e8, 300.0]];
+    /// E = E_0 (1 - s (1 - e^{-ξ p})) (Yoshida, Uemori and Fujiwara, Int. J. Plasticity 18,
+    /// 2002).
+    modulus_degradation: ModulusDegradation {
+        share: size("1", 0.02, (-1.0, 0.9)),
+        rate: shape("1", 20.0, 1.0),
+    } from [[0.1, 20.0], [-0.1, 20.0]];
+    /// Compression yields at (1 + a) of tension.
+    strength_differential: StrengthDifferential {
+        asymmetry: size("1", 0.01, (-0.5, 0.5)),
+    } from [[0.02], [-0.02]];
+    /// A frame of compliance C between grips and drive: it is ε + C σ that runs evenly between
+    /// two readings, not the strain (Lemaitre and Chaboche, Mechanics of Solid Materials,
+    /// 1990, section 3.2). It tells where interpolated samples of the strain were.
+    frame_compliance: FrameCompliance {
+        compliance: size("1/Pa", 5e-13, (0.0, 1e-10)),
+    } from [[2e-12], [8e-12]];
+    /// Stress recorded late by a part of a sample, or strain.
+    stress_late: StressLate {
+        samples: size("1", 0.05, (-2.0, 2.0)),
+    } from [[0.3], [-0.3]];
+}
 
-    fn parameters(&self) -> &'static [Named] {
-        &[
-            ("modulus", "Pa"),
-            ("yield_stress", "Pa"),
-            ("hardening", "Pa"),
-            ("recovery", "1"),
-            ("strain_amplitude", "1"),
-        ]
-    }
+impl Equations for CyclicMaterial {
+    const KIND: &'static str = "cyclic_material";
+    type Nominal = Nominal;
+    type Effects = Effects;
+    const INPUTS: &'static [Named] = &[("strain", "1")];
+    const OUTPUT: Named = ("stress", "Pa");
+    const IS_HYSTERETIC: bool = true;
 
-    fn effects(&self) -> Vec<Effect> {
-        let backstress = |name, recovery: f64, spread, starts: &[&[f64]]| {
-            effect(
-                name,
-                vec![
-                    size("hardening", "Pa", 1e8, (0.0, 1e12)),
-                    shape("recovery", "1", recovery, spread),
-                ],
-                &[0.0, recovery],
-                starts,
-            )
-        };
-        vec![
-            backstress(
-                "second_backstress",
-                200.0,
-                1.2,
-                &[&[1e9, 20.0], &[1e10, 200.0], &[5e10, 1000.0]],
-            ),
-            // A third one that hardly recovers.
-            backstress("lasting_backstress", 5.0, 0.5, &[&[1e9, 5.0]]),
-            // R = Q (1 - e^{-b p}), p the plastic path (Voce 1948).
-            effect(
-                "isotropic_hardening",
-                vec![
-                    size("saturation", "Pa", 5e6, (-3e8, 1e9)),
-                    shape("rate", "1", 10.0, 1.0),
-                ],
-                &[0.0, 10.0],
-                &[&[5e7, 10.0], &[-3e7, 10.0]],
-            ),
-            // R goes on with the plastic path, H p, where the first term is full (Voce 1948 as
-            // extended by Palm, Trans. ASME 71, 1949).
-            effect(
-                "lasting_hardening",
-                vec![size("slope", "Pa", 3e6, (-1e9, 1e9))],
-                &[0.0],
-                &[&[1e7], &[-1e7]],
-            ),
-            // Yield plateau: a further R that falls within the first strain (Q < 0).
-            effect(
-                "initial_softening",
-                vec![
-                    size("drop", "Pa", 5e6, (0.0, 4e8)),
-                    shape("rate", "1", 200.0, 0.7),
-                ],
-                &[0.0, 200.0],
-                &[&[5e7, 200.0], &[1e8, 300.0]],
-            ),
-            // E = E_0 (1 - s (1 - e^{-ξ p})) (Yoshida, Uemori and Fujiwara, Int. J. Plasticity 18,
-            // 2002).
-            effect(
-                "modulus_degradation",
-                vec![
-                    size("share", "1", 0.02, (-1.0, 0.9)),
-                    shape("rate", "1", 20.0, 1.0),
-                ],
-                &[0.0, 20.0],
-                &[&[0.1, 20.0], &[-0.1, 20.0]],
-            ),
-            // Compression yields at (1 + a) of tension.
-            effect(
-                "strength_differential",
-                vec![size("asymmetry", "1", 0.01, (-0.5, 0.5))],
-                &[0.0],
-                &[&[0.02], &[-0.02]],
-            ),
-            // A frame of compliance C between grips and drive: it is ε + C σ that runs evenly between
-            // two readings, not the strain (Lemaitre and Chaboche, Mechanics of Solid Materials,
-            // 1990, section 3.2). It tells where interpolated samples of the strain were.
-            effect(
-                "frame_compliance",
-                vec![size("compliance", "1/Pa", 5e-13, (0.0, 1e-10))],
-                &[0.0],
-                &[&[2e-12], &[8e-12]],
-            ),
-            // Stress recorded late by a part of a sample, or strain.
-            effect(
-                "stress_late",
-                vec![size("samples", "1", 0.05, (-2.0, 2.0))],
-                &[0.0],
-                &[&[0.3], &[-0.3]],
-            ),
-        ]
-    }
-
-    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
-        let (
-            &[modulus, yield_stress, hardening, recovery, amplitude],
-            &[
-                slow,
-                slow_recovery,
-                fast,
-                fast_recovery,
-                saturation,
-                rate,
-                lasting,
-                drop,
-                drop_rate,
-                degradation,
-                degradation_rate,
-                differential,
-                compliance,
-                late,
-            ],
-        ) = (nominal, effects)
-        else {
-            return;
-        };
+    fn simulate(&self, series: &Series, nominal: &Nominal, effects: &Effects, out: &mut [f64]) {
+        let Nominal {
+            modulus,
+            yield_stress,
+            hardening,
+            recovery,
+            strain_amplitude: amplitude,
+        } = *nominal;
+        let Effects {
+            second_backstress: second,
+            lasting_backstress: third,
+            isotropic_hardening: IsotropicHardening { saturation, rate },
+            lasting_hardening: LastingHardening { slope: lasting },
+            initial_softening:
+                InitialSoftening {
+                    drop,
+                    rate: drop_rate,
+                },
+            modulus_degradation:
+                ModulusDegradation {
+                    share: degradation,
+                    rate: degradation_rate,
+                },
+            strength_differential:
+                StrengthDifferential {
+                    asymmetry: differential,
+                },
+            frame_compliance: FrameCompliance { compliance },
+            stress_late: StressLate { samples: late },
+        } = *effects;
         let strain = &series.inputs[0];
         let Some(&first) = strain.first() else { return };
         let mut state = Steel {
@@ -149,8 +116,8 @@ impl Rig for CyclicMaterial {
             yield_stress,
             backstresses: [
                 (hardening, recovery),
-                (slow, slow_recovery),
-                (fast, fast_recovery),
+                (second.hardening, second.recovery),
+                (third.hardening, third.recovery),
             ],
             isotropic: [(saturation, rate), (-drop, drop_rate)],
             lasting,
@@ -286,23 +253,23 @@ impl Steel {
 
 #[cfg(test)]
 mod tests {
+    use super::super::EffectTable;
     use super::*;
 
     fn stress(strain: &[f64], amplitude: f64, compliance: f64) -> Vec<f64> {
         let series = Series::new("path", 1.0, vec![strain.to_vec()], vec![0.0; strain.len()]);
-        let effects: Vec<f64> = CyclicMaterial
-            .effects()
-            .iter()
-            .flat_map(|effect| {
-                if effect.candidate.effect == "frame_compliance" {
-                    vec![compliance]
-                } else {
-                    effect.off.clone()
-                }
-            })
-            .collect();
+        let effects = Effects {
+            frame_compliance: FrameCompliance { compliance },
+            ..Effects::off().unwrap()
+        };
         // Perfectly plastic at 400 MPa.
-        let nominal = [2e11, 4e8, 0.0, 1.0, amplitude];
+        let nominal = Nominal {
+            modulus: 2e11,
+            yield_stress: 4e8,
+            hardening: 0.0,
+            recovery: 1.0,
+            strain_amplitude: amplitude,
+        };
         let mut out = vec![0.0; strain.len()];
         CyclicMaterial.simulate(&series, &nominal, &effects, &mut out);
         out

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::{KINDS, Named, Rig, of_kind};
 use units::convert;
@@ -42,7 +42,7 @@ pub struct Column {
 }
 
 /// A value, how sure it is, and its unit.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quantity {
     /// The value.
@@ -60,7 +60,7 @@ pub struct Quantity {
 pub enum LeftOut {
     /// Every second block of this length.
     EverySecondBlock(Quantity),
-    /// The second half of each file.
+    /// The second half of each file; false is refused, since something must be left out.
     SecondHalf(bool),
     /// These files.
     Files(Vec<PathBuf>),
@@ -189,6 +189,10 @@ fn median_of_five(values: &[f64]) -> Vec<f64> {
 
 impl Description {
     /// Reads a description.
+    ///
+    /// # Errors
+    /// A file that cannot be read; what is no TOML or has an unknown key, with line and column; an
+    /// unknown kind.
     pub fn read(path: &Path) -> Result<Self, DescriptionError> {
         let text = std::fs::read_to_string(path).map_err(|source| DescriptionError::Read {
             path: path.to_owned(),
@@ -230,17 +234,24 @@ impl Description {
     }
 
     /// The rig's equations.
-    pub fn rig(&self) -> Result<Box<dyn Rig>, DescriptionError> {
+    ///
+    /// # Errors
+    /// An unknown kind.
+    pub fn rig(&self) -> Result<&'static dyn Rig, DescriptionError> {
         of_kind(&self.kind).ok_or_else(|| {
+            let kinds: Vec<&str> = KINDS.into_iter().map(Rig::kind).collect();
             self.wrong(format!(
                 "kind `{}` is unknown: expected one of {}",
                 self.kind,
-                KINDS.join(", ")
+                kinds.join(", ")
             ))
         })
     }
 
     /// Nominal values and standard deviations in the rig's order, SI.
+    ///
+    /// # Errors
+    /// A parameter that is missing, unknown, or in a unit of another quantity.
     pub fn nominal(&self, rig: &dyn Rig) -> Result<Vec<(f64, f64)>, DescriptionError> {
         let known = rig.parameters();
         if let Some(extra) = self
@@ -264,6 +275,9 @@ impl Description {
     }
 
     /// Reads the data: the description's own files, or `files` in their place.
+    ///
+    /// # Errors
+    /// A file that cannot be read, by place; too little data on either side of what is left out.
     pub fn measurement(&self, files: &[PathBuf]) -> Result<Measurement, DescriptionError> {
         let rig = self.rig()?;
         let folder = self.path.parent().unwrap_or(Path::new(""));
@@ -274,7 +288,7 @@ impl Description {
         }
         let mut series = files
             .iter()
-            .map(|file| self.series(file, rig.as_ref()))
+            .map(|file| self.series(file, rig))
             .collect::<Result<Vec<_>, _>>()?;
         self.leave_out(&mut series, files)?;
         Ok(Measurement { series })
@@ -291,7 +305,14 @@ impl Description {
                     }
                 }
             }
-            LeftOut::SecondHalf(_) => {
+            LeftOut::SecondHalf(false) => {
+                return Err(self.wrong(
+                    "`left_out.second_half` = false leaves nothing out to test on: expected true, \
+                     or `every_second_block` or `files` in its place"
+                        .to_owned(),
+                ));
+            }
+            LeftOut::SecondHalf(true) => {
                 for one in series.iter_mut() {
                     let half = one.left_out.len() / 2;
                     one.left_out[half..].fill(true);

@@ -3,159 +3,121 @@
 //! Nominal: elastic up to a Coulomb force, `f' = k v (1 - (f / F)^n sgn v)` with n → ∞ (Dahl 1968;
 //! n = 1 is his curve, n between is Bouc and Wen's with no post-yield stiffness).
 
-use super::{Effect, Named, Rig, Series, effect, shape, size};
+use super::table::{effects, nominal_parameters, shape, size};
+use super::{Equations, Named, Series};
 
 /// The rig.
 pub struct HystereticDevice;
 
-impl Rig for HystereticDevice {
-    fn inputs(&self) -> &'static [Named] {
-        &[("displacement", "m"), ("velocity", "m/s")]
-    }
+nominal_parameters! {
+    coulomb_force: "N",
+    stiffness: "N/m",
+}
 
-    fn output(&self) -> Named {
-        ("force", "N")
-    }
+effects! {
+    /// F± = F (1 ± a).
+    asymmetric_coulomb_friction: AsymmetricCoulombFriction {
+        asymmetry: size("1", 0.03, (-0.9, 0.9)),
+    } from [[0.1], [-0.1]];
+    /// After the force has gone to zero, the device moves through a gap before it takes
+    /// hold on the other side.
+    free_play: FreePlay {
+        gap: size("m", 2e-4, (0.0, 0.05)),
+    } from [[2e-3], [6e-3]];
+    /// Stiffness while the force falls is (1 + s) k: a band that wraps on gives way more
+    /// softly than it lets go.
+    stiffer_unloading: StifferUnloading {
+        excess: size("1", 0.05, (-0.9, 20.0)),
+    } from [[0.5], [-0.3]];
+    /// k± = k (1 ± a).
+    asymmetric_stiffness: AsymmetricStiffness {
+        asymmetry: size("1", 0.03, (-0.9, 0.9)),
+    } from [[0.1], [-0.1]];
+    /// Asymmetry a e^{-c X}, X the greatest excursion so far: a surface, like the rubber of
+    /// Mullins (Rubber Chem. Technol. 42, 1969), remembers how far it was driven.
+    excursion_memory: ExcursionMemory {
+        decay: size("1/m", 5.0, (-100.0, 500.0)),
+    } from [[20.0], [-10.0]];
+    /// k (1 + h |f| / F): contact that stiffens as more of it bears (Popov, Contact Mechanics
+    /// and Friction, 2010, chapter 5).
+    hardening_stiffness: HardeningStiffness {
+        hardening: size("1", 0.05, (0.0, 20.0)),
+    } from [[0.5], [2.0]];
+    /// Rounded transition: k (1 - r |f / F|^n) with exponent n.
+    rounded_transition: RoundedTransition {
+        rounding: size("1", 0.05, (0.0, 1.0)),
+        exponent: shape("1", 2.0, 0.7),
+    } from [[0.5, 2.0], [0.9, 1.0]];
+    /// Soft begin of contact: k (1 - p e^{-|f| / (c F)}); p near one would be free play.
+    progressive_contact: ProgressiveContact {
+        softness: size("1", 0.05, (0.0, 0.8)),
+        share: shape("1", 0.1, 0.7),
+    } from [[0.6, 0.1], [0.6, 0.3]];
+    /// F (1 + s e^{-|v| / v_s}) (Stribeck).
+    stribeck: Stribeck {
+        excess: size("1", 0.03, (-0.9, 2.0)),
+        speed: shape("m/s", 0.03, 1.0),
+    } from [[0.2, 0.03], [-0.2, 0.03]];
+    /// F (1 + s |v| / (1 m/s)).
+    rate_dependence: RateDependence {
+        slope: size("s/m", 0.2, (-5.0, 20.0)),
+    } from [[0.5], [-0.5]];
+    /// c v beside the friction.
+    viscous: Viscous {
+        damping: size("N s/m", 300.0, (-1e6, 1e6)),
+    } from [[3e3], [-3e3]];
+    /// y follows the force through (2π f)² / (s² + 2 ζ (2π f) s + (2π f)²), ζ = 0.1: mass and
+    /// spring between device and load cell.
+    load_path_resonance: LoadPathResonance {
+        frequency: shape("rad/s", 150.0, 0.7).off_at(0.0),
+    } from [[80.0], [110.0], [200.0]];
+    /// Displacement or force late.
+    delay: Delay {
+        delay: size("s", 1e-3, (0.0, 0.2)),
+    } from [[5e-3], [2e-2]];
+}
 
-    fn parameters(&self) -> &'static [Named] {
-        &[("coulomb_force", "N"), ("stiffness", "N/m")]
-    }
+impl Equations for HystereticDevice {
+    const KIND: &'static str = "hysteretic_device";
+    type Nominal = Nominal;
+    type Effects = Effects;
+    const INPUTS: &'static [Named] = &[("displacement", "m"), ("velocity", "m/s")];
+    const OUTPUT: Named = ("force", "N");
+    const IS_HYSTERETIC: bool = true;
 
-    fn effects(&self) -> Vec<Effect> {
-        vec![
-            // F± = F (1 ± a).
-            effect(
-                "asymmetric_coulomb_friction",
-                vec![size("asymmetry", "1", 0.03, (-0.9, 0.9))],
-                &[0.0],
-                &[&[0.1], &[-0.1]],
-            ),
-            // After the force has gone to zero, the device moves through a gap before it takes
-            // hold on the other side.
-            effect(
-                "free_play",
-                vec![size("gap", "m", 2e-4, (0.0, 0.05))],
-                &[0.0],
-                &[&[2e-3], &[6e-3]],
-            ),
-            // Stiffness while the force falls is (1 + s) k: a band that wraps on gives way more
-            // softly than it lets go.
-            effect(
-                "stiffer_unloading",
-                vec![size("excess", "1", 0.05, (-0.9, 20.0))],
-                &[0.0],
-                &[&[0.5], &[-0.3]],
-            ),
-            // k± = k (1 ± a).
-            effect(
-                "asymmetric_stiffness",
-                vec![size("asymmetry", "1", 0.03, (-0.9, 0.9))],
-                &[0.0],
-                &[&[0.1], &[-0.1]],
-            ),
-            // Asymmetry a e^{-c X}, X the greatest excursion so far: a surface, like the rubber of
-            // Mullins (Rubber Chem. Technol. 42, 1969), remembers how far it was driven.
-            effect(
-                "excursion_memory",
-                vec![size("decay", "1/m", 5.0, (-100.0, 500.0))],
-                &[0.0],
-                &[&[20.0], &[-10.0]],
-            ),
-            // k (1 + h |f| / F): contact that stiffens as more of it bears (Popov, Contact Mechanics
-            // and Friction, 2010, chapter 5).
-            effect(
-                "hardening_stiffness",
-                vec![size("hardening", "1", 0.05, (0.0, 20.0))],
-                &[0.0],
-                &[&[0.5], &[2.0]],
-            ),
-            // Rounded transition: k (1 - r |f / F|^n) with exponent n.
-            effect(
-                "rounded_transition",
-                vec![
-                    size("rounding", "1", 0.05, (0.0, 1.0)),
-                    shape("exponent", "1", 2.0, 0.7),
-                ],
-                &[0.0, 2.0],
-                &[&[0.5, 2.0], &[0.9, 1.0]],
-            ),
-            // Soft begin of contact: k (1 - p e^{-|f| / (c F)}); p near one would be free play.
-            effect(
-                "progressive_contact",
-                vec![
-                    size("softness", "1", 0.05, (0.0, 0.8)),
-                    shape("share", "1", 0.1, 0.7),
-                ],
-                &[0.0, 0.1],
-                &[&[0.6, 0.1], &[0.6, 0.3]],
-            ),
-            // F (1 + s e^{-|v| / v_s}) (Stribeck).
-            effect(
-                "stribeck",
-                vec![
-                    size("excess", "1", 0.03, (-0.9, 2.0)),
-                    shape("speed", "m/s", 0.03, 1.0),
-                ],
-                &[0.0, 0.03],
-                &[&[0.2, 0.03], &[-0.2, 0.03]],
-            ),
-            // F (1 + s |v| / (1 m/s)).
-            effect(
-                "rate_dependence",
-                vec![size("slope", "s/m", 0.2, (-5.0, 20.0))],
-                &[0.0],
-                &[&[0.5], &[-0.5]],
-            ),
-            // c v beside the friction.
-            effect(
-                "viscous",
-                vec![size("damping", "N s/m", 300.0, (-1e6, 1e6))],
-                &[0.0],
-                &[&[3e3], &[-3e3]],
-            ),
-            // y follows the force through (2π f)² / (s² + 2 ζ (2π f) s + (2π f)²), ζ = 0.1: mass and
-            // spring between device and load cell.
-            effect(
-                "load_path_resonance",
-                vec![shape("frequency", "rad/s", 150.0, 0.7)],
-                &[0.0],
-                &[&[80.0], &[110.0], &[200.0]],
-            ),
-            // Displacement or force late.
-            effect(
-                "delay",
-                vec![size("delay", "s", 1e-3, (0.0, 0.2))],
-                &[0.0],
-                &[&[5e-3], &[2e-2]],
-            ),
-        ]
-    }
-
-    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
-        let &[coulomb, stiffness] = nominal else {
-            return;
-        };
-        let &[
-            asymmetry,
-            gap,
-            unloading,
-            stiffness_asymmetry,
-            decay,
-            hardening,
-            rounding,
-            exponent,
-            softness,
-            contact,
-            excess,
-            slow,
-            rate,
-            damping,
-            resonance,
-            delay,
-        ] = effects
-        else {
-            return;
-        };
+    fn simulate(&self, series: &Series, nominal: &Nominal, effects: &Effects, out: &mut [f64]) {
+        let Nominal {
+            coulomb_force: coulomb,
+            stiffness,
+        } = *nominal;
+        let Effects {
+            asymmetric_coulomb_friction: AsymmetricCoulombFriction { asymmetry },
+            free_play: FreePlay { gap },
+            stiffer_unloading: StifferUnloading { excess: unloading },
+            asymmetric_stiffness:
+                AsymmetricStiffness {
+                    asymmetry: stiffness_asymmetry,
+                },
+            excursion_memory: ExcursionMemory { decay },
+            hardening_stiffness: HardeningStiffness { hardening },
+            rounded_transition: RoundedTransition { rounding, exponent },
+            progressive_contact:
+                ProgressiveContact {
+                    softness,
+                    share: contact,
+                },
+            stribeck: Stribeck {
+                excess,
+                speed: slow,
+            },
+            rate_dependence: RateDependence { slope: rate },
+            viscous: Viscous { damping },
+            load_path_resonance:
+                LoadPathResonance {
+                    frequency: resonance,
+                },
+            delay: Delay { delay },
+        } = *effects;
         let (x, v) = (&series.inputs[0], &series.inputs[1]);
         // The device begins as it was left: where in the gap, the first measured force tells.
         let mut force = series
@@ -255,6 +217,7 @@ impl Rig for HystereticDevice {
 
 #[cfg(test)]
 mod tests {
+    use super::super::EffectTable;
     use super::*;
 
     #[test]
@@ -274,17 +237,17 @@ mod tests {
             vec![displacement, vec![0.0; n]],
             vec![0.0; n],
         );
-        let effects: Vec<f64> = HystereticDevice
-            .effects()
-            .iter()
-            .flat_map(|effect| match effect.candidate.effect {
-                "asymmetric_coulomb_friction" => vec![-0.3],
-                "excursion_memory" => vec![50.0],
-                _ => effect.off.clone(),
-            })
-            .collect();
+        let effects = Effects {
+            asymmetric_coulomb_friction: AsymmetricCoulombFriction { asymmetry: -0.3 },
+            excursion_memory: ExcursionMemory { decay: 50.0 },
+            ..Effects::off().unwrap()
+        };
+        let nominal = Nominal {
+            coulomb_force: 1e4,
+            stiffness: 1e8,
+        };
         let mut out = vec![0.0; n];
-        HystereticDevice.simulate(&series, &[1e4, 1e8], &effects, &mut out);
+        HystereticDevice.simulate(&series, &nominal, &effects, &mut out);
         let fade = |excursion: f64| 0.3 * (-50.0 * excursion).exp();
         for (place, force) in [
             (500, 1e4 * (1.0 - fade(0.005))),

@@ -1,29 +1,21 @@
 //! A rig with its measurements, as the engine of the diagnosis sees it.
 
 use super::{Effect, Measurement, Rig};
-use crate::diagnosis::engine::{Candidate, Point, RigModel};
+use crate::diagnosis::engine::{Candidate, ExtensibleModel, Point, SimulatedModel};
 
 /// Runs into which a part is cut for the check inside it.
 const RUNS: usize = 16;
 
 /// The selections of samples that can be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Selection {
+pub enum Part {
     /// What the description fits.
     Fitted = 0,
     /// What it leaves out.
     LeftOut = 1,
 }
 
-impl Selection {
-    /// The two folds inside the part, as records.
-    pub fn folds(self) -> [usize; 2] {
-        match self {
-            Self::Fitted => [2, 3],
-            Self::LeftOut => [4, 5],
-        }
-    }
-
+impl Part {
     /// The other part.
     pub fn other(self) -> Self {
         match self {
@@ -49,7 +41,7 @@ pub struct Measured<'a> {
     /// Per record and series, the places of its samples.
     places: Vec<Vec<Vec<usize>>>,
     /// Error that counts as one.
-    pub scale: f64,
+    scale: f64,
 }
 
 const NAMES: [&str; 6] = [
@@ -104,21 +96,6 @@ impl<'a> Measured<'a> {
         }
     }
 
-    /// The same with another scale of the error.
-    pub fn with_scale(&self, scale: f64) -> Self {
-        Self {
-            rig: self.rig,
-            measurement: self.measurement,
-            nominal: self.nominal.clone(),
-            uncertain: self.uncertain.clone(),
-            effects: self.effects.clone(),
-            candidates: self.candidates.clone(),
-            channel: self.channel,
-            places: self.places.clone(),
-            scale,
-        }
-    }
-
     /// Values of the nominal parameters at `point`, SI; those that must be positive stay so.
     pub fn nominal_values(&self, point: &Point) -> Vec<f64> {
         let mut values: Vec<f64> = self.nominal.iter().map(|(value, _)| *value).collect();
@@ -162,19 +139,6 @@ impl<'a> Measured<'a> {
         out
     }
 
-    /// Errors (output's unit) at `point` on the samples of `record`.
-    pub fn errors(&self, point: &Point, record: usize) -> Vec<f64> {
-        let mut errors = Vec::with_capacity(self.residual_count(record));
-        for (s, places) in self.places[record].iter().enumerate() {
-            if !places.is_empty() {
-                let simulated = self.simulate(point, s);
-                let measured = &self.measurement.series[s].output;
-                errors.extend(places.iter().map(|&k| measured[k] - simulated[k]));
-            }
-        }
-        errors
-    }
-
     /// `||y - m|| / ||m - mean||` on the samples of `record`, the mean taken in each series.
     pub fn normalised_error(&self, point: &Point, record: usize) -> f64 {
         let errors = self.errors(point, record);
@@ -192,7 +156,7 @@ impl<'a> Measured<'a> {
     }
 }
 
-impl RigModel for Measured<'_> {
+impl ExtensibleModel for Measured<'_> {
     type Predictor = ();
 
     fn nuisance(&self) -> usize {
@@ -245,5 +209,41 @@ impl RigModel for Measured<'_> {
             *o = e / self.scale;
         }
         errors.len() == out.len() && out.iter().all(|r| r.is_finite())
+    }
+}
+
+impl SimulatedModel for Measured<'_> {
+    fn errors(&self, point: &Point, record: usize) -> Vec<f64> {
+        let mut errors = Vec::with_capacity(self.residual_count(record));
+        for (s, places) in self.places[record].iter().enumerate() {
+            if !places.is_empty() {
+                let simulated = self.simulate(point, s);
+                let measured = &self.measurement.series[s].output;
+                errors.extend(places.iter().map(|&k| measured[k] - simulated[k]));
+            }
+        }
+        errors
+    }
+
+    fn folds(&self, record: usize) -> [usize; 2] {
+        [2 + 2 * record, 3 + 2 * record]
+    }
+
+    fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    fn with_scale(&self, scale: f64) -> Self {
+        Self {
+            rig: self.rig,
+            measurement: self.measurement,
+            nominal: self.nominal.clone(),
+            uncertain: self.uncertain.clone(),
+            effects: self.effects.clone(),
+            candidates: self.candidates.clone(),
+            channel: self.channel,
+            places: self.places.clone(),
+            scale,
+        }
     }
 }

@@ -1,53 +1,70 @@
 //! Real rigs: what was measured, what the nominal model gets wrong, which cause it has.
 //!
-//! A rig is one file that meets [`Rig`]; a set of measurements is a [`Description`] in TOML. The
+//! A rig is one file that meets [`Equations`]; a set of measurements is a [`Description`] in TOML. The
 //! diagnosis never asks for white residuals, which no real rig leaves: it names a cause that pays
 //! on data not fitted and that is found on each part of the data.
 
 mod closed_loop_actuator;
+pub mod curves;
 mod cyclic_material;
 mod description;
+mod diagnosis;
+mod extended;
 mod hysteretic_device;
 mod measured;
 mod positioning_drive;
-mod report;
-mod resampling;
-mod selection;
 pub mod shake_table;
+mod table;
 
 pub use description::{Description, DescriptionError, LeftOut, Measurement, Quantity, Series};
-pub use report::{EffectReport, PartReport, Report, Value, diagnose};
-pub use resampling::{correlation_time, gain_interval, normalised_error};
+pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, diagnose};
+pub use extended::ExtendedRig;
 
-use crate::diagnosis::engine::{Candidate, EffectParameter, Role, Scale};
+pub use table::{Effect, EffectTable, NominalTable};
 
 /// A quantity by name and SI unit.
 pub type Named = (&'static str, &'static str);
 
-/// An effect that a rig may have, with the values at which it is absent.
-#[derive(Debug, Clone)]
-pub struct Effect {
-    /// What the engine searches.
-    pub candidate: Candidate,
-    /// Values (SI) without the effect.
-    pub off: Vec<f64>,
+/// The equations of a kind of rig. A new kind is one file that implements this, and its line in
+/// [`KINDS`].
+pub trait Equations: Sync {
+    /// Its name in a description.
+    const KIND: &'static str;
+    /// Parameters of the nominal model.
+    type Nominal: NominalTable;
+    /// The effects that it may have.
+    type Effects: EffectTable;
+
+    /// What the data must hold beside the output.
+    const INPUTS: &'static [Named];
+    /// What is simulated and compared.
+    const OUTPUT: Named;
+    /// True where the output depends on the input's path, which a loop shows best.
+    const IS_HYSTERETIC: bool = false;
+
+    /// Output for the inputs of `series` alone.
+    fn simulate(
+        &self,
+        series: &Series,
+        nominal: &Self::Nominal,
+        effects: &Self::Effects,
+        out: &mut [f64],
+    );
 }
 
-impl Effect {
-    /// The same with effects that records of a rig often cannot tell from it.
-    fn like(mut self, names: &'static [&'static str]) -> Self {
-        self.candidate.look_alikes = names;
-        self
-    }
-}
-
-/// A kind of rig: its equations and the effects it may have.
+/// [`Equations`] of any kind.
 pub trait Rig: Sync {
+    /// Its name in a description.
+    fn kind(&self) -> &'static str;
+
     /// What the data must hold beside the output.
     fn inputs(&self) -> &'static [Named];
 
     /// What is simulated and compared.
     fn output(&self) -> Named;
+
+    /// Whether the output depends on the input's path.
+    fn is_hysteretic(&self) -> bool;
 
     /// Parameters of the nominal model.
     fn parameters(&self) -> &'static [Named];
@@ -55,70 +72,77 @@ pub trait Rig: Sync {
     /// The effects.
     fn effects(&self) -> Vec<Effect>;
 
-    /// Output for the inputs of `series` alone, with the nominal parameters and the values of all
-    /// effects' parameters in order.
+    /// Output for the inputs of `series` alone, with values in the order of [`Self::parameters`] and
+    /// of all parameters of [`Self::effects`], SI; not a number where their count is another.
     fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]);
 }
 
-/// Kinds of rig, by the name a description uses.
-pub const KINDS: [&str; 4] = [
-    "closed_loop_actuator",
-    "positioning_drive",
-    "hysteretic_device",
-    "cyclic_material",
+impl<E: Equations> Rig for E {
+    fn kind(&self) -> &'static str {
+        E::KIND
+    }
+
+    fn inputs(&self) -> &'static [Named] {
+        E::INPUTS
+    }
+
+    fn output(&self) -> Named {
+        E::OUTPUT
+    }
+
+    fn is_hysteretic(&self) -> bool {
+        E::IS_HYSTERETIC
+    }
+
+    fn parameters(&self) -> &'static [Named] {
+        E::Nominal::TABLE
+    }
+
+    fn effects(&self) -> Vec<Effect> {
+        E::Effects::table()
+    }
+
+    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
+        match (
+            E::Nominal::from_values(nominal),
+            E::Effects::from_values(effects),
+        ) {
+            (Some(nominal), Some(effects)) => {
+                Equations::simulate(self, series, &nominal, &effects, out);
+            }
+            _ => out.fill(f64::NAN),
+        }
+    }
+}
+
+/// Every kind of rig.
+pub static KINDS: [&dyn Rig; 4] = [
+    &closed_loop_actuator::ClosedLoopActuator,
+    &positioning_drive::PositioningDrive,
+    &hysteretic_device::HystereticDevice,
+    &cyclic_material::CyclicMaterial,
 ];
 
 /// The rig of a kind.
-pub fn of_kind(kind: &str) -> Option<Box<dyn Rig>> {
-    Some(match kind {
-        "closed_loop_actuator" => Box::new(closed_loop_actuator::ClosedLoopActuator),
-        "positioning_drive" => Box::new(positioning_drive::PositioningDrive),
-        "hysteretic_device" => Box::new(hysteretic_device::HystereticDevice),
-        "cyclic_material" => Box::new(cyclic_material::CyclicMaterial),
-        _ => return None,
-    })
+pub fn of_kind(kind: &str) -> Option<&'static dyn Rig> {
+    KINDS.into_iter().find(|rig| rig.kind() == kind)
 }
 
-/// A size counted in `unit`; `weak` is the least worth a name.
-fn size(name: &'static str, si: &'static str, unit: f64, bounds: (f64, f64)) -> EffectParameter {
-    EffectParameter {
-        name,
-        unit: si,
-        scale: Scale::Linear(unit),
-        role: Role::Size { weak: unit },
-        bounds,
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// A positive detail of form, usually `typical`, within a factor `e^spread`.
-fn shape(name: &'static str, si: &'static str, typical: f64, spread: f64) -> EffectParameter {
-    EffectParameter {
-        name,
-        unit: si,
-        scale: Scale::Logarithmic,
-        role: Role::Shape { typical, spread },
-        bounds: (
-            typical * (-6.0 * spread).exp(),
-            typical * (6.0 * spread).exp(),
-        ),
-    }
-}
-
-fn effect(
-    name: &'static str,
-    parameters: Vec<EffectParameter>,
-    off: &[f64],
-    starts: &[&[f64]],
-) -> Effect {
-    Effect {
-        candidate: Candidate {
-            effect: name,
-            parameters,
-            starts: starts.iter().map(|start| start.to_vec()).collect(),
-            look_alikes: &[],
-            tolerance: 1.0,
-            contains: None,
-        },
-        off: off.to_vec(),
+    #[test]
+    fn a_wrong_number_of_values_gives_no_number() {
+        let series = Series::new("none", 1.0, vec![vec![0.0; 16]; 2], vec![0.0; 16]);
+        for rig in KINDS {
+            let nominal = vec![1.0; rig.parameters().len()];
+            let effects: Vec<f64> = rig.effects().into_iter().flat_map(|e| e.off).collect();
+            for (nominal, effects) in [(&nominal[1..], &effects[..]), (&nominal, &effects[1..])] {
+                let mut out = vec![0.0; 16];
+                rig.simulate(&series, nominal, effects, &mut out);
+                assert!(out.iter().all(|y| y.is_nan()), "{}", rig.kind());
+            }
+        }
     }
 }

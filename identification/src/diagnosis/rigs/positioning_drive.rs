@@ -3,7 +3,8 @@
 //! Nominal: `M v' = G u - F_v v - F_c sgn v - o`, `u = k_p k_v (r - q) - k_v Δq/h`, sampled
 //! (Janot, Gautier and Brunot, Data set and reference models of EMPS, 2019).
 
-use super::{Effect, Named, Rig, Series, effect, shape, size};
+use super::table::{effects, nominal_parameters, shape, size};
+use super::{Equations, Named, Series};
 
 /// The rig.
 pub struct PositioningDrive;
@@ -14,126 +15,95 @@ const LEADS: [f64; 12] = [
     1e-3, 1.25e-3, 2e-3, 2.5e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3, 12e-3, 20e-3,
 ];
 
-impl Rig for PositioningDrive {
-    fn inputs(&self) -> &'static [Named] {
-        &[("reference", "m"), ("position", "m")]
-    }
+nominal_parameters! {
+    mass: "kg",
+    viscous_friction: "N s/m",
+    coulomb_friction: "N",
+    offset: "N",
+    force_gain: "N/V",
+    position_gain: "1/s",
+    velocity_gain: "V s/m",
+    voltage_limit: "V",
+}
 
-    fn output(&self) -> Named {
-        ("motor_voltage", "V")
-    }
+effects! {
+    /// F± = (F_v (1 ± a) |v| + F_c) sgn v + o: friction of a worn screw (Janot, Gautier and
+    /// Brunot 2019, section 4). The nominal offset is the Coulomb part of the asymmetry.
+    asymmetric_friction: AsymmetricFriction {
+        viscous_asymmetry: size("1", 0.03, (-0.9, 0.9)),
+    } from [[0.1], [-0.1]];
+    /// F_c (1 + s e^{-|v|/v_s}): s > 0 is Stribeck's fall, s < 0 a friction that builds up
+    /// with speed (Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994).
+    speed_dependent_coulomb: SpeedDependentCoulomb {
+        excess: size("1", 0.03, (-0.99, 3.0)),
+        speed: shape("m/s", 0.01, 1.0),
+    } from [[0.2, 0.01], [-0.3, 0.01]];
+    /// A cos(2π q / p) + B sin(2π q / p): screw and motor poles.
+    force_ripple: ForceRipple {
+        cosine: size("N", 0.2, (-20.0, 20.0)),
+        sine: size("N", 0.2, (-20.0, 20.0)),
+        period: shape("m", 3e-3, 1.0),
+    } from LEADS.map(|lead| [0.5, 0.5, lead]);
+    /// Current loop: T F' = G u - F.
+    actuation_lag: ActuationLag {
+        time_constant: size("s", 1e-4, (0.0, 0.02)),
+    } from [[5e-4]], like ["delay"];
+    /// u acts late.
+    delay: Delay {
+        delay: size("s", 1e-4, (0.0, 2e-3)),
+    } from [[5e-4]], like ["actuation_lag"];
+    /// F_c (1 + c (q - q_0)), q_0 in the middle of the travel: misalignment.
+    position_dependent_friction: PositionDependentFriction {
+        slope: size("1/m", 0.1, (-5.0, 5.0)),
+    } from [[0.3], [-0.3]];
+    /// -D |v| v.
+    quadratic_drag: QuadraticDrag {
+        drag: size("N s2/m2", 20.0, (-2000.0, 2000.0)),
+    } from [[100.0], [-100.0]];
+    /// Load on a spring: a share m of the mass hangs on k and d = 2 ζ (k m)^{1/2}, ζ = 0.05.
+    flexibility: Flexibility {
+        share: size("1", 0.02, (0.0, 0.9)),
+        frequency: shape("rad/s", 300.0, 0.7),
+    } from [[0.1, 150.0], [0.1, 400.0]];
+}
 
-    fn parameters(&self) -> &'static [Named] {
-        &[
-            ("mass", "kg"),
-            ("viscous_friction", "N s/m"),
-            ("coulomb_friction", "N"),
-            ("offset", "N"),
-            ("force_gain", "N/V"),
-            ("position_gain", "1/s"),
-            ("velocity_gain", "V s/m"),
-            ("voltage_limit", "V"),
-        ]
-    }
+impl Equations for PositioningDrive {
+    const KIND: &'static str = "positioning_drive";
+    type Nominal = Nominal;
+    type Effects = Effects;
+    const INPUTS: &'static [Named] = &[("reference", "m"), ("position", "m")];
+    const OUTPUT: Named = ("motor_voltage", "V");
 
-    fn effects(&self) -> Vec<Effect> {
-        let mut ripple = effect(
-            "force_ripple",
-            vec![
-                size("cosine", "N", 0.2, (-20.0, 20.0)),
-                size("sine", "N", 0.2, (-20.0, 20.0)),
-                shape("period", "m", 3e-3, 1.0),
-            ],
-            &[0.0, 0.0, 1e-3],
-            &[],
-        );
-        ripple.candidate.starts = LEADS.iter().map(|&lead| vec![0.5, 0.5, lead]).collect();
-        vec![
-            // F± = (F_v (1 ± a) |v| + F_c) sgn v + o: friction of a worn screw (Janot, Gautier and
-            // Brunot 2019, section 4). The nominal offset is the Coulomb part of the asymmetry.
-            effect(
-                "asymmetric_friction",
-                vec![size("viscous_asymmetry", "1", 0.03, (-0.9, 0.9))],
-                &[0.0],
-                &[&[0.1], &[-0.1]],
-            ),
-            // F_c (1 + s e^{-|v|/v_s}): s > 0 is Stribeck's fall, s < 0 a friction that builds up
-            // with speed (Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994).
-            effect(
-                "speed_dependent_coulomb",
-                vec![
-                    size("excess", "1", 0.03, (-0.99, 3.0)),
-                    shape("speed", "m/s", 0.01, 1.0),
-                ],
-                &[0.0, 0.01],
-                &[&[0.2, 0.01], &[-0.3, 0.01]],
-            ),
-            // A cos(2π q / p) + B sin(2π q / p): screw and motor poles.
-            ripple,
-            // Current loop: T F' = G u - F.
-            effect(
-                "actuation_lag",
-                vec![size("time_constant", "s", 1e-4, (0.0, 0.02))],
-                &[0.0],
-                &[&[5e-4]],
-            )
-            .like(&["delay"]),
-            // u acts late.
-            effect(
-                "delay",
-                vec![size("delay", "s", 1e-4, (0.0, 2e-3))],
-                &[0.0],
-                &[&[5e-4]],
-            )
-            .like(&["actuation_lag"]),
-            // F_c (1 + c (q - q_0)), q_0 in the middle of the travel: misalignment.
-            effect(
-                "position_dependent_friction",
-                vec![size("slope", "1/m", 0.1, (-5.0, 5.0))],
-                &[0.0],
-                &[&[0.3], &[-0.3]],
-            ),
-            // -D |v| v.
-            effect(
-                "quadratic_drag",
-                vec![size("drag", "N s2/m2", 20.0, (-2000.0, 2000.0))],
-                &[0.0],
-                &[&[100.0], &[-100.0]],
-            ),
-            // Load on a spring: a share m of the mass hangs on k and d = 2 ζ (k m)^{1/2}, ζ = 0.05.
-            effect(
-                "flexibility",
-                vec![
-                    size("share", "1", 0.02, (0.0, 0.9)),
-                    shape("frequency", "rad/s", 300.0, 0.7),
-                ],
-                &[0.0, 300.0],
-                &[&[0.1, 150.0], &[0.1, 400.0]],
-            ),
-        ]
-    }
-
-    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
-        let &[mass, viscous, coulomb, offset, force_gain, kp, kv, limit] = nominal else {
-            return;
-        };
-        let &[
-            viscous_asymmetry,
-            excess,
-            slow,
-            cosine,
-            sine,
-            period,
-            lag,
-            delay,
-            slope,
-            drag,
-            share,
-            frequency,
-        ] = effects
-        else {
-            return;
-        };
+    fn simulate(&self, series: &Series, nominal: &Nominal, effects: &Effects, out: &mut [f64]) {
+        let Nominal {
+            mass,
+            viscous_friction: viscous,
+            coulomb_friction: coulomb,
+            offset,
+            force_gain,
+            position_gain: kp,
+            velocity_gain: kv,
+            voltage_limit: limit,
+        } = *nominal;
+        let Effects {
+            asymmetric_friction: AsymmetricFriction { viscous_asymmetry },
+            speed_dependent_coulomb:
+                SpeedDependentCoulomb {
+                    excess,
+                    speed: slow,
+                },
+            force_ripple:
+                ForceRipple {
+                    cosine,
+                    sine,
+                    period,
+                },
+            actuation_lag: ActuationLag { time_constant: lag },
+            delay: Delay { delay },
+            position_dependent_friction: PositionDependentFriction { slope },
+            quadratic_drag: QuadraticDrag { drag },
+            flexibility: Flexibility { share, frequency },
+        } = *effects;
         let (reference, position) = (&series.inputs[0], &series.inputs[1]);
         if reference.len() < 8 || position.len() < 8 {
             return;

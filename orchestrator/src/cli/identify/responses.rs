@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use identification::data::Recording;
-use identification::estimation::frequency_response::{Estimate, direct, joint_input_output};
+use identification::estimation::frequency_response::{
+    FrequencyResponseEstimate, direct, joint_input_output,
+};
 use identification::identify::model::rig_from;
 use identification::identify::rig::RigIdentification;
 use plant::linear::{FrequencyResponse, TransferFunction, log_space};
@@ -121,7 +123,7 @@ fn measured(found: &RigIdentification, recording: &Recording, index: usize) -> V
 }
 
 /// None where the recording is too short to average.
-fn estimate(recording: &Recording, channel: &str) -> Option<Estimate> {
+fn estimate(recording: &Recording, channel: &str) -> Option<FrequencyResponseEstimate> {
     let segment = (recording.len() / SEGMENTS).max(1);
     let segment = 1 << segment.ilog2();
     let command = recording.channel("valve_command")?;

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use fmi_rs::model_description::fmi3;
 
 use super::{
-    Causality, Description, FmiVersion, Kind, Variability, Variable, depend, preferred_step,
+    Causality, Description, FmiVersion, Item, Kind, Variability, Variable, depend, preferred_step,
 };
 
 /// Reads the text.
@@ -20,7 +20,11 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
         let items = |declared: &str| match file.get_type_definition(declared) {
             Some(fmi3::TypeDefinition::Enumeration { items, .. }) => items
                 .iter()
-                .map(|item| (item.name.clone(), item.value))
+                .map(|item| Item {
+                    name: item.name.clone(),
+                    value: item.value,
+                    description: item.description.clone().unwrap_or_default(),
+                })
                 .collect(),
             _ => Vec::new(),
         };

@@ -57,6 +57,17 @@ impl fmt::Display for FmiVersion {
     }
 }
 
+/// One of the choices of an enumeration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Item {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: i64,
+    /// What it means; may be empty.
+    pub description: String,
+}
+
 /// The type of a variable, named as in FMI 3.0.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
@@ -64,8 +75,8 @@ pub enum Kind {
     Float64,
     /// FMI 2.0 Integer.
     Int32,
-    /// A choice: names and values.
-    Enumeration(Vec<(String, i64)>),
+    /// A choice.
+    Enumeration(Vec<Item>),
     /// True or false.
     Boolean,
     /// Text.

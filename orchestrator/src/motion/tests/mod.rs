@@ -6,8 +6,11 @@ mod synthetic;
 
 use std::path::PathBuf;
 
+use std::path::Path;
+
 use super::*;
 use crate::units::convert;
+use crate::units::{INCH, STANDARD_GRAVITY};
 
 /// The shared records, or none (told plainly) where they are not present.
 fn shared_records() -> Option<PathBuf> {

@@ -8,16 +8,17 @@ use plant::sensors::instrumentation::Instrumentation;
 use plant::specimens::linear::LinearSpecimen;
 use units::constants::INCH;
 
-use super::relations::{Relation, misfit, relations};
+use super::experiment;
+use super::gain::{Gain, gain};
+use super::health::{RelationReport, health};
+use super::relations::{misfit, relations};
 use super::sentence::sentence;
 use crate::diagnosis::case::{
     CHANNELS, Case, CaseError, Nominal, Record, blind_spot, noise_ratios, problems,
     too_little_excitation,
 };
-use crate::diagnosis::engine::experiment;
-use crate::diagnosis::engine::gain::{Gain, gain};
-use crate::diagnosis::engine::{NamedEffect, Verdict, judge};
-use crate::diagnosis::engine::{Point, RigModel, Role, Test};
+use crate::diagnosis::engine::{ExtensibleModel, NamedEffect, Verdict, judge};
+use crate::diagnosis::engine::{Observer, Point, Role, Test};
 use crate::diagnosis::rigs::shake_table::catalogue::{ModelRecord, ShakeTableModel};
 use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Signals};
 
@@ -63,8 +64,8 @@ pub struct Diagnosis {
     pub extended_model: ExtendedModel,
     /// The effects in it: [`Self::effects`], and under `Unexplained` those that only help.
     pub modelled: Vec<NamedEffect>,
-    /// The five relations on the identification record, nominal model.
-    pub relations: Vec<Relation>,
+    /// The five relations on the identification record.
+    pub relations: BTreeMap<&'static str, RelationReport>,
     /// Traces left over, strongest first.
     pub remaining: Vec<Test>,
     /// Share of the nominal model's excess error that the effects explain.
@@ -82,22 +83,23 @@ pub struct Validation {
     pub period: f64,
     /// What acted and what was measured, SI.
     pub signals: Signals,
+    /// Whether the command that acted is what the stated law makes of the readings (R5), free of the
+    /// recorder's noise, rather than the recorded one.
+    pub by_law: bool,
     /// Errors of the nominal model, four channels a sample.
     pub before: Vec<f64>,
     /// Errors of the extended model.
     pub after: Vec<f64>,
 }
 
-/// The command that acted: by the law where it explains the record, as recorded elsewhere.
-fn acting_command(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -> Vec<f64> {
+/// The command that the stated law made, where it explains the recorded one.
+fn command_by_law(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -> Option<Vec<f64>> {
     let recorded = &record.valve_command;
     let [x, a, ..] = &record.channels;
-    let Some(law) = nominal.controller else {
-        return recorded.clone();
-    };
+    let law = nominal.controller?;
     let mut commands = law.commands(&record.reference, x, a, 1.0 / nominal.sample_rate);
     if commands.len() != recorded.len() || commands.len() < 3 {
-        return recorded.clone();
+        return None;
     }
     let last = commands.len() - 1;
     // The record's ends lack a neighbour of the reference.
@@ -116,9 +118,9 @@ fn acting_command(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -
             record.name,
             miss / nominal.command_noise
         ));
-        return recorded.clone();
+        return None;
     }
-    commands
+    Some(commands)
 }
 
 /// Model and records of a case, after its checks; sentences on what is missing go to `notes`.
@@ -171,11 +173,13 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
     ];
     for (record, with_effects) in ordered.into_iter().flatten() {
         let value = |i: usize, k: usize| record.channels[i].get(k).copied().unwrap_or(0.0);
+        let command = command_by_law(record, nominal, notes);
         records.push(ModelRecord {
             name: record.name.clone(),
             with_effects,
+            by_law: command.is_some(),
             signals: Signals {
-                command: acting_command(record, nominal, notes),
+                command: command.unwrap_or_else(|| record.valve_command.clone()),
                 channels: (0..record.len())
                     .map(|k| [value(0, k), value(1, k), value(2, k), value(3, k)])
                     .collect(),
@@ -200,10 +204,11 @@ fn prediction(
         .then_some((predictor, out))
 }
 
-/// Diagnoses a case. `verbose` tells the search's steps on standard error.
+/// Diagnoses a case; `observer` is told the search's steps.
 ///
-/// Refuses records that would mislead, naming record, column and place.
-pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
+/// # Errors
+/// Records that would mislead, by record, column and place.
+pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseError> {
     let unfit = |problem: &str| CaseError::Unfit {
         problems: vec![problem.into()],
     };
@@ -216,7 +221,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     let held_out = model.records.len() - 1;
     let fitted: Vec<usize> = (0..held_out).collect();
     let origin = Point {
-        nuisance: vec![0.0; RigModel::nuisance(&model)],
+        nuisance: vec![0.0; ExtensibleModel::nuisance(&model)],
         effects: Vec::new(),
     };
     let lost = || {
@@ -227,7 +232,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
     };
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
     let signals = &model.records[held_out].signals;
-    let mut judgement = judge(&model, &fitted, &[held_out], verbose).ok_or_else(lost)?;
+    let mut judgement = judge(&model, &fitted, &[held_out], observer).ok_or_else(lost)?;
     for note in at_their_ends(&model, &judgement.best.point) {
         judgement.verdict = Verdict::Unexplained;
         notes.push(note);
@@ -326,7 +331,15 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
             sensors: rig.sensors,
             standard_errors,
         },
-        relations,
+        relations: health(
+            case,
+            &relations,
+            &Nominal {
+                shake_table: rig.shake_table,
+                specimen: rig.specimen,
+                ..case.nominal.clone()
+            },
+        ),
         remaining: judgement
             .tests
             .into_iter()
@@ -338,6 +351,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
         validation: Validation {
             period: model.period,
             signals: signals.clone(),
+            by_law: model.records[held_out].by_law,
             before: before.1,
             after: after.1,
         },
@@ -348,7 +362,7 @@ pub fn diagnose(case: &Case, verbose: bool) -> Result<Diagnosis, CaseError> {
 fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
     let mut notes = Vec::new();
     for (index, internal) in &point.effects {
-        let candidate = &RigModel::candidates(model)[*index];
+        let candidate = &ExtensibleModel::candidates(model)[*index];
         for (parameter, value) in candidate.parameters.iter().zip(candidate.values(internal)) {
             let (low, high) = parameter.bounds;
             let near = |end: f64| (value - end).abs() < 1e-3 * end.abs();

@@ -2,10 +2,14 @@
 
 pub mod catalogue;
 mod diagnosis;
+pub mod experiment;
+pub mod gain;
+mod health;
 pub mod predictor;
 pub mod relations;
 mod sentence;
 
 pub use diagnosis::*;
+pub use health::RelationReport;
 pub use plant::identified::effects::quantity::laboratory_unit;
-pub use sentence::{amount, said};
+pub use sentence::{amount, said, with_error};

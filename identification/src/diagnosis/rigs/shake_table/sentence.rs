@@ -1,17 +1,27 @@
 //! A verdict as one sentence for a laboratory engineer.
 
+use super::gain::Gain;
 use crate::diagnosis::engine::Test;
-use crate::diagnosis::engine::gain::Gain;
-use crate::diagnosis::engine::{Estimate, NamedEffect, Verdict};
+use crate::diagnosis::engine::{NamedEffect, ParameterEstimate, Verdict};
 use plant::identified::effects::{find, quantity::laboratory_unit};
 use units::convert;
 
-/// Value and standard error in `unit`, with as many digits as the error leaves meaning:
-/// `0.0865 ± 0.0001 V`.
-pub fn amount(parameter: &Estimate, unit: &str) -> String {
-    let converted = convert(1.0, parameter.unit, unit);
-    let (factor, unit) = converted.map_or((1.0, parameter.unit), |factor| (factor, unit));
-    let (value, error) = (factor * parameter.value, factor * parameter.standard_error);
+/// Value and standard error of `parameter` in `unit`, as [`with_error`] writes them.
+pub fn amount(parameter: &ParameterEstimate, unit: &str) -> String {
+    with_error(
+        parameter.value,
+        parameter.standard_error,
+        parameter.unit,
+        unit,
+    )
+}
+
+/// Value and standard error, given in `si`, in `unit`, with as many digits as the error leaves
+/// meaning: `0.0865 ± 0.0001 V`.
+pub fn with_error(value: f64, standard_error: f64, si: &str, unit: &str) -> String {
+    let converted = convert(1.0, si, unit);
+    let (factor, unit) = converted.map_or((1.0, si), |factor| (factor, unit));
+    let (value, error) = (factor * value, factor * standard_error);
     let unit = if unit == "1" { "" } else { unit };
     let order = |x: f64| x.abs().log10().floor() as i32;
     if !(error.is_finite() && error > 0.0 && value.is_finite() && value != 0.0) {
@@ -110,8 +120,8 @@ pub(super) fn sentence(
 mod tests {
     use super::*;
 
-    fn estimate(value: f64, standard_error: f64, unit: &'static str) -> Estimate {
-        Estimate {
+    fn estimate(value: f64, standard_error: f64, unit: &'static str) -> ParameterEstimate {
+        ParameterEstimate {
             name: "size".into(),
             value,
             unit,

@@ -10,7 +10,7 @@ use plant::identified::nominal::{NominalRig, PARAMETERS};
 use plant::identified::rig::IdentifiedRig;
 
 use crate::diagnosis::case::{CHANNELS, Nominal};
-use crate::diagnosis::engine::{Candidate, Point, RigModel};
+use crate::diagnosis::engine::{Candidate, ExtensibleModel, Point};
 use crate::diagnosis::rigs::shake_table::predictor::{Disturbance, Predictor, Signals};
 
 /// One record and whether the effects were there when it was taken.
@@ -22,6 +22,8 @@ pub struct ModelRecord {
     pub signals: Signals,
     /// False for a baseline: the same rig before the effect.
     pub with_effects: bool,
+    /// Whether the command is that of the stated law rather than the recorded one.
+    pub by_law: bool,
 }
 
 /// The shake table of a case.
@@ -114,7 +116,7 @@ pub struct ShakeTablePredictor {
     without_effects: Option<Predictor>,
 }
 
-impl RigModel for ShakeTableModel {
+impl ExtensibleModel for ShakeTableModel {
     type Predictor = ShakeTablePredictor;
 
     fn nuisance(&self) -> usize {
@@ -236,7 +238,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::diagnosis::engine::{Judgement, judge};
+    use crate::diagnosis::engine::{Judgement, Observer, judge};
     use plant::identified::shake_table::ShakeTable;
     use plant::specimens::linear::LinearSpecimen;
 
@@ -281,6 +283,7 @@ mod tests {
                 name: name.into(),
                 signals,
                 with_effects: true,
+                by_law: false,
             }
         });
         ShakeTableModel::new(&nominal, nominal.noise, records.into())
@@ -302,7 +305,7 @@ mod tests {
             rig.effects.valve.dead_band = f64::from(hidden.contains(&"valve_dead_band")) * 0.12;
             rig.sensors.actuator_force.bias = f64::from(hidden.contains(&"load_cell_bias")) * 8.0;
             let model = model(&rig, 31);
-            let straight = judge(&model, &[0], &[1], false).unwrap();
+            let straight = judge(&model, &[0], &[1], Observer::none()).unwrap();
             assert_eq!(said(&straight).1, hidden);
 
             let mut turned = model.clone();
@@ -311,7 +314,7 @@ mod tests {
             turned.candidates.rotate_left(7);
             turned.effects.rotate_left(7);
             assert_eq!(
-                said(&judge(&turned, &[0], &[1], false).unwrap()),
+                said(&judge(&turned, &[0], &[1], Observer::none()).unwrap()),
                 said(&straight)
             );
 
@@ -326,7 +329,7 @@ mod tests {
                 candidate.effect = mirror(candidate.effect);
                 candidate.contains = candidate.contains.map(mirror);
             }
-            let judgement = judge(&relabelled, &[0], &[1], false).unwrap();
+            let judgement = judge(&relabelled, &[0], &[1], Observer::none()).unwrap();
             let mut expected: Vec<_> = hidden.iter().map(|name| mirror(name)).collect();
             expected.sort_unstable();
             assert_eq!(said(&judgement), (straight.verdict, expected));

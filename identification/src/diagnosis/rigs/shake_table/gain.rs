@@ -1,16 +1,8 @@
 //! What the extended model brings on a record that it has not seen.
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-
+use super::predictor::{Predictor, Signals};
 use crate::diagnosis::case::deviation;
-use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Signals};
-
-/// Seed of the bootstrap.
-pub const BOOTSTRAP_SEED: u64 = 20_170_401;
-const RESAMPLES: usize = 1000;
-/// Length of a bootstrap block, samples.
-const BLOCK: usize = 250;
+use crate::diagnosis::engine::resampling::{bootstrap, running, share_gone};
 
 /// Prediction errors before and after, normalised by the channels' standard deviations.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,80 +99,5 @@ pub fn gain(
         after_ratio: whitened_rms(after.1),
         interval_95: share_gone(&sums(&squares_before), &sums(&squares_after)),
         channels,
-    }
-}
-
-/// Running sums of `values`, the first is zero.
-pub fn running(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut total = 0.0;
-    std::iter::once(0.0)
-        .chain(values.map(|value| {
-            total += value;
-            total
-        }))
-        .collect()
-}
-
-/// 95 % interval of `1 - sqrt(after/before)` from running sums of squares.
-pub fn share_gone(before: &[f64], after: &[f64]) -> [f64; 2] {
-    bootstrap([before, after], |[b, a]| {
-        1.0 - (a / b.max(f64::MIN_POSITIVE)).sqrt()
-    })
-}
-
-/// 95 % interval of a `statistic` of means, from the [`running`] sums of what they are means of:
-/// moving-block bootstrap over the samples.
-pub fn bootstrap<const N: usize>(
-    sums: [&[f64]; N],
-    statistic: impl Fn([f64; N]) -> f64,
-) -> [f64; 2] {
-    let n = sums.iter().map(|s| s.len()).min().unwrap_or(0);
-    let n = n.saturating_sub(1);
-    if n < 4 {
-        return [0.0, 0.0];
-    }
-    let block = BLOCK.min(n / 2).max(1);
-    let blocks = n.div_ceil(block);
-    let mut random = ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED);
-    let mut values: Vec<f64> = (0..RESAMPLES)
-        .map(|_| {
-            let mut means = [0.0; N];
-            for _ in 0..blocks {
-                let start = random.random_range(0..=n - block);
-                for (mean, sums) in means.iter_mut().zip(&sums) {
-                    *mean += (sums[start + block] - sums[start]) / (blocks * block) as f64;
-                }
-            }
-            statistic(means)
-        })
-        .collect();
-    values.sort_by(f64::total_cmp);
-    [
-        values[RESAMPLES / 40],
-        values[RESAMPLES - 1 - RESAMPLES / 40],
-    ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn interval_holds_the_share_of_a_steady_gain() {
-        let sums = |size: f64| -> Vec<f64> {
-            let mut total = 0.0;
-            (0..5001)
-                .map(|k| {
-                    let here = total;
-                    total += size * (1.0 + 0.5 * (0.37 * f64::from(k)).sin());
-                    here
-                })
-                .collect()
-        };
-        let [low, high] = share_gone(&sums(4.0), &sums(1.0));
-        assert!(
-            low <= 0.5 && 0.5 <= high && high - low < 0.05,
-            "{low} {high}"
-        );
     }
 }

@@ -1,4 +1,4 @@
-//! The pictures of a diagnosis.
+//! The pictures of a case.
 
 use identification::diagnosis::case::{CHANNELS, Case};
 use identification::diagnosis::rigs::shake_table::{Diagnosis, Validation};

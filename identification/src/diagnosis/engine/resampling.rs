@@ -1,28 +1,16 @@
-//! Significance with autocorrelated residuals.
+//! Intervals and significance by resampling blocks, so that samples may be correlated.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Seed of the bootstrap.
+/// Seed of [`gain_interval`].
 pub const SEED: u64 = 1;
+/// Seed of [`bootstrap`].
+pub const BOOTSTRAP_SEED: u64 = 20_170_401;
+/// Draws of a bootstrap.
 const DRAWS: usize = 1000;
-
-/// `||y - m|| / ||m - mean||` over the samples where `keep` holds.
-pub fn normalised_error(simulated: &[f64], measured: &[f64], keep: &[bool]) -> f64 {
-    let kept = || {
-        measured
-            .iter()
-            .zip(simulated)
-            .zip(keep)
-            .filter(|(_, keep)| **keep)
-            .map(|(p, _)| p)
-    };
-    let count = kept().count().max(1) as f64;
-    let mean = kept().map(|(m, _)| m).sum::<f64>() / count;
-    let error: f64 = kept().map(|(m, y)| (y - m).powi(2)).sum();
-    let size: f64 = kept().map(|(m, _)| (m - mean).powi(2)).sum();
-    (error / size).sqrt()
-}
+/// Length of a block of [`bootstrap`], samples.
+const BLOCK: usize = 250;
 
 /// Samples that count as one: `1 + 2 Σ ρ_k` over the first positive autocorrelations (Geyer's
 /// initial positive sequence, Statistical Science 7, 1992).
@@ -85,6 +73,54 @@ pub fn gain_interval(before: &[f64], after: &[f64]) -> (f64, f64) {
     (gains[DRAWS * 25 / 1000], gains[DRAWS * 975 / 1000 - 1])
 }
 
+/// Running sums of `values`, the first is zero.
+pub fn running(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut total = 0.0;
+    std::iter::once(0.0)
+        .chain(values.map(|value| {
+            total += value;
+            total
+        }))
+        .collect()
+}
+
+/// 95 % interval of `1 - sqrt(after/before)` from running sums of squares.
+pub fn share_gone(before: &[f64], after: &[f64]) -> [f64; 2] {
+    bootstrap([before, after], |[b, a]| {
+        1.0 - (a / b.max(f64::MIN_POSITIVE)).sqrt()
+    })
+}
+
+/// 95 % interval of a `statistic` of means, from the [`running`] sums of what they are means of:
+/// moving-block bootstrap over the samples.
+pub fn bootstrap<const N: usize>(
+    sums: [&[f64]; N],
+    statistic: impl Fn([f64; N]) -> f64,
+) -> [f64; 2] {
+    let n = sums.iter().map(|s| s.len()).min().unwrap_or(0);
+    let n = n.saturating_sub(1);
+    if n < 4 {
+        return [0.0, 0.0];
+    }
+    let block = BLOCK.min(n / 2).max(1);
+    let blocks = n.div_ceil(block);
+    let mut random = ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED);
+    let mut values: Vec<f64> = (0..DRAWS)
+        .map(|_| {
+            let mut means = [0.0; N];
+            for _ in 0..blocks {
+                let start = random.random_range(0..=n - block);
+                for (mean, sums) in means.iter_mut().zip(&sums) {
+                    *mean += (sums[start + block] - sums[start]) / (blocks * block) as f64;
+                }
+            }
+            statistic(means)
+        })
+        .collect();
+    values.sort_by(f64::total_cmp);
+    [values[DRAWS / 40], values[DRAWS - 1 - DRAWS / 40]]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -114,5 +150,24 @@ mod tests {
             .collect();
         let (low, high) = gain_interval(&before, &after);
         assert!(low < 0.5 && 0.5 < high && high - low < 0.1, "{low} {high}");
+    }
+
+    #[test]
+    fn interval_holds_the_share_of_a_steady_gain() {
+        let sums = |size: f64| -> Vec<f64> {
+            let mut total = 0.0;
+            (0..5001)
+                .map(|k| {
+                    let here = total;
+                    total += size * (1.0 + 0.5 * (0.37 * f64::from(k)).sin());
+                    here
+                })
+                .collect()
+        };
+        let [low, high] = share_gone(&sums(4.0), &sums(1.0));
+        assert!(
+            low <= 0.5 && 0.5 <= high && high - low < 0.05,
+            "{low} {high}"
+        );
     }
 }

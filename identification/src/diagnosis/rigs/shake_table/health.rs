@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use identification::diagnosis::case::{Case, Nominal, Record};
-use identification::diagnosis::rigs::shake_table::Diagnosis;
-use identification::diagnosis::rigs::shake_table::predictor::Disturbance;
-use identification::diagnosis::rigs::shake_table::relations;
 use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
+
+use super::predictor::Disturbance;
+use super::relations::{self, Relation};
+use crate::diagnosis::case::{Case, Nominal, Record};
 
 /// Seed of the noise on the simulated healthy rig.
 const SEED: u64 = 20_170_401;
@@ -28,21 +28,18 @@ pub struct RelationReport {
     pub healthy: Option<f64>,
 }
 
-/// The relations on the identification record.
-pub(super) fn relations(
+/// The relations on the identification record of `case`, which are `nominal` with the nominal
+/// parameters; `estimated` are those that were estimated along.
+pub(super) fn health(
     case: &Case,
-    diagnosis: &Diagnosis,
+    nominal: &[Relation],
+    estimated: &Nominal,
 ) -> BTreeMap<&'static str, RelationReport> {
-    let estimated = Nominal {
-        shake_table: diagnosis.extended_model.shake_table,
-        specimen: diagnosis.extended_model.specimen,
-        ..case.nominal.clone()
-    };
-    let after = relations::relations(&case.identification, &estimated);
-    let healthy = healthy(&case.identification, &estimated)
-        .map(|record| relations::relations(&record, &estimated));
-    let all = diagnosis.relations.iter().map(|relation| {
-        let find = |all: &[relations::Relation]| {
+    let after = relations::relations(&case.identification, estimated);
+    let healthy = healthy(&case.identification, estimated)
+        .map(|record| relations::relations(&record, estimated));
+    let all = nominal.iter().map(|relation| {
+        let find = |all: &[Relation]| {
             let mut all = all.iter();
             all.find(|other| other.name == relation.name)
                 .map(|other| other.ratio)

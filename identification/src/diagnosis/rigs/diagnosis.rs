@@ -1,33 +1,37 @@
-//! The report of a diagnosis on real data.
+//! The diagnosis of a rig on real data.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::measured::{Measured, Selection};
-use super::resampling::gain_interval;
-use super::selection::{Selected, select};
+use super::super::report::{ends_or_not_a_number, or_not_a_number};
+use super::measured::{Measured, Part};
 use super::{Description, DescriptionError, Measurement};
-use crate::diagnosis::engine::{Point, RigModel, Verdict};
+use crate::diagnosis::engine::resampling::gain_interval;
+use crate::diagnosis::engine::{
+    ExtensibleModel, Observer, Point, Progress, Selected, SimulatedModel, Verdict, estimates,
+    select,
+};
 
 /// A parameter of the extended model, SI.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Value {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NamedValue {
     /// Its name.
     pub name: String,
     /// The estimate.
     pub value: f64,
     /// SI unit.
-    pub unit: &'static str,
+    pub unit: String,
     /// One standard deviation, autocorrelation of the residuals counted.
+    #[serde(deserialize_with = "or_not_a_number")]
     pub standard_error: f64,
 }
 
 /// An effect that one part of the data asks for.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct EffectReport {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PartEffect {
     /// Its name.
     pub effect: String,
     /// Its parameters.
-    pub parameters: Vec<Value>,
+    pub parameters: Vec<NamedValue>,
     /// Probability that its gain on unseen data is no chance, correlated samples counted once.
     pub confidence: f64,
     /// By how much the squared error on the data not fitted grows without it (all else refitted),
@@ -36,7 +40,7 @@ pub struct EffectReport {
 }
 
 /// What one part of the data says, tested on the other.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PartReport {
     /// Normalised error of the nominal model on the data not fitted.
     pub nominal_error: f64,
@@ -48,31 +52,33 @@ pub struct PartReport {
     pub fitted_error: f64,
     /// 95 % interval of the share of the refitted model's squared error that the effects take away
     /// on the data not fitted.
+    #[serde(deserialize_with = "ends_or_not_a_number")]
     pub gain_interval: (f64, f64),
     /// Nominal parameters as refitted.
-    pub parameters: Vec<Value>,
+    pub parameters: Vec<NamedValue>,
     /// The effects.
-    pub effects: Vec<EffectReport>,
+    pub effects: Vec<PartEffect>,
     /// Share of the nominal model's squared error on the data not fitted that the extended model
     /// explains.
     pub explained: f64,
     /// Pairs of an effect that nearly did as well and the one that was taken.
     pub rivals: Vec<(String, String)>,
+    /// Where the extended model is.
     #[serde(skip)]
-    point: Point,
+    pub(super) point: Point,
 }
 
 /// The diagnosis of a rig.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Report {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RigDiagnosis {
     /// The rig.
     pub name: String,
     /// Its kind.
     pub kind: String,
     /// What is simulated.
-    pub output: &'static str,
-    /// `adequate`, `named`, `ambiguous` or `unexplained`.
-    pub verdict: &'static str,
+    pub output: String,
+    /// The verdict.
+    pub verdict: Verdict,
     /// Effects that both parts of the data name.
     pub named: Vec<String>,
     /// Effects that only one part names.
@@ -92,24 +98,23 @@ pub struct Report {
 pub fn diagnose(
     description: &Description,
     measurement: &Measurement,
-    verbose: bool,
-) -> Result<Report, DescriptionError> {
+    observer: Observer<'_>,
+) -> Result<RigDiagnosis, DescriptionError> {
     let rig = description.rig()?;
-    let nominal = description.nominal(rig.as_ref())?;
-    let measured = Measured::new(rig.as_ref(), measurement, nominal);
-    let part = |fitted: Selection| {
-        if verbose {
-            eprintln!("fitting {}", measured.record_name(fitted as usize));
-        }
+    let nominal = description.nominal(rig)?;
+    let measured = Measured::new(rig, measurement, nominal);
+    let part = |fitted: Part| {
+        let record = fitted as usize;
+        observer.tell(|| Progress::Fitting(measured.record_name(record).to_owned()));
         let selected =
-            select(&measured, fitted, verbose).ok_or_else(|| DescriptionError::Description {
+            select(&measured, record, observer).ok_or_else(|| DescriptionError::Description {
                 path: description.path.clone(),
                 what: "the nominal model gives no finite output on these data".to_owned(),
             })?;
         Ok(part_report(&measured, fitted, &selected))
     };
-    let as_described = part(Selection::Fitted)?;
-    let swapped = part(Selection::LeftOut)?;
+    let as_described = part(Part::Fitted)?;
+    let swapped = part(Part::LeftOut)?;
     let list = |part: &PartReport| -> Vec<String> {
         part.effects
             .iter()
@@ -154,11 +159,11 @@ pub fn diagnose(
         (_, _, true) => Verdict::Ambiguous,
         _ => Verdict::Named,
     };
-    Ok(Report {
+    Ok(RigDiagnosis {
         name: description.name.clone(),
         kind: description.kind.clone(),
-        output: rig.output().0,
-        verdict: verdict.word(),
+        output: rig.output().0.to_owned(),
+        verdict,
         named,
         not_confirmed,
         unexplained: 1.0 - as_described.explained,
@@ -167,7 +172,7 @@ pub fn diagnose(
     })
 }
 
-fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) -> PartReport {
+fn part_report(measured: &Measured<'_>, fitted: Part, selected: &Selected) -> PartReport {
     let tested = fitted.other() as usize;
     let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
     let origin = Point {
@@ -179,29 +184,24 @@ fn part_report(measured: &Measured<'_>, fitted: Selection, selected: &Selected) 
     let extended = measured.errors(&selected.extended.point, tested);
     let after = squares(&extended);
     let point = &selected.extended.point;
-    let mut place = point.nuisance.len();
     let mut effects = Vec::new();
-    for (i, (index, internal)) in point.effects.iter().enumerate() {
-        let candidate = &measured.candidates()[*index];
-        let parameters = candidate
-            .parameters
-            .iter()
-            .zip(internal)
-            .map(|(parameter, &q)| {
-                let deviation = selected.deviations.get(place).copied().unwrap_or(f64::NAN);
-                place += 1;
-                Value {
-                    name: parameter.name.to_owned(),
-                    value: parameter.scale.to_value(q),
-                    unit: parameter.unit,
-                    standard_error: (parameter.scale.slope(q) * deviation).abs(),
-                }
-            })
-            .collect();
+    for (i, named) in estimates(measured, point, &selected.deviations)
+        .into_iter()
+        .enumerate()
+    {
         let without = squares(&measured.errors(&selected.without[i].point, tested));
-        effects.push(EffectReport {
-            effect: candidate.effect.to_owned(),
-            parameters,
+        effects.push(PartEffect {
+            effect: named.effect.to_owned(),
+            parameters: named
+                .parameters
+                .into_iter()
+                .map(|p| NamedValue {
+                    name: p.name,
+                    value: p.value,
+                    unit: p.unit.to_owned(),
+                    standard_error: p.standard_error,
+                })
+                .collect(),
             confidence: normal(selected.deviates[i]),
             share: (without - after) / before,
         });
@@ -242,7 +242,7 @@ fn normal(deviate: f64) -> f64 {
     if deviate < 0.0 { above } else { 1.0 - above }
 }
 
-fn parameters(measured: &Measured<'_>, point: &Point, deviations: &[f64]) -> Vec<Value> {
+fn parameters(measured: &Measured<'_>, point: &Point, deviations: &[f64]) -> Vec<NamedValue> {
     let values = measured.nominal_values(point);
     let names = measured.uncertain_names();
     let known = measured.rig.parameters();
@@ -253,41 +253,55 @@ fn parameters(measured: &Measured<'_>, point: &Point, deviations: &[f64]) -> Vec
             let place = known.iter().position(|(k, _)| k == name)?;
             let mut moved = point.clone();
             moved.nuisance[i] += deviations.get(i).copied().unwrap_or(0.0);
-            Some(Value {
+            Some(NamedValue {
                 name: (*name).to_owned(),
                 value: values[place],
-                unit: known[place].1,
+                unit: known[place].1.to_owned(),
                 standard_error: (measured.nominal_values(&moved)[place] - values[place]).abs(),
             })
         })
         .collect()
 }
 
-impl Report {
-    /// Measured output, nominal and extended model of every series, for pictures.
-    ///
-    /// # Errors
-    /// When the description does not fit the rig.
-    pub fn curves(
-        &self,
-        description: &Description,
-        measurement: &Measurement,
-    ) -> Result<Vec<[Vec<f64>; 3]>, DescriptionError> {
-        let rig = description.rig()?;
-        let nominal = description.nominal(rig.as_ref())?;
-        let measured = Measured::new(rig.as_ref(), measurement, nominal);
-        let origin = Point {
-            nuisance: vec![0.0; measured.nuisance()],
-            effects: Vec::new(),
-        };
-        let curves = (0..measurement.series.len()).map(|s| {
-            let measured_output = measurement.series[s].output.clone();
-            [
-                measured_output,
-                measured.simulate(&origin, s),
-                measured.simulate(&self.as_described.point, s),
-            ]
-        });
-        Ok(curves.collect())
+impl RigDiagnosis {
+    /// What was found, in a sentence.
+    pub fn sentence(&self) -> String {
+        let listed = |names: &[String]| names.join(", ").replace('_', " ");
+        let part = &self.as_described;
+        let falls = format!(
+            "the error of {} on the data left out falls from {:.1} to {:.1} %",
+            self.output,
+            100.0 * part.nominal_error,
+            100.0 * part.extended_error
+        );
+        let name = &self.name;
+        match self.verdict {
+            Verdict::Adequate => format!(
+                "{name}: the nominal model is adequate; refitted within its uncertainty, its error \
+                 of {} on the data left out is {:.1} %.",
+                self.output,
+                100.0 * part.refitted_error
+            ),
+            Verdict::Named => format!(
+                "{name}: every part of the data names {}; {falls}.",
+                listed(&self.named)
+            ),
+            Verdict::Ambiguous => {
+                let rivals = part.rivals.iter();
+                let rivals: Vec<String> = rivals
+                    .map(|(rival, against)| format!("{rival} in the place of {against}"))
+                    .collect();
+                format!(
+                    "{name}: every part of the data names {}, and {} would do nearly as well; \
+                     {falls}.",
+                    listed(&self.named),
+                    listed(&rivals)
+                )
+            }
+            Verdict::Unexplained => format!(
+                "{name}: no effect is named by every part of the data and pays on all of them; with \
+                 what one part asks for, {falls}."
+            ),
+        }
     }
 }

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use identification::diagnosis::case::{CHANNELS, ControlLaw, Nominal, Record};
-use identification::diagnosis::engine::gain::{running, share_gone};
+use identification::diagnosis::engine::resampling::{running, share_gone};
+use identification::diagnosis::{GainAgainstNoise, GainReport};
 
-use super::GainReport;
 use crate::fmu::Fmu;
 use crate::master::{Algorithm, Ended, Pace, Simulation};
 use crate::motion::Motion;
-use crate::system::{SystemFile, assemble};
+use crate::system::{ComponentFile, Origin, Quantity, SystemFile, VariableName, assemble};
 use plant::identified::nominal::{shake_table_values, specimen_values};
 
 /// Coupling steps of table and specimen in a sample, the finest that the rig's delays allow (they
@@ -62,8 +62,7 @@ pub fn play(
     period: f64,
     noise: Option<([f64; 4], i32)>,
 ) -> Result<Channels, String> {
-    let text = system(rig, law, period, noise)?;
-    let file = SystemFile::parse("closed loop", &text).map_err(|e| e.to_string())?;
+    let file = system(rig, law, period, noise)?;
     let mut library = |path: &str| -> Result<Arc<Fmu>, Box<dyn std::error::Error>> {
         Ok(Fmu::open(Path::new(path))?)
     };
@@ -127,13 +126,13 @@ fn motion(reference: &[f64], period: f64) -> Motion {
     }
 }
 
-/// The closed loop as a system file.
+/// The closed loop as a system.
 fn system(
     rig: &RigFmus,
     law: &ControlLaw,
     period: f64,
     noise: Option<([f64; 4], i32)>,
-) -> Result<String, String> {
+) -> Result<SystemFile, String> {
     let share = law.velocity_filter;
     if !(share > 0.0 && share <= 1.0) {
         return Err(format!(
@@ -168,47 +167,61 @@ fn system(
         ),
         ("valve_limit", law.limit),
     ];
-    let component = |name: &str, fmu: &Path, head: &str, parameters: &[(&str, f64)]| {
-        let fmu = toml::Value::from(fmu.display().to_string());
-        let mut text = format!("[components.{name}]\nfmu = {fmu}\n{head}");
-        text += &format!("[components.{name}.parameters]\n");
+    let component = |fmu: &Path, parameters: &[(&str, f64)]| {
+        let mut component = ComponentFile::new(&fmu.display().to_string());
         for (parameter, value) in parameters {
-            // The debug form always has a point or an exponent: a TOML float.
-            text += &format!("\"{parameter}\" = {value:?}\n");
+            component.set(parameter, *value);
         }
-        text
+        component
     };
-    let sampled = format!("period = \"{period} s\"\n");
-    let mut text = String::from("connections = [\n");
-    for quantity in ["displacement", "velocity", "acceleration"] {
-        text += &format!(
-            "\"reference.{quantity} -> control.reference_{quantity}\",\n\
-             \"sensors.measured_{quantity} -> control.measured_{quantity}\",\n\
-             \"table.{quantity} -> sensors.{quantity}\",\n"
-        );
-    }
-    text += "\"table.actuator_force -> sensors.actuator_force\",\n\
-             \"control.valve_command -> table.valve_command\",\n";
-    if rig.specimen.is_some() {
-        text += "\"table.acceleration -> specimen.table_acceleration\",\n\
-                 \"specimen.force -> table.specimen_force\",\n\
-                 \"specimen.acceleration -> sensors.specimen_acceleration\",\n";
-    }
-    text += "]\n";
-    text += &component("table", &rig.table.0, "", &rig.table.1);
-    text += &component("sensors", &rig.sensors, &sampled, &sensors);
+    let mut table = component(&rig.table.0, &rig.table.1);
+    let mut sensors = component(&rig.sensors, &sensors).period(period);
     if let Some((_, seed)) = noise {
-        text += &format!("seed = {seed}\n");
+        sensors.set("seed", i64::from(seed));
     }
-    text += &component("control", &rig.control, &sampled, &control);
-    match &rig.specimen {
-        Some((fmu, parameters)) => text += &component("specimen", fmu, "", parameters),
-        None => {
-            text += "[components.table.inputs]\nspecimen_force = 0.0\n\
-                     [components.sensors.inputs]\nspecimen_acceleration = 0.0\n";
+    let mut system = SystemFile::new("closed loop");
+    let mut connect = |from: Origin, component: &str, variable: &str| {
+        system.connect(from, VariableName::new(component, variable));
+    };
+    for quantity in Quantity::ALL {
+        let name = quantity.name();
+        connect(
+            Origin::reference(quantity),
+            "control",
+            &format!("reference_{name}"),
+        );
+        let measured = format!("measured_{name}");
+        connect(Origin::output("sensors", &measured), "control", &measured);
+        connect(Origin::output("table", name), "sensors", name);
+    }
+    for (from, output, to, input) in [
+        ("table", "actuator_force", "sensors", "actuator_force"),
+        ("control", "valve_command", "table", "valve_command"),
+    ] {
+        connect(Origin::output(from, output), to, input);
+    }
+    if let Some((fmu, parameters)) = &rig.specimen {
+        for (from, output, to, input) in [
+            ("table", "acceleration", "specimen", "table_acceleration"),
+            ("specimen", "force", "table", "specimen_force"),
+            (
+                "specimen",
+                "acceleration",
+                "sensors",
+                "specimen_acceleration",
+            ),
+        ] {
+            connect(Origin::output(from, output), to, input);
         }
+        system.add("specimen", component(fmu, parameters));
+    } else {
+        table = table.input("specimen_force", 0.0);
+        sensors = sensors.input("specimen_acceleration", 0.0);
     }
-    Ok(text)
+    system.add("table", table);
+    system.add("sensors", sensors);
+    system.add("control", component(&rig.control, &control).period(period));
+    Ok(system)
 }
 
 /// What the co-simulated models make of a record.
@@ -278,7 +291,7 @@ fn gain(record: &Record, before: &Channels, after: &Channels, floor: &[f64; 4]) 
         .iter()
         .map(|&i| {
             let errors = [rms(before, i), rms(after, i), floor[i]];
-            (CHANNELS[i], errors.map(|error| error / scale(i)))
+            (CHANNELS[i].to_owned(), errors.map(|error| error / scale(i)))
         })
         .collect();
     let overall = |of: &dyn Fn(usize) -> f64| {
@@ -295,11 +308,14 @@ fn gain(record: &Record, before: &Channels, after: &Channels, floor: &[f64; 4]) 
     GainReport {
         before_nrmse: overall(&|i| rms(before, i) / scale(i)),
         after_nrmse: overall(&|i| rms(after, i) / scale(i)),
-        noise_floor_nrmse: overall(&|i| floor[i] / scale(i)),
-        interval_95: share_gone(&sums(before), &sums(after)),
-        record: "validation",
-        before_ratio: overall(&|i| rms(before, i) / floor[i]),
-        after_ratio: overall(&|i| rms(after, i) / floor[i]),
-        channels,
+        noise_floor_nrmse: Some(overall(&|i| floor[i] / scale(i))),
+        interval_95: share_gone(&sums(before), &sums(after)).into(),
+        interval_of: None,
+        record: "validation".to_owned(),
+        against_noise: Some(GainAgainstNoise {
+            before_ratio: overall(&|i| rms(before, i) / floor[i]),
+            after_ratio: overall(&|i| rms(after, i) / floor[i]),
+            channels,
+        }),
     }
 }

@@ -9,7 +9,7 @@ use crate::diagnosis::case::ControlLaw;
 
 /// A motion and how well it separates two models.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Experiment {
+pub struct SeparatingExperiment {
     /// Kind of motion.
     pub kind: &'static str,
     /// Peak displacement of its reference, m.
@@ -78,9 +78,9 @@ pub fn separate(
     law: &ControlLaw,
     noise: &[f64; 4],
     period: f64,
-) -> Option<Experiment> {
+) -> Option<SeparatingExperiment> {
     let samples = (DURATION / period) as usize;
-    let mut best: Option<Experiment> = None;
+    let mut best: Option<SeparatingExperiment> = None;
     for (index, kind) in KINDS.into_iter().enumerate() {
         for peak in PEAKS {
             let motion = reference(index, peak, samples, period);
@@ -101,7 +101,7 @@ pub fn separate(
                     .as_ref()
                     .is_none_or(|best| separation > best.separation)
             {
-                best = Some(Experiment {
+                best = Some(SeparatingExperiment {
                     kind,
                     peak,
                     separation,

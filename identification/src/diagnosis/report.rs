@@ -1,0 +1,273 @@
+//! The report of a diagnosis: what is printed as JSON, written, drawn and handed on.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::engine::{NamedEffect, Verdict};
+use super::rigs::shake_table::{self, RelationReport};
+use super::rigs::{PartEffect, RigDiagnosis};
+
+/// A diagnosis of a case or of a rig; SI.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DiagnosisReport {
+    /// One sentence.
+    pub sentence: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The effects.
+    pub effects: Vec<EffectReport>,
+    /// Rival sets of effects.
+    pub alternatives: Vec<Vec<String>>,
+    /// The experiment that would tell the first rival apart.
+    pub separating_experiment: Option<String>,
+    /// What the extended model brings on data that were not fitted.
+    pub gain: GainReport,
+    /// Where the extended model was written.
+    pub extended_model: Option<PathBuf>,
+    /// The FMU (3.0) with the first of the effects.
+    pub extended_fmu: Option<PathBuf>,
+    /// All FMUs of the extended model.
+    pub extended_fmus: Vec<PathBuf>,
+    /// What the reader should know.
+    pub notes: Vec<String>,
+    /// What the verdict rests on.
+    #[serde(flatten)]
+    pub evidence: Evidence,
+    /// Time taken, s.
+    pub wall_s: f64,
+}
+
+/// What a verdict rests on, which differs with the noise that a right model leaves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Evidence {
+    /// White innovations.
+    ShakeTable(ShakeTableEvidence),
+    /// Correlated errors of a simulation.
+    Rig(Box<RigEvidence>),
+}
+
+/// What a verdict on a case rests on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShakeTableEvidence {
+    /// The gain in closed-loop co-simulation through the FMUs.
+    pub co_simulation: Option<GainReport>,
+    /// The relations R1 to R5 on the identification record.
+    pub relations: BTreeMap<String, RelationReport>,
+    /// Traces left over, strongest first, as normal deviates.
+    pub remaining: Vec<(String, f64)>,
+    /// Share of the nominal model's excess error that the effects explain.
+    pub share_explained: f64,
+}
+
+/// What a verdict on a rig rests on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RigEvidence {
+    /// Share of the nominal model's squared error on the data left out that stays unexplained.
+    pub unexplained_share: f64,
+    /// What each part of the data says, tested on the other.
+    pub rig: RigDiagnosis,
+}
+
+/// An effect in a [`DiagnosisReport`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectReport {
+    /// Its name in the catalogue.
+    pub effect: String,
+    /// Its parameters by name.
+    pub parameters: BTreeMap<String, ParameterReport>,
+    /// 0 to 1.
+    pub confidence: f64,
+    /// Of a rig: by how much the squared error on unseen data grows without it, as a share of the
+    /// nominal model's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub share_explained: Option<f64>,
+    /// Of a rig: whether every part of the data names it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub on_every_part: Option<bool>,
+}
+
+/// A parameter in an [`EffectReport`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterReport {
+    /// The estimate.
+    pub value: f64,
+    /// SI unit.
+    pub unit: String,
+    /// One standard deviation; not a number where it is unknown.
+    #[serde(deserialize_with = "or_not_a_number")]
+    pub standard_error: f64,
+}
+
+/// What the extended model brings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GainReport {
+    /// Error over the variation of what was measured, nominal; of a case the root mean square over
+    /// its channels.
+    pub before_nrmse: f64,
+    /// The same for the extended model.
+    pub after_nrmse: f64,
+    /// The same for a perfect model, where the sensors' noise is known.
+    pub noise_floor_nrmse: Option<f64>,
+    /// 95 % interval of the share of the error that is gone.
+    #[serde(deserialize_with = "ends_or_not_a_number")]
+    pub interval_95: (f64, f64),
+    /// What exactly the interval is of, where it is not that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_of: Option<String>,
+    /// The data, which were not fitted.
+    pub record: String,
+    /// By channel and against the noise, of a case.
+    #[serde(flatten)]
+    pub against_noise: Option<GainAgainstNoise>,
+}
+
+/// A gain where the noise of every channel is known.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GainAgainstNoise {
+    /// Error before, in units of the noise floor.
+    pub before_ratio: f64,
+    /// And after.
+    pub after_ratio: f64,
+    /// By channel: before, after, floor.
+    pub channels: BTreeMap<String, [f64; 3]>,
+}
+
+/// JSON has no word for what is not a number but `null`.
+pub(super) fn or_not_a_number<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+/// As [`or_not_a_number`], two of them.
+pub(super) fn ends_or_not_a_number<'de, D: Deserializer<'de>>(
+    from: D,
+) -> Result<(f64, f64), D::Error> {
+    let (low, high): (Option<f64>, Option<f64>) = Deserialize::deserialize(from)?;
+    Ok((low.unwrap_or(f64::NAN), high.unwrap_or(f64::NAN)))
+}
+
+impl From<&NamedEffect> for EffectReport {
+    fn from(named: &NamedEffect) -> Self {
+        let parameters = named.parameters.iter().map(|p| {
+            let report = ParameterReport {
+                value: p.value,
+                unit: p.unit.to_owned(),
+                standard_error: p.standard_error,
+            };
+            (p.name.clone(), report)
+        });
+        Self {
+            effect: named.effect.to_owned(),
+            parameters: parameters.collect(),
+            confidence: named.confidence,
+            share_explained: None,
+            on_every_part: None,
+        }
+    }
+}
+
+impl From<&shake_table::gain::Gain> for GainReport {
+    fn from(gain: &shake_table::gain::Gain) -> Self {
+        let channels = gain.channels.iter();
+        Self {
+            before_nrmse: gain.before_nrmse,
+            after_nrmse: gain.after_nrmse,
+            noise_floor_nrmse: Some(gain.noise_floor_nrmse),
+            interval_95: gain.interval_95.into(),
+            interval_of: None,
+            record: "validation".to_owned(),
+            against_noise: Some(GainAgainstNoise {
+                before_ratio: gain.before_ratio,
+                after_ratio: gain.after_ratio,
+                channels: channels
+                    .map(|c| (c.channel.to_owned(), [c.before, c.after, c.floor]))
+                    .collect(),
+            }),
+        }
+    }
+}
+
+impl From<&shake_table::Diagnosis> for DiagnosisReport {
+    fn from(found: &shake_table::Diagnosis) -> Self {
+        let owned = |set: &Vec<&str>| set.iter().map(ToString::to_string).collect();
+        let relations = found.relations.iter();
+        Self {
+            sentence: found.sentence.clone(),
+            verdict: found.verdict,
+            effects: found.effects.iter().map(EffectReport::from).collect(),
+            alternatives: found.alternatives.iter().map(owned).collect(),
+            separating_experiment: found.separating_experiment.clone(),
+            gain: (&found.gain).into(),
+            extended_model: None,
+            extended_fmu: None,
+            extended_fmus: Vec::new(),
+            notes: found.notes.clone(),
+            evidence: Evidence::ShakeTable(ShakeTableEvidence {
+                co_simulation: None,
+                relations: relations
+                    .map(|(name, r)| ((*name).to_owned(), *r))
+                    .collect(),
+                remaining: found
+                    .remaining
+                    .iter()
+                    .map(|test| (test.what.clone(), test.deviate))
+                    .collect(),
+                share_explained: found.share_explained,
+            }),
+            wall_s: 0.0,
+        }
+    }
+}
+
+impl From<&RigDiagnosis> for DiagnosisReport {
+    fn from(found: &RigDiagnosis) -> Self {
+        let part = &found.as_described;
+        let effect = |one: &PartEffect| {
+            let parameters = one.parameters.iter().map(|p| {
+                let report = ParameterReport {
+                    value: p.value,
+                    unit: p.unit.clone(),
+                    standard_error: p.standard_error,
+                };
+                (p.name.clone(), report)
+            });
+            EffectReport {
+                effect: one.effect.clone(),
+                parameters: parameters.collect(),
+                confidence: one.confidence,
+                share_explained: Some(one.share),
+                on_every_part: Some(!found.not_confirmed.contains(&one.effect)),
+            }
+        };
+        let rivals = part.rivals.iter();
+        Self {
+            sentence: found.sentence(),
+            verdict: found.verdict,
+            effects: part.effects.iter().map(effect).collect(),
+            alternatives: rivals.map(|(rival, _)| vec![rival.clone()]).collect(),
+            separating_experiment: None,
+            gain: GainReport {
+                before_nrmse: part.nominal_error,
+                after_nrmse: part.extended_error,
+                noise_floor_nrmse: None,
+                interval_95: part.gain_interval,
+                interval_of: Some(
+                    "share of the refitted model's squared error that the effects take away".into(),
+                ),
+                record: "left out".to_owned(),
+                against_noise: None,
+            },
+            extended_model: None,
+            extended_fmu: None,
+            extended_fmus: Vec::new(),
+            notes: Vec::new(),
+            evidence: Evidence::Rig(Box::new(RigEvidence {
+                unexplained_share: found.unexplained,
+                rig: found.clone(),
+            })),
+            wall_s: 0.0,
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Diagnosis of a case or of a rig: from files to a report with its pictures, the extended model and,
+//! of a shake table, its FMUs.
+
+mod case;
+pub mod co_simulation;
+mod page;
+mod pictures;
+mod rig;
+pub mod text;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use identification::diagnosis::case::CaseError;
+use identification::diagnosis::engine::Observer;
+use identification::diagnosis::rigs::DescriptionError;
+use identification::diagnosis::{
+    self as library, Diagnosis, DiagnosisError, DiagnosisReport, Evidence, Subject,
+};
+
+use crate::error::Error;
+use crate::report::{self, Report};
+use crate::results::Results;
+
+/// File with the extended model, in the folder of `--out`.
+pub const EXTENDED_MODEL: &str = "extended_model.toml";
+/// File with the JSON object, in the folder of `--out`.
+pub const DIAGNOSIS: &str = "diagnosis.json";
+/// File with the report, in the folder of `--out`.
+pub const REPORT: &str = "report.html";
+
+/// Diagnoses the case in folder `subject`, or the rig that the description `subject` (`.toml`)
+/// tells of, on `data` in place of its own files if there are any. Writes the extended model, its
+/// FMUs, the JSON object, the report and, of a rig, curves and pictures into `folder`, all or
+/// nothing. `observer` is told what is tried.
+///
+/// # Errors
+/// What cannot be read, records that would mislead, a folder that cannot be written.
+pub fn diagnose(
+    subject: &Path,
+    data: &[PathBuf],
+    folder: &Path,
+    observer: Observer<'_>,
+) -> Result<DiagnosisReport, Error> {
+    let begun = Instant::now();
+    Results::check(folder)?;
+    let read = Subject::read(subject, data).map_err(|error| fault(subject, error))?;
+    let found = library::diagnose(&read, observer).map_err(|error| fault(subject, error))?;
+    let mut report = found.report();
+    report.extended_model = Some(folder.join(EXTENDED_MODEL));
+    let mut results = Results::begin(folder)?;
+    let page = match &found {
+        Diagnosis::Case { case, found } => {
+            let extended = case::extend(case, found, &mut report, &mut results, folder)?;
+            report.wall_s = begun.elapsed().as_secs_f64();
+            page::of_case(subject, &report, case, found, &extended)
+        }
+        Diagnosis::Rig {
+            description,
+            measurement,
+            found,
+        } => {
+            let curves = rig::extend(description, measurement, found, &mut results, folder)?;
+            report.wall_s = begun.elapsed().as_secs_f64();
+            page::of_rig(&found.name, subject, &report, &curves)
+        }
+    };
+    results.write_text(REPORT, &html(&page, folder)?)?;
+    results.write_text(DIAGNOSIS, &format!("{:#}\n", serde_json::json!(report)))?;
+    results.finish()?;
+    Ok(report)
+}
+
+/// The files of `report`, which lie in `folder`, for people.
+pub fn files(report: &DiagnosisReport, folder: &Path) -> Vec<PathBuf> {
+    let mut files = [REPORT, DIAGNOSIS, EXTENDED_MODEL]
+        .map(|name| folder.join(name))
+        .to_vec();
+    if matches!(report.evidence, Evidence::Rig(_)) {
+        files.extend(rig::FILES.map(|name| folder.join(name)));
+    }
+    files.extend(report.extended_fmus.iter().cloned());
+    files
+}
+
+fn html(page: &Report, folder: &Path) -> Result<String, Error> {
+    report::html(page).map_err(|error| file_fault(&folder.join(REPORT), error))
+}
+
+fn file_fault(path: &Path, error: impl std::fmt::Display) -> Error {
+    Error::File {
+        path: path.into(),
+        reason: error.to_string(),
+    }
+}
+
+/// The error by the file that is at fault, which is `subject` where none is named.
+fn fault(subject: &Path, error: DiagnosisError) -> Error {
+    match error {
+        DiagnosisError::Case(CaseError::File { file, reason }) => file_fault(&file, reason),
+        DiagnosisError::Rig(DescriptionError::Read { path, source }) => file_fault(&path, source),
+        DiagnosisError::Rig(DescriptionError::Description { path, what }) => {
+            file_fault(&path, what)
+        }
+        DiagnosisError::Rig(DescriptionError::Data { path, line, what }) => {
+            file_fault(&path, format!("line {line}: {what}"))
+        }
+        DiagnosisError::DataOfACase => Error::Option {
+            option: "--data",
+            reason: error.to_string(),
+        },
+        other @ DiagnosisError::Case(_) => file_fault(subject, other),
+    }
+}
+
+/// The report of the diagnosis whose `diagnosis.json` lies in `folder`: of a rig with its pictures,
+/// where its curves are still there, of a case without them, since they need the records.
+///
+/// # Errors
+/// A file that cannot be read or is none of a diagnosis; a report with pictures that would be lost.
+pub fn page_again(folder: &Path) -> Result<String, Error> {
+    let path = folder.join(DIAGNOSIS);
+    let text = std::fs::read_to_string(&path).map_err(|error| file_fault(&path, error))?;
+    let report: DiagnosisReport = serde_json::from_str(&text)
+        .map_err(|error| file_fault(&path, format!("not the JSON of a diagnosis: {error}")))?;
+    let curves = match &report.evidence {
+        Evidence::Rig(_) => rig::curves_again(folder)?,
+        Evidence::ShakeTable(_) => None,
+    };
+    if curves.is_none() && folder.join(REPORT).is_file() {
+        return Err(file_fault(
+            folder,
+            "its report.html has pictures that diagnosis.json does not hold; move it away to have \
+             one without them, or run `shakebench diagnose` again",
+        ));
+    }
+    html(&page::again(folder, &report, curves.as_deref()), folder)
+}

@@ -1,0 +1,237 @@
+//! A diagnosis on the terminal, and the tables that it shares with the report.
+
+use identification::diagnosis::rigs::shake_table::{laboratory_unit, with_error};
+use identification::diagnosis::rigs::{PartReport, RigDiagnosis};
+use identification::diagnosis::{
+    DiagnosisReport, Evidence, GainReport, ParameterReport, ShakeTableEvidence,
+};
+
+use crate::report::columns::{aligned, significant};
+
+fn in_unit(parameter: &ParameterReport, unit: &str) -> String {
+    let (value, error) = (parameter.value, parameter.standard_error);
+    with_error(value, error, &parameter.unit, unit)
+}
+
+/// Estimates with a line of headings. The units of the laboratory stand beside SI for the shake
+/// table, whose laboratory it is.
+pub(super) fn parameters(report: &DiagnosisReport) -> Vec<Vec<String>> {
+    let is_case = matches!(report.evidence, Evidence::ShakeTable(_));
+    let mut heading = vec!["effect", "parameter"];
+    heading.extend(is_case.then_some("laboratory"));
+    heading.extend(["SI", "confidence"]);
+    heading.extend((!is_case).then_some("on every part"));
+    let mut rows = vec![heading.into_iter().map(String::from).collect()];
+    for effect in &report.effects {
+        let row = |name: &str, of: Option<&ParameterReport>| {
+            let cell = |unit: &dyn Fn(&str) -> String| {
+                of.map_or("-".to_string(), |p| in_unit(p, &unit(&p.unit)))
+            };
+            let mut row = vec![effect.effect.clone(), name.to_string()];
+            row.extend(is_case.then(|| cell(&|si| laboratory_unit(si).to_string())));
+            row.push(cell(&str::to_string));
+            row.push(format!("{:.3}", effect.confidence));
+            let word = |all| if all { "yes" } else { "no" }.to_string();
+            row.extend(effect.on_every_part.map(word));
+            row
+        };
+        if effect.parameters.is_empty() {
+            rows.push(row("-", None));
+        }
+        let all = effect.parameters.iter();
+        rows.extend(all.map(|(name, p)| row(name, Some(p))));
+    }
+    rows
+}
+
+/// Columns of [`channels`].
+const GAIN: [&str; 6] = [
+    "channel",
+    "before",
+    "after",
+    "noise floor",
+    "before/floor",
+    "after/floor",
+];
+
+/// Errors by channel with a line of headings; the overall ratios are those of the gain itself. None
+/// where the noise is not known.
+pub(super) fn channels(gain: &GainReport) -> Option<Vec<Vec<String>>> {
+    let noise = gain.against_noise.as_ref()?;
+    let row = |name: &str, [before, after, floor]: [f64; 3], ratios: [f64; 2]| {
+        let mut row = vec![name.to_string()];
+        row.extend([before, after, floor].map(|error| significant(error, 3)));
+        row.extend(ratios.map(|ratio| significant(ratio, 3)));
+        row
+    };
+    let mut rows = vec![GAIN.map(String::from).to_vec()];
+    let channels = noise.channels.iter();
+    rows.extend(
+        channels.map(|(name, e)| row(&name.replace('_', " "), *e, [e[0] / e[2], e[1] / e[2]])),
+    );
+    let floor = gain.noise_floor_nrmse.unwrap_or(f64::NAN);
+    rows.push(row(
+        "all",
+        [gain.before_nrmse, gain.after_nrmse, floor],
+        [noise.before_ratio, noise.after_ratio],
+    ));
+    Some(rows)
+}
+
+/// How much of the error is gone, with its interval.
+pub(super) fn share(gain: &GainReport) -> String {
+    let (low, high) = gain.interval_95;
+    let (low, high) = (100.0 * low, 100.0 * high);
+    let decimals = usize::from(high - low < 2.0);
+    format!("Of the error {low:.decimals$} to {high:.decimals$} % is gone (95 %, block bootstrap)")
+}
+
+/// What else the reader should know, a line each.
+pub(super) fn remarks(report: &DiagnosisReport) -> Vec<String> {
+    let mut lines: Vec<String> = match &report.evidence {
+        Evidence::ShakeTable(_) => report
+            .alternatives
+            .iter()
+            .map(|set| format!("as likely: {}", set.join(" and ")))
+            .collect(),
+        Evidence::Rig(evidence) => {
+            let rig = &evidence.rig;
+            let rivals = rig.as_described.rivals.iter();
+            let only = (!rig.not_confirmed.is_empty()).then(|| {
+                let names = rig.not_confirmed.join(", ");
+                format!("on one part of the data only: {names}")
+            });
+            rivals
+                .map(|(rival, against)| format!("{rival} would do nearly as well as {against}"))
+                .chain(only)
+                .collect()
+        }
+    };
+    if let Some(experiment) = &report.separating_experiment {
+        lines.push(format!("what would separate them: {experiment}"));
+    }
+    lines.extend(report.notes.iter().cloned());
+    if let Evidence::ShakeTable(evidence) = &report.evidence {
+        // The strongest traces tell enough; diagnosis.json has them all.
+        for (what, deviate) in evidence.remaining.iter().take(5) {
+            lines.push(format!(
+                "left over: {what} ({deviate:.1} standard deviations)"
+            ));
+        }
+    }
+    lines
+}
+
+/// Columns of [`relations`].
+const RELATIONS: [&str; 5] = [
+    "relation",
+    "nominal",
+    "re-estimated",
+    "healthy rig",
+    "state",
+];
+
+/// The relations with a word each and a line of headings: how they are with the nominal parameters,
+/// and with re-estimated ones, against a healthy rig.
+pub(super) fn relations(evidence: &ShakeTableEvidence) -> Vec<Vec<String>> {
+    let holds = |ratio: f64, healthy: f64| ratio < 1.3 * healthy;
+    let mut rows = vec![RELATIONS.map(String::from).to_vec()];
+    rows.extend(evidence.relations.iter().map(|(name, relation)| {
+        let healthy = relation.healthy;
+        let word = healthy.map_or("", |healthy| {
+            match (
+                holds(relation.nominal, healthy),
+                holds(relation.estimated, healthy),
+            ) {
+                (_, false) => "broken",
+                (false, true) => "within the parameters' uncertainty",
+                (true, true) => "holds",
+            }
+        });
+        vec![
+            name.clone(),
+            significant(relation.nominal, 3),
+            significant(relation.estimated, 3),
+            healthy.map_or("-".into(), |healthy| significant(healthy, 3)),
+            word.to_string(),
+        ]
+    }));
+    rows
+}
+
+/// Errors on the data that each part was not fitted to, in percent, with a line of headings.
+pub(super) fn parts(rig: &RigDiagnosis) -> Vec<Vec<String>> {
+    let heading = [
+        "fitted",
+        "nominal",
+        "refitted",
+        "extended",
+        "on the fitted data",
+        "squared error gone",
+        "95 %",
+    ];
+    let row = |name: &str, part: &PartReport| {
+        let mut row = vec![name.to_string()];
+        let errors = [
+            part.nominal_error,
+            part.refitted_error,
+            part.extended_error,
+            part.fitted_error,
+        ];
+        row.extend(errors.map(|error| format!("{:.2} %", 100.0 * error)));
+        let gone = 1.0 - (part.extended_error / part.refitted_error).powi(2);
+        let (low, high) = part.gain_interval;
+        row.push(format!("{:.0} %", 100.0 * gone));
+        row.push(format!("{:.0} to {:.0} %", 100.0 * low, 100.0 * high));
+        row
+    };
+    vec![
+        heading.map(String::from).to_vec(),
+        row("as described", &rig.as_described),
+        row("parts swapped", &rig.swapped),
+    ]
+}
+
+/// What is printed without `--json`.
+pub fn text(report: &DiagnosisReport) -> String {
+    let mut text = format!("{}\n", report.sentence);
+    if !report.effects.is_empty() {
+        text += &format!("\n{}", aligned(&parameters(report)));
+    }
+    match &report.evidence {
+        Evidence::ShakeTable(evidence) => {
+            let gain = |gain: &GainReport| {
+                let rows = channels(gain).unwrap_or_default();
+                format!("{}{}\n", aligned(&rows), share(gain))
+            };
+            text += &format!(
+                "\nerror one step ahead on the validation record, which was not fitted (NRMSE)\n{}",
+                gain(&report.gain)
+            );
+            if let Some(closed) = &evidence.co_simulation {
+                text += &format!(
+                    "\nthe same record co-simulated in closed loop by the FMUs (NRMSE)\n{}",
+                    gain(closed)
+                );
+            }
+            text += &format!(
+                "\nrelations on the identification record, errors in units of the noise\n{}",
+                aligned(&relations(evidence))
+            );
+        }
+        Evidence::Rig(evidence) => {
+            text += &format!(
+                "\nerror of {} on the data not fitted\n{}unexplained: {:.0} % of the nominal \
+                 model's squared error on the data left out\n",
+                evidence.rig.output,
+                aligned(&parts(&evidence.rig)),
+                100.0 * evidence.unexplained_share
+            );
+        }
+    }
+    let remarks = remarks(report);
+    if !remarks.is_empty() {
+        text += &format!("\nnotes\n  {}\n", remarks.join("\n  "));
+    }
+    text
+}

@@ -1,0 +1,108 @@
+//! A system whose names, types, units and connections hold: what the master is given.
+
+use std::sync::Arc;
+
+use super::connection::Quantity;
+use super::value::Value;
+use crate::fmu::Fmu;
+
+/// Sampling period of a controller for which nothing else is said, s (Section 5.3.1: 500 Hz).
+pub const DEFAULT_PERIOD: f64 = units::constants::SAMPLING_PERIOD;
+
+/// A system whose names, types, units and connections have been checked.
+#[derive(Debug, Clone)]
+pub struct System {
+    /// Its name.
+    pub name: String,
+    /// One line for people.
+    pub description: String,
+    /// The components, in alphabetical order.
+    pub components: Vec<Component>,
+    /// The connections.
+    pub connections: Vec<Connection>,
+    /// What ends the run early.
+    pub end: Option<End>,
+    /// The Boolean input that is set when a sampled component fails, as component and variable.
+    pub stop: Option<(usize, usize)>,
+}
+
+/// What ends a run early.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct End {
+    /// The Boolean output that ends the run when it becomes true, as component and variable.
+    pub when: (usize, usize),
+    /// The enumeration output that says why, as component and variable.
+    pub cause: Option<(usize, usize)>,
+    /// How long the run goes on after that, s.
+    pub after: f64,
+}
+
+/// A component of a [`System`].
+#[derive(Debug, Clone)]
+pub struct Component {
+    /// Its name in the system.
+    pub name: String,
+    /// What it is an instance of.
+    pub fmu: Arc<Fmu>,
+    /// For a sampled component its period, s: its outputs hold what its last call computed.
+    pub period: Option<f64>,
+    /// Parameters that are set, as position of the variable and value.
+    pub parameters: Vec<(usize, Value)>,
+    /// Values of inputs that nothing drives.
+    pub inputs: Vec<(usize, Value)>,
+}
+
+/// A connection of a [`System`]: an input takes `factor` times the source's value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Connection {
+    /// Where the value comes from.
+    pub source: Source,
+    /// The driven component.
+    pub component: usize,
+    /// Its input.
+    pub input: usize,
+    /// Conversion between the units, 1 where they are the same.
+    pub factor: f64,
+}
+
+/// Where a connection's value comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Source {
+    /// The motion that the table is asked for.
+    Reference {
+        /// What of it.
+        quantity: Quantity,
+        /// How many samples ahead of the present one; negative: before it.
+        ahead: isize,
+    },
+    /// An output of a component.
+    Output {
+        /// The component.
+        component: usize,
+        /// Position of the variable.
+        variable: usize,
+    },
+}
+
+impl System {
+    /// `component.variable` of an output or input.
+    pub fn variable_name(&self, component: usize, variable: usize) -> String {
+        let component = &self.components[component];
+        let variable = &component.fmu.description.variables[variable];
+        format!("{}.{}", component.name, variable.name)
+    }
+
+    /// The name of a source of a connection.
+    pub fn source_name(&self, source: Source) -> String {
+        match source {
+            Source::Reference { quantity, ahead: 0 } => format!("reference.{}", quantity.name()),
+            Source::Reference { quantity, ahead } => {
+                format!("reference.{}[{ahead}]", quantity.name())
+            }
+            Source::Output {
+                component,
+                variable,
+            } => self.variable_name(component, variable),
+        }
+    }
+}

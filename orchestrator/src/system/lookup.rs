@@ -1,0 +1,59 @@
+//! Components and variables by name.
+
+use super::checked::Component;
+use super::hint;
+use crate::fmu::{Causality, Fmu};
+
+/// The position of a component.
+///
+/// # Errors
+/// No such name (with the nearest one).
+pub(super) fn component_index(components: &[Component], name: &str) -> Result<usize, String> {
+    components
+        .iter()
+        .position(|part| part.name == name)
+        .ok_or_else(|| {
+            let known = components.iter().map(|part| part.name.as_str());
+            format!("there is no component `{name}`{}", hint(name, known))
+        })
+}
+
+/// The position of the variable `name`, which has to be of that causality.
+///
+/// # Errors
+/// Another causality, or no such name (with the nearest one).
+pub(super) fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, String> {
+    let description = &fmu.description;
+    let word = words(causality);
+    let Some(position) = description.position(name) else {
+        let known = description
+            .of(causality)
+            .map(|index| description.variables[index].name.as_str());
+        return Err(format!(
+            "{} ({}) has no {word} `{name}`{}",
+            description.model_name,
+            fmu.file_name(),
+            hint(name, known)
+        ));
+    };
+    let found = description.variables[position].causality;
+    if found != causality {
+        return Err(format!("`{name}` is {}, expected {word}", article(found)));
+    }
+    Ok(position)
+}
+
+fn words(causality: Causality) -> &'static str {
+    match causality {
+        Causality::Parameter => "parameter",
+        Causality::Input => "input",
+        Causality::Output => "output",
+        Causality::Local => "local variable",
+    }
+}
+
+fn article(causality: Causality) -> String {
+    let word = words(causality);
+    let vowel = word.starts_with(['i', 'o']);
+    format!("{} {word}", if vowel { "an" } else { "a" })
+}
