@@ -7,6 +7,7 @@
 
 pub mod allocation;
 pub mod hierarchy;
+pub mod hybrid;
 pub mod interlock;
 pub mod loop_shaping;
 pub mod loops;

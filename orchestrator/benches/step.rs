@@ -2,6 +2,7 @@
 //! the same three components without FMI; then the physical rig with yielding specimen, sensors and
 //! interlock under each controller. 20 s of motion over the time of a run is the factor over real time.
 //! Loading and initializing the FMUs is not timed, nor is reading the motion.
+//! `cargo bench -p shakebench --bench step`
 
 #![allow(
     clippy::unwrap_used,
@@ -10,10 +11,10 @@
 )]
 
 use std::hint::black_box;
+use std::time::Instant;
 
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion as Sample};
-use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use plant::identified::shake_table::{ShakeTable, ShakeTableState};
 use plant::specimens::linear::{LinearSpecimen, SpecimenState};
 use shakebench::fmu::FmiVersion;
@@ -21,11 +22,34 @@ use shakebench::master::{Algorithm, Pace};
 use shakebench::motion::Motion;
 use shakebench::run::experiment::{Prepared, Request, prepare};
 
+const SECONDS: f64 = 20.0;
+
+/// Prints the median of several runs, each on something prepared outside the timing.
+fn report<T, R>(name: &str, runs: usize, mut prepare: impl FnMut() -> T, run: impl Fn(T) -> R) {
+    let mut times: Vec<f64> = (0..runs)
+        .map(|_| {
+            let prepared = prepare();
+            let start = Instant::now();
+            black_box(run(black_box(prepared)));
+            start.elapsed().as_secs_f64()
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    let (least, median, most) = (times[0], times[runs / 2], times[runs - 1]);
+    println!(
+        "{name}: {:.0} times real time, {:.2} ms (median of {runs}, {:.2} to {:.2} ms)",
+        SECONDS / median,
+        1e3 * median,
+        1e3 * least,
+        1e3 * most
+    );
+}
+
 /// 20 s of the built-in motion.
 fn prepared(fmi: FmiVersion) -> Prepared {
     let request = Request {
         fmi,
-        duration_s: Some(20.0),
+        duration_s: Some(SECONDS),
         ..Request::built_in("three-variable")
     };
     prepare(&request).unwrap()
@@ -65,52 +89,42 @@ fn native(motion: &Motion, samples: usize) -> f64 {
     table_state.displacement
 }
 
-fn three_variable(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("three-variable with specimen, 20 s");
-    group.sample_size(20);
-    group.throughput(Throughput::Elements(10_000));
+fn through_fmus(name: &str, runs: usize, prepared: &Prepared) {
+    report(
+        name,
+        runs,
+        || prepared.simulation(Algorithm::GaussSeidel).unwrap(),
+        |simulation| simulation.run(prepared.samples, Pace::Fastest, &mut |_| {}),
+    );
+}
+
+fn main() {
     for fmi in [FmiVersion::V2, FmiVersion::V3] {
         let prepared = prepared(fmi);
         assert_eq!(prepared.samples, 10_000);
-        group.bench_function(format!("FMI {fmi}"), |bencher| {
-            bencher.iter_batched(
-                || prepared.simulation(Algorithm::GaussSeidel).unwrap(),
-                |simulation| simulation.run(prepared.samples, Pace::Fastest, &mut |_| {}),
-                BatchSize::PerIteration,
-            );
-        });
+        through_fmus(
+            &format!("three-variable with specimen, FMI {fmi}"),
+            21,
+            &prepared,
+        );
     }
     let Prepared {
         motion, samples, ..
     } = prepared(FmiVersion::V3);
-    group.bench_function("without FMI", |bencher| {
-        bencher.iter(|| native(black_box(&motion), samples));
-    });
-    group.finish();
-}
-
-fn physical_rig(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("physical rig with yielding specimen, 20 s");
-    group.sample_size(10);
-    group.throughput(Throughput::Elements(10_000));
+    report(
+        "three-variable with specimen, without FMI",
+        21,
+        || (),
+        |()| native(black_box(&motion), samples),
+    );
     for system in ["three-variable", "sliding-mode", "mpc"] {
         let request = Request {
             plant: "servohydraulic".into(),
             specimen: "yielding".into(),
-            duration_s: Some(20.0),
+            duration_s: Some(SECONDS),
             ..Request::built_in(system)
         };
-        let prepared = prepare(&request).unwrap();
-        group.bench_function(system, |bencher| {
-            bencher.iter_batched(
-                || prepared.simulation(Algorithm::GaussSeidel).unwrap(),
-                |simulation| simulation.run(prepared.samples, Pace::Fastest, &mut |_| {}),
-                BatchSize::PerIteration,
-            );
-        });
+        let name = format!("physical rig with yielding specimen, {system}");
+        through_fmus(&name, 11, &prepare(&request).unwrap());
     }
-    group.finish();
 }
-
-criterion_group!(benches, three_variable, physical_rig);
-criterion_main!(benches);

@@ -2,6 +2,7 @@
 
 #![warn(clippy::missing_errors_doc)]
 
+pub mod benchmark;
 pub mod cli;
 pub mod comparison;
 pub mod component_library;
@@ -10,6 +11,7 @@ pub mod diagnosis;
 pub mod error;
 pub mod extended_model;
 pub mod fmu;
+pub mod identify;
 pub mod library;
 pub mod master;
 pub mod metrics;

@@ -19,7 +19,7 @@ pub use archive::PackedFmu;
 pub use error::PackError;
 pub(crate) use error::file_error;
 pub use variant::{StartValue, write_variant};
-use workspace::Workspace;
+use workspace::{Component, Workspace};
 
 /// Builds every component and packs it as `out/fmi2/NAME.fmu` and `out/fmi3/NAME.fmu`, as far as
 /// it is not there already. Sorted by name, then version.
@@ -27,22 +27,21 @@ use workspace::Workspace;
 /// # Errors
 /// When the workspace, cargo or the folder is not usable, or a component does not compile.
 pub fn build_fmus(out: &Path, versions: &[FmiVersion]) -> Result<Vec<PackedFmu>, PackError> {
-    let workspace = Workspace::find()?;
-    let packages = workspace.packages_under("fmus")?;
-    workspace.pack(&packages, out, versions)
+    Workspace::find()?.pack(Workspace::published, out, versions)
 }
 
-/// Builds and packs one package of the workspace that [`build_fmus`] does not list, such as a
-/// component made for tests.
+/// Builds and packs the component whose crate lies in a folder of the workspace, also one that
+/// [`build_fmus`] does not list, such as `tests/importers/faulty`.
 ///
 /// # Errors
 /// As [`build_fmus`].
-pub fn build_package(
-    package: &str,
+pub fn build_component(
+    folder: &str,
     out: &Path,
     versions: &[FmiVersion],
 ) -> Result<Vec<PackedFmu>, PackError> {
-    Workspace::find()?.pack(&[package.to_string()], out, versions)
+    let component = |workspace: &Workspace| Ok(vec![workspace.component_in(folder)?]);
+    Workspace::find()?.pack(component, out, versions)
 }
 
 /// All FMUs of both versions in `target/fmus`, built at most once in a process.
@@ -72,10 +71,8 @@ pub fn default_folder() -> Result<PathBuf, PackError> {
 /// # Errors
 /// As [`build_fmus`].
 pub fn model_descriptions() -> Result<Vec<(PathBuf, String)>, PackError> {
-    let workspace = Workspace::find()?;
-    let packages = workspace.packages_under("fmus")?;
     let mut files = Vec::new();
-    for library in workspace.build(&packages)? {
+    for Component { library, .. } in Workspace::find()?.published()? {
         let Descriptions {
             name, fmi2, fmi3, ..
         } = ComponentLibrary::open(&library)?.describe()?;

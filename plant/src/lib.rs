@@ -5,6 +5,7 @@
 
 pub mod delay_line;
 pub mod error;
+pub mod hybrid;
 pub mod identified;
 pub mod integration;
 pub mod linear;

@@ -3,12 +3,9 @@
 //!
 //! `cargo run --release -p acceptance --example rig_recordings -- FOLDER`
 
-#[path = "../tests/identify_data/mod.rs"]
-mod identify_data;
-
 use std::path::Path;
 
-use identify_data::{Test, csv};
+use acceptance::recordings::{Test, csv};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args()

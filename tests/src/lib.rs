@@ -4,4 +4,5 @@ pub mod hidden_suite;
 pub mod monolithic;
 pub mod native_rig;
 pub mod python;
+pub mod recordings;
 pub mod shared;

@@ -1,5 +1,6 @@
 //! The command line: one file a command, which parses, calls and prints.
 
+pub mod benchmark;
 pub mod build;
 pub mod compare;
 pub mod design;
@@ -7,6 +8,7 @@ pub mod diagnose;
 pub mod identify;
 pub mod info;
 pub mod report;
+mod rig;
 pub mod run;
 
 use std::process::ExitCode;
@@ -32,6 +34,8 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Run a benchmark of others and score controllers by its rules
+    Benchmark(benchmark::Arguments),
     /// Build the components and pack them as FMUs
     Build(build::Arguments),
     /// Run controllers on records and print the thesis's tables beside the results
@@ -54,6 +58,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         None => run::execute(&run::Arguments::default()),
+        Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
         Some(Command::Build(arguments)) => build::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::Design(arguments)) => design::execute(&arguments),

@@ -76,7 +76,7 @@ pub fn play(
                 .run(reference.len(), Pace::Fastest, &mut |_| {});
         match outcome.ended {
             Ended::Complete => Ok(outcome),
-            other => Err(other.story()),
+            other => Err(other.message()),
         }
     };
     let mut outcome = Err(String::new());

@@ -3,9 +3,9 @@
 use super::transfer::{Inputs, Outputs};
 use super::{MasterError, Part};
 
-/// The largest number of repetitions of a loop.
-pub(super) const LARGEST_REPETITION: usize = 100;
-/// Values that change by less than this part of their size stand still.
+/// The largest number of passes of a fixed-point iteration.
+pub(super) const MOST_PASSES: usize = 100;
+/// Values that change by less than this part of their size have converged.
 const TOLERANCE: f64 = 1e-12;
 
 /// An [`crate::system::Operation`] with its value references.
@@ -18,7 +18,7 @@ pub(super) enum Action {
     },
     /// Set the inputs of a sampled component, step it over its period, read its outputs.
     Call { part: usize },
-    /// Repeat until the values stand still.
+    /// Repeat until the values converge.
     Iterate {
         actions: Vec<Action>,
         /// Sampled components among them, whose state is kept for the repetition.
@@ -93,7 +93,7 @@ impl Action {
                     for action in actions.iter_mut() {
                         action.perform(at, parts, signals, names)?;
                     }
-                    if settled(at.time, pass, last, signals, names)? {
+                    if converged(at.time, pass, last, signals, names)? {
                         break;
                     }
                     for &part in called.iter().filter(|_| at.calls) {
@@ -121,8 +121,8 @@ impl Action {
     }
 }
 
-/// Whether the values stand still; an error when they still do not after too many repetitions.
-pub(super) fn settled(
+/// Whether the fixed-point iteration has converged; an error when it has not after too many passes.
+pub(super) fn converged(
     time: f64,
     passes: usize,
     last: &[f64],
@@ -136,13 +136,13 @@ pub(super) fn settled(
     if !last.iter().zip(now).any(|pair| moving(&pair)) {
         return Ok(true);
     }
-    if passes < LARGEST_REPETITION {
+    if passes < MOST_PASSES {
         return Ok(false);
     }
     let pairs = last.iter().zip(now).enumerate();
     let most = pairs.max_by(|(_, a), (_, b)| excess(*a).total_cmp(&excess(*b)));
     let (place, (before, after)) = most.unwrap_or((0, (&0.0, &0.0)));
-    Err(MasterError::NotSettled {
+    Err(MasterError::NotConverged {
         time,
         passes,
         variable: names.get(place).cloned().unwrap_or_default(),

@@ -128,11 +128,12 @@ impl<'a> Plan<'a> {
         let mut names = vec![String::new(); reference.len()];
         for quantity in Quantity::ALL {
             let source = Source::Reference { quantity, ahead: 0 };
-            names[reference.tap(quantity, 0)] = system.source_name(source);
+            names[reference.tap(quantity, 0)] = system.origin(source).to_string();
         }
         for connection in &system.connections {
             if let Source::Reference { quantity, ahead } = connection.source {
-                names[reference.tap(quantity, ahead)] = system.source_name(connection.source);
+                names[reference.tap(quantity, ahead)] =
+                    system.origin(connection.source).to_string();
             }
         }
         let mut plan = Self {
@@ -181,7 +182,7 @@ impl<'a> Plan<'a> {
             for &output in &alike {
                 self.places.insert((component, output), self.names.len());
                 self.names
-                    .push(self.system.variable_name(component, output));
+                    .push(self.system.variable_name(component, output).to_string());
             }
             group.add(
                 kind,

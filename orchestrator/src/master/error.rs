@@ -31,7 +31,7 @@ pub enum MasterError {
         "the values do not stand still at {time} s after {passes} repetitions: `{variable}` still \
          changes by {change:e}"
     )]
-    NotSettled {
+    NotConverged {
         /// Time, s.
         time: f64,
         /// Repetitions made.

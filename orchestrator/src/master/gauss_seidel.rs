@@ -11,15 +11,7 @@ pub(super) fn observe(simulation: &mut Simulation) -> Result<(), MasterError> {
         step: simulation.step,
         calls: true,
     };
-    for action in &mut simulation.actions {
-        action.perform(
-            at,
-            &mut simulation.parts,
-            &mut simulation.signals,
-            &simulation.names,
-        )?;
-    }
-    Ok(())
+    simulation.perform(at)
 }
 
 /// Continuous components over `[t_k, t_k + h]` with their inputs held: commands at their value of

@@ -2,10 +2,10 @@
 //! at the mean of their values at both ends of the step (the trapezoidal rule), so that nothing is
 //! extrapolated; of second order.
 
-use super::action::{Moment, settled};
+use super::action::{Moment, converged};
 use super::{MasterError, Simulation};
 
-/// Continuous components over `[t_k, t_k + h]`, repeated until the values at the end stand still.
+/// Continuous components over `[t_k, t_k + h]`, repeated until the values at the end converge.
 pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     let (time, step) = (simulation.time(), simulation.step);
     // Between two calls of a sampled component nothing of it changes.
@@ -38,7 +38,7 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
         for action in actions.iter_mut().filter(|action| action.is_continuous()) {
             action.perform(end, parts, next, names)?;
         }
-        if settled(time, pass, last, next, names)? {
+        if converged(time, pass, last, next, names)? {
             return Ok(());
         }
         for part in parts.iter_mut().filter(|part| part.every.is_none()) {

@@ -24,7 +24,7 @@ pub use record::Record;
 pub use run::{Ended, Ending, LogLine, Outcome, Pace};
 
 use crate::fmu::{Instance, Item, State};
-use action::Action;
+use action::{Action, Moment};
 use reference::Reference;
 use transfer::{Inputs, Outputs};
 
@@ -49,7 +49,7 @@ pub enum Algorithm {
     #[default]
     GaussSeidel,
     /// In dependency order; loops of direct feedthrough and the coupling over a step are repeated
-    /// until the values stand still (the FMUs must be able to save their state).
+    /// until the values converge (the FMUs must be able to save their state).
     Iterative,
 }
 
@@ -166,7 +166,7 @@ impl Simulation {
     /// Makes the outputs at the present tick known; due sampled components are called.
     ///
     /// # Errors
-    /// A call that an FMU did not complete, or a loop that does not settle.
+    /// A call that an FMU did not complete, or a loop that does not converge.
     pub fn observe(&mut self) -> Result<(), MasterError> {
         self.reference
             .sample(self.tick / self.ticks_per_row, &mut self.signals);
@@ -176,10 +176,18 @@ impl Simulation {
         }
     }
 
+    /// Carries out all actions.
+    fn perform(&mut self, at: Moment) -> Result<(), MasterError> {
+        for action in &mut self.actions {
+            action.perform(at, &mut self.parts, &mut self.signals, &self.names)?;
+        }
+        Ok(())
+    }
+
     /// Steps over `[t_k, t_k + h]`.
     ///
     /// # Errors
-    /// A call that an FMU did not complete, or a coupling that does not settle.
+    /// A call that an FMU did not complete, or a coupling that does not converge.
     pub fn advance(&mut self) -> Result<(), MasterError> {
         match self.algorithm {
             Algorithm::Jacobi => jacobi::advance(self)?,

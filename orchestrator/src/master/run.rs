@@ -67,7 +67,7 @@ impl Ended {
 
     /// Why it ended early; none where it is complete.
     pub fn reason(&self) -> Option<String> {
-        (self.kind() != Ending::Complete).then(|| self.story())
+        (self.kind() != Ending::Complete).then(|| self.message())
     }
 
     /// When the run was stopped before its end, s.
@@ -79,7 +79,7 @@ impl Ended {
     }
 
     /// What happened, for people.
-    pub fn story(&self) -> String {
+    pub fn message(&self) -> String {
         match self {
             Self::Complete => "complete".to_string(),
             Self::Interlock {
@@ -131,7 +131,7 @@ pub enum Pace {
     /// As fast as it goes.
     #[default]
     Fastest,
-    /// Never ahead of the clock on the wall.
+    /// Never ahead of wall-clock time.
     RealTime,
 }
 

@@ -1,7 +1,7 @@
-//! Initialization: parameters are set, and values travel along the connections until they stand
-//! still.
+//! Initialization: parameters are set, and values travel along the connections until they
+//! converge.
 
-use super::action::{Moment, settled};
+use super::action::{Moment, converged};
 use super::{MasterError, Simulation};
 use crate::fmu::{Instance, Kind};
 use crate::system::{Component, Value};
@@ -37,19 +37,12 @@ pub(super) fn initialize(simulation: &mut Simulation, stop: f64) -> Result<(), M
     let mut last = simulation.signals.clone();
     for pass in 1.. {
         last.copy_from_slice(&simulation.signals);
-        for action in &mut simulation.actions {
-            action.perform(
-                at,
-                &mut simulation.parts,
-                &mut simulation.signals,
-                &simulation.names,
-            )?;
-        }
+        simulation.perform(at)?;
         for part in &mut simulation.parts {
             part.inputs.transfer(&simulation.signals, &part.instance)?;
         }
         // The first pass only replaces zeros.
-        if pass > 1 && settled(0.0, pass, &last, &simulation.signals, &simulation.names)? {
+        if pass > 1 && converged(0.0, pass, &last, &simulation.signals, &simulation.names)? {
             break;
         }
     }

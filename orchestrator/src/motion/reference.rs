@@ -1,4 +1,4 @@
-//! References: displacement, velocity and acceleration as given, used to the letter.
+//! References: displacement, velocity and acceleration played as given.
 
 use std::path::Path;
 

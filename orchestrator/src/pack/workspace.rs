@@ -18,6 +18,14 @@ pub(super) struct Workspace {
     pub(super) root: PathBuf,
 }
 
+/// A component as cargo has built it.
+pub(super) struct Component {
+    /// The folder of its crate.
+    folder: PathBuf,
+    /// Its dynamic library.
+    pub(super) library: PathBuf,
+}
+
 impl Workspace {
     /// Looks upwards from the package that cargo runs, the present folder and the program.
     pub(super) fn find() -> Result<Self, PackError> {
@@ -60,74 +68,71 @@ impl Workspace {
         Ok(String::from_utf8_lossy(&output.stdout).into_owned())
     }
 
-    /// Names of the packages under a folder that have a `cdylib`.
-    pub(super) fn packages_under(&self, folder: &str) -> Result<Vec<String>, PackError> {
-        let answer = self.cargo(&["metadata", "--no-deps", "--format-version", "1"])?;
-        let fail = |problem: String| PackError::Answer {
-            command: "metadata",
-            problem,
-        };
-        let metadata: serde_json::Value =
-            serde_json::from_str(&answer).map_err(|e| fail(e.to_string()))?;
-        let packages = metadata["packages"]
-            .as_array()
-            .ok_or_else(|| fail("no `packages`".into()))?;
-        let within = |package: &&serde_json::Value| {
-            let manifest = package["manifest_path"].as_str().map(Path::new);
-            let above = manifest.and_then(|m| m.parent()?.parent()?.file_name());
-            above.is_some_and(|above| above == folder)
-        };
-        Ok(packages
-            .iter()
-            .filter(within)
-            .filter(|package| targets(&package["targets"]).any(|t| kinds(t, "cdylib")))
-            .filter_map(|package| package["name"].as_str().map(String::from))
-            .collect())
-    }
-
-    /// Builds packages and returns their dynamic libraries.
-    pub(super) fn build(&self, packages: &[String]) -> Result<Vec<PathBuf>, PackError> {
-        let mut arguments = vec![
+    /// Lets cargo build the libraries of every default member, and returns the dynamic ones.
+    ///
+    /// All of them, though components alone are asked for: cargo compiles a dependency once for
+    /// every set of features that it is asked for, and only the selection of `cargo run` and
+    /// `cargo test` finds what those have compiled.
+    pub(super) fn build(&self) -> Result<Vec<Component>, PackError> {
+        let answer = self.cargo(&[
             "build",
             "--release",
+            "--lib",
             "--message-format",
             "json-render-diagnostics",
-        ];
-        for package in packages {
-            arguments.extend(["-p", package]);
-        }
-        let answer = self.cargo(&arguments)?;
+        ])?;
         let fail = |problem: String| PackError::Answer {
             command: "build",
             problem,
         };
-        let mut libraries = Vec::new();
+        let mut components = Vec::new();
         for line in answer.lines() {
             let message: serde_json::Value =
                 serde_json::from_str(line).map_err(|e| fail(e.to_string()))?;
             let manifest = message["manifest_path"].as_str().map(Path::new);
-            let ours = manifest.is_some_and(|manifest| manifest.starts_with(&self.root));
-            if !ours || !kinds(&message["target"], "cdylib") {
+            let folder = manifest
+                .and_then(Path::parent)
+                .filter(|folder| folder.starts_with(&self.root));
+            let (Some(folder), true) = (folder, kinds(&message["target"], "cdylib")) else {
                 continue;
-            }
+            };
             let files = message["filenames"].as_array().into_iter().flatten();
-            let extension = std::env::consts::DLL_EXTENSION;
-            libraries.extend(
-                files
-                    .filter_map(|file| file.as_str().map(PathBuf::from))
-                    .filter(|file| file.extension().is_some_and(|e| e == extension)),
-            );
+            let library = files
+                .filter_map(|file| file.as_str().map(PathBuf::from))
+                .find(|file| {
+                    file.extension()
+                        .is_some_and(|e| e == std::env::consts::DLL_EXTENSION)
+                })
+                .ok_or_else(|| fail(format!("no dynamic library of {}", folder.display())))?;
+            components.push(Component {
+                folder: folder.into(),
+                library,
+            });
         }
-        if libraries.len() != packages.len() {
-            let (found, wanted) = (libraries.len(), packages.join(", "));
-            return Err(fail(format!("{found} dynamic libraries for {wanted}")));
-        }
-        Ok(libraries)
+        Ok(components)
+    }
+
+    /// The components under `fmus/`: what the project publishes.
+    pub(super) fn published(&self) -> Result<Vec<Component>, PackError> {
+        let mut components = self.build()?;
+        components.retain(|component| component.folder.parent() == Some(&self.root.join("fmus")));
+        Ok(components)
+    }
+
+    /// The component whose crate lies in a folder, such as `tests/importers/faulty`.
+    pub(super) fn component_in(&self, folder: &str) -> Result<Component, PackError> {
+        let mut components = self.build()?.into_iter();
+        components
+            .find(|component| component.folder == self.root.join(folder))
+            .ok_or_else(|| PackError::Answer {
+                command: "build",
+                problem: format!("no component in `{folder}`"),
+            })
     }
 
     pub(super) fn pack(
         &self,
-        packages: &[String],
+        components: impl FnOnce(&Self) -> Result<Vec<Component>, PackError>,
         out: &Path,
         versions: &[FmiVersion],
     ) -> Result<Vec<PackedFmu>, PackError> {
@@ -141,7 +146,7 @@ impl Workspace {
         lock.lock().map_err(file_error(&lock_path))?;
         let licences = self.licences()?;
         let mut packed = Vec::new();
-        for library in self.build(packages)? {
+        for Component { library, .. } in components(self)? {
             let binary = fs::read(&library).map_err(file_error(&library))?;
             let descriptions = ComponentLibrary::open(&library)?.describe()?;
             for version in versions {
@@ -170,10 +175,6 @@ impl Workspace {
         }
         Ok(licences)
     }
-}
-
-fn targets(targets: &serde_json::Value) -> impl Iterator<Item = &serde_json::Value> {
-    targets.as_array().into_iter().flatten()
 }
 
 fn kinds(target: &serde_json::Value, kind: &str) -> bool {

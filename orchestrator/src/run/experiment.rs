@@ -148,13 +148,15 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
 }
 
 fn motion(request: &Request, file: &SystemFile) -> Result<Motion, Error> {
+    let usual = motion::Options::default();
     let options = motion::Options {
+        sample_time: file.sampling()?.unwrap_or(usual.sample_time),
         scaling: request.scaling.map(|scale| match scale {
             Scale::Factor(factor) => Scaling::Factor(factor),
             Scale::PeakAcceleration(peak) => Scaling::PeakAcceleration(peak),
             Scale::PeakDisplacement(peak) => Scaling::PeakDisplacement(peak),
         }),
-        ..motion::Options::default()
+        ..usual
     };
     let beside = |path: &String| {
         file.directory

@@ -4,9 +4,10 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::checked::{Component, DEFAULT_PERIOD, End, System};
-use super::connection::{Link, VariableName, connect};
+use super::connection::connect;
 use super::error::SystemError;
 use super::file::{ComponentFile, SystemFile};
+use super::link::{Link, VariableName};
 use super::lookup::{component_index, find};
 use super::model;
 use super::value::{self, Setting, Value};
@@ -55,7 +56,7 @@ pub fn assemble(
     let mut connections = Vec::new();
     let mut driven: HashMap<(usize, usize), &Link> = HashMap::new();
     for link in &file.connections {
-        let wrong = |reason| file.fault(&link.to_string(), reason);
+        let wrong = |reason| file.fault(&link.place(), reason);
         let connection = connect(&components, link).map_err(wrong)?;
         let input = (connection.component, connection.input);
         if let Some(first) = driven.insert(input, link) {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::connection::Quantity;
+use super::link::{Link, Origin, Quantity, VariableName};
 use super::value::Value;
 use crate::fmu::Fmu;
 
@@ -85,24 +85,30 @@ pub enum Source {
 }
 
 impl System {
-    /// `component.variable` of an output or input.
-    pub fn variable_name(&self, component: usize, variable: usize) -> String {
+    /// The name of an output or input.
+    pub fn variable_name(&self, component: usize, variable: usize) -> VariableName {
         let component = &self.components[component];
         let variable = &component.fmu.description.variables[variable];
-        format!("{}.{}", component.name, variable.name)
+        VariableName::new(&component.name, &variable.name)
     }
 
     /// The name of a source of a connection.
-    pub fn source_name(&self, source: Source) -> String {
+    pub fn origin(&self, source: Source) -> Origin {
         match source {
-            Source::Reference { quantity, ahead: 0 } => format!("reference.{}", quantity.name()),
-            Source::Reference { quantity, ahead } => {
-                format!("reference.{}[{ahead}]", quantity.name())
-            }
+            Source::Reference { quantity, ahead } => Origin::Reference { quantity, ahead },
             Source::Output {
                 component,
                 variable,
-            } => self.variable_name(component, variable),
+            } => Origin::Output(self.variable_name(component, variable)),
         }
+    }
+
+    /// The connections by names.
+    pub fn links(&self) -> impl Iterator<Item = Link> {
+        self.connections.iter().map(|connection| Link {
+            from: self.origin(connection.source),
+            to: self.variable_name(connection.component, connection.input),
+            line: None,
+        })
     }
 }

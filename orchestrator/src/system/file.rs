@@ -30,8 +30,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::connection::{self, Link, Origin, VariableName};
 use super::error::SystemError;
+use super::link::{self, Link, Origin, VariableName};
 use super::rule::Rule;
 use super::value::{self, Setting};
 
@@ -126,6 +126,9 @@ pub struct MeasurementsFile {
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentFile {
+    /// Time between samples of the motion, such as `"1 ms"`; absent: 2 ms.
+    #[serde(default)]
+    pub sampling: Option<Setting>,
     /// Coupling step, such as `"2 ms"`.
     #[serde(default)]
     pub step: Option<Setting>,
@@ -228,7 +231,7 @@ impl SystemFile {
         for connection in &written.connections {
             let line = 1 + text[..connection.span().start].matches('\n').count();
             let connection = connection.get_ref();
-            let links = connection::parse(connection, line);
+            let links = link::parse(connection, line);
             connections.extend(links.map_err(|reason| SystemError::Place {
                 origin: origin.to_string(),
                 place: format!("connection `{connection}` (line {line})"),
@@ -266,6 +269,14 @@ impl SystemFile {
                 .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         }
         Ok(file)
+    }
+
+    /// Time between samples of the motion, s.
+    ///
+    /// # Errors
+    /// What stands there is no time.
+    pub fn sampling(&self) -> Result<Option<f64>, SystemError> {
+        self.time("sampling", self.experiment.sampling.as_ref())
     }
 
     /// Coupling step of the experiment, s.
@@ -347,6 +358,7 @@ impl SystemFile {
             }
         }
         let (own, other) = (&mut self.experiment, part.experiment);
+        own.sampling = other.sampling.or(own.sampling.take());
         own.step = other.step.or(own.step.take());
         own.duration = other.duration.or(own.duration.take());
         own.record = other.record.or(own.record.take());

@@ -26,7 +26,7 @@ pub enum Operation {
         /// The component.
         component: usize,
     },
-    /// Repeat these until their values stand still.
+    /// Repeat these until their values converge.
     Iterate(Vec<Operation>),
 }
 
@@ -270,8 +270,9 @@ fn cycle(
         let connection = drivers(system, &nodes[node])
             .find(|c| source_node(system, c.source) == Some(nodes[from]));
         if let Some(connection) = connection {
-            variables.push(system.source_name(connection.source));
-            variables.push(system.variable_name(connection.component, connection.input));
+            variables.push(system.origin(connection.source).to_string());
+            let input = system.variable_name(connection.component, connection.input);
+            variables.push(input.to_string());
         }
     }
     variables.extend(variables.first().cloned());

@@ -342,7 +342,7 @@ fn a_rig_that_cannot_be_diagnosed_is_refused_by_place() {
     refused(
         folder,
         &["diagnose", "press.toml"],
-        &["press.toml", "line 16", "third_half"],
+        &["press.toml", "line 15", "third_half"],
     );
     press(folder, 6, BLOCKS);
     let path = folder.join("press.toml");

@@ -10,7 +10,8 @@ use crate::{shakebench, stderr, stdout};
 
 /// A table under displacement control beside a component that fails on demand.
 fn system(folder: &Path, version: pack::FmiVersion, faulty: &str, experiment: &str) {
-    let packed = pack::build_package("faulty-component", &folder.join("fmus"), &[version]).unwrap();
+    let packed =
+        pack::build_component("tests/importers/faulty", &folder.join("fmus"), &[version]).unwrap();
     let text = format!(
         r#"
         connections = [

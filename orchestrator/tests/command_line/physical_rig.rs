@@ -378,7 +378,7 @@ fn a_failing_controller_lets_the_interlock_bring_the_valve_to_null() {
     let write = |text: String| fs::write(folder.path().join("rig.toml"), text).unwrap();
     for version in pack::FmiVersion::ALL {
         let out = folder.path().join("fmus");
-        let packed = pack::build_package("faulty-component", &out, &[version]).unwrap();
+        let packed = pack::build_component("tests/importers/faulty", &out, &[version]).unwrap();
         let fmu = packed[0].path.display().to_string();
         write(failing_controller(&fmu, "none"));
         let output = shakebench(folder.path(), &["run", "rig.toml", "--out", "healthy"]);

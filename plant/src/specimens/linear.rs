@@ -21,7 +21,7 @@ pub struct LinearSpecimen {
 }
 
 impl LinearSpecimen {
-    /// Takes weight (N), gravity (m/s²), period (s) and damping ratio.
+    /// Takes mass (kg), period (s) and damping ratio.
     pub fn from_period(mass: f64, period: f64, damping_ratio: f64) -> Self {
         let omega = TAU / period;
         Self {

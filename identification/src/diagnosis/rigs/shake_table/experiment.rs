@@ -52,6 +52,9 @@ fn reference(kind: usize, peak: f64, samples: usize, period: f64) -> Vec<f64> {
 }
 
 /// What the sensors of `rig` show in closed loop with `law` on `reference`, without noise.
+///
+/// # Errors
+/// A rig that cannot be sampled.
 pub fn play(
     rig: &IdentifiedRig,
     law: &ControlLaw,

@@ -1,0 +1,73 @@
+#![allow(non_snake_case, reason = "an FMU is named in camel case")]
+//! Linear quadratic Gaussian tracking as an FMU.
+
+use controllers::Controller;
+use controllers::hybrid::TrackingInput;
+use controllers::hybrid::linear_quadratic::{
+    LinearQuadraticDesign, LinearQuadraticTracking as Law,
+};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use plant::hybrid::{PERIOD, TransferSystemParameters};
+use serde::{Deserialize, Serialize};
+
+/// Linear quadratic Gaussian tracking control.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct LinearQuadraticTracking {
+    design: LinearQuadraticDesign,
+    law: Option<Law>,
+    input: TrackingInput,
+    command: f64,
+}
+
+impl Default for LinearQuadraticTracking {
+    fn default() -> Self {
+        Self {
+            design: LinearQuadraticDesign::default(),
+            law: None,
+            input: TrackingInput::default(),
+            command: 0.0,
+        }
+    }
+}
+
+impl Component for LinearQuadraticTracking {
+    const NAME: &'static str = "LinearQuadraticTracking";
+    const DESCRIPTION: &'static str = "Linear quadratic Gaussian tracking control";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const STEP_SIZE: f64 = plant::hybrid::PERIOD;
+    const ANY_STEP_SIZE: bool = false;
+
+    fn variables() -> Vec<Variable<Self>> {
+        const INPUTS: [&str; 2] = ["desired_displacement", "measured_displacement"];
+        fmu_kit::table! { Self, s:
+            input("desired_displacement", s.input.desired, "Displacement that the numerical substructure wants", "m" => "mm")
+                .nominal(5e-3);
+            input("measured_displacement", s.input.measured, "Displacement of the specimen, as measured", "m" => "mm")
+                .nominal(5e-3);
+            output("command", s.command, "Command to the actuator", "m" => "mm")
+                .discrete().nominal(5e-3).depends_on(&INPUTS, Dependent);
+            parameter("command_weight", s.design.command_weight, "Weight of the command against the displacement error");
+            parameter("command_noise", s.design.command_noise, "White noise on the command, one standard deviation", "m");
+            parameter("disturbance_step", s.design.disturbance_step, "Step of the disturbance at the command a sample, one standard deviation", "m");
+            parameter("measurement_noise", s.design.measurement_noise, "Noise of the measured displacement, one standard deviation", "m");
+            parameter("lead_samples", s.design.lead, "Lead of the desired displacement, samples");
+        }
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        let law = Law::design(&TransferSystemParameters::default(), &self.design, PERIOD)?;
+        law.validate()?;
+        self.law = Some(law);
+        self.command = 0.0;
+        Ok(())
+    }
+
+    fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        if let Some(law) = &mut self.law {
+            self.command = law.step(&self.input, step_size);
+        }
+        Ok(())
+    }
+}
+
+fmu_kit::export!(LinearQuadraticTracking);

@@ -1,0 +1,158 @@
+#![allow(non_snake_case, reason = "an FMU is named in camel case")]
+//! The numerical substructure of hybrid simulation as an FMU.
+
+mod matrix;
+
+use fmu_kit::{Causality, Component, ComponentResult, Variable};
+use plant::hybrid::{BenchmarkCase, Frame, NumericalSubstructure as Part, PERIOD};
+use serde::{Deserialize, Serialize};
+
+/// Largest number of degrees of freedom.
+const MOST: usize = 8;
+
+/// A frame less its specimen, under the ground and the measured force.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct NumericalSubstructure {
+    case: i32,
+    mass: String,
+    damping: String,
+    stiffness: String,
+    specimen: [f64; 3],
+    interface: i32,
+    force_delay: i32,
+    part: Option<Part>,
+    force: f64,
+    ground: f64,
+    ground_next: f64,
+    displacement: [f64; MOST],
+    velocity: [f64; MOST],
+    acceleration: [f64; MOST],
+}
+
+impl Default for NumericalSubstructure {
+    fn default() -> Self {
+        let plant = plant::hybrid::TransferSystemParameters::default();
+        Self {
+            case: 1,
+            mass: String::new(),
+            damping: String::new(),
+            stiffness: String::new(),
+            specimen: [
+                plant.specimen_mass,
+                plant.specimen_damping(),
+                plant.specimen_stiffness,
+            ],
+            interface: 1,
+            force_delay: 1,
+            part: None,
+            force: 0.0,
+            ground: 0.0,
+            ground_next: 0.0,
+            displacement: [0.0; MOST],
+            velocity: [0.0; MOST],
+            acceleration: [0.0; MOST],
+        }
+    }
+}
+
+impl NumericalSubstructure {
+    fn frame(&self) -> Result<Frame, Box<dyn std::error::Error>> {
+        if self.mass.is_empty() && self.damping.is_empty() && self.stiffness.is_empty() {
+            let number = u8::try_from(self.case).unwrap_or_default();
+            return Ok(BenchmarkCase::new(number)?.frame());
+        }
+        Ok(Frame {
+            mass: matrix::read("mass", &self.mass)?,
+            damping: matrix::read("damping", &self.damping)?,
+            stiffness: matrix::read("stiffness", &self.stiffness)?,
+        })
+    }
+}
+
+impl Component for NumericalSubstructure {
+    const NAME: &'static str = "NumericalSubstructure";
+    const DESCRIPTION: &'static str = "The computed part of a structure in hybrid simulation";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const STEP_SIZE: f64 = PERIOD;
+    const ANY_STEP_SIZE: bool = false;
+
+    fn variables() -> Vec<Variable<Self>> {
+        let mut variables = fmu_kit::table! { Self, s:
+            input("measured_force", s.force, "Force of the specimen, as measured", "N" => "kN").nominal(5e3);
+            input("ground_acceleration", s.ground, "Acceleration of the ground", "m/s2" => "g").nominal(3.0);
+            input("ground_acceleration_next", s.ground_next, "The same one sample later", "m/s2" => "g").nominal(3.0);
+            parameter("case", s.case, "Case of the benchmark, where no matrices are given").min(1.0).max(4.0);
+            parameter("mass", s.mass, "Mass of the whole frame in kg, rows separated by semicolons");
+            parameter("damping", s.damping, "Damping of the whole frame in N.s/m, likewise");
+            parameter("stiffness", s.stiffness, "Stiffness of the whole frame in N/m, likewise");
+            parameter("specimen_mass", s.specimen[0], "Mass that the specimen takes off", "kg");
+            parameter("specimen_damping", s.specimen[1], "Damping that the specimen takes off", "N.s/m");
+            parameter("specimen_stiffness", s.specimen[2], "Stiffness that the specimen takes off", "N/m");
+            parameter("interface", s.interface, "Degree of freedom that the specimen belongs to, from 1").min(1.0).max(8.0);
+            parameter("force_delay_samples", s.force_delay, "Samples by which the force is fed late").min(0.0).max(64.0);
+        };
+        let outputs = |name, about: &str, unit, nominal, field| {
+            let elements = Variable::<Self>::array(name, Causality::Output, MOST, field);
+            elements
+                .into_iter()
+                .enumerate()
+                .map(move |(i, element)| {
+                    element
+                        .about(&format!("{about} of degree of freedom {}", i + 1))
+                        .unit(unit)
+                        .nominal(nominal)
+                })
+                .collect::<Vec<_>>()
+        };
+        variables.extend(outputs("displacement", "Displacement", "m", 5e-3, |s| {
+            &mut s.displacement
+        }));
+        variables.extend(outputs("velocity", "Velocity", "m/s", 0.1, |s| {
+            &mut s.velocity
+        }));
+        let accelerations = outputs("acceleration", "Total acceleration", "m/s2", 3.0, |s| {
+            &mut s.acceleration
+        });
+        variables.extend(accelerations.into_iter().map(|element| {
+            element.depends_on(&["ground_acceleration"], fmu_kit::Dependency::Dependent)
+        }));
+        variables
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        let frame = self.frame()?;
+        if frame.order() > MOST {
+            return Err(format!(
+                "the frame has {} degrees of freedom, at most {MOST} are possible",
+                frame.order()
+            )
+            .into());
+        }
+        let interface = usize::try_from(self.interface - 1).unwrap_or(usize::MAX);
+        let delay = usize::try_from(self.force_delay).unwrap_or_default();
+        let part = Part::new(&frame, self.specimen, interface, delay, Self::STEP_SIZE)?;
+        self.part = Some(part);
+        Ok(())
+    }
+
+    fn update_outputs(&mut self, _time: f64) {
+        if let Some(part) = &self.part {
+            let n = part.order();
+            self.displacement[..n].copy_from_slice(part.displacements());
+            self.velocity[..n].copy_from_slice(part.velocities());
+            for (i, acceleration) in self.acceleration[..n].iter_mut().enumerate() {
+                *acceleration = part.total_acceleration(i, self.ground);
+            }
+        }
+    }
+
+    fn step(&mut self, _time: f64, _step_size: f64) -> ComponentResult {
+        if let Some(part) = &mut self.part {
+            let middle = 0.5 * (self.ground + self.ground_next);
+            part.step(self.force, [self.ground, middle, self.ground_next]);
+        }
+        Ok(())
+    }
+}
+
+fmu_kit::export!(NumericalSubstructure);

@@ -1,0 +1,3 @@
+//! Benchmarks of others, run by their own rules.
+
+pub mod vrths;

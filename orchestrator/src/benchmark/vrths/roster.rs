@@ -1,0 +1,154 @@
+//! The tracking laws that the benchmark compares.
+
+use controllers::hybrid::adaptive_inverse::AdaptiveInverse;
+use controllers::hybrid::extrapolation::Extrapolation;
+use controllers::hybrid::gradient_inverse::GradientInverse;
+use controllers::hybrid::linear_quadratic::{LinearQuadraticDesign, LinearQuadraticTracking};
+use controllers::hybrid::model_inverse::ModelInverse;
+use controllers::hybrid::phase_lead_pi::PhaseLeadPi;
+use controllers::hybrid::robust_tracking::RobustTracking;
+use controllers::hybrid::sliding_mode::TrackingSlidingMode;
+use plant::ModelError;
+use plant::hybrid::{PERIOD, TransferSystemParameters};
+
+use super::simulation::TrackingLaw;
+
+/// A tracking law with its name.
+#[derive(Clone, Copy)]
+pub struct Entry {
+    /// What `--controller` calls it.
+    pub name: &'static str,
+    /// What it is, in a few words.
+    pub about: &'static str,
+    /// Whether the converters sit inside the law.
+    pub own_converters: bool,
+    make: fn() -> Result<Box<TrackingLaw>, ModelError>,
+}
+
+impl Entry {
+    /// A new law.
+    ///
+    /// # Errors
+    /// A design that has no solution.
+    pub fn make(&self) -> Result<Box<TrackingLaw>, ModelError> {
+        (self.make)()
+    }
+}
+
+/// The benchmark's own controller, which the published table is of.
+pub const SAMPLE: &str = "phase-lead-pi";
+
+/// The law that does best.
+pub const BEST: &str = "adaptive-inverse";
+
+/// Lead of the desired displacement that makes up for the force, which is fed one sample late and
+/// then held over one more: what the substructure gets is in the mean one and a half samples old.
+pub const LEAD: f64 = 1.5;
+
+/// All laws, the benchmark's own first.
+pub const ALL: [Entry; 9] = [
+    Entry {
+        name: SAMPLE,
+        about: "the benchmark's sample controller: PI with phase lead",
+        own_converters: true,
+        make: || Ok(Box::new(PhaseLeadPi::default())),
+    },
+    Entry {
+        name: "inverse-without-specimen",
+        about: "inverse of the transfer system without its specimen, third order",
+        own_converters: false,
+        make: || {
+            let law = ModelInverse::of(&ModelInverse::without_specimen(), 3)?;
+            Ok(Box::new(law))
+        },
+    },
+    Entry {
+        name: "inverse",
+        about: "inverse of the nominal plant",
+        own_converters: false,
+        make: || Ok(Box::new(smooth_inverse(0.0)?)),
+    },
+    Entry {
+        name: "inverse-pi",
+        about: "the same with PI, target led by 1.5 samples",
+        own_converters: false,
+        make: || {
+            Ok(Box::new(ModelInverse {
+                proportional: 2.0,
+                integral: 95.0,
+                ..smooth_inverse(LEAD)?
+            }))
+        },
+    },
+    Entry {
+        name: "robust",
+        about: "the same with synthesised loop shaping instead of PI",
+        own_converters: false,
+        make: || {
+            let plant = TransferSystemParameters::default();
+            let law = RobustTracking::synthesise(&plant, 60.0, 50.0, LEAD, PERIOD)?;
+            Ok(Box::new(law))
+        },
+    },
+    Entry {
+        name: "linear-quadratic",
+        about: "inverse, state feedback and Kalman filter with a disturbance at the command",
+        own_converters: false,
+        make: || {
+            let design = LinearQuadraticDesign {
+                lead: LEAD,
+                ..LinearQuadraticDesign::default()
+            };
+            let plant = TransferSystemParameters::default();
+            let law = LinearQuadraticTracking::design(&plant, &design, PERIOD)?;
+            Ok(Box::new(law))
+        },
+    },
+    Entry {
+        name: "sliding-mode",
+        about: "published: Li et al. 2021",
+        own_converters: false,
+        make: || Ok(Box::new(TrackingSlidingMode::published()?)),
+    },
+    Entry {
+        name: "gradient-inverse",
+        about: "published: adaptive inverse of Gálmez and Fermandois 2022",
+        own_converters: false,
+        make: || Ok(Box::new(GradientInverse::default())),
+    },
+    Entry {
+        name: BEST,
+        about: "inverse estimated by instrumental variables, target led by 1.5 samples",
+        own_converters: false,
+        make: || Ok(Box::new(AdaptiveInverse::benchmark(PERIOD)?)),
+    },
+];
+
+/// The roster's entry of a name.
+#[must_use]
+pub fn entry(name: &str) -> Option<Entry> {
+    ALL.into_iter().find(|entry| entry.name == name)
+}
+
+/// The nominal inverse with all derivatives; the hold of the command is led by half a sample.
+fn smooth_inverse(lead: f64) -> Result<ModelInverse, ModelError> {
+    let plant = TransferSystemParameters::default();
+    Ok(ModelInverse {
+        desired: Extrapolation::new(5, 16, lead + 0.5)?,
+        ..ModelInverse::of(&plant, 5)?
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_law_can_be_made_and_has_its_own_name() {
+        for (i, entry) in ALL.iter().enumerate() {
+            entry.make().unwrap().validate().unwrap();
+            assert!(ALL[..i].iter().all(|other| other.name != entry.name));
+        }
+        assert!(ALL.iter().any(|entry| entry.name == BEST));
+    }
+}

@@ -1,0 +1,5 @@
+//! The FMUs: what is packed, what is published, and what importers make of them.
+
+mod importers;
+mod model_descriptions;
+mod packing;

@@ -1,0 +1,5 @@
+//! Effects that a model lacks: hidden by an independent program, put on measurements, or neither.
+
+mod extended_model;
+mod hidden_effects;
+mod measured;

@@ -1,0 +1,94 @@
+//! Table and specimen coupled as FMUs against the same rig as one model, both under the same
+//! controller sampled at 2 ms; only the coupling step varies.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::path::Path;
+
+use acceptance::monolithic::{table_acceleration, worst_error};
+use acceptance::shared;
+use shakebench::master::{Algorithm, Ended};
+use shakebench::run::experiment::{Prepared, Request, prepare};
+
+fn request(record: Option<&Path>, specimen: &str, step: f64) -> Prepared {
+    let request = Request {
+        specimen: specimen.to_string(),
+        record: record.map(Path::to_path_buf),
+        step_s: Some(step),
+        ..Request::built_in("three-variable")
+    };
+    prepare(&request).unwrap()
+}
+
+fn coupled(prepared: &Prepared, algorithm: Algorithm) -> Vec<f64> {
+    let outcome = prepared.run(algorithm).unwrap();
+    assert!(
+        matches!(outcome.ended, Ended::Complete),
+        "{}",
+        outcome.ended.message()
+    );
+    outcome.record.column("table.acceleration").unwrap()
+}
+
+/// Errors for coupling steps of 2, 1, 0.5 and 0.25 ms and the orders between them.
+fn convergence(algorithm: Algorithm) -> (Vec<f64>, Vec<f64>) {
+    let steps = [0.002, 0.001, 0.0005, 0.00025];
+    let errors: Vec<f64> = steps
+        .iter()
+        .map(|&step| {
+            let prepared = request(None, "linear", step);
+            let truth = table_acceleration(&prepared.motion, true);
+            worst_error(&truth, &coupled(&prepared, algorithm))
+        })
+        .collect();
+    let orders = errors
+        .windows(2)
+        .map(|pair| (pair[0] / pair[1]).log2())
+        .collect();
+    println!("{algorithm}: errors {errors:?}, orders {orders:?}");
+    (errors, orders)
+}
+
+#[test]
+fn coupling_at_2_ms_errs_by_less_than_2_percent_of_the_peak_for_every_record() {
+    let mut errors = Vec::new();
+    for record in shared::records() {
+        let prepared = request(Some(&record), "linear", 0.002);
+        let truth = table_acceleration(&prepared.motion, true);
+        let error = worst_error(&truth, &coupled(&prepared, Algorithm::GaussSeidel));
+        println!("{}: {:.2} %", prepared.motion.name, 100.0 * error);
+        errors.push((prepared.motion.name.clone(), error));
+    }
+    for (name, error) in errors {
+        // Without any error it would not be a coupling.
+        assert!(error < 0.02 && error > 1e-6, "{name}: {error}");
+    }
+}
+
+#[test]
+fn without_a_specimen_there_is_nothing_to_couple() {
+    let prepared = request(None, "none", 0.002);
+    let truth = table_acceleration(&prepared.motion, false);
+    let error = worst_error(&truth, &coupled(&prepared, Algorithm::GaussSeidel));
+    assert!(error < 1e-9, "{error:e}");
+}
+
+#[test]
+fn the_coupling_is_of_second_order() {
+    for algorithm in [Algorithm::GaussSeidel, Algorithm::Iterative] {
+        let (errors, orders) = convergence(algorithm);
+        assert!(errors[0] < 0.005, "{algorithm}: {errors:?}");
+        for order in orders {
+            assert!((order - 2.0).abs() < 0.1, "{algorithm}: {order}");
+        }
+    }
+}
+
+#[test]
+fn a_jacobi_master_couples_with_first_order() {
+    let (errors, orders) = convergence(Algorithm::Jacobi);
+    println!("{errors:?}");
+    for order in orders {
+        assert!((order - 1.0).abs() < 0.3, "{order}");
+    }
+}
