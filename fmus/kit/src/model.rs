@@ -270,6 +270,7 @@ fn check_kind<C>(variable: &Variable<C>, start: &mut C) -> Result<(), String> {
     }
     let value = match &variable.access {
         Access::Real(field) => *field(start),
+        Access::Within(place) => *place(start),
         Access::Element(field, index) => *field(start)
             .get(*index)
             .ok_or_else(|| "is no element of its array".to_string())?,

@@ -25,8 +25,8 @@ use units::constants::SAMPLING_PERIOD;
 
 use super::file::{ComponentFile, SystemFile};
 use super::link::{Link, Origin};
-use super::model::shake_table_values;
 use super::rule::Rule;
+use plant::identified::nominal::shake_table_values;
 
 /// Samples by which the sensors of the physical rig are late.
 const DELAY: usize = 1;

@@ -100,6 +100,7 @@ fn start<C: Component>(variable: &Variable<C>) -> Option<String> {
     let mut start = C::default();
     Some(match &variable.access {
         Access::Real(field) => field(&mut start).to_string(),
+        Access::Within(place) => place(&mut start).to_string(),
         Access::Element(field, index) => field(&mut start)[*index].to_string(),
         Access::Integer(field) | Access::Choice(field, _) => field(&mut start).to_string(),
         Access::Boolean(field) => field(&mut start).to_string(),
