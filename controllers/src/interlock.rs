@@ -4,7 +4,7 @@
 //! model, a specimen or an actuator from needless damage; whoever works at a rig is protected by
 //! the emergency stop, the pressure-off valve and the fence, none of which may depend on it.
 
-use units::constants::{G, INCH, LBF, SAMPLING_PERIOD, STROKE};
+use units::constants::{G, INCH, LBF, STROKE};
 
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};
@@ -471,9 +471,6 @@ impl Controller for Interlock {
         };
     }
 }
-
-/// Longest time from a trip to the valve at null with the default settings, s.
-pub const TIME_TO_NULL: f64 = 0.02 + SAMPLING_PERIOD;
 
 #[cfg(test)]
 #[path = "interlock_tests.rs"]

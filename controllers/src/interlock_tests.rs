@@ -1,3 +1,5 @@
+use units::constants::SAMPLING_PERIOD;
+
 use super::*;
 
 const H: f64 = SAMPLING_PERIOD;
@@ -20,6 +22,9 @@ fn healthy(k: u32) -> InterlockInput {
         ..InterlockInput::default()
     }
 }
+
+/// Longest time from a trip to the valve at null with the default settings, s.
+const TIME_TO_NULL: f64 = 0.02 + H;
 
 /// Runs `count` samples with `disturb` applied; returns the interlock and the commands.
 fn run(

@@ -4,7 +4,8 @@
 
 use std::f64::consts::TAU;
 
-use identification::diagnosis::case::{Case, CaseError, Nominal, Record, problems};
+use identification::data::{Channel, Recording, TimeBase};
+use identification::diagnosis::case::{Case, CaseError, Nominal, problems};
 use identification::diagnosis::engine::{Observer, Verdict};
 use identification::diagnosis::rigs::shake_table::diagnose;
 use identification::diagnosis::rigs::shake_table::experiment::play;
@@ -50,9 +51,9 @@ relative = 0.01
 
 const SAMPLES: usize = 3000;
 
-/// A record of the rig in closed loop with sensor noise that the controller does not see: enough
+/// A recording of the rig in closed loop with sensor noise that the controller does not see: enough
 /// for looking at its columns.
-fn record(name: &str, nominal: &Nominal, rig: &IdentifiedRig, seed: u64) -> Record {
+fn recording(name: &str, nominal: &Nominal, rig: &IdentifiedRig, seed: u64) -> Recording {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let period = 1.0 / nominal.sample_rate;
     let phases: Vec<f64> = (0..12).map(|_| TAU * random.random::<f64>()).collect();
@@ -76,13 +77,26 @@ fn record(name: &str, nominal: &Nominal, rig: &IdentifiedRig, seed: u64) -> Reco
         }
     }
     let valve_command = law.commands(&reference, &channels[0], &channels[1], period);
-    Record {
-        name: name.into(),
-        time: (0..SAMPLES).map(|k| k as f64 * period).collect(),
-        valve_command,
-        channels,
-        reference,
-    }
+    let stamps = (0..SAMPLES).map(|k| k as f64 * period).collect();
+    let mut columns: Vec<_> = Channel::OUTPUTS.into_iter().zip(channels).collect();
+    columns.push((Channel::ValveCommand, valve_command));
+    columns.push((Channel::Reference, reference));
+    Recording::measured(name, TimeBase::Stamps(stamps), columns).unwrap()
+}
+
+/// Changes the samples of a channel.
+fn edit(recording: &mut Recording, channel: Channel, change: impl FnOnce(&mut Vec<f64>)) {
+    let mut values = recording.samples(channel).to_vec();
+    change(&mut values);
+    recording.replace(channel, values).unwrap();
+}
+
+/// Changes the time stamps.
+fn edit_time(recording: &mut Recording, change: impl FnOnce(&mut Vec<f64>)) {
+    let TimeBase::Stamps(stamps) = &mut recording.time else {
+        panic!("no stamps");
+    };
+    change(stamps);
 }
 
 fn healthy() -> Case {
@@ -100,8 +114,8 @@ fn healthy() -> Case {
         ..Default::default()
     };
     Case {
-        identification: record("identification", &nominal, &rig, 1),
-        validation: record("validation", &nominal, &rig, 2),
+        identification: recording("identification", &nominal, &rig, 1),
+        validation: recording("validation", &nominal, &rig, 2),
         small: None,
         baseline: None,
         nominal,
@@ -118,9 +132,9 @@ fn refused(case: &Case) -> String {
 #[test]
 fn a_gap_is_named_with_its_place() {
     let mut case = healthy();
-    for time in &mut case.validation.time[1200..] {
-        *time += 0.006;
-    }
+    edit_time(&mut case.validation, |time| {
+        time[1200..].iter_mut().for_each(|t| *t += 0.006);
+    });
     let message = refused(&case);
     assert!(
         message.contains("validation: a gap after 2.3980 s"),
@@ -132,7 +146,9 @@ fn a_gap_is_named_with_its_place() {
 #[test]
 fn another_sampling_rate_is_named() {
     let mut case = healthy();
-    case.identification.time.iter_mut().for_each(|t| *t *= 2.0);
+    edit_time(&mut case.identification, |time| {
+        time.iter_mut().for_each(|t| *t *= 2.0);
+    });
     let message = refused(&case);
     assert!(
         message.contains("identification: sampled at 250.0000 Hz"),
@@ -143,11 +159,10 @@ fn another_sampling_rate_is_named() {
 #[test]
 fn a_clipped_sensor_is_named() {
     let mut case = healthy();
-    let acceleration = &mut case.identification.channels[1];
-    let limit = 0.4 * acceleration.iter().fold(0.0f64, |m, a| m.max(a.abs()));
-    acceleration
-        .iter_mut()
-        .for_each(|a| *a = a.clamp(-limit, limit));
+    edit(&mut case.identification, Channel::Acceleration, |values| {
+        let limit = 0.4 * values.iter().fold(0.0f64, |m, a| m.max(a.abs()));
+        values.iter_mut().for_each(|a| *a = a.clamp(-limit, limit));
+    });
     let message = refused(&case);
     assert!(message.contains("`acceleration` is clipped"), "{message}");
 }
@@ -155,9 +170,9 @@ fn a_clipped_sensor_is_named() {
 #[test]
 fn a_sensor_that_stands_at_its_end_is_clipped_and_not_frozen() {
     let mut case = healthy();
-    for a in &mut case.validation.channels[0] {
-        *a = a.clamp(-0.001, 0.001);
-    }
+    edit(&mut case.validation, Channel::Displacement, |values| {
+        values.iter_mut().for_each(|x| *x = x.clamp(-0.001, 0.001));
+    });
     let error = refused(&case);
     assert!(
         error.contains("validation: `displacement` is clipped"),
@@ -168,12 +183,13 @@ fn a_sensor_that_stands_at_its_end_is_clipped_and_not_frozen() {
 #[test]
 fn dropped_samples_that_were_filled_are_named() {
     let mut case = healthy();
-    for start in [400, 900, 1400] {
-        for k in start..start + 4 {
-            for channel in &mut case.identification.channels {
-                channel[k] = channel[start - 1];
+    for channel in Channel::OUTPUTS {
+        edit(&mut case.identification, channel, |values| {
+            for start in [400, 900, 1400] {
+                let before = values[start - 1];
+                values[start..start + 4].fill(before);
             }
-        }
+        });
     }
     let error = refused(&case);
     assert!(
@@ -185,9 +201,8 @@ fn dropped_samples_that_were_filled_are_named() {
 #[test]
 fn without_displacement_the_rest_is_used() {
     let mut case = healthy();
-    for record in [&mut case.identification, &mut case.validation] {
-        record.channels[0].clear();
-    }
+    case.identification = case.identification.without(Channel::Displacement);
+    case.validation = case.validation.without(Channel::Displacement);
     let diagnosis = diagnose(&case, Observer::none()).unwrap();
     assert!(
         diagnosis
@@ -251,7 +266,9 @@ fn noise_beyond_what_is_stated_is_named_and_no_effect() {
 #[test]
 fn a_frozen_sensor_is_named() {
     let mut case = healthy();
-    case.validation.channels[2][500..900].fill(1.0);
+    edit(&mut case.validation, Channel::ActuatorForce, |values| {
+        values[500..900].fill(1.0);
+    });
     let message = refused(&case);
     assert!(
         message.contains("validation: `actuator_force` is frozen"),
@@ -262,7 +279,9 @@ fn a_frozen_sensor_is_named() {
 #[test]
 fn dropped_readings_are_named() {
     let mut case = healthy();
-    case.identification.channels[0][77] = f64::NAN;
+    edit(&mut case.identification, Channel::Displacement, |values| {
+        values[77] = f64::NAN;
+    });
     let message = refused(&case);
     assert!(message.contains("`displacement` has 1 empty"), "{message}");
     assert!(message.contains("sample 77"), "{message}");
@@ -271,8 +290,10 @@ fn dropped_readings_are_named() {
 #[test]
 fn too_little_excitation_is_named() {
     let mut case = healthy();
-    let record = &mut case.identification;
-    record.channels[0].iter_mut().for_each(|x| *x *= 1e-3);
+    let recording = &mut case.identification;
+    edit(recording, Channel::Displacement, |values| {
+        values.iter_mut().for_each(|x| *x *= 1e-3);
+    });
     let message = refused(&case);
     assert!(
         message.contains("identification: too little excitation"),
@@ -283,23 +304,24 @@ fn too_little_excitation_is_named() {
 #[test]
 fn a_table_that_sticks_at_low_level_and_a_command_at_its_limit_are_no_faults() {
     let mut case = healthy();
-    let record = &mut case.identification;
-    record.channels[0].iter_mut().for_each(|x| *x *= 1e-3);
-    record.valve_command[500..600].fill(10.0);
-    assert_eq!(problems(record, &case.nominal), Vec::<String>::new());
-    record.valve_command[500..600].fill(9.0);
-    assert_eq!(problems(record, &case.nominal).len(), 1);
+    let recording = &mut case.identification;
+    edit(recording, Channel::Displacement, |values| {
+        values.iter_mut().for_each(|x| *x *= 1e-3);
+    });
+    edit(recording, Channel::ValveCommand, |values| {
+        values[500..600].fill(10.0);
+    });
+    assert_eq!(problems(recording, &case.nominal), Vec::<String>::new());
+    edit(recording, Channel::ValveCommand, |values| {
+        values[500..600].fill(9.0);
+    });
+    assert_eq!(problems(recording, &case.nominal).len(), 1);
 }
 
 #[test]
 fn too_few_samples_are_named() {
     let mut case = healthy();
-    case.validation.time.truncate(100);
-    case.validation.valve_command.truncate(100);
-    case.validation
-        .channels
-        .iter_mut()
-        .for_each(|c| c.truncate(100));
+    case.validation = case.validation.cut(0, 100);
     let message = refused(&case);
     assert!(message.contains("100 samples are too few"), "{message}");
 }
@@ -307,8 +329,10 @@ fn too_few_samples_are_named() {
 #[test]
 fn a_sign_turned_over_is_told_from_an_effect() {
     let mut case = healthy();
-    for record in [&mut case.identification, &mut case.validation] {
-        record.channels[1].iter_mut().for_each(|a| *a = -*a);
+    for recording in [&mut case.identification, &mut case.validation] {
+        edit(recording, Channel::Acceleration, |values| {
+            values.iter_mut().for_each(|a| *a = -*a);
+        });
     }
     let message = refused(&case);
     assert!(
@@ -320,7 +344,7 @@ fn a_sign_turned_over_is_told_from_an_effect() {
 #[test]
 fn records_with_other_channels_are_not_of_one_rig() {
     let mut case = healthy();
-    case.validation.channels[3].clear();
+    case.validation = case.validation.without(Channel::SpecimenAcceleration);
     let message = refused(&case);
     assert!(message.contains("are the records of one rig"), "{message}");
 }
@@ -328,9 +352,8 @@ fn records_with_other_channels_are_not_of_one_rig() {
 #[test]
 fn a_missing_channel_is_told_and_the_rest_used() {
     let mut case = healthy();
-    for record in [&mut case.identification, &mut case.validation] {
-        record.channels[3].clear();
-    }
+    case.identification = case.identification.without(Channel::SpecimenAcceleration);
+    case.validation = case.validation.without(Channel::SpecimenAcceleration);
     let diagnosis = diagnose(&case, Observer::none()).unwrap();
     let notes = diagnosis.notes.join("; ");
     assert!(
@@ -341,35 +364,27 @@ fn a_missing_channel_is_told_and_the_rest_used() {
 }
 
 #[test]
-fn a_column_without_unit_is_named() {
-    let error = Record::parse("r", "time [s],displacement\n0,1\n").unwrap_err();
-    assert!(
-        error.contains("column `displacement` has no unit"),
-        "{error}"
-    );
-    let error = Record::parse("r", "time [s],displacement [lbf]\n0,1\n").unwrap_err();
-    assert!(
-        error.contains("unit \"lbf\" (kg m s^-2) does not fit \"m\" (m)"),
-        "{error}"
-    );
-    let error = Record::parse("r", "time [s],displacement [in]\n0,1\n0.002,x\n").unwrap_err();
-    assert!(
-        error.contains("line 3, column `displacement`: `x` is no number"),
-        "{error}"
-    );
-}
-
-#[test]
-fn order_units_and_unknown_columns_change_nothing() {
-    let a = Record::parse("r", "time [s],valve_command [V],displacement [in]\n0,1,2\n").unwrap();
-    let b = Record::parse(
-        "r",
-        "extra,displacement [mm],time [ms],valve_command [mV]\nx,50.8,0,1000\n",
-    )
-    .unwrap();
-    assert_eq!(a.time, b.time);
-    assert!((a.channels[0][0] - b.channels[0][0]).abs() < 1e-15);
-    assert_eq!(a.valve_command, b.valve_command);
+fn rounded_time_stamps_that_the_nominal_rate_explains_are_no_fault() {
+    let mut case = healthy();
+    edit_time(&mut case.identification, |time| {
+        time.iter_mut()
+            .for_each(|t| *t = (*t * 100.0).round() / 100.0);
+    });
+    let found = problems(&case.identification, &case.nominal);
+    assert_eq!(found, Vec::<String>::new());
+    // Another rate behind the same rounding, and samples that are missing.
+    case.nominal.sample_rate = 400.0;
+    let found = problems(&case.identification, &case.nominal).join("; ");
+    assert!(found.contains("sampled at 500.0000 Hz"), "{found}");
+    case.nominal.sample_rate = 500.0;
+    edit_time(&mut case.identification, |time| {
+        time[1500..].iter_mut().for_each(|t| *t += 0.05);
+    });
+    let found = problems(&case.identification, &case.nominal).join("; ");
+    assert!(found.contains("rounded to 0.01 s"), "{found}");
+    edit_time(&mut case.identification, |time| time.fill(0.0));
+    let found = problems(&case.identification, &case.nominal).join("; ");
+    assert!(found.contains("time does not increase"), "{found}");
 }
 
 #[test]

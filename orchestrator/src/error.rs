@@ -32,6 +32,9 @@ pub enum Error {
     /// Results cannot be written.
     #[error(transparent)]
     Results(#[from] ResultsError),
+    /// A file of measured data is at fault.
+    #[error(transparent)]
+    Data(#[from] identification::data::DataError),
     /// Measured data give no model.
     #[error(transparent)]
     Identification(#[from] identification::IdentificationError),

@@ -11,6 +11,7 @@ pub mod diagnosis;
 pub mod error;
 pub mod extended_model;
 pub mod fmu;
+pub mod identify;
 pub mod library;
 pub mod master;
 pub mod metrics;

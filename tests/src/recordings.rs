@@ -2,7 +2,7 @@
 
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion};
-use identification::data::{Recording, mean_and_deviation};
+use identification::data::{Channel, Recording, mean_and_deviation};
 use nalgebra::dvector;
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
@@ -63,22 +63,25 @@ impl Test {
         let noise = [1, 2, 3, 4, 5].map(|i| self.noise * size[i]);
         let mut channels = self.play(&reference, noise, &mut random);
         let names = [
-            "valve_command",
-            "displacement",
-            "velocity",
-            "acceleration",
-            "actuator_force",
-            "specimen_acceleration",
+            Channel::ValveCommand,
+            Channel::Displacement,
+            Channel::Velocity,
+            Channel::Acceleration,
+            Channel::ActuatorForce,
+            Channel::SpecimenAcceleration,
         ];
-        let mut columns: Vec<(String, Vec<f64>)> = names
-            .iter()
+        let sensed = |channel: Channel| match channel {
+            Channel::Velocity => false,
+            Channel::SpecimenAcceleration => self.specimen.is_some(),
+            _ => true,
+        };
+        let mut columns: Vec<(Channel, Vec<f64>)> = names
+            .into_iter()
             .zip(channels.drain(..))
-            .filter(|(name, _)| **name != "velocity")
-            .filter(|(name, _)| self.specimen.is_some() || **name != "specimen_acceleration")
-            .map(|(name, values)| ((*name).to_string(), values))
+            .filter(|(channel, _)| sensed(*channel))
             .collect();
         let wanted = reference.iter().map(|r| r.displacement).collect();
-        columns.push(("reference".to_string(), wanted));
+        columns.push((Channel::Reference, wanted));
         Recording::new(&format!("test {}", self.seed), PERIOD, columns).unwrap()
     }
 
@@ -170,25 +173,14 @@ fn reference(duration: f64, band: (f64, f64), random: &mut ChaCha8Rng) -> Vec<Mo
 
 /// A recording as the file that `shakebench identify` reads.
 pub fn csv(recording: &Recording) -> String {
-    let unit = |name: &str| match name {
-        "valve_command" => "V",
-        "actuator_force" => "N",
-        "displacement" | "reference" => "m",
-        _ => "m/s^2",
-    };
-    let names: Vec<&str> = recording.names().collect();
     let mut text = String::from("time [s]");
-    for name in &names {
-        text += &format!(",{name} [{}]", unit(name));
+    for (channel, _) in recording.channels() {
+        text += &format!(",{} [{}]", channel.name(), channel.unit());
     }
-    let columns: Vec<&[f64]> = names
-        .iter()
-        .filter_map(|name| recording.channel(name))
-        .collect();
     for k in 0..recording.len() {
-        text += &format!("\n{:.3}", k as f64 * recording.period);
-        for column in &columns {
-            text += &format!(",{:.8e}", column[k]);
+        text += &format!("\n{:.3}", recording.time_at(k));
+        for (_, values) in recording.channels() {
+            text += &format!(",{:.8e}", values[k]);
         }
     }
     text + "\n"

@@ -224,7 +224,7 @@ fn partitions_through_the_master_are_the_run_without_fmi() {
         assert!(
             matches!(outcome.ended, Ended::Complete),
             "{}",
-            outcome.ended.story()
+            outcome.ended.message()
         );
 
         let n = outcome.record.len();

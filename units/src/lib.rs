@@ -218,6 +218,20 @@ pub fn convert(value: f64, from: &str, to: &str) -> Result<f64, UnitError> {
     Ok(value * Unit::parse(from)?.factor_to(&Unit::parse(to)?)?)
 }
 
+/// The factor from `unit` to `meant`. Where an acceleration is meant, `gal` is the galileo of
+/// seismology (1 cm/s²), not the gallon.
+///
+/// # Errors
+/// A unit that cannot be read, or two of different dimension.
+pub fn factor_meant(unit: &str, meant: &str) -> Result<f64, UnitError> {
+    let (unit, meant) = (Unit::parse(unit)?, Unit::parse(meant)?);
+    let galileo = Unit::parse("Gal")?;
+    if unit.text.eq_ignore_ascii_case("gal") && meant.dimension == galileo.dimension {
+        return galileo.factor_to(&meant);
+    }
+    unit.factor_to(&meant)
+}
+
 /// Reads a value meant to be in `unit`, as `--set`, `--pga` and `--peak` take it: a number alone
 /// is in that unit already, a number with a unit is converted to it.
 ///

@@ -148,6 +148,15 @@ fn a_number_alone_is_in_the_unit_that_is_meant() {
 }
 
 #[test]
+fn gal_is_what_is_meant() {
+    close(factor_meant("gal", "m/s^2").unwrap(), 0.01);
+    close(factor_meant("Gal", "g").unwrap(), 0.01 / 9.806_65);
+    close(factor_meant("gal", "m^3").unwrap(), 3.785_411_784e-3);
+    close(factor_meant("in", "m").unwrap(), 0.0254);
+    assert!(factor_meant("gal", "m").is_err());
+}
+
+#[test]
 fn grams_are_not_offered() {
     assert!(Unit::parse("mg").is_err());
     assert_eq!(

@@ -369,4 +369,6 @@ fn design_filter(model: &LoopModel, p: &Parameters) -> Result<SteadyStateKalmanF
 #[cfg(test)]
 mod problem_tests;
 #[cfg(test)]
+mod process_model_tests;
+#[cfg(test)]
 mod tests;

@@ -8,7 +8,6 @@ use units::constants::INCH;
 
 use super::*;
 use crate::mpc::solver::{Outcome, Solver};
-use crate::three_variable::continuous_process_model;
 use plant::linear::zero_order_hold;
 
 /// Eq 5-14 to 5-18 over all 3p commands and the slack, written out from the closed loop.
@@ -293,42 +292,6 @@ fn sampled_prediction_is_what_plant_and_law_do() {
         }
         assert!(law.integral != 0.0);
     }
-}
-
-#[test]
-fn continuous_prediction_is_equation_5_5() {
-    let parameters = Parameters {
-        plant: prediction_plant(&Rig {
-            shake_table: plant::identified::shake_table::ShakeTable::derounded(),
-            specimen: None,
-        }),
-        law: LowLevelLaw::Continuous,
-        ..Parameters::default()
-    };
-    let table = plant::identified::shake_table::ShakeTable::derounded().table;
-    // The process model that is checked against the printed digits.
-    let printed = continuous_process_model(
-        &plant::identified::actuator::PublishedActuator::Derounded
-            .transfer_functions()
-            .state_space(),
-        [
-            1.0 / table.mass,
-            table.damping / table.mass,
-            table.stiffness / table.mass,
-        ],
-        &parameters.low_level.gains,
-    )
-    .sample(H);
-    let control = ModelPredictiveControl::new(parameters).unwrap();
-    let model = control.model();
-    let near = |got: nalgebra::DMatrixView<f64>, want: &DMatrix<f64>| {
-        got.iter()
-            .zip(want.iter())
-            .all(|(g, w)| (g - w).abs() <= 1e-10 * w.abs() + 1e-13)
-    };
-    assert!(near(model.a.view((0, 0), (6, 6)), &printed.a));
-    assert!(near(model.b.view((0, 0), (6, 3)), &printed.b));
-    assert!(near(model.c.view((0, 0), (3, 6)), &printed.c));
 }
 
 const H: f64 = 0.002;

@@ -7,7 +7,11 @@
     missing_docs,
     reason = "the signatures and their meaning are the standard's"
 )]
-#![allow(clippy::missing_safety_doc, clippy::too_many_arguments)]
+#![allow(
+    clippy::missing_errors_doc,
+    clippy::missing_safety_doc,
+    clippy::too_many_arguments
+)]
 
 mod derivatives;
 

@@ -186,6 +186,12 @@ impl<C: Component> Model<C> {
         !self.states.is_empty()
     }
 
+    /// The state whose derivative the variable at `index` is, both as positions from 0.
+    pub fn state_of(&self, index: usize) -> Option<usize> {
+        let mut states = self.states.iter();
+        states.find(|s| s.derivative == index).map(|s| s.state)
+    }
+
     /// The position of a value reference in the table.
     ///
     /// # Errors

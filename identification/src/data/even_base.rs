@@ -1,7 +1,9 @@
-//! From raw columns to recordings on an even time base: drop-outs, uneven stamps, gaps.
+//! From what was measured to recordings on an even time base: drop-outs, uneven stamps, gaps.
+
+use std::cmp::Ordering;
 
 use super::faults::runs;
-use super::{Finding, Recording};
+use super::{Finding, Recording, RoundedStamps, TimeBase};
 use crate::IdentificationError;
 
 /// Missing samples up to this many in a row are bridged by a straight line.
@@ -10,21 +12,45 @@ const LONGEST_BRIDGE: usize = 5;
 const JITTER: f64 = 0.02;
 
 impl Recording {
-    /// Puts raw columns on an even time base: short drop-outs (NaN) are bridged, uneven stamps
-    /// interpolated, and the recording is cut where samples are missing for longer. Each piece is
-    /// a recording of its own; everything done is told.
+    /// Puts a recording on an even time base: short drop-outs (NaN) are bridged, stamps that were
+    /// rounded get back their even base, uneven ones are interpolated, and the recording is cut
+    /// where samples are missing for longer. Each piece is a recording of its own; everything done
+    /// is told.
     ///
     /// # Errors
-    /// Time that does not increase, fewer than two samples.
-    pub fn from_columns(
-        name: &str,
-        time: &[f64],
-        channels: Vec<(String, Vec<f64>)>,
-    ) -> Result<(Vec<Self>, Vec<Finding>), IdentificationError> {
+    /// No time, time that does not increase, fewer than two samples.
+    pub fn on_even_base(self) -> Result<(Vec<Self>, Vec<Finding>), IdentificationError> {
+        let Self {
+            name,
+            source,
+            time,
+            notes,
+            mut channels,
+        } = self;
         let unreadable = |what: String, expected| IdentificationError::Unreadable {
-            recording: name.to_string(),
+            recording: name.clone(),
             what,
             expected,
+        };
+        let mut time = match time {
+            TimeBase::Stamps(stamps) => stamps,
+            even @ TimeBase::Even { .. } => {
+                let whole = Self {
+                    name,
+                    source,
+                    time: even,
+                    notes,
+                    channels,
+                };
+                let faults = whole.faults();
+                return Ok((vec![whole], faults));
+            }
+            TimeBase::Unknown => {
+                return Err(unreadable(
+                    "no column `time`".into(),
+                    "time stamps, for example `time [s]`",
+                ));
+            }
         };
         if time.len() < 2 {
             return Err(unreadable(
@@ -32,34 +58,51 @@ impl Recording {
                 "at least two rows of numbers",
             ));
         }
-        if let Some(at) = time
-            .windows(2)
-            .position(|pair| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater))
-        {
-            return Err(unreadable(
-                format!(
-                    "time does not increase at row {} ({} s)",
-                    at + 2,
-                    time[at + 1]
-                ),
-                "time stamps that increase",
-            ));
-        }
         let mut findings = Vec::new();
         let mut tell = |what: String| {
             findings.push(Finding {
-                recording: name.to_string(),
+                recording: name.clone(),
                 what,
             });
         };
-        let period = even_period(time);
-        let uneven = time
-            .windows(2)
-            .filter(|pair| {
-                let steps = (pair[1] - pair[0]) / period;
-                (steps - steps.round().max(1.0)).abs() > JITTER
-            })
-            .count();
+        notes.into_iter().for_each(&mut tell);
+        let increases = |pair: &[f64]| pair[1].partial_cmp(&pair[0]) == Some(Ordering::Greater);
+        let turn = time.windows(2).position(|pair| !increases(pair));
+        let mut period = even_period(&time);
+        let mut uneven = strays(&time, period);
+        if turn.is_some() || uneven > 0 {
+            let rounded = RoundedStamps::of(&time, None);
+            if let Some((step, even)) = rounded.and_then(|r| Some((r.step, r.period?))) {
+                tell(format!(
+                    "time stamps are rounded to {step} s; a sample every {even:.6} s ({:.3} Hz) \
+                     explains them all and is used",
+                    1.0 / even
+                ));
+                (period, uneven) = (even, 0);
+                let start = time[0];
+                for (k, t) in time.iter_mut().enumerate() {
+                    *t = start + k as f64 * even;
+                }
+            } else if let Some(at) = turn {
+                let rounded = rounded.filter(|_| time[at + 1] == time[at]).map_or(
+                    String::new(),
+                    |r| {
+                        format!(
+                            "; the stamps are rounded to {} s, and no even rate explains them all",
+                            r.step
+                        )
+                    },
+                );
+                return Err(unreadable(
+                    format!(
+                        "time does not increase at row {} ({} s){rounded}",
+                        at + 2,
+                        time[at + 1]
+                    ),
+                    "time stamps that increase",
+                ));
+            }
+        }
         if uneven > 0 {
             tell(format!(
                 "uneven time stamps: {uneven} of {} steps stray from {:.6} s by more than {:.0} %; \
@@ -71,18 +114,7 @@ impl Recording {
         }
 
         let mut missing = vec![false; time.len()];
-        let mut channels = channels;
         for (channel, values) in &mut channels {
-            if values.len() != time.len() {
-                return Err(unreadable(
-                    format!(
-                        "`{channel}` has {} samples, not {}",
-                        values.len(),
-                        time.len()
-                    ),
-                    "columns of one length",
-                ));
-            }
             let runs = runs(values, |value| !value.is_finite());
             for &(first, end) in &runs {
                 let inside = first > 0 && end < values.len();
@@ -95,8 +127,9 @@ impl Recording {
             if let Some(&(first, end)) = runs.first() {
                 let count: usize = runs.iter().map(|run| run.1 - run.0).sum();
                 tell(format!(
-                    "drop-outs in `{channel}`: {count} samples in {} places, the first at \
+                    "drop-outs in `{}`: {count} samples in {} places, the first at \
                      {:.3} s ({} samples)",
+                    channel.name(),
                     runs.len(),
                     time[first],
                     end - first
@@ -130,11 +163,14 @@ impl Recording {
                 name: if several {
                     format!("{name} (part {})", index + 1)
                 } else {
-                    name.to_string()
+                    name.clone()
                 },
-                period,
-                start: time[first],
-                source: name.to_string(),
+                source: source.clone(),
+                time: TimeBase::Even {
+                    start: time[first],
+                    period,
+                },
+                notes: Vec::new(),
                 channels: channels
                     .iter()
                     .map(|(channel, values)| {
@@ -143,7 +179,7 @@ impl Recording {
                         } else {
                             values[first..end].to_vec()
                         };
-                        (channel.clone(), values)
+                        (*channel, values)
                     })
                     .collect(),
             })
@@ -153,6 +189,15 @@ impl Recording {
         }
         Ok((recordings, findings))
     }
+}
+
+/// Steps that are no multiple of the period.
+fn strays(time: &[f64], period: f64) -> usize {
+    let strays = |pair: &&[f64]| {
+        let steps = (pair[1] - pair[0]) / period;
+        (steps - steps.round().max(1.0)).abs() > JITTER
+    };
+    time.windows(2).filter(strays).count()
 }
 
 /// The step of the even base: the median step, refined over the whole recording where no gap
@@ -198,6 +243,7 @@ fn interpolate(time: &[f64], values: &[f64], period: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Channel;
     use super::*;
 
     fn wave(count: usize) -> Vec<f64> {
@@ -208,9 +254,15 @@ mod tests {
         (0..count).map(|k| k as f64 * 0.002).collect()
     }
 
+    const FORCE: Channel = Channel::ActuatorForce;
+
+    fn measured(time: &[f64], values: Vec<f64>) -> Recording {
+        let time = TimeBase::Stamps(time.to_vec());
+        Recording::measured("a.csv", time, vec![(FORCE, values)]).unwrap()
+    }
+
     fn read(time: &[f64], values: Vec<f64>) -> (Vec<Recording>, String) {
-        let columns = vec![("force".to_string(), values)];
-        let (recordings, findings) = Recording::from_columns("a.csv", time, columns).unwrap();
+        let (recordings, findings) = measured(time, values).on_even_base().unwrap();
         let text = findings.iter().map(ToString::to_string).collect::<Vec<_>>();
         (recordings, text.join("\n"))
     }
@@ -219,8 +271,8 @@ mod tests {
     fn a_clean_recording_has_no_findings() {
         let (recordings, findings) = read(&even(500), wave(500));
         assert_eq!(findings, "");
-        assert_eq!(recordings[0].period, 0.002);
-        assert_eq!(recordings[0].channel("force").unwrap(), wave(500));
+        assert_eq!(recordings[0].period(), 0.002);
+        assert_eq!(recordings[0].channel(FORCE).unwrap(), wave(500));
     }
 
     #[test]
@@ -228,9 +280,9 @@ mod tests {
         let mut values = wave(500);
         values[100..102].fill(f64::NAN);
         let (recordings, findings) = read(&even(500), values);
-        assert!(
-            findings.contains("drop-outs in `force`: 2 samples in 1 places, the first at 0.200 s")
-        );
+        assert!(findings.contains(
+            "drop-outs in `actuator_force`: 2 samples in 1 places, the first at 0.200 s"
+        ));
         assert_eq!(recordings.len(), 1);
 
         let mut values = wave(500);
@@ -243,10 +295,14 @@ mod tests {
         let (recordings, findings) = read(&time, wave(500));
         assert!(findings.contains("gap of 0.502 s at 0.398 s"), "{findings}");
         assert_eq!((recordings[0].len(), recordings[1].len()), (200, 300));
-        assert!((recordings[1].start - 0.9).abs() < 1e-12);
+        assert!((recordings[1].time_at(0) - 0.9).abs() < 1e-12);
 
         let clipped = wave(500).iter().map(|v| v.clamp(-0.2, 0.2)).collect();
-        assert!(read(&even(500), clipped).1.contains("`force` is clipped"));
+        assert!(
+            read(&even(500), clipped)
+                .1
+                .contains("`actuator_force` is clipped")
+        );
 
         let mut stuck = wave(500);
         stuck[50..100].fill(0.25);
@@ -258,7 +314,7 @@ mod tests {
         assert!(
             read(&even(500), vec![3.0; 500])
                 .1
-                .contains("`force` is constant")
+                .contains("`actuator_force` is constant")
         );
     }
 
@@ -270,8 +326,8 @@ mod tests {
         let values = time.iter().map(|t| 3.0 * t).collect();
         let (recordings, findings) = read(&time, values);
         assert!(findings.contains("uneven time stamps"), "{findings}");
-        let values = recordings[0].channel("force").unwrap();
-        let period = recordings[0].period;
+        let values = recordings[0].channel(FORCE).unwrap();
+        let period = recordings[0].period();
         for (k, value) in values.iter().enumerate() {
             let line = 3.0 * (time[0] + k as f64 * period);
             assert!((value - line).abs() < 1e-9);
@@ -279,8 +335,31 @@ mod tests {
     }
 
     #[test]
+    fn rounded_stamps_get_back_their_even_base() {
+        let time: Vec<f64> = (0..2000).map(|k| f64::from(k / 5) * 0.01).collect();
+        let (recordings, findings) = read(&time, wave(2000));
+        assert_eq!(recordings[0].period(), 0.002);
+        assert_eq!(recordings[0].channel(FORCE).unwrap(), wave(2000));
+        assert!(findings.contains("rounded to 0.01 s"), "{findings}");
+        assert!(findings.contains("500.000 Hz"), "{findings}");
+
+        let mut holed = time.clone();
+        holed.drain(800..830);
+        let error = measured(&holed, wave(1970))
+            .on_even_base()
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("rounded to 0.01 s, and no even rate explains them all"),
+            "{error}"
+        );
+    }
+
+    #[test]
     fn time_that_turns_back_is_refused_by_row() {
-        let error = Recording::from_columns("a.csv", &[0.0, 0.1, 0.05], vec![]).unwrap_err();
+        let error = measured(&[0.0, 0.1, 0.05], vec![0.0; 3])
+            .on_even_base()
+            .unwrap_err();
         assert_eq!(
             error.to_string(),
             "a.csv: time does not increase at row 3 (0.05 s); expected time stamps that increase"

@@ -34,7 +34,8 @@ impl Recording {
                 what,
             });
         };
-        for (name, values) in &self.channels {
+        for (channel, values) in self.channels() {
+            let name = channel.name();
             if is_constant(values) {
                 tell(format!("`{name}` is constant"));
                 continue;
@@ -65,8 +66,8 @@ impl Recording {
                 tell(format!(
                     "drop-out in `{name}`: the value repeats for {:.3} s from {:.3} s ({} such \
                      places)",
-                    (end - first) as f64 * self.period,
-                    self.start + first as f64 * self.period,
+                    (end - first) as f64 * self.period(),
+                    self.time_at(first),
                     stuck.len()
                 ));
             }

@@ -5,10 +5,11 @@ use nalgebra::{Complex, DMatrix, DVector};
 use plant::identified::actuator::IdentifiedActuator;
 
 use crate::IdentificationError;
+use crate::data::OUTPUT_NAMES;
 use crate::estimation::gauss_newton::GaussNewtonEstimate;
 use crate::estimation::prediction::{Parameter, PredictionModel};
 use crate::estimation::residuals::{ResidualTest, residual_test};
-use crate::identify::model::{OUTPUT_NAMES, OUTPUTS, PHYSICAL, RigModel, rig_from};
+use crate::identify::model::{OUTPUTS, PHYSICAL, RigModel, rig_from};
 use crate::identify::rig::RigIdentification;
 use crate::identify::validation;
 

@@ -1,7 +1,7 @@
 //! Recordings from which no rig can be had, named before any fit.
 
 use crate::IdentificationError;
-use crate::data::{Recording, mean_and_deviation};
+use crate::data::{Channel, Recording, mean_and_deviation};
 use crate::estimation::frequency_response::excited_band;
 use crate::estimation::least_squares::reduce;
 
@@ -12,6 +12,13 @@ const PARAMETERS: usize = 33;
 const SAMPLES_A_PARAMETER: usize = 40;
 /// A command that its past and the outputs explain to this part of its size is pure feedback.
 const FEEDBACK: f64 = 1e-4;
+
+/// What must have been measured on any rig.
+const OUTPUTS: [Channel; 3] = [
+    Channel::Displacement,
+    Channel::Acceleration,
+    Channel::ActuatorForce,
+];
 
 /// Checks one recording; returns warnings.
 ///
@@ -30,21 +37,22 @@ pub(crate) fn check(
             samples: recording.len(),
             parameters: PARAMETERS,
             needed: needed.ceil() as usize,
-            seconds: needed * recording.period,
+            seconds: needed * recording.period(),
         });
     }
-    let command = recording
-        .require("valve_command", NEEDED)
-        .map_err(|error| match error {
-            IdentificationError::ConstantChannel { value, .. } => {
-                IdentificationError::NoExcitation {
-                    recording: name.clone(),
-                    what: format!("valve_command stands at {value:.4} V"),
+    let command =
+        recording
+            .require(Channel::ValveCommand, NEEDED)
+            .map_err(|error| match error {
+                IdentificationError::ConstantChannel { value, .. } => {
+                    IdentificationError::NoExcitation {
+                        recording: name.clone(),
+                        what: format!("valve_command stands at {value:.4} V"),
+                    }
                 }
-            }
-            other => other,
-        })?;
-    for channel in ["displacement", "acceleration", "actuator_force"] {
+                other => other,
+            })?;
+    for channel in OUTPUTS {
         let values = recording.require(channel, NEEDED)?;
         let noise = high_frequency_noise(values);
         let (_, size) = mean_and_deviation(values);
@@ -52,8 +60,9 @@ pub(crate) fn check(
             return Err(IdentificationError::NoExcitation {
                 recording: name.clone(),
                 what: format!(
-                    "`{channel}` is noise for the most part (root mean square {size:.3e}, white \
-                     noise {noise:.3e}, SI)"
+                    "`{}` is noise for the most part (root mean square {size:.3e}, white noise \
+                     {noise:.3e}, SI)",
+                    channel.name()
                 ),
             });
         }
@@ -73,9 +82,9 @@ fn high_frequency_noise(values: &[f64]) -> f64 {
 
 /// Whether the command is a fixed function of its own past and of the outputs.
 fn feedback(recording: &Recording, command: &[f64]) -> Result<(), IdentificationError> {
-    let outputs: Vec<&[f64]> = ["displacement", "acceleration", "actuator_force"]
-        .iter()
-        .filter_map(|name| recording.channel(name))
+    let outputs: Vec<&[f64]> = OUTPUTS
+        .into_iter()
+        .filter_map(|channel| recording.channel(channel))
         .collect();
     let count = 3 + 2 * outputs.len();
     let all = reduce(command.len() - 2, count, 1, |k, row| {
@@ -112,8 +121,8 @@ fn feedback(recording: &Recording, command: &[f64]) -> Result<(), Identification
 /// Frequencies that the command holds.
 fn excitation(recording: &Recording, command: &[f64]) -> Result<Vec<String>, IdentificationError> {
     let segment = (command.len() / 4).clamp(64, 8192);
-    let (low, high, lines) = excited_band(command, recording.period, segment, 1e-6)?;
-    let width = 1.0 / (segment as f64 * recording.period);
+    let (low, high, lines) = excited_band(command, recording.period(), segment, 1e-6)?;
+    let width = 1.0 / (segment as f64 * recording.period());
     // A Hann window spreads one line over some ten at this depth.
     if lines <= 24 {
         return Err(IdentificationError::RankDeficient {

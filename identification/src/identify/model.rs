@@ -15,19 +15,13 @@ use plant::identified::table::Table;
 use plant::linear::{StateSpace, discrete_riccati};
 use plant::specimens::linear::LinearSpecimen;
 
+use crate::data::Channel;
 use crate::estimation::prediction::{self, PredictionModel};
 
 /// Number of outputs.
-pub const OUTPUTS: usize = 4;
+pub const OUTPUTS: usize = Channel::OUTPUTS.len();
 /// Number of states: actuator, table, specimen.
 pub const STATES: usize = 7;
-/// The outputs, as columns are named.
-pub const OUTPUT_NAMES: [&str; OUTPUTS] = [
-    "displacement",
-    "acceleration",
-    "actuator_force",
-    "specimen_acceleration",
-];
 /// Rows of [`Rig::state_space`] that are measured.
 const ROWS: [usize; OUTPUTS] = [0, 2, 3, 6];
 

@@ -17,7 +17,8 @@ use serde::{Deserialize, Serialize};
 use units::constants::{INCH, LBF};
 
 use crate::IdentificationError;
-use crate::identify::model::{DELAY, MASS, OUTPUT_NAMES, SPECIMEN};
+use crate::data::OUTPUT_NAMES;
+use crate::identify::model::{DELAY, MASS, SPECIMEN};
 use crate::identify::rig::RigIdentification;
 
 /// The name of the thesis's units, and the default of a file that names none.

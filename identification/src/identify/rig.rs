@@ -8,7 +8,7 @@ use plant::identified::coupled::Rig;
 use plant::specimens::linear::LinearSpecimen;
 
 use crate::IdentificationError;
-use crate::data::Recording;
+use crate::data::{Channel, Recording};
 use crate::estimation::gauss_newton::{self, FINE, GaussNewtonEstimate, Search};
 use crate::estimation::prediction::{Parameter, cost};
 use crate::estimation::residuals::ResidualTest;
@@ -202,7 +202,7 @@ pub fn identify(
 }
 
 /// The channel that tells that a specimen stands on the table.
-const SPECIMEN_SENSOR: &str = "specimen_acceleration";
+const SPECIMEN_SENSOR: Channel = Channel::SpecimenAcceleration;
 /// Indices of the constants of denominator and G1, which make the slow pole and zero.
 const A0: usize = 2;
 const B0: usize = 5;

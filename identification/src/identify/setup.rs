@@ -1,11 +1,11 @@
 //! Recordings as scaled experiments, and the parameters that they share with starts and bounds.
 
 use crate::IdentificationError;
-use crate::data::Recording;
+use crate::data::{Channel, OUTPUT_NAMES, Recording, mean_and_deviation};
 use crate::estimation::prediction::Parameter;
 use crate::identify::model::{
-    DELAY, Experiment, MASS, NUISANCE, OUTPUT_NAMES, OUTPUTS, PHYSICAL, PHYSICAL_NAMES, RigModel,
-    SPECIMEN, STATES,
+    DELAY, Experiment, MASS, NUISANCE, OUTPUTS, PHYSICAL, PHYSICAL_NAMES, RigModel, SPECIMEN,
+    STATES,
 };
 use crate::identify::start;
 
@@ -41,21 +41,20 @@ pub(crate) fn scaled_experiment(
 ) -> Result<Experiment, IdentificationError> {
     const NEEDED: &str = "valve_command, displacement, acceleration, actuator_force and, with a specimen, \
          specimen_acceleration";
-    let command = fitted.require("valve_command", NEEDED)?;
-    let command_scale = crate::data::mean_and_deviation(command).1;
+    let command = fitted.require(Channel::ValveCommand, NEEDED)?;
+    let command_scale = mean_and_deviation(command).1;
     let mut scale = [1.0; OUTPUTS];
     let mut measured = [true; OUTPUTS];
-    for (i, name) in OUTPUT_NAMES.iter().enumerate() {
-        let optional = i == OUTPUTS - 1;
-        if optional && fitted.channel(name).is_none() {
+    for (i, channel) in Channel::OUTPUTS.into_iter().enumerate() {
+        let optional = channel == Channel::SpecimenAcceleration;
+        if optional && fitted.channel(channel).is_none() {
             measured[i] = false;
         } else {
-            scale[i] = crate::data::mean_and_deviation(fitted.require(name, NEEDED)?).1;
+            scale[i] = mean_and_deviation(fitted.require(channel, NEEDED)?).1;
         }
     }
     let specimen = measured[OUTPUTS - 1];
-    let column = |name: &str| recording.channel(name).unwrap_or(&[]);
-    let channels = OUTPUT_NAMES.map(column);
+    let channels = Channel::OUTPUTS.map(|channel| recording.samples(channel));
     let outputs = (0..recording.len())
         .map(|k| {
             nalgebra::SVector::from_fn(|i, _| {
@@ -65,8 +64,8 @@ pub(crate) fn scaled_experiment(
         .collect();
     Ok(Experiment {
         name: recording.name.clone(),
-        period: recording.period,
-        command: column("valve_command").to_vec(),
+        period: recording.period(),
+        command: recording.samples(Channel::ValveCommand).to_vec(),
         outputs,
         scale,
         command_scale,

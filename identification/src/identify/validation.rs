@@ -9,8 +9,8 @@ use nalgebra::{DMatrix, DVector, dmatrix};
 use plant::identified::coupled::Rig;
 use plant::linear::StateSpace;
 
-use crate::data::fit_percent;
-use crate::identify::model::{Experiment, OUTPUT_NAMES, OUTPUTS, RigModel, rig_from};
+use crate::data::{OUTPUT_NAMES, fit_percent};
+use crate::identify::model::{Experiment, OUTPUTS, RigModel, rig_from};
 
 /// Fit of one channel of one recording.
 #[derive(Debug, Clone, PartialEq)]

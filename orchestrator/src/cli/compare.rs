@@ -6,10 +6,10 @@ use std::process::ExitCode;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::rig::RigArguments;
 use crate::comparison::{self, Plan, Played, Progress};
 use crate::error::Error;
 use crate::system::built_in;
-use crate::system::tuning::Tuning;
 
 /// Options of `shakebench compare`.
 #[derive(Debug, Args)]
@@ -26,15 +26,8 @@ pub struct Arguments {
     /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Plant: identified, servohydraulic [default: identified]
-    #[arg(long)]
-    plant: Option<String>,
-    /// Specimen: none, linear, yielding [default: linear]
-    #[arg(long)]
-    specimen: Option<String>,
-    /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
-    #[arg(long, value_enum)]
-    tuning: Option<Tuning>,
+    #[command(flatten)]
+    rig: RigArguments,
     /// Folder for report.html, comparison.json and errors.csv [default: shakebench-results/comparison]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -49,13 +42,12 @@ pub struct Arguments {
 /// # Errors
 /// Unknown names, or a motion at fault: nothing is run then.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
-    let or = |given: &Option<String>, default: &str| given.clone().unwrap_or(default.into());
     let plan = Plan {
         controllers: controllers(&arguments.controllers)?,
         motions: played(arguments)?,
-        plant: or(&arguments.plant, built_in::DEFAULT_PLANT),
-        specimen: or(&arguments.specimen, built_in::DEFAULT_SPECIMEN),
-        tuning: arguments.tuning,
+        plant: arguments.rig.plant(),
+        specimen: arguments.rig.specimen(),
+        tuning: arguments.rig.tuning,
     };
     let bar = ProgressBar::hidden();
     // A template that cannot be read leaves the plain bar.

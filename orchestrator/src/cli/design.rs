@@ -7,7 +7,8 @@ use clap::Args;
 
 use crate::design::{self, LoopName, Options, Synthesis};
 use crate::error::Error;
-use crate::report::columns::{aligned, significant};
+use crate::report::columns::aligned;
+use crate::report::number::significant;
 use crate::units::INCH;
 
 /// Options of `shakebench design`.

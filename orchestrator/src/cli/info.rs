@@ -9,7 +9,8 @@ use crate::error::Error;
 use crate::fmu::{Causality, FmiVersion, Fmu};
 use crate::library::FmuLibrary;
 use crate::motion;
-use crate::report::columns::{aligned, significant};
+use crate::report::columns::aligned;
+use crate::report::number::significant;
 use crate::system::{self, Operation, SystemFile, built_in};
 use crate::units::STANDARD_GRAVITY;
 
@@ -150,13 +151,9 @@ fn system(file: &SystemFile) -> Result<String, Error> {
     });
     text += &last_left(rows.collect());
     text += "\nconnections\n";
-    let rows = system.connections.iter().map(|connection| {
-        let to = system.variable_name(connection.component, connection.input);
-        vec![
-            format!("  {}", system.source_name(connection.source)),
-            format!("-> {to}"),
-        ]
-    });
+    let rows = system
+        .links()
+        .map(|link| vec![format!("  {}", link.from), format!("-> {}", link.to)]);
     text += &last_left(rows.collect());
     text += "\norder of calls at a sample\n";
     for (number, operation) in system.schedule(true)?.operations.iter().enumerate() {
@@ -172,7 +169,7 @@ fn words(system: &system::System, operation: &Operation) -> String {
         Operation::Read { component, outputs } => {
             let names = outputs
                 .iter()
-                .map(|&output| system.variable_name(*component, output));
+                .map(|&output| system.variable_name(*component, output).to_string());
             format!("read {}", names.collect::<Vec<_>>().join(", "))
         }
         Operation::Iterate(parts) => {

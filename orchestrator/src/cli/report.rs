@@ -9,7 +9,7 @@ use crate::comparison;
 use crate::diagnosis;
 use crate::error::Error;
 use crate::results::Results;
-use crate::run::summary;
+use crate::run::page;
 
 /// Options of `shakebench report`.
 #[derive(Debug, Args)]
@@ -41,8 +41,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     let has = |name: &str| folder.join(name).is_file();
     let report = folder.join(diagnosis::REPORT);
-    let (kind, page) = if has("manifest.json") || has("results.csv") {
-        ("run", summary::page_again(folder)?)
+    let (kind, html) = if has("manifest.json") || has("results.csv") {
+        ("run", page::page_again(folder)?)
     } else if has(comparison::COMPARISON) {
         ("comparison", comparison::page_again(folder)?)
     } else if has(diagnosis::DIAGNOSIS) {
@@ -54,7 +54,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ));
     };
     let mut results = Results::begin(folder)?;
-    results.write_text(diagnosis::REPORT, &page)?;
+    results.write_text(diagnosis::REPORT, &html)?;
     results.finish()?;
     if arguments.json {
         println!("{}", serde_json::json!({"of": kind, "report": report}));

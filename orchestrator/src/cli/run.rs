@@ -2,21 +2,27 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::OneVersion;
+use super::rig::RigArguments;
 use crate::error::Error;
+use crate::fmu::{Isolation, Options, Trace};
 use crate::master::{Algorithm, Ended, Pace};
-use crate::motion;
+use crate::motion::{self, Motion};
+use crate::report::columns::aligned;
+use crate::report::number::significant;
 use crate::results::Results;
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
-use crate::run::summary;
+use crate::run::page;
+use crate::run::summary::Summary;
 use crate::system::built_in;
-use crate::system::tuning::Tuning;
-use crate::units::{self, STANDARD_GRAVITY};
+use crate::units::{self, INCH, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
 #[derive(Debug, Default, Args)]
@@ -35,15 +41,8 @@ pub struct Arguments {
     /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Plant of a built-in system: identified, servohydraulic [default: identified]
-    #[arg(long)]
-    plant: Option<String>,
-    /// Specimen of a built-in system: none, linear, yielding [default: linear]
-    #[arg(long)]
-    specimen: Option<String>,
-    /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
-    #[arg(long, value_enum)]
-    tuning: Option<Tuning>,
+    #[command(flatten)]
+    rig: RigArguments,
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
@@ -80,6 +79,18 @@ pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    /// FMUs in a process of their own; foreign ones are those that are given as files
+    #[arg(long, value_enum, default_value_t = Isolation::Foreign)]
+    isolate: Isolation,
+    /// How long a call of an FMU in a process of its own may take [default: 120 s]
+    #[arg(long, value_name = "T")]
+    call_limit: Option<String>,
+    /// Write every call of every FMU, with its values, to this file
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Ask the FMUs for debug messages: all, or those of these categories
+    #[arg(long, value_name = "CATEGORY", num_args = 0.., value_delimiter = ',')]
+    log: Option<Vec<String>>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
         "system", "record", "reference", "plant", "specimen", "tuning", "set", "fmi", "algorithm", "step",
@@ -102,12 +113,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Some(manifest) => manifest.request.clone(),
         None => request(arguments)?,
     };
-    let prepared = prepare(&request)?;
+    let mut prepared = prepare(&request)?;
+    prepared.options = fmu_options(arguments)?;
     let Prepared {
         system,
         motion,
         step,
         samples,
+        ..
     } = &prepared;
     let folder = arguments.out.clone().unwrap_or_else(|| {
         let name = format!("{}-{}", system.name, motion.name);
@@ -128,15 +141,15 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 
     let plan = (request.algorithm, *step, *samples);
     let manifest = Manifest::new(&request, system, motion, plan, &outcome.record);
-    let summary = summary::Summary::new(&request, &prepared, &outcome, &manifest);
-    let files = summary::write(&folder, &prepared, &outcome, &summary, &manifest)?;
+    let summary = Summary::new(&request, &prepared, &outcome, &manifest);
+    let files = page::write(&folder, &prepared, &outcome, &summary, &manifest)?;
     for line in &summary.warnings {
         eprintln!("warning: {line}");
     }
     if arguments.json {
         println!("{}", serde_json::json!(summary));
     } else {
-        print!("{}", summary.table(motion));
+        print!("{}", table(&summary, motion));
         println!("\nwritten:");
         for file in files {
             println!("  {}", file.display());
@@ -151,14 +164,120 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
         eprintln!("the run was repeated to the bit");
     }
-    if matches!(outcome.ended, Ended::Complete) {
+    if outcome.ended.is_regular() {
+        if let Ended::Terminated { .. } = outcome.ended {
+            eprintln!("note: {}", outcome.ended.message());
+        }
         return Ok(ExitCode::SUCCESS);
     }
-    eprintln!("error: the run ended early: {}", outcome.ended.story());
+    eprintln!("error: the run ended early: {}", outcome.ended.message());
     eprintln!("what was computed until then is saved");
     Ok(ExitCode::from(1))
 }
 
+/// How FMUs are run.
+///
+/// # Errors
+/// A trace that cannot be written.
+fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
+    let trace = arguments.trace.as_deref().map(|path| {
+        let created = Trace::create(path).map_err(|error| Error::File {
+            path: path.to_path_buf(),
+            reason: error.to_string(),
+        });
+        created.map(Arc::new)
+    });
+    let limit = arguments.call_limit.as_deref();
+    let limit = limit.map(|text| {
+        let seconds = quantity("--call-limit", text, "s")?;
+        Duration::try_from_secs_f64(seconds).map_err(|error| Error::Option {
+            option: "--call-limit",
+            reason: error.to_string(),
+        })
+    });
+    Ok(Options {
+        isolation: arguments.isolate,
+        call_limit: limit.transpose()?.unwrap_or(Options::CALL_LIMIT),
+        trace: trace.transpose()?,
+        log_categories: arguments.log.clone(),
+    })
+}
+
+/// The figures as a table for people.
+fn table(summary: &Summary, motion: &Motion) -> String {
+    let mut text = format!("{} on {}\n", summary.system, summary.motion.name);
+    for note in &motion.notes {
+        text += &format!("  {note}\n");
+    }
+    for (name, seed) in &summary.seeds {
+        text += &format!("  seed of the noise of `{name}`: {seed}\n");
+    }
+    text += &format!(
+        "\n{} steps of {} ms (FMI {}, {}), {} times real time, {}\n\n",
+        summary.steps,
+        significant(1e3 * summary.step_s, 3)
+            .trim_end_matches('0')
+            .trim_end_matches('.'),
+        summary.fmi,
+        summary.algorithm,
+        significant(summary.real_time_factor, 2),
+        summary.ended.word(),
+    );
+    let Some(tracking) = &summary.tracking else {
+        return text;
+    };
+    let row = |name: &str, cells: [String; 3]| {
+        let mut row = vec![name.to_string()];
+        row.extend(cells);
+        row
+    };
+    let inches = |value: f64| format!("{:.4} in", value / INCH);
+    let gravity = |value: f64| format!("{:.4} g", value / STANDARD_GRAVITY);
+    let percent = |value: f64| format!("{value:.4} %");
+    text += &aligned(&[
+        row(
+            "",
+            ["reference".into(), "table".into(), "largest error".into()],
+        ),
+        row(
+            "displacement, peak",
+            [
+                inches(motion.peak_displacement()),
+                inches(tracking.peak_displacement),
+                inches(tracking.peak_displacement_error),
+            ],
+        ),
+        row(
+            "acceleration, peak",
+            [
+                gravity(motion.peak_acceleration()),
+                gravity(tracking.peak_acceleration),
+                gravity(tracking.peak_acceleration_error),
+            ],
+        ),
+    ]);
+    text += "\n";
+    let pair = |name: &str, value: String| vec![name.to_string(), value];
+    text += &aligned(&[
+        pair(
+            "error in time, acceleration",
+            percent(tracking.time_domain_percent),
+        ),
+        pair(
+            "error in frequency, acceleration",
+            percent(tracking.frequency_domain_percent),
+        ),
+        pair(
+            "error in time, displacement",
+            percent(tracking.displacement_percent),
+        ),
+        pair(
+            "delay of the table",
+            format!("{:.1} ms", 1e3 * tracking.delay),
+        ),
+    ]);
+    text
+}
 /// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.
 ///
 /// # Errors
@@ -170,15 +289,14 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         .unwrap_or(built_in::DEFAULT_SYSTEM.to_string());
     let is_file = is_file(&system);
     for (option, given) in [
-        ("--plant", &arguments.plant),
-        ("--specimen", &arguments.specimen),
+        ("--plant", &arguments.rig.plant),
+        ("--specimen", &arguments.rig.specimen),
     ] {
         if let (true, Some(_)) = (is_file, given) {
             let reason = format!("{system} is a file and has its own; edit it instead");
             return Err(Error::Option { option, reason });
         }
     }
-    let or = |given: &Option<String>, default: &str| given.clone().unwrap_or(default.into());
     let text = |option, given: &Option<String>, unit: &'static str| {
         given
             .as_ref()
@@ -199,9 +317,9 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         } else {
             system
         },
-        plant: or(&arguments.plant, built_in::DEFAULT_PLANT),
-        specimen: or(&arguments.specimen, built_in::DEFAULT_SPECIMEN),
-        tuning: arguments.tuning,
+        plant: arguments.rig.plant(),
+        specimen: arguments.rig.specimen(),
+        tuning: arguments.rig.tuning,
         record: arguments.record.as_deref().map(absolute),
         reference: arguments.reference.as_deref().map(absolute),
         seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use identification::data::{Sheet, Wanted};
+
 use super::result::{History, Row};
 use crate::error::Error;
 
@@ -46,28 +48,26 @@ pub(super) fn written(rows: &[Row]) -> String {
 /// # Errors
 /// A file that cannot be read or a cell that is no number, with its line.
 pub(super) fn read(path: &Path, controller: &str) -> Result<Option<History>, Error> {
-    let fault = |reason: String| Error::File {
-        path: path.to_path_buf(),
-        reason,
+    let wanted = Wanted {
+        is_column: &|cell| cell == "time",
+        header: "`time`, then two columns of errors a controller",
     };
-    let mut csv = csv::Reader::from_path(path).map_err(|error| fault(error.to_string()))?;
-    let names = csv.headers().map_err(|error| fault(error.to_string()))?;
-    let place = |column: &str| names.iter().position(|name| name == column);
-    let [Some(x), Some(a)] = COLUMNS.map(|column| place(&format!("{controller}.{column}"))) else {
+    let sheet = Sheet::read(path, wanted)?;
+    let numbers = |head: &str| -> Result<Option<Vec<f64>>, Error> {
+        let Ok(place) = sheet.place(head) else {
+            return Ok(None);
+        };
+        let mut values = sheet.column(place, head)?;
+        // A run that ended early leaves cells empty.
+        values.retain(|value| !value.is_nan());
+        Ok(Some(values))
+    };
+    let heads = COLUMNS.map(|column| format!("{controller}.{column}"));
+    let (Some(time), Some(displacement_error), Some(acceleration_error)) =
+        (numbers("time")?, numbers(&heads[0])?, numbers(&heads[1])?)
+    else {
         return Ok(None);
     };
-    let mut columns = [Vec::new(), Vec::new(), Vec::new()];
-    for (row, line) in csv.records().zip(2..) {
-        let row = row.map_err(|error| fault(error.to_string()))?;
-        for (column, at) in columns.iter_mut().zip([0, x, a]) {
-            let cell = row.get(at).unwrap_or_default();
-            if !cell.is_empty() {
-                let wrong = |_| fault(format!("line {line}: `{cell}` is no number"));
-                column.push(cell.parse::<f64>().map_err(wrong)?);
-            }
-        }
-    }
-    let [time, displacement_error, acceleration_error] = columns;
     Ok(time.get(1).map(|dt| History {
         dt: *dt,
         displacement_error,

@@ -1,7 +1,7 @@
 //! Margins as a table.
 
 use super::figures::LoopFigures;
-use crate::report::columns::significant;
+use crate::report::number::significant;
 
 /// The figures as a table: two rows of heads (name, unit), then two a loop.
 pub fn table(rows: &[LoopFigures]) -> Vec<Vec<String>> {

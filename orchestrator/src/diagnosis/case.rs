@@ -3,7 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use identification::diagnosis::case::{CHANNELS, Case};
+use identification::data::Channel;
+use identification::diagnosis::case::Case;
 use identification::diagnosis::rigs::shake_table::Diagnosis;
 use identification::diagnosis::{DiagnosisReport, Evidence};
 
@@ -96,15 +97,17 @@ fn in_closed_loop(
     found: &Diagnosis,
     extended: &[PackedFmu],
 ) -> Result<Comparison, String> {
-    let record = &case.validation;
+    let recording = &case.validation;
     let law = case.nominal.controller.ok_or("the case states no law")?;
-    if record.reference.len() != record.len() {
+    let is_missing = |channel: &Channel| recording.channel(*channel).is_none();
+    if is_missing(&Channel::Reference) {
         return Err("the validation record has no column `reference`".into());
     }
-    if let Some(missing) = [0, 1].into_iter().find(|&i| record.channels[i].is_empty()) {
+    let needed = [Channel::Displacement, Channel::Acceleration];
+    if let Some(missing) = needed.into_iter().find(is_missing) {
         return Err(format!(
             "without `{}` nothing tells whether the stated law made the command (R5)",
-            CHANNELS[missing]
+            missing.name()
         ));
     }
     if !found.validation.by_law {
@@ -130,5 +133,5 @@ fn in_closed_loop(
         })
     };
     let before = rig(&original)?.nominal(&case.nominal);
-    co_simulation::compare(record, &case.nominal, &law, &before, &rig(&changed)?)
+    co_simulation::compare(recording, &case.nominal, &law, &before, &rig(&changed)?)
 }

@@ -6,7 +6,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use identification::diagnosis::case::{CHANNELS, ControlLaw, Nominal, Record};
+use identification::data::{Channel, OUTPUT_NAMES, Recording, mean_and_deviation};
+use identification::diagnosis::case::{ControlLaw, Nominal};
 use identification::diagnosis::engine::resampling::{running, share_gone};
 use identification::diagnosis::{GainAgainstNoise, GainReport};
 
@@ -22,7 +23,7 @@ const STEPS_A_SAMPLE: [f64; 3] = [4.0, 2.0, 1.0];
 /// Runs with the sensors' noise that the floor is the mean of.
 const SEEDS: [i32; 4] = [1, 2, 3, 4];
 
-/// The sensors' readings of [`CHANNELS`], SI.
+/// The sensors' readings of [`Channel::OUTPUTS`], SI.
 pub type Channels = [Vec<f64>; 4];
 
 /// FMUs of a rig, each with the parameters that are set on top of its start values.
@@ -76,7 +77,7 @@ pub fn play(
                 .run(reference.len(), Pace::Fastest, &mut |_| {});
         match outcome.ended {
             Ended::Complete => Ok(outcome),
-            other => Err(other.story()),
+            other => Err(other.message()),
         }
     };
     let mut outcome = Err(String::new());
@@ -237,19 +238,20 @@ pub(super) struct Comparison {
     pub gain: GainReport,
 }
 
-/// Plays the reference of `record` through the FMUs of both rigs and holds them against it.
+/// Plays the reference of `recording` through the FMUs of both rigs and holds them against it.
 ///
 /// # Errors
 /// As [`play`].
 pub(super) fn compare(
-    record: &Record,
+    recording: &Recording,
     nominal: &Nominal,
     law: &ControlLaw,
     before: &RigFmus,
     after: &RigFmus,
 ) -> Result<Comparison, String> {
     let period = 1.0 / nominal.sample_rate;
-    let played = |rig: &RigFmus, noise| play(rig, law, &record.reference, period, noise);
+    let reference = recording.samples(Channel::Reference);
+    let played = |rig: &RigFmus, noise| play(rig, law, reference, period, noise);
     let (before, after) = (played(before, None)?, {
         let clean = played(after, None)?;
         let mut floor = [0.0; 4];
@@ -262,7 +264,7 @@ pub(super) fn compare(
         (clean, floor.map(f64::sqrt))
     });
     let (after, floor) = after;
-    let gain = gain(record, &before, &after, &floor);
+    let gain = gain(recording, &before, &after, &floor);
     Ok(Comparison {
         before,
         after,
@@ -276,22 +278,27 @@ fn mean_square(a: &[f64], b: &[f64]) -> f64 {
     sum / a.len().min(b.len()).max(1) as f64
 }
 
-fn gain(record: &Record, before: &Channels, after: &Channels, floor: &[f64; 4]) -> GainReport {
+fn gain(
+    recording: &Recording,
+    before: &Channels,
+    after: &Channels,
+    floor: &[f64; 4],
+) -> GainReport {
+    let measured = Channel::OUTPUTS.map(|channel| recording.samples(channel));
     let live: Vec<usize> = (0..4)
-        .filter(|&i| !record.channels[i].is_empty() && floor[i] > 0.0)
+        .filter(|&i| !measured[i].is_empty() && floor[i] > 0.0)
         .collect();
-    let scale = |i: usize| {
-        let deviation = identification::diagnosis::case::deviation(&record.channels[i]);
-        deviation.max(f64::MIN_POSITIVE)
-    };
-    let rms = |simulated: &Channels, i: usize| -> f64 {
-        mean_square(&record.channels[i], &simulated[i]).sqrt()
-    };
+    let scale = |i: usize| mean_and_deviation(measured[i]).1.max(f64::MIN_POSITIVE);
+    let rms =
+        |simulated: &Channels, i: usize| -> f64 { mean_square(measured[i], &simulated[i]).sqrt() };
     let channels = live
         .iter()
         .map(|&i| {
             let errors = [rms(before, i), rms(after, i), floor[i]];
-            (CHANNELS[i].to_owned(), errors.map(|error| error / scale(i)))
+            (
+                OUTPUT_NAMES[i].to_owned(),
+                errors.map(|error| error / scale(i)),
+            )
         })
         .collect();
     let overall = |of: &dyn Fn(usize) -> f64| {
@@ -300,8 +307,8 @@ fn gain(record: &Record, before: &Channels, after: &Channels, floor: &[f64; 4]) 
     };
     // Running sums of the squared error over all channels, in units of their floors.
     let sums = |simulated: &Channels| -> Vec<f64> {
-        running((0..record.len()).map(|k| {
-            let error = |&i: &usize| (record.channels[i][k] - simulated[i][k]) / floor[i];
+        running((0..recording.len()).map(|k| {
+            let error = |&i: &usize| (measured[i][k] - simulated[i][k]) / floor[i];
             live.iter().map(|i| error(i).powi(2)).sum::<f64>()
         }))
     };

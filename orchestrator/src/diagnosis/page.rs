@@ -12,7 +12,7 @@ use identification::diagnosis::{DiagnosisReport, Evidence, GainReport, ShakeTabl
 use super::case::Extended;
 use super::{DIAGNOSIS, pictures, rig, text};
 use crate::extended_model::ExtendedModel;
-use crate::report::columns::significant;
+use crate::report::number::significant;
 use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Report, Section, Table};
 use crate::system::model::{shake_table_values, specimen_values};
 

@@ -1,6 +1,7 @@
 //! The pictures of a case.
 
-use identification::diagnosis::case::{CHANNELS, Case};
+use identification::data::{Channel, OUTPUT_NAMES};
+use identification::diagnosis::case::Case;
 use identification::diagnosis::rigs::shake_table::{Diagnosis, Validation};
 use realfft::RealFftPlanner;
 
@@ -22,7 +23,7 @@ pub(super) struct Errors {
 
 /// Channels with errors on the validation record: place, whitened errors before and after.
 fn channels(validation: &Validation) -> impl Iterator<Item = (usize, [Vec<f64>; 2])> {
-    (0..CHANNELS.len()).filter_map(|channel| {
+    (0..OUTPUT_NAMES.len()).filter_map(|channel| {
         let pick = |errors: &[f64]| -> Vec<f64> {
             errors.iter().skip(channel).step_by(4).copied().collect()
         };
@@ -35,11 +36,11 @@ fn channels(validation: &Validation) -> impl Iterator<Item = (usize, [Vec<f64>; 
 
 /// The sensors' readings less those of both rigs in closed loop, over time.
 pub(super) fn closed_loop(case: &Case, found: &Comparison) -> Vec<Panel> {
-    let record = &case.validation;
     let period = 1.0 / case.nominal.sample_rate;
-    let live = (0..CHANNELS.len()).filter(|&i| !record.channels[i].is_empty());
-    live.map(|i| {
-        let measured = &record.channels[i];
+    let outputs = Channel::OUTPUTS.map(|channel| case.validation.channel(channel));
+    let live = (0..).zip(outputs);
+    let live = live.filter_map(|(i, measured)| Some((i, measured?)));
+    live.map(|(i, measured)| {
         let error = |simulated: &[f64]| -> Vec<f64> {
             measured.iter().zip(simulated).map(|(m, s)| m - s).collect()
         };
@@ -58,7 +59,7 @@ pub(super) fn closed_loop(case: &Case, found: &Comparison) -> Vec<Panel> {
 }
 
 fn words(channel: usize) -> String {
-    CHANNELS[channel].replace('_', " ")
+    OUTPUT_NAMES[channel].replace('_', " ")
 }
 
 fn units(channel: usize) -> Units {
@@ -92,17 +93,17 @@ fn band(period: f64, length: usize, half: f64) -> Series {
 /// One-step errors on the validation record.
 pub(super) fn errors(case: &Case, diagnosis: &Diagnosis) -> Errors {
     let Validation {
-        period, signals, ..
+        period, samples, ..
     } = &diagnosis.validation;
-    let displacement: Vec<f64> = signals.channels.iter().map(|row| row[0]).collect();
+    let displacement: Vec<f64> = samples.channels.iter().map(|row| row[0]).collect();
     let mut states = vec![
-        ("command", Units::VOLTAGE, signals.command.clone()),
+        ("command", Units::VOLTAGE, samples.command.clone()),
         ("velocity", Units::VELOCITY, slope(&displacement, *period)),
         ("displacement", Units::DISPLACEMENT, displacement),
     ];
     if let Some(specimen) = case.nominal.specimen {
         // Its spring holds the mass: -m a = k d, but for damping.
-        let acceleration = signals.channels.iter().map(|row| row[3]);
+        let acceleration = samples.channels.iter().map(|row| row[3]);
         let drift: Vec<f64> = acceleration
             .map(|a| -specimen.mass * a / specimen.stiffness)
             .collect();

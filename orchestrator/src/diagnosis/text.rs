@@ -6,7 +6,8 @@ use identification::diagnosis::{
     DiagnosisReport, Evidence, GainReport, ParameterReport, ShakeTableEvidence,
 };
 
-use crate::report::columns::{aligned, significant};
+use crate::report::columns::aligned;
+use crate::report::number::significant;
 
 fn in_unit(parameter: &ParameterReport, unit: &str) -> String {
     let (value, error) = (parameter.value, parameter.standard_error);

@@ -1,11 +1,12 @@
 //! What is done at a tick, prepared for doing it many times.
 
+use super::signals::Signals;
 use super::transfer::{Inputs, Outputs};
 use super::{MasterError, Part};
 
-/// The largest number of repetitions of a loop.
-pub(super) const LARGEST_REPETITION: usize = 100;
-/// Values that change by less than this part of their size stand still.
+/// The largest number of passes of a fixed-point iteration.
+pub(super) const MOST_PASSES: usize = 100;
+/// Values that change by less than this part of their size have converged.
 const TOLERANCE: f64 = 1e-12;
 
 /// An [`crate::system::Operation`] with its value references.
@@ -18,7 +19,7 @@ pub(super) enum Action {
     },
     /// Set the inputs of a sampled component, step it over its period, read its outputs.
     Call { part: usize },
-    /// Repeat until the values stand still.
+    /// Repeat until the values converge.
     Iterate {
         actions: Vec<Action>,
         /// Sampled components among them, whose state is kept for the repetition.
@@ -46,7 +47,7 @@ impl Action {
         &mut self,
         at: Moment,
         parts: &mut [Part],
-        signals: &mut [f64],
+        signals: &mut Signals,
         names: &[String],
     ) -> Result<(), MasterError> {
         match self {
@@ -55,7 +56,7 @@ impl Action {
                 inputs,
                 outputs,
             } => {
-                let instance = &parts[*part].instance;
+                let instance = &mut parts[*part].instance;
                 inputs.transfer(signals, instance)?;
                 outputs.read(signals, instance)?;
             }
@@ -67,9 +68,9 @@ impl Action {
                 if part.failure.is_some() {
                     return Ok(());
                 }
-                part.inputs.transfer(signals, &part.instance)?;
+                part.inputs.transfer(signals, &mut part.instance)?;
                 if !at.calls {
-                    return Ok(part.outputs.read(signals, &part.instance)?);
+                    return Ok(part.outputs.read(signals, &mut part.instance)?);
                 }
                 part.step(at.time, every as f64 * at.step)?;
                 if part.failure.is_none() {
@@ -89,11 +90,11 @@ impl Action {
                     part.instance.save_state(&mut part.state)?;
                 }
                 for pass in 1.. {
-                    last.copy_from_slice(signals);
+                    last.copy_from_slice(&signals.numbers);
                     for action in actions.iter_mut() {
                         action.perform(at, parts, signals, names)?;
                     }
-                    if settled(at.time, pass, last, signals, names)? {
+                    if converged(at.time, pass, last, &signals.numbers, names)? {
                         break;
                     }
                     for &part in called.iter().filter(|_| at.calls) {
@@ -121,8 +122,8 @@ impl Action {
     }
 }
 
-/// Whether the values stand still; an error when they still do not after too many repetitions.
-pub(super) fn settled(
+/// Whether the fixed-point iteration has converged; an error when it has not after too many passes.
+pub(super) fn converged(
     time: f64,
     passes: usize,
     last: &[f64],
@@ -136,13 +137,13 @@ pub(super) fn settled(
     if !last.iter().zip(now).any(|pair| moving(&pair)) {
         return Ok(true);
     }
-    if passes < LARGEST_REPETITION {
+    if passes < MOST_PASSES {
         return Ok(false);
     }
     let pairs = last.iter().zip(now).enumerate();
     let most = pairs.max_by(|(_, a), (_, b)| excess(*a).total_cmp(&excess(*b)));
     let (place, (before, after)) = most.unwrap_or((0, (&0.0, &0.0)));
-    Err(MasterError::NotSettled {
+    Err(MasterError::NotConverged {
         time,
         passes,
         variable: names.get(place).cloned().unwrap_or_default(),

@@ -5,6 +5,8 @@
 
 use std::path::Path;
 
+use identification::data::DataError;
+
 use super::accelerogram::{Record, file_name, stem};
 use super::error::MotionError;
 use crate::units::{STANDARD_GRAVITY, Unit};
@@ -19,32 +21,31 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Record, MotionError> {
         .iter()
         .take(LONGEST_HEADER)
         .position(|line| line.to_ascii_uppercase().contains("NPTS"))
-        .ok_or_else(|| MotionError::File {
-            path: path.to_path_buf(),
-            reason: format!(
+        .ok_or_else(|| {
+            let reason = format!(
                 "no line with NPTS and DT among the first {LONGEST_HEADER}; \
                  expected `NPTS=   2676, DT=   .0200 SEC` or `2676  0.0200  NPTS, DT`"
-            ),
+            );
+            DataError::file(path, reason)
         })?;
-    let (announced, dt, style) = points_and_step(path, header + 1, lines[header])?;
+    let (announced, dt, style) = points_and_step(path, header as u64 + 1, lines[header])?;
     let factor = unit_of_header(path, &lines[..header])?;
 
     let mut acceleration = Vec::new();
-    for (index, line) in lines.iter().enumerate().skip(header + 1) {
+    for (number, line) in (1..).zip(&lines).skip(header + 1) {
         for (column, text) in line.split_whitespace().enumerate() {
             let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-            let value = value.ok_or_else(|| MotionError::NotANumber {
-                path: path.to_path_buf(),
-                line: index + 1,
+            let value = value.ok_or_else(|| DataError::NotANumber {
+                file: path.to_path_buf(),
+                line: number,
                 column: column + 1,
+                name: String::new(),
                 text: text.to_string(),
+                hint: "",
             })?;
             if acceleration.len() == announced {
-                return Err(MotionError::Line {
-                    path: path.to_path_buf(),
-                    line: index + 1,
-                    reason: format!("more numbers than the {announced} points of the header"),
-                });
+                let reason = format!("more numbers than the {announced} points of the header");
+                return Err(DataError::line(path, number, reason).into());
             }
             acceleration.push(value * factor);
         }
@@ -69,14 +70,10 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Record, MotionError> {
 /// Number of points, time step in s, and which of the two headers it was.
 fn points_and_step(
     path: &Path,
-    line: usize,
+    line: u64,
     text: &str,
-) -> Result<(usize, f64, &'static str), MotionError> {
-    let fault = |reason: String| MotionError::Line {
-        path: path.to_path_buf(),
-        line,
-        reason,
-    };
+) -> Result<(usize, f64, &'static str), DataError> {
+    let fault = |reason: String| DataError::line(path, line, reason);
     let upper = text.to_ascii_uppercase();
     let (points, step, style) = if upper.contains('=') {
         (
@@ -127,13 +124,9 @@ fn value_after(text: &str, key: &str) -> Option<String> {
 }
 
 /// The SI factor of the unit that the header names; g when it names none.
-fn unit_of_header(path: &Path, header: &[&str]) -> Result<f64, MotionError> {
-    for (index, line) in header.iter().enumerate() {
-        let fault = |reason: String| MotionError::Line {
-            path: path.to_path_buf(),
-            line: index + 1,
-            reason,
-        };
+fn unit_of_header(path: &Path, header: &[&str]) -> Result<f64, DataError> {
+    for (number, line) in (1..).zip(header) {
+        let fault = |reason: String| DataError::line(path, number, reason);
         let upper = line.to_ascii_uppercase();
         for other in ["VELOCITY TIME", "DISPLACEMENT TIME"] {
             if upper.contains(other) {

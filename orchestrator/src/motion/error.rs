@@ -2,57 +2,17 @@
 
 use std::path::PathBuf;
 
+use identification::data::DataError;
 use thiserror::Error;
 
-use crate::units::{INCH, UnitError};
+use crate::units::INCH;
 
 /// Why a motion cannot be played. Every message names the file and, where there is one, the place.
 #[derive(Debug, Error)]
 pub enum MotionError {
-    /// The file cannot be opened or read.
-    #[error("{}: {reason}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's word, or what stands in the file instead of text.
-        reason: String,
-    },
-    /// The file is there and holds nothing.
-    #[error("{}: the file is empty", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file as a whole is not what was expected.
-    #[error("{}: {reason}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong and what was expected.
-        reason: String,
-    },
-    /// One line is not what was expected.
-    #[error("{}, line {line}: {reason}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: usize,
-        /// What is wrong and what was expected.
-        reason: String,
-    },
-    /// A field is not a finite number.
-    #[error("{}, line {line}, column {column}: \"{text}\" is not a finite number", path.display())]
-    NotANumber {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: usize,
-        /// The column (field of the line), counted from 1.
-        column: usize,
-        /// What stands there.
-        text: String,
-    },
+    /// The file is missing, or is not what was expected.
+    #[error(transparent)]
+    Data(#[from] DataError),
     /// Fewer points than the header announces.
     #[error("{}: truncated: {found} of {announced} points, {} missing", path.display(), announced - found)]
     Truncated {
@@ -62,20 +22,6 @@ pub enum MotionError {
         found: usize,
         /// Points announced.
         announced: usize,
-    },
-    /// A header cell whose unit cannot be used.
-    #[error("{}, line {line}, column {column} (`{name}`): {source}", path.display())]
-    Unit {
-        /// The file.
-        path: PathBuf,
-        /// The line of the header, counted from 1.
-        line: usize,
-        /// The column, counted from 1.
-        column: usize,
-        /// The name in the header.
-        name: String,
-        /// What is wrong with the unit.
-        source: Box<UnitError>,
     },
     /// The motion needs more stroke than there is.
     #[error(

@@ -1,8 +1,8 @@
 //! Ground motions: what the table is asked to do.
 //!
 //! A *record* is an acceleration only (PEER AT2, or CSV) and is processed into a motion the table
-//! can play ([`load`]); a *reference* gives displacement, velocity and acceleration and is used to
-//! the letter ([`load_reference`]); [`built_in`] is a synthetic record for when nothing is at hand.
+//! can play ([`load`]); a *reference* gives displacement, velocity and acceleration and is played
+//! as given ([`load_reference`]); [`built_in`] is a synthetic record for when nothing is at hand.
 
 mod accelerogram;
 mod at2;

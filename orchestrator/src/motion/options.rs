@@ -30,7 +30,7 @@ pub struct Options {
     /// Length of the taper at either end, s.
     pub taper: f64,
     /// How large the motion is played; none: records to the smaller of 0.3 g and 1.2 in,
-    /// references to the letter.
+    /// references as given.
     pub scaling: Option<Scaling>,
     /// Stroke to either side, m.
     pub stroke: f64,

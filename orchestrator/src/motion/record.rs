@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use identification::data::{Channel, DataError, Text, read_text};
+
 use super::accelerogram::{Record, file_name, stem};
 use super::at2;
 use super::csv_file::{CsvFile, Kind};
@@ -23,64 +25,35 @@ pub fn read_record(path: &Path) -> Result<Record, MotionError> {
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("at2"));
     let record = if is_at2 {
-        at2::parse(path, &text)?
+        at2::parse(path, &text.text)?
     } else {
-        from_csv(path, &text)?
+        from_csv(path, text)?
     };
     if record.acceleration.len() < FEWEST {
-        return Err(MotionError::File {
-            path: path.to_path_buf(),
-            reason: format!(
-                "only {} points, a record needs {FEWEST} or more",
-                record.acceleration.len()
-            ),
-        });
+        let reason = format!(
+            "only {} points, a record needs {FEWEST} or more",
+            record.acceleration.len()
+        );
+        return Err(DataError::file(path, reason).into());
     }
     let duration = record.dt * record.acceleration.len() as f64;
     if duration > LONGEST {
-        return Err(MotionError::File {
-            path: path.to_path_buf(),
-            reason: format!(
-                "lasts {duration:.0} s (dt = {} s), records of up to {LONGEST:.0} s are played",
-                record.dt
-            ),
-        });
+        let reason = format!(
+            "lasts {duration:.0} s (dt = {} s), records of up to {LONGEST:.0} s are played",
+            record.dt
+        );
+        return Err(DataError::file(path, reason).into());
     }
     Ok(record)
 }
 
-/// The text of a file that is there and not empty.
-pub(super) fn read_text(path: &Path) -> Result<String, MotionError> {
-    let unreadable = |reason: String| MotionError::Unreadable {
-        path: path.to_path_buf(),
-        reason,
-    };
-    let bytes = std::fs::read(path).map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => unreadable("no such file".to_string()),
-        _ => unreadable(error.to_string()),
-    })?;
-    // Station names in old headers are Latin-1; only digits matter, and those are ASCII.
-    let text = String::from_utf8_lossy(&bytes);
-    if text.trim().is_empty() {
-        return Err(MotionError::Empty {
-            path: path.to_path_buf(),
-        });
-    }
-    if text.contains('\0') {
-        return Err(unreadable(
-            "holds binary data, text was expected".to_string(),
-        ));
-    }
-    Ok(text.into_owned())
-}
-
-fn from_csv(path: &Path, text: &str) -> Result<Record, MotionError> {
+fn from_csv(path: &Path, text: Text) -> Result<Record, MotionError> {
     let file = CsvFile::parse(path, text, Kind::Record)?;
     let dt = file.sample_time()?;
     Ok(Record {
         name: stem(path),
         dt,
-        acceleration: file.column("acceleration")?,
+        acceleration: file.column(Channel::Acceleration)?,
         origin: format!("{} (CSV)", file_name(path)),
         seed: None,
     })

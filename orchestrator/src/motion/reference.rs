@@ -1,6 +1,8 @@
-//! References: displacement, velocity and acceleration as given, used to the letter.
+//! References: displacement, velocity and acceleration played as given.
 
 use std::path::Path;
+
+use identification::data::{Channel, DataError, read_text};
 
 use super::accelerogram::{file_name, stem};
 use super::csv_file::{CsvFile, Kind, rounded};
@@ -8,7 +10,6 @@ use super::error::MotionError;
 use super::options::{Options, Scaling};
 use super::playable::{Motion, peak};
 use super::process::{check_options, check_stroke};
-use super::record::read_text;
 use crate::units::{INCH, STANDARD_GRAVITY};
 
 /// Reads a reference. Its numbers are played as they stand, unless `options.scaling` asks for
@@ -21,12 +22,12 @@ use crate::units::{INCH, STANDARD_GRAVITY};
 pub fn load_reference(path: &Path, options: &Options) -> Result<Motion, MotionError> {
     let name = stem(path);
     check_options(&name, options)?;
-    let file = CsvFile::parse(path, &read_text(path)?, Kind::Reference)?;
+    let file = CsvFile::parse(path, read_text(path)?, Kind::Reference)?;
     let dt = file.sample_time()?;
     let mut columns = [
-        file.column("displacement")?,
-        file.column("velocity")?,
-        file.column("acceleration")?,
+        file.column(Channel::Displacement)?,
+        file.column(Channel::Velocity)?,
+        file.column(Channel::Acceleration)?,
     ];
     let mut notes = vec![format!(
         "reference {}: {} points at {} s, used to the letter",
@@ -37,14 +38,12 @@ pub fn load_reference(path: &Path, options: &Options) -> Result<Motion, MotionEr
 
     let every = (options.sample_time / dt).round();
     if every < 1.0 || (every * dt - options.sample_time).abs() > 1e-3 * options.sample_time {
-        return Err(MotionError::File {
-            path: path.to_path_buf(),
-            reason: format!(
-                "sampled at {} s; the controllers need {} s (or a whole fraction of it)",
-                rounded(dt),
-                options.sample_time
-            ),
-        });
+        let reason = format!(
+            "sampled at {} s; the controllers need {} s (or a whole fraction of it)",
+            rounded(dt),
+            options.sample_time
+        );
+        return Err(DataError::file(path, reason).into());
     }
     if every > 1.0 {
         for column in &mut columns {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::number::significant;
+use super::number::typeset;
 use super::svg::escaped;
 
 /// Bars in groups, from zero, each with its number.
@@ -109,7 +109,7 @@ pub(super) fn svg(bars: &Bars) -> String {
                 "<text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
                 at + 7.0,
                 middle + 4.5,
-                significant(bar.value, 3)
+                typeset(bar.value, 3)
             );
             y += BAR;
         }

@@ -27,16 +27,3 @@ pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     }
     text
 }
-
-/// A number with so many significant digits, without exponent where it can be read so.
-pub(crate) fn significant(value: f64, digits: usize) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let magnitude = value.abs().log10().floor() as i32;
-    if !(-5..7).contains(&magnitude) {
-        return format!("{value:.*e}", digits - 1);
-    }
-    let decimals = (digits as i32 - 1 - magnitude).max(0) as usize;
-    format!("{value:.decimals$}")
-}

@@ -4,7 +4,7 @@ use minijinja::syntax::SyntaxConfig;
 use minijinja::{AutoEscape, Environment, Value, context};
 
 use super::chart_data::json_for_script;
-use super::number::significant;
+use super::number::typeset;
 use super::{Cell, Report, Section, Table, bars};
 
 const TEMPLATE: &str = include_str!("assets/report.html");
@@ -103,12 +103,12 @@ fn cell(cell: &Cell) -> Value {
     let (laboratory, si) = match cell {
         Cell::Text(text) => (text.clone(), text.clone()),
         Cell::Number(value, digits) => {
-            let text = significant(*value, *digits);
+            let text = typeset(*value, *digits);
             (text.clone(), text)
         }
         Cell::Quantity(value, units, digits) => {
             let text = |factor: f64, name: &str| {
-                let number = significant(value / factor, *digits);
+                let number = typeset(value / factor, *digits);
                 if name.is_empty() {
                     number
                 } else {

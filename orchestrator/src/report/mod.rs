@@ -8,7 +8,7 @@ mod bars;
 mod chart_data;
 pub(crate) mod columns;
 mod html;
-mod number;
+pub(crate) mod number;
 mod run;
 mod svg;
 

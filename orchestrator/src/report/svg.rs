@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::chart_data::envelope;
-use super::number::significant;
+use super::number::typeset;
 use super::{Axis, Panel, Series, Style};
 
 const WIDTH: f64 = 820.0;
@@ -130,7 +130,7 @@ impl Scale {
             return decades
                 .flat_map(|decade| within.iter().map(move |digit| digit * 10_f64.powi(decade)))
                 .filter(|value| (self.low - 1e-9..=self.high + 1e-9).contains(&value.log10()))
-                .map(|value| (self.place(value.log10()), significant(value, 1)))
+                .map(|value| (self.place(value.log10()), typeset(value, 1)))
                 .collect();
         }
         let rough = span / 6.0;
@@ -147,7 +147,7 @@ impl Scale {
             .map(|n| {
                 let shown = n as f64 * step;
                 let label = if self.logarithmic {
-                    significant(10_f64.powf(shown), 2)
+                    typeset(10_f64.powf(shown), 2)
                 } else {
                     format!("{shown:.decimals$}").replace('-', "\u{2212}")
                 };

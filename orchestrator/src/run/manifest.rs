@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::fmu::{Causality, hexadecimal};
 use crate::master::{Algorithm, Record};
 use crate::motion::Motion;
-use crate::system::System;
+use crate::system::{Link, System};
 
 /// `manifest.json` of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,7 +33,7 @@ pub struct Manifest {
     /// The components by name.
     pub components: BTreeMap<String, ComponentEntry>,
     /// The connections, as in a system file.
-    pub connections: Vec<String>,
+    pub connections: Vec<Link>,
     /// SHA-256 of the recorded values, bit by bit.
     pub results_sha256: String,
 }
@@ -100,10 +100,6 @@ impl Manifest {
             };
             (component.name.clone(), entry)
         });
-        let connections = system.connections.iter().map(|connection| {
-            let to = system.variable_name(connection.component, connection.input);
-            format!("{} -> {to}", system.source_name(connection.source))
-        });
         let histories = [&motion.displacement, &motion.velocity, &motion.acceleration];
         Self {
             shakebench: env!("CARGO_PKG_VERSION").to_string(),
@@ -120,7 +116,7 @@ impl Manifest {
                 notes: motion.notes.clone(),
             },
             components: components.collect(),
-            connections: connections.collect(),
+            connections: system.links().collect(),
             results_sha256: digest(record.rows().flatten()),
         }
     }
@@ -164,7 +160,11 @@ impl Manifest {
                 }
             }
         }
-        let (then, now) = (self.connections.join(", "), again.connections.join(", "));
+        let all = |links: &[Link]| {
+            let links: Vec<String> = links.iter().map(ToString::to_string).collect();
+            links.join(", ")
+        };
+        let (then, now) = (all(&self.connections), all(&again.connections));
         compare("connections", &then, &now);
         compare("results", &self.results_sha256, &again.results_sha256);
         lines

@@ -2,5 +2,6 @@
 
 pub mod experiment;
 pub mod manifest;
+pub mod page;
 pub mod signals;
 pub mod summary;

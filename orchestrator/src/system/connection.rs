@@ -1,232 +1,10 @@
-//! Connections as written, `"table.displacement -> control.measured_displacement"`, and their check.
-
-use std::fmt;
-use std::str::FromStr;
-
-use serde::Deserialize;
+//! Connections checked against the FMUs: names, types and units.
 
 use super::checked::{Component, Connection, Source};
-use super::hint;
+use super::link::{Link, Origin};
 use super::lookup::{component_index, find};
-use crate::fmu::{Causality, Kind, Variable};
+use crate::fmu::{BaseUnit, Causality, Kind, Variable};
 use crate::units::Unit;
-
-/// A variable of a component, `component.variable`.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
-#[serde(try_from = "String")]
-pub struct VariableName {
-    /// The component's name in the system.
-    pub component: String,
-    /// The variable's name, which may have points in it.
-    pub variable: String,
-}
-
-/// Where a connection begins.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Origin {
-    /// The motion that the table is asked for.
-    Reference {
-        /// What of it.
-        quantity: Quantity,
-        /// How many samples ahead of the present one; negative: before it.
-        ahead: isize,
-    },
-    /// An output of a component.
-    Output(VariableName),
-}
-
-/// What of the reference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Quantity {
-    /// Displacement, m.
-    Displacement,
-    /// Velocity, m/s.
-    Velocity,
-    /// Acceleration, m/s².
-    Acceleration,
-}
-
-impl Quantity {
-    /// All of them, in the order of their results.
-    pub const ALL: [Self; 3] = [Self::Displacement, Self::Velocity, Self::Acceleration];
-
-    /// Its name as an output of `reference`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Displacement => "displacement",
-            Self::Velocity => "velocity",
-            Self::Acceleration => "acceleration",
-        }
-    }
-
-    /// Its unit.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Displacement => "m",
-            Self::Velocity => "m/s",
-            Self::Acceleration => "m/s2",
-        }
-    }
-}
-
-/// A connection by names, before they are looked up in the FMUs.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Link {
-    /// Where the value comes from.
-    pub from: Origin,
-    /// The input that takes it.
-    pub to: VariableName,
-    /// Line of the file that it stands in.
-    pub line: Option<usize>,
-}
-
-/// Samples further ahead or behind are mistakes.
-const FARTHEST: isize = 100_000;
-
-impl VariableName {
-    /// The variable of a component.
-    pub fn new(component: &str, variable: &str) -> Self {
-        Self {
-            component: component.to_string(),
-            variable: variable.to_string(),
-        }
-    }
-}
-
-impl FromStr for VariableName {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (component, variable) = text
-            .split_once('.')
-            .ok_or_else(|| format!("`{text}` should read component.variable"))?;
-        Ok(Self::new(component, variable))
-    }
-}
-
-impl TryFrom<String> for VariableName {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
-    }
-}
-
-impl fmt::Display for VariableName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}", self.component, self.variable)
-    }
-}
-
-impl Origin {
-    /// An output of a component.
-    pub fn output(component: &str, variable: &str) -> Self {
-        Self::Output(VariableName::new(component, variable))
-    }
-
-    /// The reference at the present sample.
-    pub fn reference(quantity: Quantity) -> Self {
-        Self::Reference { quantity, ahead: 0 }
-    }
-}
-
-impl FromStr for Origin {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let name: VariableName = text.parse()?;
-        if name.component != "reference" {
-            return Ok(Self::Output(name));
-        }
-        reference(&name.variable).ok_or_else(|| {
-            let known = Quantity::ALL.into_iter().map(Quantity::name);
-            format!(
-                "the reference has no `{0}`{1} (or `displacement[3]`, three samples ahead)",
-                name.variable,
-                hint(&name.variable, known)
-            )
-        })
-    }
-}
-
-impl fmt::Display for Origin {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Reference { quantity, ahead: 0 } => write!(f, "reference.{}", quantity.name()),
-            Self::Reference { quantity, ahead } => {
-                write!(f, "reference.{}[{ahead}]", quantity.name())
-            }
-            Self::Output(name) => name.fmt(f),
-        }
-    }
-}
-
-impl fmt::Display for Link {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "connection `{} -> {}`", self.from, self.to)?;
-        match self.line {
-            Some(line) => write!(f, " (line {line})"),
-            None => Ok(()),
-        }
-    }
-}
-
-/// The connections that a text stands for; `[a..b]` on both sides stands for several.
-///
-/// # Errors
-/// What was expected.
-pub(super) fn parse(text: &str, line: usize) -> Result<Vec<Link>, String> {
-    let (from, to) = text
-        .split_once("->")
-        .ok_or("expected \"component.output -> component.input\"")?;
-    let (from, to) = (expand(from.trim())?, expand(to.trim())?);
-    if from.len() != to.len() {
-        return Err(format!(
-            "{} values on the left and {} on the right",
-            from.len(),
-            to.len()
-        ));
-    }
-    let link = |(from, to): (String, String)| {
-        Ok(Link {
-            from: from.parse()?,
-            to: to.parse()?,
-            line: Some(line),
-        })
-    };
-    from.into_iter().zip(to).map(link).collect()
-}
-
-fn expand(end: &str) -> Result<Vec<String>, String> {
-    let range = end
-        .strip_suffix(']')
-        .and_then(|rest| rest.rsplit_once('['))
-        .and_then(|(name, range)| Some((name, range.split_once("..")?)));
-    let Some((name, (first, last))) = range else {
-        return Ok(vec![end.to_string()]);
-    };
-    let bound = |text: &str| text.trim().parse::<usize>().ok().filter(|&n| n < 100_000);
-    match (bound(first), bound(last)) {
-        (Some(first), Some(last)) if first <= last => Ok((first..=last)
-            .map(|index| format!("{name}[{index}]"))
-            .collect()),
-        _ => Err(format!("`{end}` has no range such as [1..15]")),
-    }
-}
-
-/// `displacement` or `displacement[3]` of the reference.
-fn reference(variable: &str) -> Option<Origin> {
-    let (name, ahead) = match variable.strip_suffix(']') {
-        None => (variable, 0),
-        Some(rest) => {
-            let (name, index) = rest.split_once('[')?;
-            let ahead: isize = index.trim().parse().ok()?;
-            (name, Some(ahead).filter(|ahead| ahead.abs() < FARTHEST)?)
-        }
-    };
-    let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name)?;
-    Some(Origin::Reference { quantity, ahead })
-}
 
 /// The connection of a link, after its names, types and units were checked.
 ///
@@ -238,13 +16,18 @@ pub(super) fn connect(components: &[Component], link: &Link) -> Result<Connectio
     let input = find(&components[component].fmu, &to.variable, Causality::Input)?;
     let target = &components[component].fmu.description.variables[input];
 
-    let (source, kind, unit) = match from {
+    let (source, kind, unit, base) = match from {
         Origin::Reference { quantity, ahead } => {
             let source = Source::Reference {
                 quantity: *quantity,
                 ahead: *ahead,
             };
-            (source, &Kind::Float64, Some(quantity.unit()))
+            (
+                source,
+                &Kind::Float64,
+                Some(quantity.unit()),
+                Some(quantity.base_unit()),
+            )
         }
         Origin::Output(name) => {
             let component = component_index(components, &name.component)?;
@@ -255,38 +38,98 @@ pub(super) fn connect(components: &[Component], link: &Link) -> Result<Connectio
                 component,
                 variable,
             };
-            (source, &output.kind, output.unit.as_deref())
+            (
+                source,
+                &output.kind,
+                output.unit.as_deref(),
+                output.base_unit,
+            )
         }
     };
     fits(kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
-    let factor = factor(unit, target.unit.as_deref())
+    let (factor, offset) = conversion((unit, base), (target.unit.as_deref(), target.base_unit))
         .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
     Ok(Connection {
         source,
         component,
         input,
         factor,
+        offset,
     })
 }
 
 fn fits(kind: &Kind, target: &Variable) -> Result<(), String> {
-    let same = kind.name() == target.kind.name();
-    let widened = *kind == Kind::Int32 && target.kind == Kind::Float64;
-    if kind.is_numeric() && (same || widened) {
+    if kind.drives(&target.kind) {
         return Ok(());
     }
     let (from, to) = (kind.name(), target.kind.name());
     Err(format!("is a {from} and cannot drive the {to}"))
 }
 
-/// The factor from one unit to the other; a side without a unit takes the other's.
-fn factor(from: Option<&str>, to: Option<&str>) -> Result<f64, String> {
-    match (from, to) {
-        (Some(from), Some(to)) if from != to => {
-            let unit = |text: &str| Unit::parse(text).map_err(|error| error.to_string());
-            let factor = unit(from)?.factor_to(&unit(to)?);
-            factor.map_err(|error| error.to_string())
+/// A unit as a description names it, and what it is in SI where the description says so.
+type NamedUnit<'a> = (Option<&'a str>, Option<BaseUnit>);
+
+/// Factor and offset from one unit to the other; a side without a unit takes the other's.
+fn conversion(from: NamedUnit, to: NamedUnit) -> Result<(f64, f64), String> {
+    let ((Some(name), base), (Some(target), target_base)) = (from, to) else {
+        return Ok((1.0, 0.0));
+    };
+    let (Some(base), Some(target_base)) = (base, target_base) else {
+        if name == target {
+            return Ok((1.0, 0.0));
         }
-        _ => Ok(1.0),
+        let unit = |text: &str| Unit::parse(text).map_err(|error| error.to_string());
+        let factor = unit(name)?.factor_to(&unit(target)?);
+        return factor
+            .map(|factor| (factor, 0.0))
+            .map_err(|error| error.to_string());
+    };
+    if base == target_base {
+        return Ok((1.0, 0.0));
     }
+    if name == target {
+        return Err(format!(
+            "both are in `{name}`, but that is {} in one FMU and {} in the other",
+            in_si(&base),
+            in_si(&target_base)
+        ));
+    }
+    if base.exponents != target_base.exponents {
+        return Err(format!(
+            "`{name}` is {} and `{target}` is {}",
+            in_si(&base),
+            in_si(&target_base)
+        ));
+    }
+    // Written units that our own grammar knows keep its factors, which are exact.
+    let known = || Some((Unit::parse(name).ok()?, Unit::parse(target).ok()?));
+    if base.offset == 0.0
+        && target_base.offset == 0.0
+        && let Some((from, to)) = known()
+        && let Ok(factor) = from.factor_to(&to)
+        && (factor * target_base.factor / base.factor - 1.0).abs() < 1e-6
+    {
+        return Ok((factor, 0.0));
+    }
+    Ok((
+        base.factor / target_base.factor,
+        (base.offset - target_base.offset) / target_base.factor,
+    ))
+}
+
+/// A unit in SI, for people.
+fn in_si(base: &BaseUnit) -> String {
+    let names = ["kg", "m", "s", "A", "K", "mol", "cd"];
+    let mut text = base.factor.to_string();
+    for (name, &exponent) in names.iter().zip(&base.exponents) {
+        match exponent {
+            0 => {}
+            1 => text += &format!(" {name}"),
+            exponent => text += &format!(" {name}^{exponent}"),
+        }
+    }
+    if base.offset != 0.0 {
+        text += &format!(" + {}", base.offset);
+    }
+    text
 }

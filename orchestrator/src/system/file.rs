@@ -30,8 +30,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::connection::{self, Link, Origin, VariableName};
 use super::error::SystemError;
+use super::link::{self, Link, Origin, VariableName};
 use super::rule::Rule;
 use super::value::{self, Setting};
 
@@ -231,7 +231,7 @@ impl SystemFile {
         for connection in &written.connections {
             let line = 1 + text[..connection.span().start].matches('\n').count();
             let connection = connection.get_ref();
-            let links = connection::parse(connection, line);
+            let links = link::parse(connection, line);
             connections.extend(links.map_err(|reason| SystemError::Place {
                 origin: origin.to_string(),
                 place: format!("connection `{connection}` (line {line})"),

@@ -8,6 +8,7 @@ mod connection;
 mod error;
 mod file;
 mod graph;
+mod link;
 mod lookup;
 pub mod model;
 mod rule;
@@ -16,10 +17,10 @@ mod value;
 
 pub use assemble::{Library, assemble};
 pub use checked::{Component, Connection, DEFAULT_PERIOD, Source, System};
-pub use connection::{Link, Origin, Quantity, VariableName};
 pub use error::SystemError;
 pub use file::{ComponentFile, ExperimentFile, MeasurementsFile, SystemFile};
 pub use graph::{Operation, Schedule};
+pub use link::{Link, Origin, Quantity, VariableName};
 pub use rule::Rule;
 pub use value::{Setting, Value};
 

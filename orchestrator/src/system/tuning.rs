@@ -23,8 +23,8 @@ use plant::servo_hydraulic::ServoHydraulicTable;
 use serde::{Deserialize, Serialize};
 use units::constants::SAMPLING_PERIOD;
 
-use super::connection::{Link, Origin};
 use super::file::{ComponentFile, SystemFile};
+use super::link::{Link, Origin};
 use super::model::shake_table_values;
 use super::rule::Rule;
 
@@ -170,19 +170,7 @@ impl Rules {
     }
 
     fn three_variable(&self, component: &mut ComponentFile) {
-        let g = &self.gains;
-        set(
-            component,
-            &[
-                ("proportional_gain", g.proportional),
-                ("integral_gain", g.integral),
-                ("velocity_feedback_gain", g.velocity_feedback),
-                ("acceleration_feedback_gain", g.acceleration_feedback),
-                ("displacement_feedforward_gain", g.displacement_feedforward),
-                ("velocity_feedforward_gain", g.velocity_feedforward),
-                ("acceleration_feedforward_gain", g.acceleration_feedforward),
-            ],
-        );
+        set(component, &self.gains.named());
     }
 
     fn force_pid(&self, component: &mut ComponentFile) {

@@ -7,6 +7,7 @@ mod benchmark;
 mod contract;
 mod diagnosis;
 mod failures;
+mod hostile;
 mod motions;
 mod physical_rig;
 mod reports;

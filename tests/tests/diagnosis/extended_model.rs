@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use acceptance::python::run_script;
 use hidden_effects::case::{Case as Generated, Kind, Settings};
-use identification::diagnosis::case::{CHANNELS, ControlLaw, Nominal, deviation};
+use identification::data::{OUTPUT_NAMES, mean_and_deviation};
+use identification::diagnosis::case::{ControlLaw, Nominal};
 use identification::diagnosis::engine::{Candidate, NamedEffect, ParameterEstimate, Role};
 use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
 use identification::diagnosis::rigs::shake_table::catalogue::catalogue;
@@ -184,9 +185,9 @@ fn fmus_with_an_effect_move_in_closed_loop_like_the_engine_that_finds_it() {
         let expected = native(&rig, &law, &reference);
         // In units of the channel's own variation.
         let (mut off, mut effect) = (0.0f64, 0.0f64);
-        for i in 0..CHANNELS.len() {
+        for i in 0..OUTPUT_NAMES.len() {
             // The sensor of a specimen that is not there shows nothing.
-            let size = deviation(&plain[i]);
+            let size = mean_and_deviation(&plain[i]).1;
             let change = |with: &[f64], without: &[f64]| -> Vec<f64> {
                 with.iter().zip(without).map(|(a, b)| a - b).collect()
             };
@@ -345,7 +346,7 @@ fn in_fmpy_the_extended_fmus_start_with_the_effects() {
         let outputs = ["displacement", "acceleration", "actuator_force"];
         let played = fmpy(&fmu.path, &inputs, &outputs);
         for (i, name) in outputs.iter().enumerate() {
-            let size = deviation(&with[i]);
+            let size = mean_and_deviation(&with[i]).1;
             let own = rms(&played[i], &with[i]) / size;
             let nominal = rms(&played[i], &without[i]) / size;
             println!(

@@ -306,13 +306,13 @@ fn bad_data_are_refused_by_name() {
     with(
         good.replacen("displacement [m]", "displacement", 1),
         &[
-            "data.csv: line 1: `displacement` has no unit",
+            "data.csv, line 1: column `displacement` has no unit",
             "displacement [m]",
         ],
     );
     with(
         good.replacen("displacement [m]", "displacement [kg]", 1),
-        &["data.csv: line 1: `displacement`"],
+        &["data.csv, line 1, column 3 (`displacement`)"],
     );
     with(
         with_column(
@@ -323,7 +323,7 @@ fn bad_data_are_refused_by_name() {
             },
         ),
         &[
-            "data.csv: line 100: `actuator_force` is \"n/a\"",
+            "data.csv, line 100, column 5 (`actuator_force`): \"n/a\"",
             "expected a number",
         ],
     );

@@ -1,7 +1,7 @@
 //! Chapter 2 as a tool: the rig's parameters from noisy data taken in closed loop.
 
-use acceptance::recordings::{PERIOD, Test};
-use identification::data::Recording;
+use acceptance::recordings::Test;
+use identification::data::Channel;
 use identification::identify::model::{DELAY, PHYSICAL_NAMES};
 use identification::identify::rig::{Options, RigIdentification, identify};
 use nalgebra::Complex;
@@ -237,12 +237,7 @@ fn a_punctual_command_has_no_delay() {
 #[test]
 fn a_known_specimen_stands_for_its_sensor() {
     let recording = Test::default().record();
-    let columns = recording
-        .names()
-        .filter(|name| *name != "specimen_acceleration")
-        .map(|name| (name.to_string(), recording.channel(name).unwrap().to_vec()))
-        .collect();
-    let unsensed = Recording::new("test", PERIOD, columns).unwrap();
+    let unsensed = recording.clone().without(Channel::SpecimenAcceleration);
     let known = Options {
         specimen: Some(LinearSpecimen::appendix_a()),
         ..Options::default()

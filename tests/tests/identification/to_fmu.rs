@@ -3,7 +3,7 @@
 
 use acceptance::python::run_script;
 use acceptance::recordings::{PERIOD, Test};
-use identification::data::mean_and_deviation;
+use identification::data::{Channel, mean_and_deviation};
 use identification::identify::model_file::ModelFile;
 use identification::identify::rig::{Options, identify};
 use nalgebra::{DVector, dvector};
@@ -61,7 +61,7 @@ fn an_fmu_with_the_identified_model_moves_like_the_identified_rig() {
         .unwrap()
         .with_file_name("fmus-for-tests");
     let packed = pack::build_component("fmus/shake_table", &out, &pack::FmiVersion::ALL).unwrap();
-    let command = &recording.channel("valve_command").unwrap()[..2500];
+    let command = &recording.channel(Channel::ValveCommand).unwrap()[..2500];
     let expected = native(found.rig().shake_table, command);
     for fmu in packed {
         let path = fmu.path.display().to_string();

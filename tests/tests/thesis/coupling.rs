@@ -25,7 +25,7 @@ fn coupled(prepared: &Prepared, algorithm: Algorithm) -> Vec<f64> {
     assert!(
         matches!(outcome.ended, Ended::Complete),
         "{}",
-        outcome.ended.story()
+        outcome.ended.message()
     );
     outcome.record.column("table.acceleration").unwrap()
 }

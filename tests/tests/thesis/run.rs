@@ -16,7 +16,7 @@ fn play(request: &Request) -> Record {
     assert!(
         matches!(outcome.ended, Ended::Complete),
         "{}",
-        outcome.ended.story()
+        outcome.ended.message()
     );
     assert_eq!(outcome.record.len(), prepared.motion.len());
     assert_eq!(outcome.messages.len(), 0, "{:?}", outcome.messages);

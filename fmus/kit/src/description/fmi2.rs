@@ -4,8 +4,8 @@
 //! by their position, which is their value reference, too.
 
 use super::{
-    causality, default_experiment, enumerations, initial, initial_unknown, initial_unknowns, items,
-    log_categories, range, start, token, unit_definitions, unknown, variability, xml::Element,
+    default_experiment, described, enumerations, initial_unknown, initial_unknowns, items,
+    log_categories, range, root, start, token, unit_definitions, unknown, xml::Element,
 };
 use crate::{
     component::Component,
@@ -15,18 +15,7 @@ use crate::{
 
 /// The model description of FMI 2.0.
 pub fn fmi2<C: Component>(model: &Model<C>) -> String {
-    let mut root = Element::new("fmiModelDescription")
-        .attribute("fmiVersion", "2.0")
-        .attribute("modelName", C::NAME)
-        .attribute("guid", token(model))
-        .attribute("description", C::DESCRIPTION)
-        .attribute("version", C::VERSION)
-        .attribute("license", env!("CARGO_PKG_LICENSE"))
-        .attribute(
-            "generationTool",
-            concat!("fmu-kit ", env!("CARGO_PKG_VERSION")),
-        )
-        .attribute("variableNamingConvention", "structured");
+    let mut root = root::<C>("2.0", "guid", token(model));
     if model.offers_model_exchange() {
         root = root
             .attribute("numberOfEventIndicators", C::EVENT_INDICATORS)
@@ -84,23 +73,12 @@ fn scalar<C: Component>(model: &Model<C>, index: usize, variable: &Variable<C>) 
             Element::new("Enumeration").attribute("declaredType", choices.name)
         }
     };
-    let state = model
-        .states
-        .iter()
-        .find(|s| s.derivative == index)
-        .map(|s| s.state + 1);
-    Element::new("ScalarVariable")
-        .attribute("name", &variable.name)
-        .attribute("valueReference", index + 1)
-        .attribute("description", &variable.description)
-        .attribute("causality", causality(variable.causality))
-        .attribute("variability", variability(variable.variability))
-        .optional("initial", initial(variable))
-        .child(
-            range(variable, typed)
-                .optional("start", start(variable))
-                .optional("derivative", state),
-        )
+    let state = model.state_of(index).map(|state| state + 1);
+    described("ScalarVariable", index, variable).child(
+        range(variable, typed)
+            .optional("start", start(variable))
+            .optional("derivative", state),
+    )
 }
 
 fn structure<C: Component>(model: &Model<C>) -> Element {

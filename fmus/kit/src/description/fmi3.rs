@@ -1,8 +1,8 @@
 //! `modelDescription.xml` of FMI 3.0.
 
 use super::{
-    causality, default_experiment, enumerations, initial, initial_unknown, initial_unknowns, items,
-    log_categories, range, start, token, unit_definitions, unknown, variability, xml::Element,
+    default_experiment, described, enumerations, initial_unknown, initial_unknowns, items,
+    log_categories, range, root, start, token, unit_definitions, unknown, xml::Element,
 };
 use crate::{
     component::Component,
@@ -17,18 +17,7 @@ pub fn fmi3<C: Component>(model: &Model<C>) -> String {
 
 /// The same with any token.
 pub(super) fn with_token<C: Component>(model: &Model<C>, token: &str) -> String {
-    let mut root = Element::new("fmiModelDescription")
-        .attribute("fmiVersion", "3.0")
-        .attribute("modelName", C::NAME)
-        .attribute("instantiationToken", token)
-        .attribute("description", C::DESCRIPTION)
-        .attribute("version", C::VERSION)
-        .attribute("license", env!("CARGO_PKG_LICENSE"))
-        .attribute(
-            "generationTool",
-            concat!("fmu-kit ", env!("CARGO_PKG_VERSION")),
-        )
-        .attribute("variableNamingConvention", "structured");
+    let mut root = root::<C>("3.0", "instantiationToken", token);
     if model.offers_model_exchange() {
         root = root.child(abilities::<C>("ModelExchange"));
     }
@@ -80,18 +69,8 @@ fn abilities<C: Component>(name: &str) -> Element {
 }
 
 fn typed<C: Component>(model: &Model<C>, index: usize, variable: &Variable<C>) -> Element {
-    let state = model
-        .states
-        .iter()
-        .find(|s| s.derivative == index)
-        .map(|s| s.state + 1);
-    let mut element = Element::new(variable.access.type_name())
-        .attribute("name", &variable.name)
-        .attribute("valueReference", index + 1)
-        .attribute("description", &variable.description)
-        .attribute("causality", causality(variable.causality))
-        .attribute("variability", variability(variable.variability))
-        .optional("initial", initial(variable))
+    let state = model.state_of(index).map(|state| state + 1);
+    let mut element = described(variable.access.type_name(), index, variable)
         .optional("unit", variable.unit)
         .optional("displayUnit", variable.display_unit);
     if let Access::Choice(_, choices) = &variable.access {

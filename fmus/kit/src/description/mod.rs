@@ -30,6 +30,33 @@ pub fn token<C: Component>(model: &Model<C>) -> &str {
         .get_or_init(|| fingerprint(&fmi3::with_token(model, "")))
 }
 
+/// The description's root, with the attributes that both versions have.
+fn root<C: Component>(version: &str, token_attribute: &str, token: &str) -> Element {
+    Element::new("fmiModelDescription")
+        .attribute("fmiVersion", version)
+        .attribute("modelName", C::NAME)
+        .attribute(token_attribute, token)
+        .attribute("description", C::DESCRIPTION)
+        .attribute("version", C::VERSION)
+        .attribute("license", env!("CARGO_PKG_LICENSE"))
+        .attribute(
+            "generationTool",
+            concat!("fmu-kit ", env!("CARGO_PKG_VERSION")),
+        )
+        .attribute("variableNamingConvention", "structured")
+}
+
+/// A variable's element, with the attributes that both versions have.
+fn described<C>(element: &str, index: usize, variable: &Variable<C>) -> Element {
+    Element::new(element)
+        .attribute("name", &variable.name)
+        .attribute("valueReference", index + 1)
+        .attribute("description", &variable.description)
+        .attribute("causality", causality(variable.causality))
+        .attribute("variability", variability(variable.variability))
+        .optional("initial", initial(variable))
+}
+
 fn causality(causality: Causality) -> &'static str {
     match causality {
         Causality::Parameter => "parameter",

@@ -1,9 +1,9 @@
-//! What makes a record unfit for a diagnosis, said by name.
+//! What makes a recording unfit for a diagnosis, said by name.
 
 use super::nominal::Nominal;
-use super::record::{CHANNELS, Record};
+use crate::data::{Channel, OUTPUT_NAMES, Recording, RoundedStamps, TimeBase, mean_and_deviation};
 
-/// Shortest record that is looked at, samples.
+/// Shortest recording that is looked at, samples.
 const SHORTEST: usize = 500;
 /// Standard deviations of the sensor's noise that the displacement must exceed.
 const LEAST_EXCITATION: f64 = 8.0;
@@ -14,31 +14,30 @@ const MOST_REPEATED: usize = 5;
 /// Equal readings in a row that betray a frozen one.
 const FROZEN_RUN: usize = 50;
 
-/// Everything wrong with `record`, a sentence each; empty when it can be used.
-pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
-    let name = &record.name;
+/// Everything wrong with `recording`, a sentence each; empty when it can be used.
+pub fn problems(recording: &Recording, nominal: &Nominal) -> Vec<String> {
+    let name = &recording.name;
     let mut found = Vec::new();
-    let n = record.len();
-    for (what, column) in [
-        ("time", &record.time),
-        ("valve_command", &record.valve_command),
+    let n = recording.len();
+    for (channel, is_missing) in [
+        (Channel::Time, recording.time == TimeBase::Unknown),
+        (
+            Channel::ValveCommand,
+            recording.channel(Channel::ValveCommand).is_none(),
+        ),
     ] {
-        if column.is_empty() {
+        if is_missing {
             found.push(format!(
-                "{name}: column `{what}` is missing, nothing can be told without it"
+                "{name}: column `{}` is missing, nothing can be told without it",
+                channel.name()
             ));
         }
     }
-    if record
-        .channels
-        .iter()
-        .filter(|channel| !channel.is_empty())
-        .count()
-        < 2
-    {
+    let there = |channel: &&Channel| recording.channel(**channel).is_some();
+    if Channel::OUTPUTS.iter().filter(there).count() < 2 {
         found.push(format!(
             "{name}: at least two of {} are needed",
-            CHANNELS.join(", ")
+            OUTPUT_NAMES.join(", ")
         ));
     }
     if !found.is_empty() {
@@ -50,23 +49,22 @@ pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
         ));
         return found;
     }
-    found.extend(timing(record, nominal));
-    for (channel, values) in CHANNELS.iter().zip(&record.channels) {
-        found.extend(readings(name, channel, values, f64::INFINITY));
-    }
+    found.extend(timing(recording, nominal));
     let limit = nominal.controller.map_or(f64::INFINITY, |law| law.limit);
-    found.extend(readings(
-        name,
-        "valve_command",
-        &record.valve_command,
-        limit,
-    ));
+    for channel in Channel::OUTPUTS.into_iter().chain([Channel::ValveCommand]) {
+        let limit = match channel {
+            Channel::ValveCommand => limit,
+            _ => f64::INFINITY,
+        };
+        let values = recording.samples(channel);
+        found.extend(readings(name, channel.name(), values, limit));
+    }
     if found.is_empty() {
-        found.extend(held(record));
+        found.extend(held(recording));
     }
     if let Some(limit) = nominal.controller.map(|law| law.limit) {
-        let at_limit = record
-            .valve_command
+        let at_limit = recording
+            .samples(Channel::ValveCommand)
             .iter()
             .filter(|u| u.abs() > 0.999 * limit)
             .count();
@@ -80,53 +78,76 @@ pub fn problems(record: &Record, nominal: &Nominal) -> Vec<String> {
     found
 }
 
-/// That `record` moves too little to tell anything, if it does. A low level is no fault of a record
+/// That `recording` moves too little to tell anything, if it does. A low level is no fault of one
 /// that is there to show what happens at it: a table that sticks says something.
-pub fn too_little_excitation(record: &Record, nominal: &Nominal) -> Option<String> {
-    let displacement = &record.channels[0];
-    let excitation = deviation(displacement) / nominal.noise[0];
+pub fn too_little_excitation(recording: &Recording, nominal: &Nominal) -> Option<String> {
+    let displacement = recording.samples(Channel::Displacement);
+    let (_, deviation) = mean_and_deviation(displacement);
+    let excitation = deviation / nominal.noise[0];
     (!displacement.is_empty() && excitation < LEAST_EXCITATION).then(|| {
         format!(
             "{}: too little excitation, the displacement varies by {excitation:.1} standard \
              deviations of its noise, at least {LEAST_EXCITATION} are needed",
-            record.name
+            recording.name
         )
     })
 }
 
-fn timing(record: &Record, nominal: &Nominal) -> Option<String> {
-    let name = &record.name;
+/// What is wrong with the clock, if anything. Stamps may be rounded, as long as the nominal rate
+/// explains them.
+fn timing(recording: &Recording, nominal: &Nominal) -> Option<String> {
+    let name = &recording.name;
     let period = 1.0 / nominal.sample_rate;
-    let mut steps: Vec<f64> = record
-        .time
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .collect();
+    let time: Vec<f64> = (0..recording.len()).map(|k| recording.time_at(k)).collect();
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let irregular = steps
         .iter()
         .position(|step| !step.is_finite() || (step - period).abs() > 0.1 * period);
+    let rounded = irregular.and_then(|_| RoundedStamps::of(&time, Some(period)));
+    if rounded.is_some_and(|rounded| rounded.period == Some(period)) {
+        return None;
+    }
+    let repeats = steps.contains(&0.0);
     steps.retain(|step| step.is_finite());
     steps.sort_by(f64::total_cmp);
     let median = steps.get(steps.len() / 2).copied().unwrap_or(f64::NAN);
-    if median.is_nan() || (median - period).abs() > 0.01 * period {
-        return Some(format!(
-            "{name}: sampled at {:.4} Hz, the nominal model says {} Hz",
-            1.0 / median,
-            nominal.sample_rate
-        ));
+    let sampled = match rounded {
+        Some(RoundedStamps { step, period: None }) if repeats => {
+            return Some(format!(
+                "{name}: time stamps repeat: they are rounded to {step} s, and {} Hz, as the \
+                 nominal model says, does not explain them all; samples are missing, or the rate \
+                 is another",
+                nominal.sample_rate
+            ));
+        }
+        Some(RoundedStamps {
+            period: Some(even), ..
+        }) if repeats => even,
+        _ => median,
+    };
+    if sampled.is_nan() || (sampled - period).abs() > 0.01 * period {
+        return Some(if sampled > 0.0 {
+            format!(
+                "{name}: sampled at {:.4} Hz, the nominal model says {} Hz",
+                1.0 / sampled,
+                nominal.sample_rate
+            )
+        } else {
+            format!("{name}: time does not increase, expected stamps every {period} s")
+        });
     }
     let at = irregular?;
-    let gap = record.time[at + 1] - record.time[at];
+    let gap = time[at + 1] - time[at];
     Some(if gap > period {
         format!(
             "{name}: a gap after {:.4} s, about {:.0} samples were dropped",
-            record.time[at],
+            time[at],
             gap / period - 1.0
         )
     } else {
         format!(
             "{name}: time is no steady clock after {:.4} s (step {gap:.3e} s)",
-            record.time[at]
+            time[at]
         )
     })
 }
@@ -176,31 +197,34 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
 }
 
 /// Samples that repeat the one before in every channel: dropped ones that the acquisition filled.
-fn held(record: &Record) -> Option<String> {
-    let channels: Vec<&Vec<f64>> = record.channels.iter().filter(|c| !c.is_empty()).collect();
+fn held(recording: &Recording) -> Option<String> {
+    let channels: Vec<&[f64]> = Channel::OUTPUTS
+        .into_iter()
+        .filter_map(|channel| recording.channel(channel))
+        .collect();
     let repeats = |k: &usize| {
         channels
             .iter()
             .all(|channel| channel[*k] == channel[*k - 1])
     };
-    let repeated: Vec<usize> = (1..record.len()).filter(repeats).collect();
+    let repeated: Vec<usize> = (1..recording.len()).filter(repeats).collect();
     let first = *repeated.first()?;
     (repeated.len() > MOST_REPEATED).then(|| {
         format!(
             "{}: {} samples repeat the one before in all channels, the first after {:.4} s: \
              dropped samples that were filled",
-            record.name,
+            recording.name,
             repeated.len(),
-            record.time[first]
+            recording.time_at(first)
         )
     })
 }
 
 /// How much louder than stated the noise of each channel is, from differences that leave next to
 /// nothing of the motion; none where the channel is missing.
-pub fn noise_ratios(record: &Record, nominal: &Nominal) -> [Option<f64>; 4] {
+pub fn noise_ratios(recording: &Recording, nominal: &Nominal) -> [Option<f64>; 4] {
     std::array::from_fn(|i| {
-        let channel = &record.channels[i];
+        let channel = recording.samples(Channel::OUTPUTS[i]);
         let n = channel.len().checked_sub(4).filter(|n| *n > 0)?;
         let sum: f64 = channel
             .windows(5)
@@ -211,25 +235,18 @@ pub fn noise_ratios(record: &Record, nominal: &Nominal) -> [Option<f64>; 4] {
     })
 }
 
-/// Standard deviation.
-pub fn deviation(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
-}
-
 /// What a missing channel takes away.
-pub fn blind_spot(channel: usize) -> &'static str {
+pub fn blind_spot(channel: Channel) -> &'static str {
     match channel {
-        0 => {
+        Channel::Displacement => {
             "without displacement its sensor cannot be judged, slow drifts stay unseen and the \
              controller's law cannot be checked"
         }
-        1 => {
+        Channel::Acceleration => {
             "without acceleration its sensor cannot be judged, and payload and friction are told \
              from the force alone"
         }
-        2 => {
+        Channel::ActuatorForce => {
             "without actuator force the load cell cannot be judged, and what the valve does is \
              hard to tell from what the table does"
         }

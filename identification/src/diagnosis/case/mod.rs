@@ -1,14 +1,14 @@
-//! What a laboratory hands in: a nominal model and records.
+//! What a laboratory hands in: a nominal model and recordings.
 
 mod checks;
 mod nominal;
-mod record;
 
-pub use checks::{blind_spot, deviation, noise_ratios, problems, too_little_excitation};
+pub use checks::{blind_spot, noise_ratios, problems, too_little_excitation};
 pub use nominal::{ControlLaw, Nominal};
-pub use record::{CHANNELS, Record};
 
 use std::path::{Path, PathBuf};
+
+use crate::data::{DataError, Recording};
 
 /// A folder with `nominal.toml`, `identification.csv`, `validation.csv` and, if there,
 /// `small.csv` and `baseline.csv`.
@@ -17,13 +17,13 @@ pub struct Case {
     /// The nominal model.
     pub nominal: Nominal,
     /// For fitting.
-    pub identification: Record,
+    pub identification: Recording,
     /// Another excitation, held out.
-    pub validation: Record,
+    pub validation: Recording,
     /// At low level.
-    pub small: Option<Record>,
+    pub small: Option<Recording>,
     /// The same rig without the effect.
-    pub baseline: Option<Record>,
+    pub baseline: Option<Recording>,
 }
 
 /// Why a case cannot be diagnosed.
@@ -37,7 +37,10 @@ pub enum CaseError {
         /// What is wrong with it.
         reason: String,
     },
-    /// Records that would mislead a diagnosis.
+    /// A recording that cannot be read or understood.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// Recordings that would mislead a diagnosis.
     #[error("the records cannot be diagnosed: {}", .problems.join("; "))]
     Unfit {
         /// One sentence for each problem.
@@ -46,8 +49,8 @@ pub enum CaseError {
 }
 
 impl Case {
-    /// The records that there are.
-    pub fn records(&self) -> impl Iterator<Item = &Record> {
+    /// The recordings that there are.
+    pub fn recordings(&self) -> impl Iterator<Item = &Recording> {
         let optional = [self.small.as_ref(), self.baseline.as_ref()];
         [&self.identification, &self.validation]
             .into_iter()
@@ -55,35 +58,26 @@ impl Case {
     }
 
     /// Reads a case folder.
+    ///
+    /// # Errors
+    /// A file that is missing or cannot be understood.
     pub fn read(folder: &Path) -> Result<Self, CaseError> {
-        let text = |name: &str| {
-            let file = folder.join(name);
-            std::fs::read_to_string(&file).map_err(|error| CaseError::File {
-                file,
-                reason: error.to_string(),
-            })
-        };
-        let fail = |name: &str, reason: String| CaseError::File {
-            file: folder.join(name),
+        let file = folder.join("nominal.toml");
+        let fail = |reason: String| CaseError::File {
+            file: file.clone(),
             reason,
         };
-        let nominal = Nominal::parse(&text("nominal.toml")?)
-            .map_err(|reason| fail("nominal.toml", reason))?;
-        let record = |name: &str| {
-            let file = format!("{name}.csv");
-            Record::parse(name, &text(&file)?).map_err(|reason| fail(&file, reason))
-        };
+        let text = std::fs::read_to_string(&file).map_err(|error| fail(error.to_string()))?;
+        let nominal = Nominal::parse(&text).map_err(fail)?;
+        let recording = |name: &str| Recording::read(&folder.join(format!("{name}.csv")), name);
         let optional = |name: &str| {
-            if folder.join(format!("{name}.csv")).exists() {
-                record(name).map(Some)
-            } else {
-                Ok(None)
-            }
+            let there = folder.join(format!("{name}.csv")).exists();
+            there.then(|| recording(name)).transpose()
         };
         Ok(Self {
             nominal,
-            identification: record("identification")?,
-            validation: record("validation")?,
+            identification: recording("identification")?,
+            validation: recording("validation")?,
             small: optional("small")?,
             baseline: optional("baseline")?,
         })

@@ -1,6 +1,7 @@
 //! Files are read as they are meant, and every fault is named with its place.
 
 use super::*;
+use identification::data::Text;
 
 #[test]
 fn shared_records_have_the_peaks_of_their_table() {
@@ -179,11 +180,11 @@ fn faults_of_csv_files_are_named() {
     assert_eq!(say("t_s,a_g\n"), "a.csv: a header and no data");
     assert_eq!(
         say("# x\nt_s,a_g\n0,1\n0.01,one\n"),
-        "a.csv, line 4, column 2: \"one\" is not a finite number"
+        "a.csv, line 4, column 2 (`a_g`): \"one\" is not a finite number; expected one in every cell"
     );
     assert_eq!(
         say("t_s,a_g\n0,1\n0.01\n"),
-        "a.csv, line 3: 1 fields, expected 2"
+        "a.csv, line 3: 1 cells; expected 2, as in the header"
     );
     assert_eq!(
         say("t_s,a_g\n0,1\n0.01,1\n0.02,1\n0.05,1\n0.06,1\n"),
@@ -328,7 +329,8 @@ proptest::proptest! {
         let path = Path::new("a");
         let _ = crate::motion::at2::parse(path, &text);
         for kind in [crate::motion::csv_file::Kind::Record, crate::motion::csv_file::Kind::Reference] {
-            let _ = crate::motion::csv_file::CsvFile::parse(path, &text, kind).map(|file| file.sample_time());
+            let text = Text { text: text.clone(), note: None };
+            let _ = crate::motion::csv_file::CsvFile::parse(path, text, kind).map(|file| file.sample_time());
         }
     }
 }

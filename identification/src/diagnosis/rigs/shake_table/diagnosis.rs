@@ -12,16 +12,16 @@ use super::gain::{Gain, gain};
 use super::health::{RelationReport, health};
 use super::relations::{misfit, relations};
 use super::sentence::sentence;
+use crate::data::{Channel, OUTPUT_NAMES, Recording};
 use crate::diagnosis::case::{
-    CHANNELS, Case, CaseError, Nominal, Record, blind_spot, noise_ratios, problems,
-    too_little_excitation,
+    Case, CaseError, Nominal, blind_spot, noise_ratios, problems, too_little_excitation,
 };
 use crate::diagnosis::engine::{ExtensibleModel, NamedEffect, Verdict, judge};
 use crate::diagnosis::engine::{Observer, Point, Role, Test};
 use crate::diagnosis::rigs::shake_table::catalogue::{
-    ModelRecord, NUISANCE, ShakeTableModel, nominal_parameters,
+    NUISANCE, Prepared, ShakeTableModel, nominal_parameters,
 };
-use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Signals};
+use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Samples};
 
 /// R5 fires, and the recorded command is used, where it misses the law by more than this many
 /// standard deviations of its noise.
@@ -83,7 +83,7 @@ pub struct Validation {
     /// Sampling period, s.
     pub period: f64,
     /// What acted and what was measured, SI.
-    pub signals: Signals,
+    pub samples: Samples,
     /// Whether the command that acted is what the stated law makes of the readings (R5), free of the
     /// recorder's noise, rather than the recorded one.
     pub by_law: bool,
@@ -94,11 +94,20 @@ pub struct Validation {
 }
 
 /// The command that the stated law made, where it explains the recorded one.
-fn command_by_law(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -> Option<Vec<f64>> {
-    let recorded = &record.valve_command;
-    let [x, a, ..] = &record.channels;
+fn command_by_law(
+    recording: &Recording,
+    nominal: &Nominal,
+    notes: &mut Vec<String>,
+) -> Option<Vec<f64>> {
+    let [recorded, reference, x, a] = [
+        Channel::ValveCommand,
+        Channel::Reference,
+        Channel::Displacement,
+        Channel::Acceleration,
+    ]
+    .map(|channel| recording.samples(channel));
     let law = nominal.controller?;
-    let mut commands = law.commands(&record.reference, x, a, 1.0 / nominal.sample_rate);
+    let mut commands = law.commands(reference, x, a, 1.0 / nominal.sample_rate);
     if commands.len() != recorded.len() || commands.len() < 3 {
         return None;
     }
@@ -116,7 +125,7 @@ fn command_by_law(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -
         notes.push(format!(
             "{}: the stated controller's law does not make the recorded command (R5, {:.1} times \
              its noise); the recorded one is used",
-            record.name,
+            recording.name,
             miss / nominal.command_noise
         ));
         return None;
@@ -124,32 +133,31 @@ fn command_by_law(record: &Record, nominal: &Nominal, notes: &mut Vec<String>) -
     Some(commands)
 }
 
-/// Model and records of a case, after its checks; sentences on what is missing go to `notes`.
+/// Model and recordings of a case, after its checks; sentences on what is missing go to `notes`.
 fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, CaseError> {
     let nominal = &case.nominal;
     let mut found: Vec<String> = case
-        .records()
-        .flat_map(|record| problems(record, nominal))
+        .recordings()
+        .flat_map(|recording| problems(recording, nominal))
         .collect();
     if found.is_empty() {
         let to_be_moved = [&case.identification, &case.validation];
-        let still = |record: &&Record| too_little_excitation(record, nominal);
+        let still = |recording: &&Recording| too_little_excitation(recording, nominal);
         found.extend(to_be_moved.iter().filter_map(still));
     }
-    let has = |record: &Record| {
-        record
-            .channels
-            .each_ref()
-            .map(|channel| !channel.is_empty())
+    let has = |recording: &Recording| {
+        Channel::OUTPUTS.map(|channel| recording.channel(channel).is_some())
     };
     let present = has(&case.identification);
-    for record in case.records() {
-        if found.is_empty() && has(record) != present {
+    for recording in case.recordings() {
+        if found.is_empty() && has(recording) != present {
             found.push(format!(
                 "{}: its channels are not those of {}, are the records of one rig?",
-                record.name, case.identification.name
+                recording.name, case.identification.name
             ));
         }
+        let own = recording.notes.iter();
+        notes.extend(own.map(|note| format!("{}: {note}", recording.name)));
     }
     if !found.is_empty() {
         return Err(CaseError::Unfit { problems: found });
@@ -160,31 +168,26 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
             noise[i] = f64::INFINITY;
             notes.push(format!(
                 "column `{}` is missing: {}",
-                CHANNELS[i],
-                blind_spot(i)
+                OUTPUT_NAMES[i],
+                blind_spot(Channel::OUTPUTS[i])
             ));
         }
     }
     let mut records = Vec::new();
     let ordered = [
         Some((&case.identification, true)),
-        case.small.as_ref().map(|record| (record, true)),
-        case.baseline.as_ref().map(|record| (record, false)),
+        case.small.as_ref().map(|recording| (recording, true)),
+        case.baseline.as_ref().map(|recording| (recording, false)),
         Some((&case.validation, true)),
     ];
-    for (record, with_effects) in ordered.into_iter().flatten() {
-        let value = |i: usize, k: usize| record.channels[i].get(k).copied().unwrap_or(0.0);
-        let command = command_by_law(record, nominal, notes);
-        records.push(ModelRecord {
-            name: record.name.clone(),
+    for (recording, with_effects) in ordered.into_iter().flatten() {
+        let by_law = command_by_law(recording, nominal, notes);
+        let recorded = || recording.samples(Channel::ValveCommand).to_vec();
+        records.push(Prepared {
+            name: recording.name.clone(),
             with_effects,
-            by_law: command.is_some(),
-            signals: Signals {
-                command: command.unwrap_or_else(|| record.valve_command.clone()),
-                channels: (0..record.len())
-                    .map(|k| [value(0, k), value(1, k), value(2, k), value(3, k)])
-                    .collect(),
-            },
+            by_law: by_law.is_some(),
+            samples: Samples::of(recording, by_law.unwrap_or_else(recorded)),
         });
     }
     Ok(ShakeTableModel::new(nominal, noise, records))
@@ -197,11 +200,11 @@ fn prediction(
 ) -> Option<(Predictor, Vec<f64>)> {
     let rig = model.rig(point);
     let predictor = Predictor::design(&rig, model.period, model.noise, model.disturbance).ok()?;
-    let signals = &model.records[record].signals;
-    let mut out = vec![0.0; 4 * signals.len()];
+    let samples = &model.records[record].samples;
+    let mut out = vec![0.0; 4 * samples.len()];
     let sampled = predictor.sample(&rig).ok()?;
     predictor
-        .innovations(&sampled, signals, &mut out)
+        .innovations(&sampled, samples, &mut out)
         .then_some((predictor, out))
 }
 
@@ -232,7 +235,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         )
     };
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
-    let signals = &model.records[held_out].signals;
+    let samples = &model.records[held_out].samples;
     let mut judgement = judge(&model, &fitted, &[held_out], observer).ok_or_else(lost)?;
     for note in at_their_ends(&model, &judgement.best.point) {
         judgement.verdict = Verdict::Unexplained;
@@ -240,8 +243,8 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
     }
     let after = prediction(&model, &judgement.best.point, held_out).ok_or_else(lost)?;
     let gain = gain(
-        signals,
-        &CHANNELS,
+        samples,
+        &OUTPUT_NAMES,
         (&before.0, &before.1),
         (&after.0, &after.1),
     );
@@ -278,7 +281,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
     }
     if judgement.verdict == Verdict::Unexplained {
         let ratios = noise_ratios(&case.identification, &case.nominal);
-        for (channel, ratio) in CHANNELS.iter().zip(ratios) {
+        for (channel, ratio) in OUTPUT_NAMES.iter().zip(ratios) {
             if let Some(ratio) = ratio.filter(|ratio| *ratio > LOUD) {
                 notes.push(format!(
                     "the noise of `{channel}` is {ratio:.1} times what nominal.toml states"
@@ -351,7 +354,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         notes,
         validation: Validation {
             period: model.period,
-            signals: signals.clone(),
+            samples: samples.clone(),
             by_law: model.records[held_out].by_law,
             before: before.1,
             after: after.1,

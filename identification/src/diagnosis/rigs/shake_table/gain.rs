@@ -1,7 +1,7 @@
 //! What the extended model brings on a record that it has not seen.
 
-use super::predictor::{Predictor, Signals};
-use crate::diagnosis::case::deviation;
+use super::predictor::{Predictor, Samples};
+use crate::data::mean_and_deviation;
 use crate::diagnosis::engine::resampling::{bootstrap, running, share_gone};
 
 /// Prediction errors before and after, normalised by the channels' standard deviations.
@@ -39,16 +39,16 @@ pub struct ChannelGain {
     pub intervals_95: [[f64; 2]; 2],
 }
 
-/// Compares two predictions of `signals`: whitened innovations with the predictor that made them.
+/// Compares two predictions of `samples`: whitened innovations with the predictor that made them.
 pub fn gain(
-    signals: &Signals,
+    samples: &Samples,
     names: &[&'static str; 4],
     before: (&Predictor, &[f64]),
     after: (&Predictor, &[f64]),
 ) -> Gain {
     let scale = [0, 1, 2, 3].map(|i| {
-        let channel: Vec<f64> = signals.channels.iter().map(|row| row[i]).collect();
-        deviation(&channel).max(f64::MIN_POSITIVE)
+        let channel: Vec<f64> = samples.channels.iter().map(|row| row[i]).collect();
+        mean_and_deviation(&channel).1.max(f64::MIN_POSITIVE)
     });
     let floor = after.0.floor();
     let live: Vec<usize> = (0..4).filter(|&i| floor[i] > 0.0).collect();

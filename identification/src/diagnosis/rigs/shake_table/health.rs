@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::predictor::Disturbance;
 use super::relations::{self, Relation};
-use crate::diagnosis::case::{Case, Nominal, Record};
+use crate::data::{Channel, Recording};
+use crate::diagnosis::case::{Case, Nominal};
 
 /// Seed of the noise on the simulated healthy rig.
 const SEED: u64 = 20_170_401;
@@ -54,12 +55,10 @@ pub(super) fn health(
     all.collect()
 }
 
-/// What a rig of these parameters without effects would record in place of `record`.
-fn healthy(record: &Record, nominal: &Nominal) -> Option<Record> {
+/// What a rig of these parameters without effects would record in place of `recording`.
+fn healthy(recording: &Recording, nominal: &Nominal) -> Option<Recording> {
     let law = nominal.controller?;
-    if record.reference.len() != record.len() {
-        return None;
-    }
+    let reference = recording.channel(Channel::Reference)?;
     let period = 1.0 / nominal.sample_rate;
     let rig = IdentifiedRig {
         shake_table: nominal.shake_table,
@@ -73,25 +72,27 @@ fn healthy(record: &Record, nominal: &Nominal) -> Option<Record> {
     let drive = unseen.sigma * (1.0 - unseen.phi * unseen.phi).sqrt();
     let (mut state, mut control) = (IdentifiedRigState::default(), law.start(period));
     let mut voltage = 0.0;
-    let mut simulated = Record {
-        channels: Default::default(),
-        valve_command: Vec::new(),
-        ..record.clone()
-    };
-    for k in 0..record.len() {
+    let mut outputs: [Vec<f64>; 4] = Default::default();
+    let mut commands = Vec::with_capacity(recording.len());
+    for k in 0..recording.len() {
         let readings = sampled.measure(&mut state, period * k as f64);
         let mut measured = [0.0; 4];
         for i in 0..4 {
             measured[i] = readings[i] + nominal.noise[i] * normal();
-            if !record.channels[i].is_empty() {
-                simulated.channels[i].push(measured[i]);
-            }
+            outputs[i].push(measured[i]);
         }
-        let command = control.command(&record.reference, k, measured[0], measured[1]);
+        let command = control.command(reference, k, measured[0], measured[1]);
         let recorded = command + nominal.command_noise * normal();
-        simulated.valve_command.push(recorded);
+        commands.push(recorded);
         voltage = unseen.phi * voltage + drive * normal();
         sampled.step_disturbed(&mut state, command, voltage);
     }
+    let mut simulated = recording.clone();
+    for (channel, values) in Channel::OUTPUTS.into_iter().zip(outputs) {
+        if recording.channel(channel).is_some() {
+            simulated.replace(channel, values).ok()?;
+        }
+    }
+    simulated.replace(Channel::ValveCommand, commands).ok()?;
     Some(simulated)
 }

@@ -1,11 +1,12 @@
-//! The five relations of a healthy rig, each checked from the records alone in the frequency
+//! The five relations of a healthy rig, each checked from the recordings alone in the frequency
 //! domain, against the noise of the sensors that it uses.
 
 use nalgebra::Complex;
 use plant::specimens::linear::LinearSpecimen;
 use realfft::RealFftPlanner;
 
-use crate::diagnosis::case::{Nominal, Record};
+use crate::data::{Channel, Recording};
+use crate::diagnosis::case::Nominal;
 
 /// Band in which the relations are checked, Hz.
 const BAND: (f64, f64) = (0.5, 15.0);
@@ -48,9 +49,9 @@ pub fn misfit(relations: &[Relation]) -> Option<String> {
     })
 }
 
-/// The relations that the columns of `record` allow, on the nominal model.
-pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
-    let n = record.len();
+/// The relations that the columns of `recording` allow, on the nominal model.
+pub fn relations(recording: &Recording, nominal: &Nominal) -> Vec<Relation> {
+    let n = recording.len();
     let period = 1.0 / nominal.sample_rate;
     let mut planner = RealFftPlanner::<f64>::new();
     let transform = planner.plan_fft_forward(n);
@@ -71,10 +72,10 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
         transform.process(&mut windowed, &mut out).ok()?;
         Some(out.iter().map(|z| Complex::new(z.re, z.im)).collect())
     };
-    let [x, a, f, specimen_acceleration] = record.channels.each_ref().map(|c| spectrum(c));
+    let [x, a, f, specimen_acceleration] = Channel::OUTPUTS.map(|c| spectrum(recording.samples(c)));
     // Differences are taken before the window, which would leak low frequencies into them.
     let difference = |at: &dyn Fn(&[f64], usize) -> f64| {
-        let x = &record.channels[0];
+        let x = recording.samples(Channel::Displacement);
         if x.len() != n || n < 3 {
             return None;
         }
@@ -84,7 +85,8 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
     };
     let velocity = difference(&|x, k| (x[k + 1] - x[k - 1]) / (2.0 * period));
     let second = difference(&|x, k| (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (period * period));
-    let u = spectrum(&record.valve_command);
+    let command = recording.samples(Channel::ValveCommand);
+    let u = spectrum(command);
     let bin = nominal.sample_rate / n as f64;
     let bins = ((BAND.0 / bin) as usize).max(1)..((BAND.1 / bin) as usize).min(n / 2);
     let [sx, sa, sf, ss] = nominal.noise;
@@ -201,15 +203,18 @@ pub fn relations(record: &Record, nominal: &Nominal) -> Vec<Relation> {
         });
     }
     if let Some(law) = nominal.controller {
-        let [x, a, ..] = &record.channels;
-        let commands = law.commands(&record.reference, x, a, period);
+        let [reference, x, a] = [
+            Channel::Reference,
+            Channel::Displacement,
+            Channel::Acceleration,
+        ]
+        .map(|channel| recording.samples(channel));
+        let commands = law.commands(reference, x, a, period);
         if commands.len() == n && n > 2 && nominal.command_noise > 0.0 {
             // The ends are left out: differences of the reference want neighbours.
             let inner = 1..n - 1;
             let count = inner.len() as f64;
-            let sum: f64 = inner
-                .map(|k| (record.valve_command[k] - commands[k]).powi(2))
-                .sum();
+            let sum: f64 = inner.map(|k| (command[k] - commands[k]).powi(2)).sum();
             all.push(Relation {
                 name: "R5 the controller's law",
                 ratio: (sum / count).sqrt() / nominal.command_noise,

@@ -11,17 +11,18 @@ pub use entry::Apply;
 use plant::identified::rig::IdentifiedRig;
 use plant::identified::shake_table::ShakeTable;
 
-use crate::diagnosis::case::{CHANNELS, Nominal};
+use crate::data::OUTPUT_NAMES;
+use crate::diagnosis::case::Nominal;
 use crate::diagnosis::engine::{Candidate, ExtensibleModel, Point};
-use crate::diagnosis::rigs::shake_table::predictor::{Disturbance, Predictor, Signals};
+use crate::diagnosis::rigs::shake_table::predictor::{Disturbance, Predictor, Samples};
 
-/// One record and whether the effects were there when it was taken.
+/// A recording prepared for the predictor, and whether the effects were there when it was taken.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ModelRecord {
+pub struct Prepared {
     /// Its name.
     pub name: String,
-    /// The signals, SI.
-    pub signals: Signals,
+    /// The samples, SI.
+    pub samples: Samples,
     /// False for a baseline: the same rig before the effect.
     pub with_effects: bool,
     /// Whether the command is that of the stated law rather than the recorded one.
@@ -42,7 +43,7 @@ pub struct ShakeTableModel {
     /// What drives the rig unseen.
     pub disturbance: Disturbance,
     /// The records.
-    pub records: Vec<ModelRecord>,
+    pub records: Vec<Prepared>,
     candidates: Vec<Candidate>,
     apply: Vec<Apply>,
 }
@@ -85,11 +86,11 @@ pub fn nominal_parameters(rig: &IdentifiedRig) -> Vec<f64> {
 impl ShakeTableModel {
     /// The model for `nominal` and `records`; `noise` as in [`Nominal::noise`], infinite where a
     /// channel is missing.
-    pub fn new(nominal: &Nominal, noise: [f64; 4], records: Vec<ModelRecord>) -> Self {
+    pub fn new(nominal: &Nominal, noise: [f64; 4], records: Vec<Prepared>) -> Self {
         let period = 1.0 / nominal.sample_rate;
         let commands = records
             .first()
-            .map(|record| record.signals.command.as_slice());
+            .map(|record| record.samples.command.as_slice());
         let peak = commands
             .unwrap_or_default()
             .iter()
@@ -173,7 +174,7 @@ impl ExtensibleModel for ShakeTableModel {
     }
 
     fn channels(&self) -> &[&'static str] {
-        &CHANNELS
+        &OUTPUT_NAMES
     }
 
     fn disturbed(&self, factor: f64) -> Self {
@@ -185,17 +186,17 @@ impl ExtensibleModel for ShakeTableModel {
     // From the measured signals one sample before: the noise of the sample itself is in its
     // innovation.
     fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)> {
-        let signals = &self.records[record].signals;
-        let n = signals.len();
+        let samples = &self.records[record].samples;
+        let n = samples.len();
         let before = |k: usize| k.saturating_sub(1);
         let channel =
-            |i: usize| -> Vec<f64> { (0..n).map(|k| signals.channels[before(k)][i]).collect() };
+            |i: usize| -> Vec<f64> { (0..n).map(|k| samples.channels[before(k)][i]).collect() };
         let x = channel(0);
         // Velocity over eight samples, smooth enough for its sign.
         let v: Vec<f64> = (0..n)
             .map(|k| (x[k] - x[k.saturating_sub(8)]) / (8.0 * self.period))
             .collect();
-        let command: Vec<f64> = (0..n).map(|k| signals.command[before(k)]).collect();
+        let command: Vec<f64> = (0..n).map(|k| samples.command[before(k)]).collect();
         let mut all = Vec::new();
         for (name, signal) in [
             ("valve command", command),
@@ -220,11 +221,11 @@ impl ExtensibleModel for ShakeTableModel {
     }
 
     fn residual_count(&self, record: usize) -> usize {
-        4 * self.records[record].signals.len()
+        4 * self.records[record].samples.len()
     }
 
     fn sample_count(&self, record: usize) -> usize {
-        self.records[record].signals.len()
+        self.records[record].samples.len()
     }
 
     fn predictor(&self, point: &Point) -> Option<ShakeTablePredictor> {
@@ -253,8 +254,8 @@ impl ExtensibleModel for ShakeTableModel {
         record: usize,
         out: &mut [f64],
     ) -> bool {
-        let ModelRecord {
-            signals,
+        let Prepared {
+            samples,
             with_effects,
             ..
         } = &self.records[record];
@@ -264,7 +265,7 @@ impl ExtensibleModel for ShakeTableModel {
         };
         predictor
             .sample(&rig)
-            .is_ok_and(|sampled| predictor.innovations(&sampled, signals, out))
+            .is_ok_and(|sampled| predictor.innovations(&sampled, samples, out))
     }
 }
 
@@ -298,7 +299,7 @@ mod tests {
         let records = ["identification", "validation"].map(|name| {
             let mut state = Default::default();
             let (mut reference, mut slow, mut unseen) = (0.0, 0.0, 0.0);
-            let mut signals = Signals {
+            let mut samples = Samples {
                 command: Vec::new(),
                 channels: Vec::new(),
             };
@@ -310,15 +311,15 @@ mod tests {
                     *value += noise * normal();
                 }
                 let command = 240.0 * (reference - channels[0]);
-                signals.command.push(command);
-                signals.channels.push(channels);
+                samples.command.push(command);
+                samples.channels.push(channels);
                 let fresh = disturbance.sigma * (1.0 - disturbance.phi.powi(2)).sqrt();
                 unseen = disturbance.phi * unseen + fresh * normal();
                 sampled.step_disturbed(&mut state, command, unseen);
             }
-            ModelRecord {
+            Prepared {
                 name: name.into(),
-                signals,
+                samples,
                 with_effects: true,
                 by_law: false,
             }

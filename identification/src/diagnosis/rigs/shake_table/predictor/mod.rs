@@ -12,6 +12,8 @@ use plant::identified::effects::SensorEffects;
 use plant::identified::rig::{IdentifiedRig, IdentifiedRigState, STATES, SampledRig};
 use plant::linear::discrete_riccati;
 
+use crate::data::{Channel, Recording};
+
 /// The unseen voltage beside the command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disturbance {
@@ -51,16 +53,27 @@ pub struct Predictor {
     pub log_determinant: f64,
 }
 
-/// A record as the predictor needs it: the command that acted and the four channels, SI.
+/// A recording as the predictor walks through it: the command that acted and the four outputs
+/// sample by sample, SI.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Signals {
+pub struct Samples {
     /// V.
     pub command: Vec<f64>,
     /// Displacement, acceleration, actuator force, specimen acceleration, sample by sample.
     pub channels: Vec<[f64; 4]>,
 }
 
-impl Signals {
+impl Samples {
+    /// Those of `recording` under `command` (V); zeros in the place of an output that is missing.
+    pub fn of(recording: &Recording, command: Vec<f64>) -> Self {
+        let outputs = Channel::OUTPUTS.map(|channel| recording.samples(channel));
+        let at = |k: usize| outputs.map(|values| values.get(k).copied().unwrap_or(0.0));
+        Self {
+            command,
+            channels: (0..recording.len()).map(at).collect(),
+        }
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.command.len()
@@ -219,13 +232,13 @@ impl Predictor {
         })
     }
 
-    /// Whitened innovations of `rig` on `signals`, four a sample, into `out` (which must have
+    /// Whitened innovations of `rig` on `samples`, four a sample, into `out` (which must have
     /// that length). A missing channel gives zeros. False where the prediction left the finite.
-    pub fn innovations(&self, rig: &SampledRig, signals: &Signals, out: &mut [f64]) -> bool {
+    pub fn innovations(&self, rig: &SampledRig, samples: &Samples, out: &mut [f64]) -> bool {
         let mut state = IdentifiedRigState::default();
         let mut disturbance = 0.0;
-        let samples = signals.command.iter().zip(&signals.channels);
-        for (k, ((&command, measured), row)) in samples.zip(out.chunks_exact_mut(4)).enumerate() {
+        let rows = samples.command.iter().zip(&samples.channels);
+        for (k, ((&command, measured), row)) in rows.zip(out.chunks_exact_mut(4)).enumerate() {
             let predicted = rig.measure(&mut state, k as f64 * self.period);
             let mut innovation = [0.0; 4];
             for i in 0..4 {

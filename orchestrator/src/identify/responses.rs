@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use identification::data::Recording;
+use identification::data::{Channel, Recording};
 use identification::estimation::frequency_response::{
     FrequencyResponseEstimate, direct, joint_input_output,
 };
@@ -20,10 +20,10 @@ const SEGMENTS: usize = 6;
 const SHOWN: (f64, f64) = (0.02, 50.0);
 
 /// Channel, row of the rig's outputs.
-const CHANNELS: [(&str, usize); 3] = [
-    ("displacement", 0),
-    ("acceleration", 2),
-    ("actuator_force", 3),
+const CHANNELS: [(Channel, usize); 3] = [
+    (Channel::Displacement, 0),
+    (Channel::Acceleration, 2),
+    (Channel::ActuatorForce, 3),
 ];
 
 /// From the command to each channel of the longest recording, and G1 and G2 where they are
@@ -38,7 +38,7 @@ pub(super) fn section(found: &RigIdentification, recordings: &[Recording]) -> Se
             "{}: from the command to each channel. Measured by averaged spectra, {}; lines of a \
              coherence below {LEAST_COHERENCE} are left out.",
             recording.name,
-            if recording.channel("reference").is_some() {
+            if recording.channel(Channel::Reference).is_some() {
                 "with the reference as instrument (joint input-output), which feedback does not bias"
             } else {
                 "directly: without a recorded `reference`, feedback biases them where noise dominates"
@@ -68,8 +68,8 @@ fn measured(found: &RigIdentification, recording: &Recording, index: usize) -> V
         .is_some_and(|experiment| experiment.specimen);
     let system = rig_from(&found.physical, payload, specimen)
         .state_space()
-        .sample(recording.period);
-    let highest = SHOWN.1.min(0.5 / recording.period);
+        .sample(recording.period());
+    let highest = SHOWN.1.min(0.5 / recording.period());
     let omega = log_space(TAU * SHOWN.0, TAU * highest, 400);
     let mut panels = Vec::new();
     let mut coherences = Vec::new();
@@ -77,7 +77,7 @@ fn measured(found: &RigIdentification, recording: &Recording, index: usize) -> V
         let Some(estimate) = estimate(recording, channel) else {
             continue;
         };
-        let model = FrequencyResponse::sampled(&omega, recording.period, |z| {
+        let model = FrequencyResponse::sampled(&omega, recording.period(), |z| {
             let value = system.evaluate(z).map(|matrix| matrix[(row, 0)]);
             value.unwrap_or(nalgebra::Complex::new(f64::NAN, f64::NAN))
         });
@@ -93,7 +93,7 @@ fn measured(found: &RigIdentification, recording: &Recording, index: usize) -> V
             }
         });
         panels.push(gain_panel(
-            &format!("valve_command to {channel}"),
+            &format!("valve_command to {}", channel.name()),
             vec![
                 Series::line(
                     "measured",
@@ -106,7 +106,7 @@ fn measured(found: &RigIdentification, recording: &Recording, index: usize) -> V
             ],
         ));
         coherences.push(Series::line(
-            channel,
+            channel.name(),
             Abscissa::At(places.into()),
             lines.iter().map(|&line| estimate.coherence[line]).collect(),
         ));
@@ -123,16 +123,16 @@ fn measured(found: &RigIdentification, recording: &Recording, index: usize) -> V
 }
 
 /// None where the recording is too short to average.
-fn estimate(recording: &Recording, channel: &str) -> Option<FrequencyResponseEstimate> {
+fn estimate(recording: &Recording, channel: Channel) -> Option<FrequencyResponseEstimate> {
     let segment = (recording.len() / SEGMENTS).max(1);
     let segment = 1 << segment.ilog2();
-    let command = recording.channel("valve_command")?;
+    let command = recording.channel(Channel::ValveCommand)?;
     let output = recording.channel(channel)?;
-    match recording.channel("reference") {
+    match recording.channel(Channel::Reference) {
         Some(reference) => {
-            joint_input_output(reference, command, output, recording.period, segment).ok()
+            joint_input_output(reference, command, output, recording.period(), segment).ok()
         }
-        None => direct(command, output, recording.period, segment).ok(),
+        None => direct(command, output, recording.period(), segment).ok(),
     }
 }
 

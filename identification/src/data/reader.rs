@@ -1,0 +1,209 @@
+//! From a sheet to a recording in SI units.
+
+use std::path::Path;
+
+use units::factor_meant;
+
+use super::channel::Heading;
+use super::text::Text;
+use super::{Channel, DataError, Recording, Sheet, TimeBase, Wanted, read_text};
+
+/// The header that a shake table's recording should have, for messages.
+const HEADER: &str = "such as `time [s],valve_command [V],displacement [in],acceleration \
+                      [in/s^2],actuator_force [lbf]` (any units)";
+
+/// A column that holds a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pick<'a> {
+    /// The channel.
+    pub channel: Channel,
+    /// What stands in the header.
+    pub head: &'a str,
+    /// Its unit.
+    pub unit: &'a str,
+}
+
+/// The channel that a header cell names, if it is a known one, by `name [unit]`, `name (unit)`,
+/// `name / unit`, `name_unit` or `name`.
+pub fn known_column(cell: &str) -> Option<Channel> {
+    Heading::parse(cell).map(|heading| heading.channel)
+}
+
+/// A column of a sheet with its unit.
+struct Column {
+    channel: Channel,
+    place: usize,
+    /// As the header calls it.
+    name: String,
+    own_name: bool,
+    unit: Option<(u64, String)>,
+}
+
+impl Recording {
+    /// Reads a file of the known channels in SI; columns of other names are left alone. Time
+    /// stamps stay as they are, empty cells are NaN.
+    ///
+    /// # Errors
+    /// A file that is no sheet of numbers; a known channel without a unit, or with one of another
+    /// dimension; a cell that is no number: file, line and column are named.
+    pub fn read(file: &Path, name: &str) -> Result<Self, DataError> {
+        Self::parse(file, read_text(file)?, name)
+    }
+
+    /// Reads the text of a file, as [`Self::read`] does.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(file: &Path, text: Text, name: &str) -> Result<Self, DataError> {
+        let wanted = Wanted {
+            is_column: &|cell| known_column(cell).is_some(),
+            header: HEADER,
+        };
+        Self::from_sheet(&Sheet::parse(file, text, wanted)?, name)
+    }
+
+    /// The known channels of a sheet, as [`Self::read`] has them.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_sheet(sheet: &Sheet, name: &str) -> Result<Self, DataError> {
+        let found = columns(sheet);
+        let mut columns = Vec::new();
+        for channel in Channel::KNOWN {
+            if let Some(column) = the_one(&found, channel, sheet)? {
+                let factor = factor(sheet, column)?;
+                let mut values = sheet.column(column.place, &column.name)?;
+                values.iter_mut().for_each(|value| *value *= factor);
+                columns.push((column.place, channel, values));
+            }
+        }
+        // As they stand in the file.
+        columns.sort_by_key(|column| column.0);
+        let columns = columns
+            .into_iter()
+            .map(|(_, channel, values)| (channel, values));
+        assemble(sheet, name, columns.collect())
+    }
+
+    /// Channels of the columns that are asked for, in that order; `Time` becomes the time stamps.
+    ///
+    /// # Errors
+    /// A column that is missing, a unit of another dimension, a cell that is no number.
+    pub fn pick(sheet: &Sheet, name: &str, picks: &[Pick<'_>]) -> Result<Self, DataError> {
+        let columns = picks.iter().map(|pick| {
+            let place = sheet.place(pick.head)?;
+            let unit = Some((sheet.header_line(), pick.unit.to_string()));
+            let column = Column {
+                channel: pick.channel,
+                place,
+                name: pick.head.to_string(),
+                own_name: true,
+                unit,
+            };
+            let factor = factor(sheet, &column)?;
+            let mut values = sheet.column(place, pick.head)?;
+            values.iter_mut().for_each(|value| *value *= factor);
+            Ok((pick.channel, values))
+        });
+        let columns = columns.collect::<Result<_, DataError>>()?;
+        assemble(sheet, name, columns)
+    }
+}
+
+fn assemble(
+    sheet: &Sheet,
+    name: &str,
+    mut channels: Vec<(Channel, Vec<f64>)>,
+) -> Result<Recording, DataError> {
+    let time = channels.iter().position(|own| own.0 == Channel::Time);
+    let time = time.map_or(TimeBase::Unknown, |at| {
+        TimeBase::Stamps(channels.remove(at).1)
+    });
+    let mut recording = Recording::measured(name, time, channels)
+        .map_err(|error| DataError::file(sheet.file(), error.to_string()))?;
+    recording.notes.extend(sheet.note().map(String::from));
+    Ok(recording)
+}
+
+fn columns(sheet: &Sheet) -> Vec<Column> {
+    let headings = sheet.heads().iter().enumerate();
+    headings
+        .filter_map(|(place, cell)| {
+            let heading = Heading::parse(cell)?;
+            let in_header = heading.unit_text().map(|unit| (sheet.header_line(), unit));
+            let below = || {
+                sheet
+                    .unit_below(place)
+                    .map(|(line, unit)| (line, unit.into()))
+            };
+            Some(Column {
+                channel: heading.channel,
+                place,
+                name: heading.name.to_string(),
+                own_name: heading.is_own_name(),
+                unit: in_header.or_else(below),
+            })
+        })
+        .collect()
+}
+
+/// The column of a channel: the one of its own name, else the one of another name whose unit fits.
+fn the_one<'a>(
+    columns: &'a [Column],
+    channel: Channel,
+    sheet: &Sheet,
+) -> Result<Option<&'a Column>, DataError> {
+    let twice = |found: &[&Column]| {
+        let reason = match found {
+            [first, second, ..] if first.name != second.name => format!(
+                "columns `{}` and `{}` both stand for {name}; expected one, call it `{name}`",
+                first.name,
+                second.name,
+                name = channel.name()
+            ),
+            _ => format!("column `{}` stands there twice", channel.name()),
+        };
+        DataError::line(sheet.file(), sheet.header_line(), reason)
+    };
+    let of_channel = || columns.iter().filter(|column| column.channel == channel);
+    let own: Vec<&Column> = of_channel().filter(|column| column.own_name).collect();
+    let other: Vec<&Column> = of_channel()
+        .filter(|column| !column.own_name && fits(column))
+        .collect();
+    match (own.as_slice(), other.as_slice()) {
+        ([one], _) | ([], [one]) => Ok(Some(one)),
+        ([], []) => Ok(None),
+        ([], many) | (many, _) => Err(twice(many)),
+    }
+}
+
+/// A column `command [mm]` is no valve command.
+fn fits(column: &Column) -> bool {
+    column
+        .unit
+        .as_ref()
+        .is_none_or(|(_, unit)| factor_meant(unit, column.channel.unit()).is_ok())
+}
+
+fn factor(sheet: &Sheet, column: &Column) -> Result<f64, DataError> {
+    let Column { channel, name, .. } = column;
+    let Some((line, unit)) = &column.unit else {
+        let meant = if column.own_name {
+            String::new()
+        } else {
+            format!(" ({})", channel.name())
+        };
+        let reason = format!(
+            "column `{name}`{meant} has no unit; expected for example `{name} [{}]`",
+            channel.unit()
+        );
+        return Err(DataError::line(sheet.file(), sheet.header_line(), reason));
+    };
+    factor_meant(unit, channel.unit()).map_err(|source| DataError::Unit {
+        file: sheet.file().to_path_buf(),
+        line: *line,
+        column: column.place + 1,
+        name: name.clone(),
+        source: Box::new(source),
+    })
+}

@@ -1,0 +1,187 @@
+//! `shakebench identify`
+
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+
+use crate::error::Error;
+use crate::identify::{Identified, Request, identify, parameters};
+use crate::report::columns::aligned;
+use crate::report::number::significant;
+
+/// Options of `shakebench identify`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    shakebench identify bare.csv payload.csv --out MODEL.toml\n\n\
+    Columns: time, valve_command, displacement, acceleration, actuator_force and, with a specimen\n\
+    on the table, specimen_acceleration; each header cell is `name [unit]` or `name (unit)`, parted\n\
+    by comma, semicolon or tab. A bare table alone does not determine the actuator: measure with a\n\
+    specimen or two payloads.")]
+pub struct Arguments {
+    /// Recordings of one rig
+    #[arg(value_name = "DATA.csv", required = true)]
+    data: Vec<PathBuf>,
+    /// Where the model goes; a report with plots goes beside it
+    #[arg(long, value_name = "MODEL.toml")]
+    out: PathBuf,
+    /// Part of each recording that is fitted before the rest validates it
+    #[arg(long, value_name = "PART", default_value_t = 0.75)]
+    fit_part: f64,
+    /// Known specimen, held: TOML with [specimen] mass, damping, stiffness and units. One recording
+    /// with it is enough; `specimen_acceleration` may then be missing
+    #[arg(long, value_name = "FILE")]
+    specimen: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Identifies a rig and writes its model.
+///
+/// # Errors
+/// Data at fault, or a file that cannot be written.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if !(0.3..=0.95).contains(&arguments.fit_part) {
+        return Err(Error::Option {
+            option: "--fit-part",
+            reason: format!("{}; expected 0.3 to 0.95", arguments.fit_part),
+        });
+    }
+    check_place(arguments)?;
+    let identified = identify(&Request {
+        data: arguments.data.clone(),
+        model: arguments.out.clone(),
+        fit_part: arguments.fit_part,
+        specimen: arguments.specimen.clone(),
+    })?;
+    identified.write()?;
+    if arguments.json {
+        println!(
+            "{}",
+            serde_json::to_string_pretty(&identified.summary).unwrap_or_default()
+        );
+    } else {
+        print!("{}", text(&identified));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses a place for the model that cannot be written or overwrites data.
+fn check_place(arguments: &Arguments) -> Result<(), Error> {
+    let out = &arguments.out;
+    let fault = |reason: String| Error::Option {
+        option: "--out",
+        reason,
+    };
+    if out.extension().is_none_or(|extension| extension != "toml") {
+        return Err(fault(format!(
+            "{}; expected a file name that ends in .toml",
+            out.display()
+        )));
+    }
+    let folder = match out.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    if !folder.is_dir() {
+        return Err(fault(format!(
+            "{}: the folder does not exist; expected one that does",
+            folder.display()
+        )));
+    }
+    let same =
+        |path: &Path| matches!((path.canonicalize(), out.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    let read = arguments.data.iter().chain(&arguments.specimen);
+    if let Some(path) = read.into_iter().find(|path| same(path)) {
+        return Err(fault(format!(
+            "{} is read from; expected another file",
+            path.display()
+        )));
+    }
+    Ok(())
+}
+
+fn pole(pole: &[f64; 2]) -> String {
+    let frequency = pole[0].hypot(pole[1]) / TAU;
+    format!(
+        "{} {:+.4}i 1/s ({} Hz)",
+        significant(pole[0], 5),
+        pole[1],
+        significant(frequency, 4)
+    )
+}
+
+/// What is printed without `--json`.
+fn text(identified: &Identified) -> String {
+    let (found, summary) = (&identified.found, &identified.summary);
+    let mut text = String::new();
+    if summary.identifiable {
+        text += "actuator poles\n";
+        for own in &summary.actuator_poles_rad_s {
+            text += &format!("  {}\n", pole(own));
+        }
+    } else {
+        text += "actuator: not determined by these data, see the warnings\n";
+    }
+    text += "table poles\n";
+    for own in &summary.table_poles_rad_s {
+        text += &format!("  {}\n", pole(own));
+    }
+    let mut rows = vec![
+        ["parameter", "value", "standard error", "unit"]
+            .map(String::from)
+            .to_vec(),
+    ];
+    rows.extend(parameters(found).into_iter().map(|row| row.to_vec()));
+    text += &format!("\n{}", aligned(&rows));
+    for (index, (payload, error)) in found.payload.iter().enumerate().skip(1) {
+        text += &format!(
+            "payload of {} over the first: {} kg (standard error {})\n",
+            found.model.experiments[index].name,
+            significant(*payload, 5),
+            significant(*error, 2)
+        );
+    }
+    let mut rows = vec![
+        [
+            "recording, channel",
+            "simulated %",
+            "one step %",
+            "lags outside 99 %",
+            "with command",
+        ]
+        .map(String::from)
+        .to_vec(),
+    ];
+    for fit in &found.fits {
+        let test = found
+            .residuals
+            .iter()
+            .find(|(recording, channel, _)| *recording == fit.recording && *channel == fit.channel)
+            .map(|(_, _, test)| (test.outside(), test.cross_outside()));
+        let share =
+            |value: Option<f64>| value.map_or("-".into(), |v| format!("{:.0} %", 100.0 * v));
+        rows.push(vec![
+            format!("{}, {}", fit.recording, fit.channel),
+            format!("{:.2}", fit.simulated),
+            format!("{:.2}", fit.predicted),
+            share(test.map(|t| t.0)),
+            share(test.map(|t| t.1)),
+        ]);
+    }
+    text += &format!("\nfit on the part that was not fitted\n{}", aligned(&rows));
+    if !summary.warnings.is_empty() {
+        text += "\nwarnings\n";
+        for warning in &summary.warnings {
+            text += &format!("  {warning}\n");
+        }
+    }
+    text += &format!(
+        "\nwritten: {} ({:.1} s)\n",
+        summary.model.display(),
+        summary.wall_s
+    );
+    text
+}

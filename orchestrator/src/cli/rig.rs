@@ -1,0 +1,34 @@
+//! The rig of a built-in system, as options.
+
+use clap::Args;
+
+use crate::system::built_in;
+use crate::system::tuning::Tuning;
+
+/// Options that choose a rig.
+#[derive(Debug, Default, Args)]
+pub struct RigArguments {
+    /// Plant of a built-in system: identified, servohydraulic [default: identified]
+    #[arg(long)]
+    pub plant: Option<String>,
+    /// Specimen of a built-in system: none, linear, yielding [default: linear]
+    #[arg(long)]
+    pub specimen: Option<String>,
+    /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
+    #[arg(long, value_enum)]
+    pub tuning: Option<Tuning>,
+}
+
+impl RigArguments {
+    /// The plant, chosen or not.
+    pub fn plant(&self) -> String {
+        let plant = self.plant.as_deref();
+        plant.unwrap_or(built_in::DEFAULT_PLANT).to_string()
+    }
+
+    /// The specimen, chosen or not.
+    pub fn specimen(&self) -> String {
+        let specimen = self.specimen.as_deref();
+        specimen.unwrap_or(built_in::DEFAULT_SPECIMEN).to_string()
+    }
+}

@@ -1,0 +1,118 @@
+//! The report of an identification.
+
+use identification::data::Recording;
+use identification::identify::rig::RigIdentification;
+
+use super::parameters::parameters;
+use super::responses;
+use super::summary::Summary;
+use crate::report::{Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units};
+
+/// The report with plots like Fig 2-7 and 2-10.
+pub(super) fn report(
+    found: &RigIdentification,
+    recordings: &[Recording],
+    summary: &Summary,
+) -> Report {
+    let table = Table {
+        caption: "Parameters with standard errors".into(),
+        columns: ["parameter", "value", "standard error", "unit"]
+            .map(String::from)
+            .to_vec(),
+        rows: parameters(found)
+            .into_iter()
+            .map(|row| row.map(Cell::from).to_vec())
+            .collect(),
+    };
+    let mut sections = vec![Section {
+        heading: "Model".into(),
+        notes: summary.warnings.clone(),
+        tables: vec![table],
+        ..Section::default()
+    }];
+    let period = found.model.experiments.first().map_or(1.0, |e| e.period);
+    let panels = found
+        .fits
+        .iter()
+        .map(|fit| {
+            let units = match fit.channel {
+                "displacement" => Units::DISPLACEMENT,
+                "actuator_force" => Units::FORCE,
+                _ => Units::ACCELERATION,
+            };
+            let line = |name: &str, values: &[f64]| {
+                let abscissa = Abscissa::Even {
+                    start: fit.start,
+                    step: period,
+                };
+                Series::line(name, abscissa, values.to_vec())
+            };
+            Panel {
+                title: format!(
+                    "{}: {} ({:.2} %)",
+                    fit.recording, fit.channel, fit.simulated
+                ),
+                x: Axis::linear("time", Units::TIME),
+                y: Axis::linear(fit.channel, units),
+                series: vec![
+                    line("measured", &fit.measured).coloured(0),
+                    line("simulated", &fit.model).styled(Style::Dashed),
+                ],
+            }
+        })
+        .collect();
+    sections.push(Section {
+        heading: "Validation".into(),
+        text: vec![
+            "Simulated on the part of each recording that was not fitted: displacement from the \
+             measured force (Fig 2-10), the others from the command, held to the path by the \
+             measured displacement alone (Fig 2-7)."
+                .into(),
+        ],
+        panels,
+        ..Section::default()
+    });
+    let orders = (1..=found.singular_values.len().min(20))
+        .map(|n| n as f64)
+        .collect();
+    sections.push(Section {
+        heading: "Order".into(),
+        panels: vec![Panel {
+            title: format!(
+                "Singular values of the subspace method (the model has order {})",
+                if found.specimen { 7 } else { 5 }
+            ),
+            x: Axis::linear("order", Units::NONE),
+            y: Axis::logarithmic("singular value", Units::NONE),
+            series: vec![
+                Series::line(
+                    "singular value",
+                    Abscissa::At(orders),
+                    found.singular_values.iter().copied().take(20).collect(),
+                )
+                .styled(Style::Points),
+            ],
+        }],
+        ..Section::default()
+    });
+    sections.push(responses::section(found, recordings));
+    Report {
+        title: "Identified rig".into(),
+        summary: format!(
+            "{}; {}.",
+            if found.identifiable {
+                "The data determine actuator and table"
+            } else {
+                "The data determine the table and not the actuator"
+            },
+            match summary.warnings.len() {
+                0 => "no warnings".to_string(),
+                1 => "one warning".to_string(),
+                several => format!("{several} warnings"),
+            }
+        ),
+        sections,
+        footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
+        ..Report::default()
+    }
+}
