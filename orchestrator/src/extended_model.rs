@@ -7,14 +7,13 @@ use std::path::{Path, PathBuf};
 use identification::IdentificationError;
 use identification::diagnosis::engine::NamedEffect;
 use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
-use identification::diagnosis::rigs::shake_table::catalogue::NUISANCE;
-use identification::identify::model_file::{
-    BodySection, EffectSections, ModelFile, SI, StandardErrors, Units,
-};
-use plant::identified::actuator::IdentifiedActuator;
+use identification::identify::model_file::{EffectSections, ModelFile, SI, StandardErrors, Units};
+use plant::identified::effects::{self, Variable};
+use plant::identified::nominal::{NominalRig, PARAMETERS};
+use plant::identified::shake_table::ShakeTable;
+use plant::specimens::linear::LinearSpecimen;
 
 use crate::pack::{PackError, PackedFmu, StartValue, file_error, write_variant};
-use crate::system::model::{component_of, shake_table_values, specimen_values};
 
 /// A parameter of the extended model.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,29 +27,15 @@ pub struct Estimate {
 /// What a diagnosis makes of the nominal model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtendedModel {
-    /// Component (`ShakeTable`, `Specimen`, `Instrumentation`), parameter of its FMU
-    /// (`table_mass`, `valve_dead_band.half_width`), estimate.
+    /// Component, parameter of its FMU (`table_mass`, `valve_dead_band.half_width`), estimate.
     pub parameters: BTreeMap<&'static str, BTreeMap<String, Estimate>>,
     /// The same as a model file, SI.
     pub file: ModelFile,
 }
 
-/// Where the FMUs have a parameter of a catalogue effect; none for what they do not need.
-fn fmu_parameter<'a>(effect: &'a str, parameter: &'a str) -> Option<(&'a str, &'a str)> {
-    match (effect, parameter) {
-        // Stribeck's law is a bump on Coulomb's.
-        ("stribeck_friction", "coulomb_force" | "transition_velocity") => {
-            Some(("coulomb_friction", parameter))
-        }
-        // What the sensor of a missing specimen shows belongs to no component.
-        ("specimen_absent", "sensor_share") => None,
-        same => Some(same),
-    }
-}
-
 impl ExtendedModel {
-    /// The model with `effects`, which are those in `model`.
-    pub fn new(model: &Estimated, effects: &[NamedEffect]) -> Self {
+    /// The model with the effects `named`, which are those in `model`.
+    pub fn new(model: &Estimated, named: &[NamedEffect]) -> Self {
         let error = |name: &str| model.standard_errors.get(name).copied();
         let mut parameters: BTreeMap<&'static str, BTreeMap<String, Estimate>> = BTreeMap::new();
         let mut put = |component, name: &str, value, standard_error| {
@@ -61,45 +46,42 @@ impl ExtendedModel {
             let set = parameters.entry(component).or_default();
             set.insert(name.to_string(), estimate);
         };
-        for (name, value) in shake_table_values(&model.shake_table) {
-            put("ShakeTable", name, value, error(nominal_name(name)));
-        }
-        if let Some(specimen) = &model.specimen {
-            for (name, value) in specimen_values(specimen) {
-                let error = error(&format!("specimen.{name}"));
-                put("Specimen", name, value, error);
-            }
+        let nominal = NominalRig {
+            shake_table: model.shake_table,
+            specimen: model.specimen,
+        };
+        for (parameter, value) in nominal.parameters() {
+            let component = parameter.component().name();
+            put(component, parameter.variable, value, error(parameter.name));
         }
         let (mut values, mut errors) = (EffectSections::new(), EffectSections::new());
-        let mut put_effect = |effect: &str, name: &str, value, standard_error: Option<f64>| {
-            let full = format!("{effect}.{name}");
-            put(component_of(effect), &full, value, standard_error);
-            let section = values.entry(effect.to_string()).or_default();
-            section.insert(name.to_string(), value);
-            if let Some(error) = standard_error {
-                let section = errors.entry(effect.to_string()).or_default();
-                section.insert(name.to_string(), error);
-            }
-        };
-        for NamedEffect {
-            effect, parameters, ..
-        } in effects
-        {
-            for p in parameters {
-                let known = p.standard_error.is_finite() && p.standard_error > 0.0;
-                let value = match (*effect, p.name.as_str()) {
-                    // The rig keeps it off zero, where its formula ends.
-                    ("supply_pressure_droop", "form") => model.effects.hydraulics.droop_form,
-                    _ => p.value,
+        let (mut on_rig, mut on_sensors) = (model.effects, model.sensors);
+        for named in named {
+            let Some(effect) = effects::find(named.effect) else {
+                continue;
+            };
+            for parameter in effect.parameters {
+                let home = match parameter.variable {
+                    Variable::Own => effect.name,
+                    Variable::Of(other) => other,
+                    Variable::None => continue,
                 };
-                if let Some((effect, name)) = fmu_parameter(effect, &p.name) {
-                    put_effect(effect, name, value, known.then_some(p.standard_error));
+                let Some(field) = parameter.field else {
+                    continue;
+                };
+                let value = *field.of(&mut on_rig, &mut on_sensors);
+                let estimate = named.parameters.iter().find(|p| p.name == parameter.name);
+                let standard_error = estimate
+                    .map(|p| p.standard_error)
+                    .filter(|error| error.is_finite() && *error > 0.0);
+                let full = format!("{home}.{}", parameter.name);
+                put(effect.component.name(), &full, value, standard_error);
+                let section = values.entry(home.to_string()).or_default();
+                section.insert(parameter.name.to_string(), value);
+                if let Some(error) = standard_error {
+                    let section = errors.entry(home.to_string()).or_default();
+                    section.insert(parameter.name.to_string(), error);
                 }
-            }
-            match *effect {
-                "specimen_absent" => put_effect(effect, "absent", 1.0, None),
-                "mains_hum" => put_effect(effect, "frequency", model.sensors.hum_frequency, None),
-                _ => {}
             }
         }
         let file = model_file(model, values, errors);
@@ -157,55 +139,47 @@ impl ExtendedModel {
     }
 }
 
-/// The diagnosis's name of a parameter of the FMU `ShakeTable`.
-fn nominal_name(parameter: &str) -> &'static str {
-    const NAMES: [&str; 12] = [
-        "actuator_a2",
-        "actuator_a1",
-        "actuator_a0",
-        "actuator_b2",
-        "actuator_b1",
-        "actuator_b0",
-        "actuator_e2",
-        "actuator_e1",
-        "actuator_e0",
-        "table_mass",
-        "table_damping",
-        "table_stiffness",
-    ];
-    let place = NAMES.iter().position(|name| *name == parameter);
-    place.map_or("", |place| NUISANCE[place])
-}
-
 fn model_file(model: &Estimated, effects: EffectSections, errors: EffectSections) -> ModelFile {
-    let error = |place: usize| model.standard_errors.get(NUISANCE[place]).copied();
-    let three = |first: usize| [0, 1, 2].map(|i| error(first + i).unwrap_or(0.0));
-    let section = |actuator: &IdentifiedActuator| ModelFile::actuator_section(actuator, Units::SI);
-    let body = |values: [f64; 3]| -> BodySection { ModelFile::body_section(values, Units::SI) };
-    let mut actuator_errors = section(&IdentifiedActuator {
-        denominator: three(0),
-        voltage_to_force: three(3),
-        velocity_to_force: three(6),
-    });
+    // The errors stand where the parameters do.
+    let mut error = NominalRig {
+        shake_table: model.shake_table,
+        specimen: model.specimen,
+    };
+    for parameter in PARAMETERS {
+        if let Some(place) = error.place(parameter) {
+            *place = model
+                .standard_errors
+                .get(parameter.name)
+                .copied()
+                .unwrap_or(0.0);
+        }
+    }
+    let actuator = |rig: &ShakeTable| ModelFile::actuator_section(&rig.actuator, Units::SI);
+    let table = |rig: &ShakeTable| {
+        let table = rig.table;
+        ModelFile::body_section([table.mass, table.damping, table.stiffness], Units::SI)
+    };
+    let specimen = |specimen: LinearSpecimen| {
+        let values = [specimen.mass, specimen.damping, specimen.stiffness];
+        ModelFile::body_section(values, Units::SI)
+    };
+    let mut actuator_errors = actuator(&error.shake_table);
     actuator_errors.denominator[0] = 0.0;
-    let table = model.shake_table.table;
     ModelFile {
         units: SI.to_string(),
         sample_rate: None,
         command_delay: None,
-        actuator: Some(section(&model.shake_table.actuator)),
-        table: body([table.mass, table.damping, table.stiffness]),
-        specimen: model
-            .specimen
-            .map(|s| body([s.mass, s.damping, s.stiffness])),
+        actuator: Some(actuator(&model.shake_table)),
+        table: table(&model.shake_table),
+        specimen: model.specimen.map(specimen),
         effects,
         noise: None,
         hydraulics: None,
         uncertainty: None,
         standard_errors: Some(StandardErrors {
             actuator: Some(actuator_errors),
-            table: body(three(9)),
-            specimen: model.specimen.map(|_| body(three(12))),
+            table: table(&error.shake_table),
+            specimen: error.specimen.map(specimen),
             command_delay: None,
             effects: errors,
         }),

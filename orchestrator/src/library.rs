@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::fmu::{FmiVersion, Fmu};
 use crate::pack;
-use crate::system::hint;
+use crate::units::hint;
 
 /// FMUs by the name that a system file gives them, each opened once.
 pub struct FmuLibrary {
@@ -33,7 +33,8 @@ impl FmuLibrary {
     /// # Errors
     /// An unknown name (with the nearest one), a component that does not build, an FMU at fault.
     pub fn find(&mut self, name: &str) -> Result<Arc<Fmu>, Box<dyn Error>> {
-        let path = if name.ends_with(".fmu") {
+        let is_file = name.ends_with(".fmu");
+        let path = if is_file {
             self.directory
                 .as_deref()
                 .unwrap_or(Path::new(""))
@@ -44,7 +45,11 @@ impl FmuLibrary {
         if let Some(fmu) = self.open.get(&path) {
             return Ok(fmu.clone());
         }
-        let fmu = Fmu::open(&path)?;
+        let fmu = if is_file {
+            Fmu::open(&path)?
+        } else {
+            Fmu::open_own(&path)?
+        };
         self.open.insert(path, fmu.clone());
         Ok(fmu)
     }

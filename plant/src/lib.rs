@@ -3,6 +3,7 @@
 //! Everything here is in SI units; the thesis's constants stand in thesis units (inch,
 //! pound-force, second, volt) beside their conversion. No control and no FMI.
 
+pub mod delay_line;
 pub mod error;
 pub mod hybrid;
 pub mod identified;

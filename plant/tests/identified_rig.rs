@@ -3,9 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use plant::identified::coupled::Rig;
-use plant::identified::effects::{
-    Effects, FoundationEffects, SensorEffects, SpecimenEffects, ValveEffects,
-};
+use plant::identified::effects::{Effects, FoundationEffects, SpecimenEffects, ValveEffects};
 use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
 use plant::linear::StateSpace;
 use plant::specimens::linear::LinearSpecimen;
@@ -156,14 +154,11 @@ fn fast_spool_and_stiff_foundation_and_wide_yielding_vanish() {
 #[test]
 fn sensors_show_what_their_errors_make_of_the_truth() {
     let mut tilted = rig();
-    tilted.sensors = SensorEffects {
-        accelerometer_bias: 0.1,
-        accelerometer_tilt: 0.5,
-        displacement_scale: 0.1,
-        load_cell_scale: -0.2,
-        load_cell_bias: 3.0,
-        ..Default::default()
-    };
+    tilted.sensors.acceleration.bias = 0.1;
+    tilted.sensors.accelerometer_tilt = 0.5;
+    tilted.sensors.displacement.scale_error = 0.1;
+    tilted.sensors.actuator_force.scale_error = -0.2;
+    tilted.sensors.actuator_force.bias = 3.0;
     let (got, want) = (run(&tilted, 300), run(&rig(), 300));
     for (y, z) in got.iter().zip(&want) {
         assert!((y[0] - 1.1 * z[0]).abs() < 1e-15);
@@ -206,7 +201,7 @@ fn parameters_without_meaning_are_refused_by_name() {
     let error = wrong.sample(PERIOD, 1).unwrap_err().to_string();
     assert!(error.contains("dead_band"), "{error}");
     let mut wrong = rig();
-    wrong.sensors.accelerometer_delay = 1.0;
+    wrong.sensors.acceleration.delay = 1.0;
     let error = wrong.sample(PERIOD, 1).unwrap_err().to_string();
     assert!(error.contains("accelerometer_delay"), "{error}");
 }

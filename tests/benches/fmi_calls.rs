@@ -10,6 +10,7 @@ use std::{
 };
 
 use libloading::{Library, Symbol};
+use shakebench::fmu::{Causality, Fmu, Instance, Isolation, Kind, Options};
 use shakebench::pack::{FmiVersion, PackedFmu, all_fmus};
 
 type Handle = *mut c_void;
@@ -132,12 +133,70 @@ fn measure(fmu: &PackedFmu) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
+/// What the master pays for a call: in this process, and of an FMU in another (for which the
+/// program has to be built).
+fn measure_isolated(fmu: &PackedFmu) -> Result<(), Box<dyn std::error::Error>> {
+    let opened = Fmu::open(&fmu.path)?;
+    let description = &opened.description;
+    let reference = |causality| {
+        let mut all = description
+            .of(causality)
+            .map(|at| &description.variables[at]);
+        let scalar = all.find(|variable| variable.kind == Kind::Float64);
+        scalar.map(|variable| variable.reference)
+    };
+    let (Some(input), Some(output)) = (reference(Causality::Input), reference(Causality::Output))
+    else {
+        return Ok(());
+    };
+    for (isolation, place) in [
+        (Isolation::None, "in this process"),
+        (Isolation::All, "in another process"),
+    ] {
+        let options = Options {
+            isolation,
+            ..Options::default()
+        };
+        let mut instance = Instance::new(&opened, "bench", &options)?;
+        instance.enter_initialization(0.0, 1e6)?;
+        instance.exit_initialization()?;
+        let mut value = [0.0];
+        let mut failed = None;
+        let get = median(|| {
+            for _ in 0..BATCH {
+                failed = failed
+                    .take()
+                    .or(instance.get(&Kind::Float64, &[output], &mut value).err());
+            }
+        });
+        let mut k = 0;
+        let step = median(|| {
+            for _ in 0..BATCH {
+                let set = instance.set(&Kind::Float64, &[input], &[0.0]);
+                let step = instance.do_step(f64::from(k) * 0.002, 0.002);
+                failed = failed.take().or(set.err()).or(step.err());
+                k += 1;
+            }
+        });
+        if let Some(error) = failed {
+            return Err(error);
+        }
+        println!(
+            "{:24} {place:20} get {get:8.1} ns   set and doStep {step:8.1} ns",
+            fmu.name
+        );
+    }
+    Ok(())
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    for fmu in all_fmus()?
-        .iter()
-        .filter(|fmu| fmu.version == FmiVersion::V3)
-    {
+    let all = all_fmus()?.iter();
+    let third: Vec<_> = all.filter(|fmu| fmu.version == FmiVersion::V3).collect();
+    for fmu in &third {
         measure(fmu)?;
+    }
+    for fmu in third.iter().filter(|fmu| fmu.name == "ShakeTable") {
+        measure_isolated(fmu)?;
     }
     Ok(())
 }

@@ -1,17 +1,19 @@
 //! Hides effects in fresh cases, diagnoses them and prints what came of it.
 //!
-//! `cargo run --release -p acceptance --example hidden_effects_suite -- [--one N] [--two N]
-//! [--nothing N] [--outside N] [--noise F,...] [--mismatch F,...] [--seed S] [--verbose 1]`
+//! `cargo run --release -p acceptance --example hidden_effects_suite -- [--one N] [--effect NAME]
+//! [--two N] [--nothing N] [--outside N] [--noise F,...] [--mismatch F,...] [--seed S] [--verbose 1]`
 
 use std::env;
 use std::process::ExitCode;
 
 use acceptance::hidden_suite::{Plan, line, run_all, table};
+use hidden_effects::catalogue::entry;
 
 fn main() -> ExitCode {
     let mut plan = Plan {
         seed: rand::random_range(1..1_000_000_000),
         one: 100,
+        effect: None,
         two: 50,
         nothing: 30,
         outside: 40,
@@ -22,6 +24,14 @@ fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
     while let Some(option) = arguments.next() {
         let text = arguments.next().unwrap_or_default();
+        if option == "--effect" {
+            let Some(entry) = entry(&text) else {
+                eprintln!("--effect: `{text}` is not in the catalogue");
+                return ExitCode::from(2);
+            };
+            plan.effect = Some(entry.name);
+            continue;
+        }
         let list: Result<Vec<f64>, _> = text.split(',').map(str::parse::<f64>).collect();
         let Some((value, list)) = list.ok().and_then(|list| Some((*list.first()?, list))) else {
             eprintln!("{option}: expected a number after it (of noise and mismatch several: 1,3)");
@@ -38,7 +48,7 @@ fn main() -> ExitCode {
             "--verbose" => plan.verbose = value != 0.0,
             _ => {
                 eprintln!(
-                    "{option} is unknown; expected --one, --two, --nothing, --outside, --noise, \
+                    "{option} is unknown; expected --one, --effect, --two, --nothing, --outside, --noise, \
                      --mismatch, --seed or --verbose"
                 );
                 return ExitCode::from(2);

@@ -18,6 +18,8 @@ pub struct Plan {
     pub seed: u64,
     /// Cases with one effect.
     pub one: usize,
+    /// Which effect that is; one of the exchange format's, drawn, where none is named.
+    pub effect: Option<&'static str>,
     /// Cases with two.
     pub two: usize,
     /// Cases with none.
@@ -138,7 +140,7 @@ pub fn as_scored(diagnosis: &Diagnosis) -> Verdict {
 /// All cases of a plan, in parallel; `progress` is told of each.
 pub fn run_all(plan: &Plan, progress: impl Fn(&Scored) + Sync) -> Vec<Scored> {
     let kinds = [
-        ("one", Kind::One, plan.one),
+        ("one", plan.effect.map_or(Kind::One, Kind::This), plan.one),
         ("two", Kind::Two, plan.two),
         ("nothing", Kind::Nothing, plan.nothing),
         ("outside", Kind::Outside, plan.outside),

@@ -1,10 +1,9 @@
 //! The grammar of units: products, quotients, powers, roots and brackets.
 
-use super::names::{NAMED, lookup, nearest};
-use super::{Dimension, UnitError};
-
-/// Factor to SI, and dimension.
-pub(super) type Scaled = (f64, Dimension);
+use super::dimension::{Dimension, Scaled};
+use super::error::UnitError;
+use super::names::{known, lookup};
+use super::suggestion::nearest;
 
 pub(super) struct Parser<'a> {
     text: &'a str,
@@ -63,40 +62,38 @@ impl<'a> Parser<'a> {
 
     fn product(&mut self) -> Result<Scaled, UnitError> {
         self.blanks();
-        let (mut factor, mut dimension) = self.power()?;
+        let mut unit = self.power()?;
         let mut divided = false;
         loop {
             let blank = self.blanks();
-            let sign = match self.peek() {
+            let halves = match self.peek() {
                 Some('*' | '.' | '·') => {
                     self.at += 1;
-                    1
+                    2
                 }
                 Some('/') => {
                     self.at += 1;
                     divided = true;
-                    -1
+                    -2
                 }
-                None | Some(')') => return Ok((factor, dimension)),
+                None | Some(')') => return Ok(unit),
                 Some(_) if blank && divided => {
                     return self.error("brackets or `*`: a blank after `/` can be read two ways");
                 }
-                Some(_) if blank => 1,
+                Some(_) if blank => 2,
                 Some(_) => return self.error("`*`, `/`, `^` or a blank"),
             };
             self.blanks();
-            let (next, of) = self.power()?;
-            factor = if sign > 0 {
-                factor * next
-            } else {
-                factor / next
+            let next = self.power()?;
+            unit = match next.power(halves) {
+                Some(next) => unit.times(next),
+                None => return self.error("smaller exponents"),
             };
-            dimension = dimension.combine(of, sign);
         }
     }
 
     fn power(&mut self) -> Result<Scaled, UnitError> {
-        let (factor, dimension) = self.atom()?;
+        let atom = self.atom()?;
         let halves = match self.peek() {
             Some('^') => {
                 self.at += 1;
@@ -114,8 +111,8 @@ impl<'a> Parser<'a> {
             Some('-') => 2 * self.integer()?,
             _ => 2,
         };
-        match dimension.power(halves) {
-            Some(dimension) => Ok((factor.powf(f64::from(halves) / 2.0), dimension)),
+        match atom.power(halves) {
+            Some(unit) => Ok(unit),
             None => self.error("a power that leaves whole or half exponents"),
         }
     }
@@ -172,11 +169,11 @@ impl<'a> Parser<'a> {
             Some('(') => self.bracket(),
             Some('%') => {
                 self.at += 1;
-                Ok((0.01, Dimension::default()))
+                Ok(Scaled::new(0.01, Dimension::default()))
             }
             Some('1') => {
                 self.at += 1;
-                Ok((1.0, Dimension::default()))
+                Ok(Scaled::new(1.0, Dimension::default()))
             }
             Some(c) if c.is_alphabetic() || c == '°' => {
                 let start = self.at;
@@ -188,9 +185,8 @@ impl<'a> Parser<'a> {
                 }
                 let name: String = self.characters[start..self.at].iter().collect();
                 if name == "sqrt" && self.peek() == Some('(') {
-                    let (factor, dimension) = self.bracket()?;
-                    return match dimension.power(1) {
-                        Some(dimension) => Ok((factor.sqrt(), dimension)),
+                    return match self.bracket()?.power(1) {
+                        Some(unit) => Ok(unit),
                         None => self.error("a root that leaves whole or half exponents"),
                     };
                 }
@@ -219,7 +215,7 @@ impl<'a> Parser<'a> {
         let hint = if name == "lb" || name == "lbs" {
             "; write lbf (force) or lbm (mass)".to_string()
         } else {
-            nearest(&name, NAMED.iter().map(|named| named.0))
+            nearest(&name, known())
                 .map(|near| format!("; did you mean \"{near}\"?"))
                 .unwrap_or_default()
         };

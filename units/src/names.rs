@@ -2,24 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::grammar::Scaled;
-use super::{Dimension, INCH, POUND_FORCE, STANDARD_GRAVITY};
-
-/// The name nearest to `name`, when one is near enough to be worth suggesting.
-pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let wanted = name.to_lowercase();
-    known
-        .into_iter()
-        .map(|candidate| {
-            (
-                strsim::normalized_damerau_levenshtein(&wanted, &candidate.to_lowercase()),
-                candidate,
-            )
-        })
-        .filter(|(likeness, _)| *likeness >= 0.5)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, candidate)| candidate)
-}
+use super::constants::{G as STANDARD_GRAVITY, INCH, LBF as POUND_FORCE};
+use super::dimension::{Dimension, Scaled};
 
 const PRESSURE: Dimension = Dimension::of(1, -1, -2, 0, 0);
 const FORCE: Dimension = Dimension::of(1, 1, -2, 0, 0);
@@ -31,7 +15,7 @@ const VOLUME: Dimension = Dimension::of(0, 3, 0, 0, 0);
 const ACCELERATION: Dimension = Dimension::of(0, 1, -2, 0, 0);
 
 /// Name, SI factor, dimension, and whether SI prefixes apply.
-pub(super) const NAMED: &[(&str, f64, Dimension, bool)] = &[
+const NAMED: &[(&str, f64, Dimension, bool)] = &[
     ("m", 1.0, LENGTH, true),
     ("in", INCH, LENGTH, false),
     ("inch", INCH, LENGTH, false),
@@ -67,7 +51,6 @@ pub(super) const NAMED: &[(&str, f64, Dimension, bool)] = &[
     ("ohm", 1.0, Dimension::of(1, 2, -3, -2, 0), true),
     ("W", 1.0, Dimension::of(1, 2, -3, 0, 0), true),
     ("J", 1.0, Dimension::of(1, 2, -2, 0, 0), true),
-    ("Hz", 2.0 * PI, Dimension::of(0, 0, -1, 0, 1), true),
     ("rad", 1.0, ANGLE, true),
     ("deg", PI / 180.0, ANGLE, false),
     ("°", PI / 180.0, ANGLE, false),
@@ -85,14 +68,29 @@ const PREFIXES: &[(&str, f64)] = &[
     ("G", 1e9),
 ];
 
+/// The name of the unit that counts cycles.
+const HERTZ: &str = "Hz";
+
+/// All names without prefixes.
+pub(super) fn known() -> impl Iterator<Item = &'static str> {
+    NAMED.iter().map(|named| named.0).chain([HERTZ])
+}
+
 /// The unit of that name, with or without a prefix.
 pub(super) fn lookup(name: &str) -> Option<Scaled> {
-    if let Some(&(_, factor, dimension, _)) = NAMED.iter().find(|named| named.0 == name) {
-        return Some((factor, dimension));
-    }
-    PREFIXES.iter().find_map(|&(prefix, scale)| {
-        let rest = name.strip_prefix(prefix)?;
-        let &(_, factor, dimension, _) = NAMED.iter().find(|named| named.3 && named.0 == rest)?;
-        Some((scale * factor, dimension))
-    })
+    let named = |name: &str, prefixed: bool| {
+        if name == HERTZ {
+            return Some(Scaled::hertz());
+        }
+        let own = NAMED.iter().find(|own| own.0 == name)?;
+        (own.3 || !prefixed).then(|| Scaled::new(own.1, own.2))
+    };
+    let with_prefix = |(prefix, scale): &(&str, f64)| {
+        let rest = named(name.strip_prefix(prefix)?, true)?;
+        Some(Scaled {
+            factor: scale * rest.factor,
+            ..rest
+        })
+    };
+    named(name, false).or_else(|| PREFIXES.iter().find_map(with_prefix))
 }

@@ -59,6 +59,22 @@ fn hertz_fits_radians_per_second_but_not_one_over_second() {
 }
 
 #[test]
+fn base_units_of_fmi_are_those_of_the_si_brochure() {
+    let base = |text: &str| Unit::parse(text).unwrap().base_unit();
+    // kg, m, s, A, K, mol, cd, rad.
+    let unit = |exponents, factor| Some(BaseUnit { exponents, factor });
+    assert_eq!(base("N"), unit([1, 1, -2, 0, 0, 0, 0, 0], 1.0));
+    assert_eq!(base("V/(m.s)"), unit([1, 1, -4, -1, 0, 0, 0, 0], 1.0));
+    assert_eq!(base("A.s-1/m"), unit([0, -1, -1, 1, 0, 0, 0, 0], 1.0));
+    assert_eq!(base("1"), unit([0; 8], 1.0));
+    assert_eq!(base("rad/s"), unit([0, 0, -1, 0, 0, 0, 0, 1], 1.0));
+    assert_eq!(base("Hz"), unit([0, 0, -1, 0, 0, 0, 0, 0], 1.0));
+    assert_eq!(base("kHz"), unit([0, 0, -1, 0, 0, 0, 0, 0], 1000.0));
+    assert_eq!(base("in"), unit([0, 1, 0, 0, 0, 0, 0, 0], 0.0254));
+    assert_eq!(base("sqrt(psi)"), None);
+}
+
+#[test]
 fn a_volt_is_what_it_is_in_base_units() {
     assert_eq!(
         Unit::parse("V").unwrap().dimension.to_string(),

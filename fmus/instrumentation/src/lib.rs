@@ -2,6 +2,8 @@
 //! Sensors of the rig as an FMU.
 
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Variable};
+use plant::identified::effects::{self, Component as Part, Field};
+use plant::sensors::channel::Channel;
 use plant::sensors::instrumentation::{
     Instrumentation as Sensors, InstrumentationState, Measured, SensorFault, TrueMotion,
     VelocityEstimate, VelocityFilter,
@@ -96,6 +98,197 @@ impl Instrumentation {
     }
 }
 
+/// A channel as its parameters tell of it.
+struct Described {
+    name: &'static str,
+    sensor: &'static str,
+    unit: &'static str,
+    shown: &'static str,
+    of: fn(&mut Sensors) -> &mut Channel,
+}
+
+const CHANNELS: [Described; 4] = [
+    Described {
+        name: "displacement",
+        sensor: "Displacement",
+        unit: "m",
+        shown: "in",
+        of: |s| &mut s.displacement,
+    },
+    Described {
+        name: "acceleration",
+        sensor: "Table's accelerometer",
+        unit: "m/s2",
+        shown: "in/s2",
+        of: |s| &mut s.acceleration,
+    },
+    Described {
+        name: "actuator_force",
+        sensor: "Load cell",
+        unit: "N",
+        shown: "lbf",
+        of: |s| &mut s.actuator_force,
+    },
+    Described {
+        name: "specimen_acceleration",
+        sensor: "Specimen's accelerometer",
+        unit: "m/s2",
+        shown: "in/s2",
+        of: |s| &mut s.specimen_acceleration,
+    },
+];
+
+/// What a parameter of a channel is counted in.
+#[derive(Clone, Copy)]
+enum Unit {
+    Channel,
+    Own(&'static str),
+    Angle,
+    None,
+}
+
+/// A parameter that every channel has.
+struct Quantity {
+    name: &'static str,
+    about: &'static str,
+    unit: Unit,
+    min: Option<f64>,
+    of: fn(&mut Channel) -> &mut f64,
+}
+
+const QUANTITIES: [Quantity; 10] = [
+    Quantity {
+        name: "corner",
+        about: "corner of the first-order lag, 0 without one",
+        unit: Unit::Own("Hz"),
+        min: Some(0.0),
+        of: |c| &mut c.corner,
+    },
+    Quantity {
+        name: "delay",
+        about: "lateness",
+        unit: Unit::Own("s"),
+        min: Some(0.0),
+        of: |c| &mut c.delay,
+    },
+    Quantity {
+        name: "scale_error",
+        about: "relative error of the scale",
+        unit: Unit::None,
+        min: None,
+        of: |c| &mut c.scale_error,
+    },
+    Quantity {
+        name: "bias",
+        about: "offset",
+        unit: Unit::Channel,
+        min: None,
+        of: |c| &mut c.bias,
+    },
+    Quantity {
+        name: "hum_amplitude",
+        about: "amplitude of the mains",
+        unit: Unit::Channel,
+        min: None,
+        of: |c| &mut c.hum_amplitude,
+    },
+    Quantity {
+        name: "hum_frequency",
+        about: "frequency of the mains",
+        unit: Unit::Own("Hz"),
+        min: Some(0.0),
+        of: |c| &mut c.hum_frequency,
+    },
+    Quantity {
+        name: "hum_phase",
+        about: "phase of the mains at time zero",
+        unit: Unit::Angle,
+        min: None,
+        of: |c| &mut c.hum_phase,
+    },
+    Quantity {
+        name: "noise",
+        about: "white noise, one standard deviation",
+        unit: Unit::Channel,
+        min: Some(0.0),
+        of: |c| &mut c.noise,
+    },
+    Quantity {
+        name: "range",
+        about: "largest magnitude that is read, 0 for any",
+        unit: Unit::Channel,
+        min: Some(0.0),
+        of: |c| &mut c.range,
+    },
+    Quantity {
+        name: "resolution",
+        about: "step of the converter, 0 for none",
+        unit: Unit::Channel,
+        min: Some(0.0),
+        of: |c| &mut c.resolution,
+    },
+];
+
+/// The variable of the catalogue's effect on the sensors whose parameter is found at `place`.
+fn effect_at(place: impl Fn(&mut Sensors) -> &mut f64) -> Option<String> {
+    let mut sensors = Sensors::default();
+    let wanted: *const f64 = place(&mut sensors);
+    effects::variables(Part::Instrumentation).find_map(|(name, parameter)| match parameter.field {
+        Some(Field::Sensors(field)) if std::ptr::eq(field(&mut sensors), wanted) => Some(name),
+        _ => None,
+    })
+}
+
+impl Described {
+    /// The channel's parameters as variables; one that an effect has bears the effect's name.
+    fn parameters(&self) -> impl Iterator<Item = Variable<Instrumentation>> {
+        let channel = self.of;
+        QUANTITIES.iter().filter_map(move |quantity| {
+            let field = quantity.of;
+            let name = match (effect_at(|s| field(channel(s))), quantity.unit) {
+                (Some(effect), _) => effect,
+                (None, Unit::Angle) => return None,
+                (None, _) => format!("{}_{}", self.name, quantity.name),
+            };
+            let variable = Variable::parameter_within(name, move |s: &mut Instrumentation| {
+                field(channel(&mut s.sensors))
+            })
+            .about(&format!("{}: {}", self.sensor, quantity.about))
+            .between(quantity.min, None);
+            Some(match quantity.unit {
+                Unit::Channel => variable.measured_in(self.unit, Some(self.shown)),
+                Unit::Own(unit) => variable.unit(unit),
+                Unit::Angle => variable.measured_in("rad", Some("deg")),
+                Unit::None => variable,
+            })
+        })
+    }
+}
+
+/// The parameters of effects on the sensors that belong to no channel.
+fn effect_parameters() -> impl Iterator<Item = Variable<Instrumentation>> {
+    let of_channels: Vec<String> = CHANNELS
+        .iter()
+        .flat_map(|channel| channel.parameters().map(|variable| variable.name))
+        .collect();
+    effects::variables(Part::Instrumentation).filter_map(move |(name, parameter)| {
+        let Some(Field::Sensors(field)) = parameter.field else {
+            return None;
+        };
+        if of_channels.contains(&name) {
+            return None;
+        }
+        let variable =
+            Variable::parameter_within(name, move |s: &mut Instrumentation| field(&mut s.sensors));
+        Some(
+            variable
+                .about(parameter.about)
+                .measured_in(parameter.quantity.fmi, parameter.quantity.fmi_display)
+                .between(parameter.min, parameter.max),
+        )
+    })
+}
+
 impl Component for Instrumentation {
     const NAME: &'static str = "Instrumentation";
     const DESCRIPTION: &'static str = "Sensors of a shake table and an estimate of its velocity";
@@ -119,49 +312,17 @@ impl Component for Instrumentation {
             output("measured_specimen_acceleration", s.measured.specimen_acceleration, "Absolute acceleration of the specimen, as measured", "m/s2" => "g")
                 .discrete().nominal(10.0).depends_on(&["specimen_acceleration"], Dependent);
             output("measurement_valid", s.valid, "Whether all readings are numbers; those that are not keep their last value");
-            parameter("displacement_lag.frequency", s.sensors.displacement.corner, "Displacement: corner of the first-order lag, 0 without one", "Hz").min(0.0);
-            parameter("displacement_delay", s.sensors.displacement.delay, "Displacement: lateness", "s").min(0.0);
-            parameter("displacement_scale.relative_change", s.sensors.displacement.scale_error, "Displacement: relative error of the scale");
-            parameter("displacement_bias", s.sensors.displacement.bias, "Displacement: offset", "m" => "in");
-            parameter("displacement_hum_amplitude", s.sensors.displacement.hum_amplitude, "Displacement: amplitude of the mains", "m" => "in");
-            parameter("displacement_hum_frequency", s.sensors.displacement.hum_frequency, "Displacement: frequency of the mains", "Hz").min(0.0);
-            parameter("displacement_noise", s.sensors.displacement.noise, "Displacement: white noise, one standard deviation", "m" => "in").min(0.0);
-            parameter("displacement_range", s.sensors.displacement.range, "Displacement: largest magnitude that is read, 0 for any", "m" => "in").min(0.0);
-            parameter("displacement_resolution", s.sensors.displacement.resolution, "Displacement: step of the converter, 0 for none", "m" => "in").min(0.0);
-            parameter("acceleration_corner", s.sensors.acceleration.corner, "Table's accelerometer: corner of the first-order lag, 0 without one", "Hz").min(0.0);
-            parameter("accelerometer_delay.delay", s.sensors.acceleration.delay, "Table's accelerometer: lateness", "s").min(0.0);
-            parameter("accelerometer_scale.relative_change", s.sensors.acceleration.scale_error, "Table's accelerometer: relative error of the scale");
-            parameter("accelerometer_bias.offset", s.sensors.acceleration.bias, "Table's accelerometer: offset", "m/s2" => "in/s2");
-            parameter("mains_hum.amplitude", s.sensors.acceleration.hum_amplitude, "Table's accelerometer: amplitude of the mains", "m/s2" => "in/s2");
-            parameter("mains_hum.frequency", s.sensors.acceleration.hum_frequency, "Table's accelerometer: frequency of the mains", "Hz").min(0.0);
-            parameter("mains_hum.phase", s.sensors.acceleration.hum_phase, "Table's accelerometer: phase of the mains at time zero", "rad" => "deg");
-            parameter("acceleration_noise", s.sensors.acceleration.noise, "Table's accelerometer: white noise, one standard deviation", "m/s2" => "in/s2").min(0.0);
-            parameter("acceleration_range", s.sensors.acceleration.range, "Table's accelerometer: largest magnitude that is read, 0 for any", "m/s2" => "in/s2").min(0.0);
-            parameter("acceleration_resolution", s.sensors.acceleration.resolution, "Table's accelerometer: step of the converter, 0 for none", "m/s2" => "in/s2").min(0.0);
-            parameter("actuator_force_corner", s.sensors.actuator_force.corner, "Load cell: corner of the first-order lag, 0 without one", "Hz").min(0.0);
-            parameter("actuator_force_delay", s.sensors.actuator_force.delay, "Load cell: lateness", "s").min(0.0);
-            parameter("load_cell_scale.relative_change", s.sensors.actuator_force.scale_error, "Load cell: relative error of the scale");
-            parameter("load_cell_bias.offset", s.sensors.actuator_force.bias, "Load cell: offset", "N" => "lbf");
-            parameter("actuator_force_hum_amplitude", s.sensors.actuator_force.hum_amplitude, "Load cell: amplitude of the mains", "N" => "lbf");
-            parameter("actuator_force_hum_frequency", s.sensors.actuator_force.hum_frequency, "Load cell: frequency of the mains", "Hz").min(0.0);
-            parameter("actuator_force_noise", s.sensors.actuator_force.noise, "Load cell: white noise, one standard deviation", "N" => "lbf").min(0.0);
-            parameter("actuator_force_range", s.sensors.actuator_force.range, "Load cell: largest magnitude that is read, 0 for any", "N" => "lbf").min(0.0);
-            parameter("actuator_force_resolution", s.sensors.actuator_force.resolution, "Load cell: step of the converter, 0 for none", "N" => "lbf").min(0.0);
-            parameter("specimen_acceleration_corner", s.sensors.specimen_acceleration.corner, "Specimen's accelerometer: corner of the first-order lag, 0 without one", "Hz").min(0.0);
-            parameter("specimen_acceleration_delay", s.sensors.specimen_acceleration.delay, "Specimen's accelerometer: lateness", "s").min(0.0);
-            parameter("specimen_acceleration_scale_error", s.sensors.specimen_acceleration.scale_error, "Specimen's accelerometer: relative error of the scale");
-            parameter("specimen_acceleration_bias", s.sensors.specimen_acceleration.bias, "Specimen's accelerometer: offset", "m/s2" => "in/s2");
-            parameter("specimen_acceleration_hum_amplitude", s.sensors.specimen_acceleration.hum_amplitude, "Specimen's accelerometer: amplitude of the mains", "m/s2" => "in/s2");
-            parameter("specimen_acceleration_hum_frequency", s.sensors.specimen_acceleration.hum_frequency, "Specimen's accelerometer: frequency of the mains", "Hz").min(0.0);
-            parameter("specimen_acceleration_noise", s.sensors.specimen_acceleration.noise, "Specimen's accelerometer: white noise, one standard deviation", "m/s2" => "in/s2").min(0.0);
-            parameter("specimen_acceleration_range", s.sensors.specimen_acceleration.range, "Specimen's accelerometer: largest magnitude that is read, 0 for any", "m/s2" => "in/s2").min(0.0);
-            parameter("specimen_acceleration_resolution", s.sensors.specimen_acceleration.resolution, "Specimen's accelerometer: step of the converter, 0 for none", "m/s2" => "in/s2").min(0.0);
-            parameter("accelerometer_tilt.tilt", s.sensors.accelerometer_tilt, "Pitch of the table per displacement", "rad/m" => "rad/in");
+        };
+        for channel in CHANNELS {
+            variables.extend(channel.parameters());
+        }
+        variables.extend(effect_parameters());
+        variables.extend(fmu_kit::table! { Self, s:
             parameter("delay", s.sensors.delay, "Lateness of all channels together", "s").min(0.0);
             parameter("velocity_lag", s.sensors.velocity_lag, "Lag of the differentiated velocity", "s").min(0.0);
             parameter("seed", s.seed, "Seed of the noise").min(0.0);
             parameter("fault_time", s.sensors.fault_time, "When the fault occurs", "s");
-        };
+        });
         variables.extend([
             Variable::choice("velocity_estimate", ESTIMATES, |s: &mut Self| {
                 &mut s.velocity_estimate

@@ -116,6 +116,7 @@ impl Numbers {
 fn real<'a, C>(component: &'a mut C, variable: &Variable<C>) -> Option<&'a mut f64> {
     match &variable.access {
         Access::Real(field) => Some(field(component)),
+        Access::Within(place) => Some(place(component)),
         Access::Element(field, index) => field(component).get_mut(*index),
         _ => None,
     }

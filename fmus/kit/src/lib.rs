@@ -64,7 +64,6 @@ pub mod fmi3;
 pub mod model;
 pub mod native;
 pub mod resources;
-pub mod units;
 pub mod variable;
 
 pub use component::{Component, ComponentResult, Event};

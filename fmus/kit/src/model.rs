@@ -7,11 +7,11 @@ use std::{
 };
 
 use thiserror::Error;
+use units::Unit;
 
 use crate::{
     component::Component,
     fault::{Fault, Outcome},
-    units::Unit,
     variable::{Access, Causality, Dependency, Variability, Variable},
 };
 
@@ -222,18 +222,38 @@ fn check_units<C>(variable: &Variable<C>) -> Result<(), String> {
     let unit = match (variable.unit, variable.display_unit) {
         (None, None) => return Ok(()),
         (None, Some(_)) => return Err("has a display unit but no unit".into()),
-        (Some(unit), _) => Unit::parse(unit).map_err(|e| e.to_string())?,
+        (Some(unit), _) => modelica_unit(unit)?,
     };
     if !variable.access.is_real() {
         return Err("only a Float64 has a unit".into());
     }
     if let Some(shown) = variable.display_unit {
-        let shown_unit = Unit::parse(shown).map_err(|e| e.to_string())?;
-        if unit.factor_to(&shown_unit).is_none() {
-            return Err(format!("cannot be shown in `{shown}`"));
-        }
+        let fits = unit.factor_to(&modelica_unit(shown)?);
+        fits.map_err(|error| format!("cannot be shown in `{shown}`: {error}"))?;
     }
     Ok(())
+}
+
+/// Reads a unit in the notation of Modelica, which importers read too: names with whole exponents,
+/// joined by `.`, divided at most once by a name or by a product in parentheses, as in
+/// `lbf/(V.s2)`.
+fn modelica_unit(text: &str) -> Result<Unit, String> {
+    let wrong = |problem: String| format!("unit `{text}`: {problem}");
+    let foreign = |c: &char| !(c.is_ascii_alphanumeric() || "./()-".contains(*c));
+    if let Some(foreign) = text.chars().find(foreign) {
+        return Err(wrong(format!("`{foreign}` is not of Modelica's notation")));
+    }
+    let below = text.split_once('/').map_or("", |(_, below)| below);
+    if below.contains('/') || (below.contains('.') && !below.starts_with('(')) {
+        return Err(wrong(
+            "a product below the line stands in parentheses".into(),
+        ));
+    }
+    let unit = Unit::parse(text).map_err(|error| wrong(error.to_string()))?;
+    match unit.base_unit() {
+        Some(_) if !text.is_empty() => Ok(unit),
+        _ => Err(wrong("has no whole exponents of base units".into())),
+    }
 }
 
 fn check_kind<C>(variable: &Variable<C>, start: &mut C) -> Result<(), String> {
@@ -250,6 +270,7 @@ fn check_kind<C>(variable: &Variable<C>, start: &mut C) -> Result<(), String> {
     }
     let value = match &variable.access {
         Access::Real(field) => *field(start),
+        Access::Within(place) => *place(start),
         Access::Element(field, index) => *field(start)
             .get(*index)
             .ok_or_else(|| "is no element of its array".to_string())?,
@@ -329,7 +350,7 @@ mod tests {
         for (problem, expected) in [
             (problem::<0>(), "`input`: the name is used twice"),
             (problem::<1>(), "`input`: cannot be shown in `s`"),
-            (problem::<2>(), "unknown symbol `cubit`"),
+            (problem::<2>(), "unknown unit \"cubit\""),
             (problem::<3>(), "`input`: start 0 is outside 1 to inf"),
             (problem::<4>(), "`output`: `inptu` is no variable"),
             (problem::<5>(), "`flag`: only a Float64 has a unit"),
@@ -346,5 +367,24 @@ mod tests {
             assert!(problem.contains(expected), "`{problem}` lacks `{expected}`");
         }
         assert_eq!(problem::<9>(), "");
+    }
+
+    #[test]
+    fn units_are_in_the_notation_of_modelica() {
+        for unit in ["N.s/m", "lbf/(V.s2)", "1", "A.s-1/m", "Hz"] {
+            assert!(modelica_unit(unit).is_ok(), "{unit}");
+        }
+        for unit in [
+            "N.furlong",
+            "N/V.s",
+            "m/s/s",
+            "",
+            "mx2",
+            "N*m",
+            "m^2",
+            "V s",
+        ] {
+            assert!(modelica_unit(unit).is_err(), "{unit}");
+        }
     }
 }

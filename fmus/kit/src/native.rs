@@ -84,6 +84,7 @@ fn simulate<C: Component>(job: &Job) -> Result<(), Box<dyn std::error::Error>> {
     let field = |component: &mut C, reference: ValueReference| -> *mut f64 {
         match &variables[reference as usize - 1].access {
             Access::Real(field) => field(component),
+            Access::Within(place) => place(component),
             Access::Element(field, index) => &mut field(component)[*index],
             _ => panic!("value reference {reference} is no Float64"),
         }

@@ -116,6 +116,7 @@ pub fn apply<C: Component>(
         }
         match &variable.access {
             Access::Real(field) => *field(component) = number,
+            Access::Within(place) => *place(component) = number,
             Access::Element(field, index) => field(component)[*index] = number,
             _ => return Err(fail(format!("`{name}` is no Float64"))),
         }

@@ -56,6 +56,7 @@ impl<C: Component> Instance<C> {
         let component = &mut self.now.component;
         let value = match &variable.access {
             Access::Real(field) => *field(component),
+            Access::Within(place) => *place(component),
             Access::Element(field, index) => field(component)[*index],
             _ => return Err(wrong_type(variable, "Float64")),
         };
@@ -89,6 +90,7 @@ impl<C: Component> Instance<C> {
         let variable = &self.model.variables[self.model.position(reference)?];
         match &variable.access {
             Access::Real(field) => *field(&mut self.now.component) = value,
+            Access::Within(place) => *place(&mut self.now.component) = value,
             Access::Element(field, index) => field(&mut self.now.component)[*index] = value,
             _ => return Err(wrong_type(variable, "Float64")),
         }

@@ -57,10 +57,15 @@ pub struct Enumeration {
     pub items: &'static [Item],
 }
 
+/// The way to a Float64 that takes more than a field's name.
+pub type Place<C> = Box<dyn for<'a> Fn(&'a mut C) -> &'a mut f64 + Send + Sync>;
+
 /// The way to a variable's field.
 pub enum Access<C> {
     /// A Float64 field.
     Real(fn(&mut C) -> &mut f64),
+    /// A Float64 in a part of the component, found by a list outside it.
+    Within(Place<C>),
     /// An element of an array of Float64.
     Element(fn(&mut C) -> &mut [f64], usize),
     /// An Int32 field.
@@ -77,7 +82,7 @@ impl<C> Access<C> {
     /// The name of the type as FMI 3.0 calls it.
     pub fn type_name(&self) -> &'static str {
         match self {
-            Self::Real(_) | Self::Element(..) => "Float64",
+            Self::Real(_) | Self::Within(_) | Self::Element(..) => "Float64",
             Self::Integer(_) => "Int32",
             Self::Boolean(_) => "Boolean",
             Self::Text(_) => "String",
@@ -87,7 +92,7 @@ impl<C> Access<C> {
 
     /// Whether the variable is a Float64.
     pub fn is_real(&self) -> bool {
-        matches!(self, Self::Real(_) | Self::Element(..))
+        matches!(self, Self::Real(_) | Self::Within(_) | Self::Element(..))
     }
 }
 
@@ -192,6 +197,14 @@ impl<C> Variable<C> {
         Self::new(name.into(), Causality::Parameter, T::access(field))
     }
 
+    /// A parameter of a part of the component, which a list outside it describes.
+    pub fn parameter_within(
+        name: String,
+        place: impl for<'a> Fn(&'a mut C) -> &'a mut f64 + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(name, Causality::Parameter, Access::Within(Box::new(place)))
+    }
+
     /// A local variable, such as a continuous state.
     pub fn local<T: Scalar>(name: &str, field: fn(&mut C) -> &mut T) -> Self {
         Self::new(name.into(), Causality::Local, T::access(field))
@@ -243,6 +256,20 @@ impl<C> Variable<C> {
         self
     }
 
+    /// Gives the SI unit and the one in which a laboratory wants to see it.
+    pub fn measured_in(mut self, unit: &'static str, shown: Option<&'static str>) -> Self {
+        self.unit = Some(unit);
+        self.display_unit = shown;
+        self
+    }
+
+    /// Gives the smallest and the largest value accepted, where there are such.
+    pub fn between(mut self, min: Option<f64>, max: Option<f64>) -> Self {
+        self.min = min;
+        self.max = max;
+        self
+    }
+
     /// Gives the smallest value accepted.
     pub fn min(mut self, min: f64) -> Self {
         self.min = Some(min);
@@ -281,9 +308,9 @@ impl<C> Variable<C> {
     }
 
     /// Declares that its initial value depends on inputs or parameters.
-    pub fn initially_depends_on(mut self, names: &[&str]) -> Self {
+    pub fn initially_depends_on<S: AsRef<str>>(mut self, names: &[S]) -> Self {
         self.initial_dependencies
-            .extend(names.iter().map(|name| name.to_string()));
+            .extend(names.iter().map(|name| name.as_ref().to_string()));
         self
     }
 

@@ -2,7 +2,7 @@
 //! Shake table with its hydraulic actuator as an FMU.
 
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
-use plant::identified::effects::Effects;
+use plant::identified::effects::{self, AtStart, Component as Part, Effects, Field};
 use plant::identified::extended_table::{ExtendedTable, ExtendedTableState};
 use plant::identified::shake_table::{SampledShakeTable, ShakeTable as Rig, ShakeTableState};
 use serde::{Deserialize, Serialize};
@@ -25,22 +25,27 @@ pub struct ShakeTable {
     extended: Option<ExtendedTable>,
 }
 
-/// What the command and the openings of the valve make of the rates at the start.
-const VALVE: [&str; 8] = [
-    "valve_null_bias.offset",
-    "valve_dead_band.half_width",
-    "valve_flow_gain.relative_change",
-    "valve_asymmetric_gain.asymmetry",
-    "valve_spool_lag.frequency",
-    "valve_hysteresis.half_width",
-    "command_delay.delay",
-    "valve_spool_saturation.limit",
-];
+/// The effects' parameters as variables.
+fn effect_parameters() -> impl Iterator<Item = Variable<ShakeTable>> {
+    effects::variables(Part::ShakeTable).filter_map(|(name, parameter)| {
+        let Some(Field::Table(field)) = parameter.field else {
+            return None;
+        };
+        let variable =
+            Variable::parameter_within(name, move |s: &mut ShakeTable| field(&mut s.effects));
+        Some(
+            variable
+                .about(parameter.about)
+                .measured_in(parameter.quantity.fmi, parameter.quantity.fmi_display)
+                .between(parameter.min, parameter.max),
+        )
+    })
+}
 
 impl ShakeTable {
     /// The table with its effects, where one of them is on.
     fn extended(&mut self) -> Option<ExtendedTable> {
-        if !ExtendedTable::is_active(&self.effects) {
+        if !self.effects.is_active_on_table() {
             return None;
         }
         if self.extended.is_none() {
@@ -85,7 +90,7 @@ impl Component for ShakeTable {
     const PARTIAL_DERIVATIVES: bool = true;
 
     fn variables() -> Vec<Variable<Self>> {
-        fmu_kit::table! { Self, s:
+        let mut variables = fmu_kit::table! { Self, s:
             input("valve_command", s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0);
             input("specimen_force", s.specimen_force, "Force of the specimen on the table", "N" => "lbf")
@@ -97,7 +102,8 @@ impl Component for ShakeTable {
             output("acceleration", s.acceleration, "Absolute acceleration of the table", "m/s2" => "g")
                 .nominal(10.0).derivative_of("velocity")
                 .depends_on(&["specimen_force", "displacement", "velocity", "actuator_force"], Dependent)
-                .initially_depends_on(&["specimen_force", "table_mass", "added_payload.mass"]);
+                .initially_depends_on(&["specimen_force", "table_mass"])
+                .initially_depends_on(&effects::acting_at_start(Part::ShakeTable, AtStart::Acceleration));
             output("actuator_force", s.state.table.actuator[0], "Force of the actuator on the table", "N" => "lbf")
                 .nominal(400.0);
             parameter("table_mass", s.rig.table.mass, "Mass of the table", "kg" => "lbf.s2/in");
@@ -112,51 +118,29 @@ impl Component for ShakeTable {
             parameter("actuator_e2", s.rig.actuator.velocity_to_force[0], "Velocity to force, s^2", "N/m" => "lbf/in");
             parameter("actuator_e1", s.rig.actuator.velocity_to_force[1], "Velocity to force, s", "N/(m.s)" => "lbf/(in.s)");
             parameter("actuator_e0", s.rig.actuator.velocity_to_force[2], "Velocity to force, constant", "N/(m.s2)" => "lbf/(in.s2)");
-            parameter("valve_null_bias.offset", s.effects.valve.null_bias, "Offset at the spool; 0 is off", "V");
-            parameter("valve_dead_band.half_width", s.effects.valve.dead_band, "Half width of the spool's overlap; 0 is off", "V").min(0.0);
-            parameter("valve_flow_gain.relative_change", s.effects.valve.flow_gain, "Relative change of the flow gain; 0 is off", "1");
-            parameter("valve_asymmetric_gain.asymmetry", s.effects.valve.asymmetry, "q of the gains 1 + q for positive and 1 - q for negative flow; 0 is off", "1");
-            parameter("valve_spool_lag.frequency", s.effects.valve.spool_frequency, "Natural frequency of the second-order spool; 0 is an ideal spool", "Hz").min(0.0);
-            parameter("valve_spool_lag.damping_ratio", s.effects.valve.spool_damping, "Damping ratio of the spool", "1").min(1e-3);
-            parameter("command_delay.delay", s.effects.valve.command_delay, "Pure delay of the command, at most 30 steps; 0 is off", "s" => "ms").min(0.0);
-            parameter("valve_spool_saturation.limit", s.effects.valve.spool_limit, "Travel limit of the spool; 0 is none", "V").min(0.0);
-            parameter("valve_hysteresis.half_width", s.effects.valve.hysteresis, "Half width of the play between command and spool; 0 is off", "V").min(0.0);
-            parameter("valve_flow_saturation.stall_force", s.effects.hydraulics.stall_force, "Force at which the flow stops, flow times sqrt(1 - sign(u) F / stall_force); 0 is none", "N" => "lbf").min(0.0);
-            parameter("supply_pressure_droop.loss_per_volt", s.effects.hydraulics.droop_loss, "Relative loss of flow per volt of recent mean demand; 0 is off", "1/V").min(0.0);
-            parameter("supply_pressure_droop.accumulator_time", s.effects.hydraulics.droop_time, "Time constant of the accumulator", "s").min(1e-3);
-            parameter("supply_pressure_droop.form", s.effects.hydraulics.droop_form, "c of the flow's factor (1 - c loss mean)^(1/c); 1 is a straight line, not 0", "1");
-            parameter("supply_pressure_droop.floor", s.effects.hydraulics.droop_floor, "Share of the flow that the droop leaves at least", "1").min(0.0).max(1.0);
-            parameter("internal_leakage.leakage", s.effects.hydraulics.leakage, "Flow lost in proportion to force; 0 is off", "V/N" => "V/lbf");
-            parameter("oil_column_compliance.compliance", s.effects.hydraulics.compliance, "Flow lost in proportion to the rate of force; 0 is off", "V.s/N" => "V.s/lbf").min(0.0);
-            parameter("coulomb_friction.coulomb_force", s.effects.friction.coulomb_force, "Constant force opposing the velocity, also that of Stribeck friction; 0 is off", "N" => "lbf");
-            parameter("coulomb_friction.transition_velocity", s.effects.friction.transition_velocity, "Velocity over which friction changes its sign: tanh(v / transition_velocity)", "m/s" => "in/s").min(1e-6);
-            parameter("stribeck_friction.stribeck_force", s.effects.friction.stribeck_force, "Breakaway bump above the Coulomb force at low speed; 0 is off", "N" => "lbf");
-            parameter("stribeck_friction.stribeck_velocity", s.effects.friction.stribeck_velocity, "Velocity at which the bump has fallen to 1/e", "m/s" => "in/s").min(1e-6);
-            parameter("stribeck_friction.stribeck_exponent", s.effects.friction.stribeck_exponent, "Exponent delta in the bump's exp(-|v / stribeck_velocity|^delta)", "1").min(1e-2);
-            parameter("added_payload.mass", s.effects.table.added_mass, "Mass on the table that the model does not know; 0 is off", "kg" => "lbf.s2/in");
-            parameter("viscous_damping.damping", s.effects.table.viscous_damping, "Extra damping of the table; 0 is off", "N.s/m" => "lbf.s/in");
-            parameter("cubic_stiffness.stiffness", s.effects.table.cubic_stiffness, "k3 of an extra force k3 x^3; 0 is off", "N/m3" => "lbf/in3");
-            parameter("foundation_compliance.frequency", s.effects.foundation.frequency, "Natural frequency of the reaction mass, relative to which the piston moves; 0 is rigid", "Hz").min(0.0);
-            parameter("foundation_compliance.mass_ratio", s.effects.foundation.mass_ratio, "Reaction mass in masses of the table", "1").min(1e-3);
-            parameter("foundation_compliance.damping_ratio", s.effects.foundation.damping_ratio, "Damping ratio of the reaction mass", "1").min(0.0);
+        };
+        variables.extend(effect_parameters());
+        let actuator = effects::acting_at_start(Part::ShakeTable, AtStart::ActuatorRates);
+        variables.extend(fmu_kit::table! { Self, s:
             local("actuator_state[2]", s.state.table.actuator[1], "Second state of the actuator", "N/s").nominal(1e5);
             local("actuator_state[3]", s.state.table.actuator[2], "Third state of the actuator", "N/s2").nominal(1e6);
             local("der(actuator_force)", s.actuator_rates[0], "Rate of the actuator's force", "N/s")
                 .derivative_of("actuator_force")
                 .depends_on(&["valve_command", "velocity", "actuator_force", "actuator_state[2]"], Dependent)
-                .initially_depends_on(&["valve_command", "actuator_b2", "oil_column_compliance.compliance"])
-                .initially_depends_on(&VALVE);
+                .initially_depends_on(&["valve_command", "actuator_b2"])
+                .initially_depends_on(&actuator);
             local("der(actuator_state[2])", s.actuator_rates[1], "Rate of the second state", "N/s2")
                 .derivative_of("actuator_state[2]")
                 .depends_on(&["valve_command", "velocity", "actuator_force", "actuator_state[2]", "actuator_state[3]"], Dependent)
-                .initially_depends_on(&["valve_command", "actuator_b1", "actuator_b2", "oil_column_compliance.compliance"])
-                .initially_depends_on(&VALVE);
+                .initially_depends_on(&["valve_command", "actuator_b1", "actuator_b2"])
+                .initially_depends_on(&actuator);
             local("der(actuator_state[3])", s.actuator_rates[2], "Rate of the third state", "N/s3")
                 .derivative_of("actuator_state[3]")
                 .depends_on(&["valve_command", "velocity", "actuator_force", "actuator_state[2]"], Dependent)
-                .initially_depends_on(&["valve_command", "actuator_b0", "actuator_b2", "oil_column_compliance.compliance"])
-                .initially_depends_on(&VALVE);
-        }
+                .initially_depends_on(&["valve_command", "actuator_b0", "actuator_b2"])
+                .initially_depends_on(&actuator);
+        });
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {
@@ -171,23 +155,10 @@ impl Component for ShakeTable {
     }
 
     fn allow_model_exchange(&self) -> ComponentResult {
-        let Effects {
-            valve,
-            hydraulics,
-            foundation,
-            ..
-        } = &self.effects;
-        let needing = [
-            ("valve_spool_lag", valve.spool_frequency),
-            ("command_delay", valve.command_delay),
-            ("valve_hysteresis", valve.hysteresis),
-            ("supply_pressure_droop", hydraulics.droop_loss),
-            ("foundation_compliance", foundation.frequency),
-        ];
-        match needing.into_iter().find(|(_, size)| *size != 0.0) {
-            Some((effect, _)) => Err(format!(
-                "{effect} is on: the continuous states do not tell all of it, which needs \
-                 co-simulation"
+        match effects::needing_co_simulation(Part::ShakeTable, &self.effects) {
+            Some(effect) => Err(format!(
+                "{} is on: the continuous states do not tell all of it, which needs co-simulation",
+                effect.name
             )
             .into()),
             None => Ok(()),
@@ -239,7 +210,7 @@ impl Component for ShakeTable {
     }
 
     fn partial_derivative(&self, unknown: &str, known: &str) -> f64 {
-        if ExtendedTable::is_active(&self.effects) {
+        if self.effects.is_active_on_table() {
             return self.slope(unknown, known);
         }
         let (table, actuator) = (&self.rig.table, &self.rig.actuator);

@@ -2,7 +2,9 @@
 //! Linear specimen on the table as an FMU.
 
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
-use plant::identified::effects::SpecimenEffects;
+use plant::identified::effects::{
+    self, AtStart, Component as Part, Effects, Family, Field, SpecimenEffects,
+};
 use plant::specimens::extended::{ExtendedSpecimen, ExtendedSpecimenState};
 use plant::specimens::linear::{LinearSpecimen, SampledSpecimen};
 use serde::{Deserialize, Serialize};
@@ -12,8 +14,6 @@ use serde::{Deserialize, Serialize};
 pub struct Specimen {
     specimen: LinearSpecimen,
     effects: SpecimenEffects,
-    /// 1 when nothing stands on the table.
-    absent: f64,
     state: ExtendedSpecimenState,
     table_acceleration: f64,
     force: f64,
@@ -23,6 +23,23 @@ pub struct Specimen {
     sampled: Option<SampledSpecimen>,
     #[serde(skip)]
     extended: Option<ExtendedSpecimen>,
+}
+
+/// The effects' parameters as variables.
+fn effect_parameters() -> impl Iterator<Item = Variable<Specimen>> {
+    effects::variables(Part::Specimen).filter_map(|(name, parameter)| {
+        let Some(Field::Specimen(field)) = parameter.field else {
+            return None;
+        };
+        let variable =
+            Variable::parameter_within(name, move |s: &mut Specimen| field(&mut s.effects));
+        Some(
+            variable
+                .about(parameter.about)
+                .measured_in(parameter.quantity.fmi, parameter.quantity.fmi_display)
+                .between(parameter.min, parameter.max),
+        )
+    })
 }
 
 impl Specimen {
@@ -66,7 +83,7 @@ impl Component for Specimen {
     const PARTIAL_DERIVATIVES: bool = true;
 
     fn variables() -> Vec<Variable<Self>> {
-        fmu_kit::table! { Self, s:
+        let mut variables = fmu_kit::table! { Self, s:
             input("table_acceleration", s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g")
                 .nominal(10.0);
             output("force", s.force, "Force on the table", "N" => "lbf")
@@ -79,36 +96,22 @@ impl Component for Specimen {
             parameter("mass", s.specimen.mass, "Mass of the storey", "kg" => "lbf.s2/in");
             parameter("damping", s.specimen.damping, "Viscous damping of the storey", "N.s/m" => "lbf.s/in");
             parameter("stiffness", s.specimen.stiffness, "Stiffness of the storey", "N/m" => "lbf/in");
-            parameter("specimen_yielding.yield_displacement", s.effects.yield_displacement, "Yield displacement of a Bouc-Wen spring; 0 is elastic", "m" => "in").min(0.0);
-            parameter("specimen_yielding.post_yield_ratio", s.effects.yield_post_ratio, "Stiffness after yielding over elastic stiffness", "1");
-            parameter("specimen_yielding.exponent", s.effects.yield_exponent, "Sharpness of yielding", "1").min(0.1);
-            parameter("specimen_stiffness.relative_change", s.effects.stiffness_change, "Relative change of the stiffness; 0 is off", "1");
-            parameter("specimen_damping.relative_change", s.effects.damping_change, "Relative change of the damping; 0 is off", "1");
-            parameter("specimen_second_mode.frequency", s.effects.second_mode_frequency, "Frequency of a part of the mass on its own spring; 0 is off", "Hz").min(0.0);
-            parameter("specimen_second_mode.mass_share", s.effects.second_mode_mass_share, "Share of the mass in it", "1").min(1e-3).max(0.95);
-            parameter("specimen_second_mode.damping_ratio", s.effects.second_mode_damping_ratio, "Damping ratio of it", "1").min(0.0);
-            parameter("specimen_degradation.loss", s.effects.degradation_loss, "Share of the stiffness lost with the largest drift so far; 0 is off", "1").max(1.0);
-            parameter("specimen_degradation.degradation_drift", s.effects.degradation_drift, "Drift at which 1 - 1/e of it is lost", "m" => "in").min(1e-6);
-            parameter("specimen_degradation.form", s.effects.degradation_form, "c of the share lost, 1 - (1 + c drift/degradation_drift)^(-1/c); 0 is exponential, -1 a straight line", "1");
-            parameter("specimen_uplift.uplift_displacement", s.effects.uplift_displacement, "Drift beyond which the spring is softer, without a loop; 0 is off", "m" => "in").min(0.0);
-            parameter("specimen_uplift.post_uplift_ratio", s.effects.uplift_post_ratio, "Stiffness beyond it over stiffness below", "1");
-            parameter("specimen_absent.absent", s.absent, "1: nothing stands on the table; 0 is off", "1").min(0.0).max(1.0);
+        };
+        variables.extend(effect_parameters());
+        variables.extend(fmu_kit::table! { Self, s:
             local("der(drift_velocity)", s.drift_acceleration, "Acceleration relative to the table", "m/s2" => "g")
                 .derivative_of("drift_velocity")
                 .depends_on(&["table_acceleration"], Dependent)
                 .depends_on(&["drift", "drift_velocity"], Dependent)
-                .initially_depends_on(&["table_acceleration", "specimen_absent.absent"]);
-        }
+                .initially_depends_on(&["table_acceleration"])
+                .initially_depends_on(&effects::acting_at_start(Part::Specimen, AtStart::Acceleration));
+        });
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {
         self.specimen.validate()?;
         ExtendedSpecimen::validate(&self.effects)?;
-        if self.absent != 0.0 && self.absent != 1.0 {
-            let absent = self.absent;
-            return Err(format!("specimen_absent.absent = {absent}, expected 0 or 1").into());
-        }
-        self.effects.absent = self.absent == 1.0;
         self.state = ExtendedSpecimenState::default();
         self.sampled = Some(self.specimen.sample(Self::STEP_SIZE));
         self.extended = None;
@@ -116,17 +119,15 @@ impl Component for Specimen {
     }
 
     fn allow_model_exchange(&self) -> ComponentResult {
-        let effects = &self.effects;
-        let needing = [
-            ("specimen_yielding", effects.yield_displacement),
-            ("specimen_second_mode", effects.second_mode_frequency),
-            ("specimen_degradation", effects.degradation_loss),
-            ("specimen_absent", self.absent),
-        ];
-        match needing.into_iter().find(|(_, size)| *size != 0.0) {
-            Some((effect, _)) => Err(format!(
-                "{effect} is on: drift and drift_velocity do not tell all of it, which needs \
-                 co-simulation"
+        let effects = Effects {
+            specimen: self.effects,
+            ..Effects::default()
+        };
+        match effects::needing_co_simulation(Part::Specimen, &effects) {
+            Some(effect) => Err(format!(
+                "{} is on: drift and drift_velocity do not tell all of it, which needs \
+                 co-simulation",
+                effect.name
             )
             .into()),
             None => Ok(()),
@@ -227,7 +228,7 @@ mod tests {
         assert!(state.peak_drift > 0.02, "{}", state.peak_drift);
         let refused = component.allow_model_exchange().unwrap_err().to_string();
         assert!(refused.contains("co-simulation"), "{refused}");
-        component.absent = 0.5;
+        component.effects.absent = 0.5;
         let refused = component.initialize().unwrap_err().to_string();
         assert!(refused.contains("specimen_absent.absent"), "{refused}");
     }

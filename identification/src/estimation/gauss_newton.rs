@@ -188,30 +188,6 @@ pub fn fit_within<const P: usize>(
     }
 }
 
-/// Where one held parameter would go in one step of all from the start values, and the standard
-/// error of that (from an optimum of the others, a score test).
-///
-/// # Errors
-/// The start makes no model.
-pub fn score_test<const P: usize>(
-    model: &impl PredictionModel<P>,
-    parameters: &[Parameter],
-    index: usize,
-) -> Result<(f64, f64), IdentificationError> {
-    let mut freed = parameters.to_vec();
-    freed[index].free = true;
-    let values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
-    let (information, gradient) = scoring(model, &freed, &values)?;
-    let active: Vec<usize> = (0..freed.len())
-        .filter(|&i| freed[i].free && !pushes_out(&freed[i], values[i], gradient[i]))
-        .collect();
-    let step = damped_step(&information, &gradient, &active, LEAST_DAMPING);
-    let mut unit = DVector::zeros(freed.len());
-    unit[index] = -1.0;
-    let variance = damped_step(&information, &unit, &active, LEAST_DAMPING)[index];
-    Ok((step[index], variance.max(0.0).sqrt()))
-}
-
 fn pushes_out(parameter: &Parameter, value: f64, gradient: f64) -> bool {
     let (low, high) = parameter.bounds;
     (value <= low && gradient > 0.0) || (value >= high && gradient < 0.0)

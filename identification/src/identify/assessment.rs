@@ -1,16 +1,16 @@
 //! What an identified rig is worth: refusal of what is none, fit and whiteness on the part that was
-//! not fitted, uncertainty of the responses.
+//! not fitted.
 
-use nalgebra::{Complex, DMatrix, DVector};
-use plant::identified::actuator::IdentifiedActuator;
+use nalgebra::{DMatrix, DVector};
 
 use crate::IdentificationError;
 use crate::data::OUTPUT_NAMES;
 use crate::estimation::gauss_newton::GaussNewtonEstimate;
 use crate::estimation::prediction::{Parameter, PredictionModel};
 use crate::estimation::residuals::{ResidualTest, residual_test};
-use crate::identify::model::{OUTPUTS, PHYSICAL, RigModel, rig_from};
-use crate::identify::rig::RigIdentification;
+use crate::identify::identified::RigIdentification;
+use crate::identify::model::{OUTPUTS, RigModel};
+use crate::identify::parameters::PhysicalValues;
 use crate::identify::validation;
 
 /// Refuses a rig that is none, and compares what was fitted with what was not.
@@ -23,7 +23,7 @@ pub(crate) fn assess(
     mut warnings: Vec<String>,
 ) -> Result<RigIdentification, IdentificationError> {
     let specimen = fitted.experiments.iter().any(|e| e.specimen);
-    let rig = rig_from(&estimate.parameters, 0.0, specimen);
+    let rig = PhysicalValues::of(&estimate.parameters).rig(0.0, specimen);
     let table = rig.shake_table.table;
     if table.stiffness <= 0.0 || table.damping < 0.0 {
         return Err(IdentificationError::Unstable {
@@ -47,8 +47,8 @@ pub(crate) fn assess(
         }
     }
     let mut found = RigIdentification {
-        physical: Vec::new(),
-        standard_error: Vec::new(),
+        physical: PhysicalValues::ZERO,
+        standard_error: PhysicalValues::ZERO,
         covariance: DMatrix::zeros(0, 0),
         specimen,
         payload: Vec::new(),
@@ -116,37 +116,4 @@ fn validation_residuals(
         }
     }
     tests
-}
-
-/// Responses of G1 and G2 at a frequency (Hz).
-fn responses(physical: &[f64], frequency: f64) -> [Complex<f64>; 2] {
-    let s = Complex::new(0.0, std::f64::consts::TAU * frequency);
-    let actuator: IdentifiedActuator = rig_from(physical, 0.0, false).shake_table.actuator;
-    [actuator.g1().evaluate(s), actuator.g2().evaluate(s)]
-}
-
-/// Largest relative standard error of the responses of G1 and G2 over `frequencies` (Hz).
-pub(crate) fn response_error(
-    physical: &[f64],
-    covariance: &DMatrix<f64>,
-    frequencies: &[f64],
-) -> [f64; 2] {
-    let mut largest = [0.0f64; 2];
-    for &frequency in frequencies {
-        let at = responses(physical, frequency);
-        for (path, largest) in largest.iter_mut().enumerate() {
-            let mut slope = [DVector::zeros(PHYSICAL), DVector::zeros(PHYSICAL)];
-            for i in 0..9 {
-                let mut moved = physical.to_vec();
-                let change = 1e-6 * physical[i].abs().max(1e-6);
-                moved[i] += change;
-                let relative = (responses(&moved, frequency)[path] / at[path] - 1.0) / change;
-                slope[0][i] = relative.re;
-                slope[1][i] = relative.im;
-            }
-            let variance: f64 = slope.iter().map(|s| (covariance * s).dot(s)).sum();
-            *largest = largest.max(variance.max(0.0).sqrt());
-        }
-    }
-    largest
 }

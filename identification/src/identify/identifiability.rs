@@ -9,7 +9,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DMatrix};
 
 use crate::estimation::prediction::Parameter;
-use crate::identify::model::{DELAY, PHYSICAL, PHYSICAL_NAMES, RigModel, rig_from};
+use crate::identify::model::RigModel;
+use crate::identify::parameters::{Name, Own, Physical, PhysicalValues};
 
 /// What was found inseparable.
 pub(crate) struct Inseparable {
@@ -27,9 +28,11 @@ const RANK: f64 = 1e-5;
 pub(crate) fn inseparable(model: &RigModel, parameters: &[Parameter]) -> Option<Inseparable> {
     let columns: Vec<usize> = (0..parameters.len())
         .filter(|&i| {
-            let physical = i < PHYSICAL && i != DELAY;
-            let payload = (0..model.experiments.len()).any(|e| i == model.nuisance(e));
-            parameters[i].free && (physical || payload)
+            let moves_responses = match Name::at(i) {
+                Name::Physical(name) => name != Physical::CommandDelay,
+                Name::Own(own) => own == Own::Payload,
+            };
+            parameters[i].free && moves_responses
         })
         .collect();
     let values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
@@ -64,8 +67,11 @@ pub(crate) fn inseparable(model: &RigModel, parameters: &[Parameter]) -> Option<
     let named: Vec<&str> = columns
         .iter()
         .enumerate()
-        .filter(|(column, i)| direction[*column].abs() > 1e-5 && **i < PHYSICAL)
-        .map(|(_, &i)| PHYSICAL_NAMES[i])
+        .filter(|(column, _)| direction[*column].abs() > 1e-5)
+        .filter_map(|(_, &i)| match Name::at(i) {
+            Name::Physical(name) => Some(name.name()),
+            Name::Own(_) => None,
+        })
         .collect();
     let hold = columns
         .iter()
@@ -87,8 +93,8 @@ pub(crate) fn inseparable(model: &RigModel, parameters: &[Parameter]) -> Option<
 fn responses(model: &RigModel, values: &[f64]) -> Option<Vec<Complex<f64>>> {
     let mut all = Vec::new();
     for (index, data) in model.experiments.iter().enumerate() {
-        let payload = values[model.nuisance(index)];
-        let rig = rig_from(values, payload, data.specimen);
+        let payload = values[Own::Payload.of(index)];
+        let rig = PhysicalValues::of(values).rig(payload, data.specimen);
         let (actuator, table) = (rig.shake_table.actuator, rig.shake_table.table);
         for k in 0..40 {
             let s = Complex::new(0.0, TAU * 0.03 * 1600f64.powf(f64::from(k) / 39.0));

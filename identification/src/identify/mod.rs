@@ -3,8 +3,10 @@
 mod assessment;
 mod checks;
 mod identifiability;
+pub mod identified;
 pub mod model;
 pub mod model_file;
+pub mod parameters;
 pub mod rig;
 mod setup;
 pub mod specimen_file;

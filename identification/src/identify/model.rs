@@ -8,13 +8,9 @@
 //! the command, and a force on the table.
 
 use nalgebra::{DMatrix, SMatrix, SVector};
-use plant::identified::actuator::IdentifiedActuator;
-use plant::identified::coupled::Rig;
-use plant::identified::shake_table::ShakeTable;
-use plant::identified::table::Table;
 use plant::linear::{StateSpace, discrete_riccati};
-use plant::specimens::linear::LinearSpecimen;
 
+use super::parameters::{NoiseOn, Own, Physical, PhysicalValues};
 use crate::data::Channel;
 use crate::estimation::prediction::{self, PredictionModel};
 
@@ -22,43 +18,14 @@ use crate::estimation::prediction::{self, PredictionModel};
 pub const OUTPUTS: usize = Channel::OUTPUTS.len();
 /// Number of states: actuator, table, specimen.
 pub const STATES: usize = 7;
-/// Rows of [`Rig::state_space`] that are measured.
+/// The states before those of the specimen.
+pub const SPECIMEN_STATES: usize = 5;
+/// Rows of the rig's state space that are measured.
 const ROWS: [usize; OUTPUTS] = [0, 2, 3, 6];
 
-/// Physical parameters shared by all experiments: the actuator's nine, the table's three, the
-/// specimen's three, the delay of the command.
-pub const PHYSICAL: usize = 16;
-/// Names of the physical parameters.
-pub const PHYSICAL_NAMES: [&str; PHYSICAL] = [
-    "a2",
-    "a1",
-    "a0",
-    "b2",
-    "b1",
-    "b0",
-    "e2",
-    "e1",
-    "e0",
-    "table mass",
-    "table damping",
-    "table stiffness",
-    "specimen mass",
-    "specimen damping",
-    "specimen stiffness",
-    "command delay",
-];
-/// Index of the table's mass.
-pub const MASS: usize = 9;
-/// Index of the specimen's mass.
-pub const SPECIMEN: usize = 12;
-/// Index of the delay.
-pub const DELAY: usize = 15;
-/// Nuisance parameters of an experiment: payload, offsets, initial state, logarithms of noise.
-pub const NUISANCE: usize = 1 + OUTPUTS + STATES + OUTPUTS + 2;
-
-/// One experiment, scaled.
+/// A recording as the model reads it: sample by sample and scaled.
 #[derive(Debug, Clone)]
-pub struct Experiment {
+pub struct ScaledRecording {
     /// Name of the recording.
     pub name: String,
     /// Sampling period, s.
@@ -77,7 +44,7 @@ pub struct Experiment {
     pub specimen: bool,
 }
 
-impl Experiment {
+impl ScaledRecording {
     /// Scales of the states: the force's for the actuator, the displacement's for the rest, with
     /// typical frequencies of the rig in between.
     fn state_scale(&self) -> [f64; STATES] {
@@ -95,35 +62,11 @@ impl Experiment {
     }
 }
 
-/// The rig with its parameters from a vector.
-pub fn rig_from(parameters: &[f64], payload: f64, specimen: bool) -> Rig {
-    let p = parameters;
-    Rig {
-        shake_table: ShakeTable {
-            actuator: IdentifiedActuator {
-                denominator: [p[0], p[1], p[2]],
-                voltage_to_force: [p[3], p[4], p[5]],
-                velocity_to_force: [p[6], p[7], p[8]],
-            },
-            table: Table {
-                mass: p[MASS] + payload,
-                damping: p[MASS + 1],
-                stiffness: p[MASS + 2],
-            },
-        },
-        specimen: specimen.then(|| LinearSpecimen {
-            mass: p[SPECIMEN],
-            damping: p[SPECIMEN + 1],
-            stiffness: p[SPECIMEN + 2],
-        }),
-    }
-}
-
 /// Several experiments on one rig.
 #[derive(Debug, Clone)]
 pub struct RigModel {
     /// The experiments.
-    pub experiments: Vec<Experiment>,
+    pub experiments: Vec<ScaledRecording>,
 }
 
 /// Rows of a column of the transition, one more than states: even, for the vector unit.
@@ -151,24 +94,13 @@ impl prediction::Predictor<OUTPUTS> for Predictor {
 }
 
 impl RigModel {
-    /// Index of the first nuisance parameter of an experiment.
-    pub fn nuisance(&self, experiment: usize) -> usize {
-        PHYSICAL + experiment * NUISANCE
-    }
-
-    /// Index of the logarithm of the relative noise of a channel (the outputs, then command and
-    /// table force).
-    pub fn noise(&self, experiment: usize, channel: usize) -> usize {
-        self.nuisance(experiment) + 1 + OUTPUTS + STATES + channel
-    }
-
     /// The predictor of an experiment; `None` where no steady one exists.
     fn steady_predictor(&self, experiment: usize, parameters: &[f64]) -> Option<Predictor> {
         let data = &self.experiments[experiment];
-        let own = &parameters[self.nuisance(experiment)..][..NUISANCE];
-        let (payload, rest) = own.split_first()?;
-        let rig = rig_from(parameters, *payload, data.specimen);
-        if !(rig.shake_table.table.mass > 0.0 && parameters[SPECIMEN] > 0.0) {
+        let physical = PhysicalValues::of(parameters);
+        let own = |which: Own| parameters[which.of(experiment)];
+        let rig = physical.rig(own(Own::Payload), data.specimen);
+        if !(rig.shake_table.table.mass > 0.0 && physical[Physical::SpecimenMass] > 0.0) {
             return None;
         }
         let mut system = rig.state_space();
@@ -207,7 +139,7 @@ impl RigModel {
         if sampled.a.iter().any(|value| !value.is_finite()) {
             return None;
         }
-        let late = (parameters[DELAY] / data.period).max(0.0);
+        let late = (physical[Physical::CommandDelay] / data.period).max(0.0);
         let delay = late.floor() as usize;
         let part = late - late.floor();
         let held = SVector::<f64, STATES>::from_fn(|i, _| sampled.b[(i, 0)]);
@@ -219,16 +151,15 @@ impl RigModel {
             [held, SVector::zeros()]
         };
 
-        let log_noise = &rest[OUTPUTS + STATES..];
-        let variance = |i: usize| (2.0 * log_noise[i]).exp();
+        let variance = |noise: NoiseOn| (2.0 * own(Own::LogNoise(noise))).exp();
         let command = DMatrix::from_fn(STATES, 1, |i, _| sampled.b[(i, 0)] * data.command_scale);
         let force = sampled.b.columns(1, 1);
-        let q = &command * command.transpose() * variance(OUTPUTS)
-            + force * force.transpose() * variance(OUTPUTS + 1);
+        let q = &command * command.transpose() * variance(NoiseOn::Command)
+            + force * force.transpose() * variance(NoiseOn::Table);
         let noise =
             SMatrix::<f64, OUTPUTS, OUTPUTS>::from_fn(|i, j| match (i == j, data.measured[i]) {
                 (false, _) => 0.0,
-                (true, true) => variance(i),
+                (true, true) => variance(NoiseOn::Output(i)),
                 (true, false) => 1.0,
             });
         let c_transposed = DMatrix::from_fn(STATES, OUTPUTS, |i, j| c[(j, i)]);
@@ -249,8 +180,10 @@ impl RigModel {
             }),
             output: std::array::from_fn(|j| std::array::from_fn(|i| c[(i, j)])),
             delay,
-            offset: std::array::from_fn(|i| rest[i]),
-            state: column(&rest[OUTPUTS..OUTPUTS + STATES]),
+            offset: std::array::from_fn(|i| own(Own::Offset(i))),
+            state: column(&std::array::from_fn::<_, STATES, _>(|i| {
+                own(Own::InitialState(i))
+            })),
             covariance,
         })
     }
@@ -266,7 +199,7 @@ impl RigModel {
         let data = &self.experiments[experiment];
         for i in 1..OUTPUTS {
             if data.measured[i] {
-                own[self.noise(experiment, i)] = 1e3f64.ln();
+                own[Own::LogNoise(NoiseOn::Output(i)).of(experiment)] = 1e3f64.ln();
             }
         }
         self.one_step_predictions(experiment, &own)

@@ -19,8 +19,8 @@ use units::constants::{INCH, LBF};
 use crate::IdentificationError;
 use crate::closed_loop::model_section::{HydraulicSection, UncertaintySection};
 use crate::data::OUTPUT_NAMES;
-use crate::identify::model::{DELAY, MASS, SPECIMEN};
-use crate::identify::rig::RigIdentification;
+use crate::identify::identified::RigIdentification;
+use crate::identify::parameters::Physical;
 
 /// The name of the thesis's units, and the default of a file that names none.
 pub const INCH_POUND: &str = "inch, lbf, second, volt";
@@ -318,17 +318,12 @@ impl ModelFile {
     /// data do not determine it.
     pub fn from_identification(found: &RigIdentification) -> Self {
         let units = Units::INCH_POUND;
-        let (rig, errors) = (found.rig(), &found.standard_error);
-        let table = rig.shake_table.table;
-        let three = |first: usize| [errors[first], errors[first + 1], errors[first + 2]];
-        let actuator_errors = IdentifiedActuator {
-            denominator: three(0),
-            voltage_to_force: three(3),
-            velocity_to_force: three(6),
-        };
-        let mut actuator_errors = Self::actuator_section(&actuator_errors, units);
+        let (rig, errors) = (found.rig(), found.standard_error.rig(0.0, found.specimen));
+        let body = |own: LinearSpecimen| [own.mass, own.damping, own.stiffness];
+        let (table, table_errors) = (rig.shake_table.table, errors.shake_table.table);
+        let mut actuator_errors = Self::actuator_section(&errors.shake_table.actuator, units);
         actuator_errors.denominator[0] = 0.0;
-        let delay = found.physical[DELAY];
+        let delay = found.physical[Physical::CommandDelay];
         let mut noise = toml::Table::new();
         for (i, name) in OUTPUT_NAMES.iter().enumerate() {
             if found
@@ -357,9 +352,7 @@ impl ModelFile {
                 .identifiable
                 .then(|| Self::actuator_section(&rig.shake_table.actuator, units)),
             table: Self::body_section([table.mass, table.damping, table.stiffness], units),
-            specimen: rig
-                .specimen
-                .map(|s| Self::body_section([s.mass, s.damping, s.stiffness], units)),
+            specimen: rig.specimen.map(|own| Self::body_section(body(own), units)),
             effects: EffectSections::new(),
             noise: Some(noise),
             hydraulics: None,
@@ -367,11 +360,19 @@ impl ModelFile {
             standard_errors: Some(StandardErrors {
                 effects: EffectSections::new(),
                 actuator: found.identifiable.then_some(actuator_errors),
-                table: Self::body_section(three(MASS), units),
-                specimen: rig
+                table: Self::body_section(
+                    [
+                        table_errors.mass,
+                        table_errors.damping,
+                        table_errors.stiffness,
+                    ],
+                    units,
+                ),
+                specimen: errors
                     .specimen
-                    .map(|_| Self::body_section(three(SPECIMEN), units)),
-                command_delay: (delay > 0.0).then_some(errors[DELAY]),
+                    .map(|own| Self::body_section(body(own), units)),
+                command_delay: (delay > 0.0)
+                    .then_some(found.standard_error[Physical::CommandDelay]),
             }),
         }
     }

@@ -3,22 +3,20 @@
 //! Instrumental variables give a start; Gauss-Newton on the predictor of the whole rig
 //! ([`crate::identify::model`]) refines it. The last quarter of each recording is kept for validation.
 
-use nalgebra::{Complex, DMatrix, DVector};
-use plant::identified::coupled::Rig;
 use plant::specimens::linear::LinearSpecimen;
 
 use crate::IdentificationError;
 use crate::data::{Channel, Recording};
 use crate::estimation::gauss_newton::{self, FINE, GaussNewtonEstimate, Search};
 use crate::estimation::prediction::{Parameter, cost};
-use crate::estimation::residuals::ResidualTest;
-use crate::identify::assessment::{assess, response_error};
+use crate::identify::assessment::assess;
 use crate::identify::checks;
 use crate::identify::identifiability;
-use crate::identify::model::{DELAY, OUTPUTS, PHYSICAL, RigModel, rig_from};
-use crate::identify::setup::{experiment, parameters, whole_recordings};
+use crate::identify::identified::RigIdentification;
+use crate::identify::model::RigModel;
+use crate::identify::parameters::{Name, NoiseOn, Own, Physical, PhysicalValues};
+use crate::identify::setup::{fit_part, parameters, whole_recordings};
 use crate::identify::start;
-use crate::identify::validation::ChannelFit;
 
 /// How to identify.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,90 +40,6 @@ impl Default for Options {
     }
 }
 
-/// The identified rig, SI.
-#[derive(Debug, Clone)]
-pub struct RigIdentification {
-    /// Physical parameters as in [`PHYSICAL_NAMES`].
-    pub physical: Vec<f64>,
-    /// Their standard errors.
-    pub standard_error: Vec<f64>,
-    /// Their covariance.
-    pub covariance: DMatrix<f64>,
-    /// Whether a specimen stood on the table in any recording.
-    pub specimen: bool,
-    /// Payload of each recording over the first one's, kg, with its standard error.
-    pub payload: Vec<(f64, f64)>,
-    /// Whether the data determine the actuator.
-    pub identifiable: bool,
-    /// Part of the actuator that is not determined, in words.
-    pub warnings: Vec<String>,
-    /// Relative noise by channel and recording is in here, with offsets and initial states.
-    pub parameters: Vec<f64>,
-    /// The model that predicts.
-    pub model: RigModel,
-    /// Fit per recording and channel on the validation part.
-    pub fits: Vec<ChannelFit>,
-    /// Tests of the one-step errors on the validation part, per recording and channel.
-    pub residuals: Vec<(String, &'static str, ResidualTest)>,
-    /// Singular values of the subspace method.
-    pub singular_values: DVector<f64>,
-    /// Iterations of the refinement.
-    pub iterations: usize,
-}
-
-impl RigIdentification {
-    /// The rig with a recording's payload; `specimen` says whether one stands on it.
-    pub fn rig(&self) -> Rig {
-        rig_from(&self.physical, 0.0, self.specimen)
-    }
-
-    /// Poles of G1 and G2, 1/s.
-    pub fn actuator_poles(&self) -> Vec<Complex<f64>> {
-        self.rig().shake_table.actuator.g1().poles()
-    }
-
-    /// Poles of the bare table, 1/s.
-    pub fn table_poles(&self) -> Vec<Complex<f64>> {
-        self.rig().shake_table.table.transfer_function().poles()
-    }
-
-    /// Standard deviation of the white noise of an output of a recording, SI.
-    pub fn noise(&self, recording: usize, output: usize) -> f64 {
-        let relative = self.parameters[self.model.noise(recording, output)].exp();
-        relative * self.model.experiments[recording].scale[output]
-    }
-
-    /// Takes over the numbers of an estimate.
-    pub(crate) fn take(&mut self, parameters: &[Parameter], estimate: GaussNewtonEstimate) {
-        self.physical = estimate.parameters[..PHYSICAL].to_vec();
-        self.covariance = estimate
-            .covariance
-            .view((0, 0), (PHYSICAL, PHYSICAL))
-            .into_owned();
-        self.standard_error = (0..PHYSICAL)
-            .map(|i| {
-                if parameters[i].free {
-                    estimate.standard_error(i)
-                } else {
-                    0.0
-                }
-            })
-            .collect();
-        self.payload = (0..self.model.experiments.len())
-            .map(|index| {
-                let at = self.model.nuisance(index);
-                (estimate.parameters[at], estimate.standard_error(at))
-            })
-            .collect();
-        self.parameters = estimate.parameters;
-    }
-
-    /// Largest relative standard error of the responses of G1 and G2 over `frequencies` (Hz).
-    pub fn response_error(&self, frequencies: &[f64]) -> [f64; 2] {
-        response_error(&self.physical, &self.covariance, frequencies)
-    }
-}
-
 /// Identifies a rig from its recordings: `valve_command`, `displacement`, `acceleration`,
 /// `actuator_force` and, where a specimen stands on the table, `specimen_acceleration`.
 ///
@@ -142,7 +56,7 @@ pub fn identify(
         .any(|recording| recording.channel(SPECIMEN_SENSOR).is_some());
     for recording in recordings {
         warnings.extend(checks::check(recording, options.fit_part)?);
-        let mut data = experiment(recording, options.fit_part)?;
+        let mut data = fit_part(recording, options.fit_part)?;
         data.specimen |= options.specimen.is_some() && !sensed;
         experiments.push(data);
     }
@@ -203,9 +117,10 @@ pub fn identify(
 
 /// The channel that tells that a specimen stands on the table.
 const SPECIMEN_SENSOR: Channel = Channel::SpecimenAcceleration;
-/// Indices of the constants of denominator and G1, which make the slow pole and zero.
-const A0: usize = 2;
-const B0: usize = 5;
+/// The constants of denominator and G1, which make the slow pole and zero.
+const SLOW: [Physical; 2] = [Physical::A0, Physical::B0];
+/// Place of the delay.
+const DELAY: usize = Physical::CommandDelay.place();
 /// Tolerance of the fit that is validated; the last one starts from it.
 const FITTED: f64 = 0.3;
 
@@ -229,15 +144,12 @@ fn drop_no_delay(
 /// enter linearly; then all but the noise; then the noise.
 fn approach(model: &RigModel, parameters: &mut [Parameter]) -> Result<(), IdentificationError> {
     const COARSE: f64 = 3.0;
-    let experiments = 0..model.experiments.len();
-    let is_noise = |i: usize| {
-        let mut channels = experiments
-            .clone()
-            .flat_map(|e| (0..OUTPUTS + 2).map(move |channel| model.noise(e, channel)));
-        channels.any(|own| own == i)
-    };
+    let is_noise = |i: usize| matches!(Name::at(i), Name::Own(Own::LogNoise(_)));
     let is_linear = |i: usize| {
-        i >= PHYSICAL && !is_noise(i) && experiments.clone().all(|e| i != model.nuisance(e))
+        matches!(
+            Name::at(i),
+            Name::Own(Own::Offset(_) | Own::InitialState(_))
+        )
     };
     let linear = Search {
         iterations: 4,
@@ -250,9 +162,9 @@ fn approach(model: &RigModel, parameters: &mut [Parameter]) -> Result<(), Identi
     // Where command and table force are noisy, the start may be far off; where they are not, the
     // delay is sharp.
     for process in [0.03f64, 0.005] {
-        for experiment in experiments.clone() {
-            for channel in OUTPUTS..OUTPUTS + 2 {
-                parameters[model.noise(experiment, channel)].start = process.ln();
+        for experiment in 0..model.experiments.len() {
+            for noise in [NoiseOn::Command, NoiseOn::Table] {
+                parameters[Own::LogNoise(noise).of(experiment)].start = process.ln();
             }
         }
         stage(model, parameters, &is_linear, linear)?;
@@ -321,9 +233,10 @@ fn hold_undetermined_slow_zero(
     estimate: GaussNewtonEstimate,
     warnings: &mut Vec<String>,
 ) -> Result<GaussNewtonEstimate, IdentificationError> {
-    let lost = [A0, B0]
+    let lost = SLOW
+        .map(Physical::place)
         .iter()
-        .any(|&i| estimate.standard_error(i) > 0.5 * estimate.parameters[i].abs());
+        .any(|&place| estimate.standard_error(place) > 0.5 * estimate.parameters[place].abs());
     if lost {
         warnings.push(
             "the slow pole and zero of the actuator (a0, b0) are not determined by these data: \
@@ -331,9 +244,9 @@ fn hold_undetermined_slow_zero(
                 .into(),
         );
     }
-    let p = &estimate.parameters;
-    let actuator = rig_from(p, 0.0, false).shake_table.actuator;
-    if p[A0] >= 0.0 && p[B0] >= 0.0 && actuator.validate().is_ok() {
+    let physical = PhysicalValues::of(&estimate.parameters);
+    let actuator = physical.rig(0.0, false).shake_table.actuator;
+    if SLOW.iter().all(|&name| physical[name] >= 0.0) && actuator.validate().is_ok() {
         return Ok(estimate);
     }
     if !lost {
@@ -344,9 +257,9 @@ fn hold_undetermined_slow_zero(
         );
     }
     restart(parameters, &estimate);
-    for i in [A0, B0] {
-        parameters[i].start = 0.0;
-        parameters[i].free = false;
+    for name in SLOW {
+        parameters[name.place()].start = 0.0;
+        parameters[name.place()].free = false;
     }
     gauss_newton::fit(model, parameters, Search::nearby(FITTED))
 }

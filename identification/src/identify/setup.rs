@@ -1,12 +1,10 @@
-//! Recordings as scaled experiments, and the parameters that they share with starts and bounds.
+//! Recordings scaled for the model, and the parameters that they share with starts and bounds.
 
 use crate::IdentificationError;
 use crate::data::{Channel, OUTPUT_NAMES, Recording, mean_and_deviation};
 use crate::estimation::prediction::Parameter;
-use crate::identify::model::{
-    DELAY, Experiment, MASS, NUISANCE, OUTPUTS, PHYSICAL, PHYSICAL_NAMES, RigModel, SPECIMEN,
-    STATES,
-};
+use crate::identify::model::{OUTPUTS, RigModel, SPECIMEN_STATES, ScaledRecording};
+use crate::identify::parameters::{NoiseOn, Own, Physical};
 use crate::identify::start;
 
 /// The same experiments to their end, with the scales of the fitted part.
@@ -16,7 +14,7 @@ pub(crate) fn whole_recordings(
 ) -> Result<RigModel, IdentificationError> {
     let mut experiments = Vec::new();
     for (recording, data) in recordings.iter().zip(&model.experiments) {
-        let mut whole = scaled_experiment(recording, &recording.cut(0, data.command.len()))?;
+        let mut whole = scaled(recording, &recording.cut(0, data.command.len()))?;
         whole.scale = data.scale;
         whole.command_scale = data.command_scale;
         whole.specimen = data.specimen;
@@ -26,19 +24,19 @@ pub(crate) fn whole_recordings(
 }
 
 /// One recording's fit part, scaled.
-pub(crate) fn experiment(
+pub(crate) fn fit_part(
     recording: &Recording,
-    fit_part: f64,
-) -> Result<Experiment, IdentificationError> {
-    let fitted = recording.cut(0, (recording.len() as f64 * fit_part) as usize);
-    scaled_experiment(&fitted, &fitted)
+    part: f64,
+) -> Result<ScaledRecording, IdentificationError> {
+    let fitted = recording.cut(0, (recording.len() as f64 * part) as usize);
+    scaled(&fitted, &fitted)
 }
 
 /// `recording` with the scales of `fitted`.
-pub(crate) fn scaled_experiment(
+pub(crate) fn scaled(
     recording: &Recording,
     fitted: &Recording,
-) -> Result<Experiment, IdentificationError> {
+) -> Result<ScaledRecording, IdentificationError> {
     const NEEDED: &str = "valve_command, displacement, acceleration, actuator_force and, with a specimen, \
          specimen_acceleration";
     let command = fitted.require(Channel::ValveCommand, NEEDED)?;
@@ -62,7 +60,7 @@ pub(crate) fn scaled_experiment(
             })
         })
         .collect();
-    Ok(Experiment {
+    Ok(ScaledRecording {
         name: recording.name.clone(),
         period: recording.period(),
         command: recording.samples(Channel::ValveCommand).to_vec(),
@@ -82,86 +80,100 @@ pub(crate) fn parameters(
     specimen_known: bool,
     delay: bool,
 ) -> Vec<Parameter> {
+    use Physical::*;
     let s = &start.physical;
     let specimen = model.experiments.iter().any(|e| e.specimen);
+    let period = model.experiments[0].period;
+    let critical = |mass: Physical, stiffness: Physical| (s[mass] * s[stiffness].abs()).sqrt();
     // What each coefficient is worth beside its neighbour at 0.01 to 5 rad/s.
-    let natural = [
-        s[0].abs().max(0.5 * s[1].abs().sqrt()),
-        s[1].abs(),
-        s[2].abs().max(0.01 * s[1].abs()),
-        s[3].abs(),
-        s[4].abs(),
-        s[5].abs().max(0.01 * s[4].abs()),
-        s[6].abs(),
-        s[7].abs().max(5.0 * s[6].abs()),
-        s[8].abs(),
-        s[MASS],
-        s[MASS + 1]
+    let natural = |parameter: Physical| match parameter {
+        A2 => s[A2].abs().max(0.5 * s[A1].abs().sqrt()),
+        A0 => s[A0].abs().max(0.01 * s[A1].abs()),
+        B0 => s[B0].abs().max(0.01 * s[B1].abs()),
+        E1 => s[E1].abs().max(5.0 * s[E2].abs()),
+        TableMass => s[TableMass],
+        TableDamping => s[TableDamping]
             .abs()
-            .max(0.02 * (s[MASS] * s[MASS + 2].abs()).sqrt()),
-        s[MASS + 2].abs(),
-        s[SPECIMEN].abs(),
-        s[SPECIMEN + 1]
+            .max(0.02 * critical(TableMass, TableStiffness)),
+        SpecimenDamping => s[SpecimenDamping]
             .abs()
-            .max(0.01 * (s[SPECIMEN] * s[SPECIMEN + 2].abs()).sqrt()),
-        s[SPECIMEN + 2].abs(),
-        model.experiments[0].period,
-    ];
-    let mut parameters: Vec<Parameter> = (0..PHYSICAL)
-        .map(|i| {
-            let mut parameter = Parameter::new(PHYSICAL_NAMES[i], s[i], 0.1 * natural[i]);
-            parameter.largest_step = natural[i].max(f64::MIN_POSITIVE);
-            if (SPECIMEN..DELAY).contains(&i) {
-                parameter.free = specimen && !specimen_known;
+            .max(0.01 * critical(SpecimenMass, SpecimenStiffness)),
+        CommandDelay => period,
+        A1 | B2 | B1 | E2 | E0 | TableStiffness | SpecimenMass | SpecimenStiffness => {
+            s[parameter].abs()
+        }
+    };
+    let physical = |name: &Physical| {
+        let natural = natural(*name);
+        let mut parameter = Parameter::new(name.name(), s[*name], 0.1 * natural);
+        parameter.largest_step = natural.max(f64::MIN_POSITIVE);
+        if Physical::SPECIMEN.contains(name) {
+            parameter.free = specimen && !specimen_known;
+        }
+        match name {
+            TableMass => parameter.bounds = (1e-3 * s[TableMass], 1e3 * s[TableMass]),
+            SpecimenMass => parameter.bounds = (1e-4 * s[TableMass], 1e4 * s[TableMass]),
+            CommandDelay => {
+                parameter.free = delay;
+                parameter.largest_step = period;
+                parameter.bounds = (0.0, 0.1);
             }
-            parameter
-        })
-        .collect();
-    parameters[MASS].bounds = (1e-3 * s[MASS], 1e3 * s[MASS]);
-    parameters[SPECIMEN].bounds = (1e-4 * s[MASS], 1e4 * s[MASS]);
-    parameters[DELAY].free = delay;
-    parameters[DELAY].largest_step = model.experiments[0].period;
-    parameters[DELAY].bounds = (0.0, 0.1);
+            _ => {}
+        }
+        parameter
+    };
+    let mut parameters: Vec<Parameter> = Physical::ALL.iter().map(physical).collect();
     for (index, data) in model.experiments.iter().enumerate() {
-        let own = |name: &str, start: f64, scale: f64| {
-            let mut parameter = Parameter::new(name, start, scale);
-            parameter.experiment = Some(index);
-            parameter
-        };
         let earlier =
             (0..index).any(|before| recordings[before].source == recordings[index].source);
-        let mut payload = own("payload", start.mass[index] - s[MASS], 0.1 * s[MASS]);
-        payload.free = index > 0 && !earlier;
-        if !payload.free {
-            payload.start = 0.0;
-        }
-        payload.bounds = (-0.9 * s[MASS], 1e3 * s[MASS]);
-        parameters.push(payload);
-        for i in 0..OUTPUTS {
-            let mut offset = own(&format!("{} offset", OUTPUT_NAMES[i]), 0.0, 1.0);
-            offset.free = data.measured[i];
-            parameters.push(offset);
-        }
-        for i in 0..STATES {
-            let mut state = own("initial state", 0.0, 1.0);
-            state.free = i < 5 || data.specimen;
-            parameters.push(state);
-        }
-        for i in 0..OUTPUTS + 2 {
-            let (start, low) = match i {
-                0..OUTPUTS => {
-                    let predicted = start.noise[index][i].clamp(1e-5, 0.3);
-                    (predicted.ln(), (0.03 * predicted).max(1e-6).ln())
+        let own = Own::all().map(|own| {
+            let mut parameter = match own {
+                Own::Payload => payload(start, index, index > 0 && !earlier),
+                Own::Offset(output) => {
+                    let name = format!("{} offset", OUTPUT_NAMES[output]);
+                    let mut offset = Parameter::new(&name, 0.0, 1.0);
+                    offset.free = data.measured[output];
+                    offset
                 }
-                _ => (0.005f64.ln(), 1e-4f64.ln()),
+                Own::InitialState(state) => {
+                    let mut initial = Parameter::new("initial state", 0.0, 1.0);
+                    initial.free = state < SPECIMEN_STATES || data.specimen;
+                    initial
+                }
+                Own::LogNoise(on) => log_noise(on, &start.noise[index], data),
             };
-            let mut noise = own("logarithm of noise", start, 1.0);
-            noise.free = i >= OUTPUTS || data.measured[i];
-            noise.bounds = (low, 1f64.ln());
-            noise.largest_step = 1.5;
-            parameters.push(noise);
-        }
-        debug_assert_eq!(parameters.len(), PHYSICAL + (index + 1) * NUISANCE);
+            parameter.experiment = Some(index);
+            parameter
+        });
+        parameters.extend(own);
     }
     parameters
+}
+
+fn payload(start: &start::Start, experiment: usize, free: bool) -> Parameter {
+    let mass = start.physical[Physical::TableMass];
+    let carried = start.mass[experiment] - mass;
+    let mut payload = Parameter::new("payload", if free { carried } else { 0.0 }, 0.1 * mass);
+    payload.free = free;
+    payload.bounds = (-0.9 * mass, 1e3 * mass);
+    payload
+}
+
+fn log_noise(on: NoiseOn, predicted: &[f64; OUTPUTS], data: &ScaledRecording) -> Parameter {
+    let (free, start, low) = match on {
+        NoiseOn::Output(output) => {
+            let predicted = predicted[output].clamp(1e-5, 0.3);
+            (
+                data.measured[output],
+                predicted,
+                (0.03 * predicted).max(1e-6),
+            )
+        }
+        NoiseOn::Command | NoiseOn::Table => (true, 0.005, 1e-4),
+    };
+    let mut noise = Parameter::new("logarithm of noise", start.ln(), 1.0);
+    noise.free = free;
+    noise.bounds = (low.ln(), 1f64.ln());
+    noise.largest_step = 1.5;
+    noise
 }

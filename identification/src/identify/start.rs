@@ -13,7 +13,8 @@ use crate::data::mean_and_deviation;
 use crate::estimation::instrumental_variables::{Signal, Signals, regress, simulate, stabilised};
 use crate::estimation::state_variable_filter::{Between, equal_lags, filter};
 use crate::estimation::subspace;
-use crate::identify::model::{DELAY, Experiment, MASS, OUTPUTS, PHYSICAL, SPECIMEN};
+use crate::identify::model::{OUTPUTS, ScaledRecording};
+use crate::identify::parameters::{Physical, PhysicalValues};
 
 /// Corner of the filters, rad/s: between the table's and the oil column's natural frequency.
 const CORNER: f64 = 80.0;
@@ -23,7 +24,7 @@ const ROUNDS: usize = 5;
 /// Start values.
 pub(crate) struct Start {
     /// The physical parameters.
-    pub physical: Vec<f64>,
+    pub physical: PhysicalValues,
     /// Table mass seen in each experiment.
     pub mass: Vec<f64>,
     /// Relative noise of each output of each experiment, by the high-order predictor.
@@ -68,7 +69,7 @@ impl Channels {
 /// # Errors
 /// Too little data, or signals that do not determine the table or the actuator.
 pub(crate) fn start(
-    experiments: &[Experiment],
+    experiments: &[ScaledRecording],
     known: Option<LinearSpecimen>,
     delay: bool,
 ) -> Result<Start, IdentificationError> {
@@ -83,37 +84,38 @@ pub(crate) fn start(
             longest = (data.command.len(), Some(singular_values));
         }
     }
-    let mut physical = vec![0.0; PHYSICAL];
+    let mut physical = PhysicalValues::ZERO;
     let tables = table(experiments, &channels, known)?;
     let mass: Vec<f64> = tables.mass;
-    physical[MASS] = mass[0];
-    physical[MASS + 1] = tables.damping;
-    physical[MASS + 2] = tables.stiffness;
-    physical[SPECIMEN..SPECIMEN + 3].copy_from_slice(&[mass[0], 0.0, 0.0]);
-    if let Some(known) = known {
-        physical[SPECIMEN..SPECIMEN + 3].copy_from_slice(&[
-            known.mass,
-            known.damping,
-            known.stiffness,
-        ]);
-    } else if let Some(specimen) = specimen(experiments, &channels)? {
+    physical[Physical::TableMass] = mass[0];
+    physical[Physical::TableDamping] = tables.damping;
+    physical[Physical::TableStiffness] = tables.stiffness;
+    let carried = if let Some(known) = known {
+        [known.mass, known.damping, known.stiffness]
+    } else if let Some([damping, stiffness]) = specimen(experiments, &channels)? {
         let own = tables.specimen_mass.max(1e-3 * mass[0]);
-        physical[SPECIMEN] = own;
-        physical[SPECIMEN + 1] = specimen[0] * own;
-        physical[SPECIMEN + 2] = specimen[1] * own;
+        [own, damping * own, stiffness * own]
+    } else {
+        [mass[0], 0.0, 0.0]
+    };
+    for (parameter, value) in Physical::SPECIMEN.into_iter().zip(carried) {
+        physical[parameter] = value;
     }
     // On a bare table of one mass every a1 explains the data (see `identifiability`).
     let bare = !experiments.iter().any(|e| e.specimen)
         && mass.iter().all(|own| (own / mass[0] - 1.0).abs() < 0.03);
     if delay {
-        physical[DELAY] = delay_of_command(&channels, bare);
+        physical[Physical::CommandDelay] = delay_of_command(&channels, bare);
     }
-    let late = physical[DELAY] / channels[0].period;
-    physical[..9].copy_from_slice(&actuator(&channels, late, ROUNDS, bare)?.0);
+    let late = physical[Physical::CommandDelay] / channels[0].period;
+    let (found, _) = actuator(&channels, late, ROUNDS, bare)?;
+    for (parameter, value) in Physical::ACTUATOR.into_iter().zip(found) {
+        physical[parameter] = value;
+    }
     // What the filters make of the slow pole and zero may be far off: let them cancel at first.
     const SLOW: f64 = 0.01;
-    physical[2] = SLOW * physical[1];
-    physical[5] = SLOW * physical[4];
+    physical[Physical::A0] = SLOW * physical[Physical::A1];
+    physical[Physical::B0] = SLOW * physical[Physical::B1];
     Ok(Start {
         physical,
         mass,
@@ -123,7 +125,7 @@ pub(crate) fn start(
 }
 
 fn predicted_channels(
-    data: &Experiment,
+    data: &ScaledRecording,
     known: Option<LinearSpecimen>,
 ) -> Result<(Channels, [f64; OUTPUTS], DVector<f64>), IdentificationError> {
     let mut measured: Vec<Vec<f64>> = (0..OUTPUTS)
@@ -185,7 +187,7 @@ struct Tables {
 
 /// `F = m a + c dx/dt + k x + ms as` (Eq 2-5 with the specimen's inertia), filtered.
 fn table(
-    experiments: &[Experiment],
+    experiments: &[ScaledRecording],
     channels: &[Channels],
     known: Option<LinearSpecimen>,
 ) -> Result<Tables, IdentificationError> {
@@ -284,7 +286,7 @@ fn table(
 
 /// `(s^2 + c/m s + k/m) as = (c/m s + k/m) a`: returns `[c/m, k/m]`.
 fn specimen(
-    experiments: &[Experiment],
+    experiments: &[ScaledRecording],
     channels: &[Channels],
 ) -> Result<Option<[f64; 2]>, IdentificationError> {
     let sets: Vec<Signals> = experiments

@@ -10,7 +10,8 @@ use plant::identified::coupled::Rig;
 use plant::linear::StateSpace;
 
 use crate::data::{OUTPUT_NAMES, fit_percent};
-use crate::identify::model::{Experiment, OUTPUTS, RigModel, rig_from};
+use crate::identify::model::{OUTPUTS, RigModel, ScaledRecording};
+use crate::identify::parameters::{Own, PhysicalValues};
 
 /// Fit of one channel of one recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +40,8 @@ pub(crate) fn fits(whole: &RigModel, fitted: &RigModel, parameters: &[f64]) -> V
         if data.command.len() < first + 100 {
             continue;
         }
-        let rig = rig_from(parameters, parameters[whole.nuisance(index)], data.specimen);
+        let payload = parameters[Own::Payload.of(index)];
+        let rig = PhysicalValues::of(parameters).rig(payload, data.specimen);
         let channels = Channels::new(data, first);
         let held = whole.held_by_displacement(index, parameters);
         let predictions = whole.one_step_predictions(index, parameters);
@@ -75,7 +77,7 @@ struct Channels {
 }
 
 impl Channels {
-    fn new(data: &Experiment, first: usize) -> Self {
+    fn new(data: &ScaledRecording, first: usize) -> Self {
         Self {
             period: data.period,
             outputs: (0..OUTPUTS)

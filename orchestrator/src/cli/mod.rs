@@ -11,11 +11,12 @@ pub mod report;
 mod rig;
 pub mod run;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand, ValueEnum};
 
-use crate::fmu::FmiVersion;
+use crate::fmu::{FmiVersion, isolation};
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -50,6 +51,12 @@ enum Command {
     Info(info::Arguments),
     /// Write the HTML report of a run, a comparison or a diagnosis again
     Report(report::Arguments),
+    /// Carry out calls of FMUs for another process of this program
+    #[command(name = isolation::COMMAND, hide = true)]
+    FmuProcess {
+        /// File that the calls come through
+        file: PathBuf,
+    },
     /// Run a system on a motion
     Run(Box<run::Arguments>),
 }
@@ -66,6 +73,7 @@ pub fn main() -> ExitCode {
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
+        Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
         Some(Command::Run(arguments)) => run::execute(&arguments),
     };
     done.unwrap_or_else(|error| {

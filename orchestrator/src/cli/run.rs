@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -9,6 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::OneVersion;
 use super::rig::RigArguments;
 use crate::error::Error;
+use crate::fmu::{Isolation, Options, Trace};
 use crate::master::{Algorithm, Ended, Pace};
 use crate::motion::{self, Motion};
 use crate::report::columns::aligned;
@@ -76,6 +79,18 @@ pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    /// FMUs in a process of their own; foreign ones are those that are given as files
+    #[arg(long, value_enum, default_value_t = Isolation::Foreign)]
+    isolate: Isolation,
+    /// How long a call of an FMU in a process of its own may take [default: 120 s]
+    #[arg(long, value_name = "T")]
+    call_limit: Option<String>,
+    /// Write every call of every FMU, with its values, to this file
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Ask the FMUs for debug messages: all, or those of these categories
+    #[arg(long, value_name = "CATEGORY", num_args = 0.., value_delimiter = ',')]
+    log: Option<Vec<String>>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
         "system", "record", "reference", "plant", "specimen", "tuning", "control_model", "set", "fmi", "algorithm", "step",
@@ -98,12 +113,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Some(manifest) => manifest.request.clone(),
         None => request(arguments)?,
     };
-    let prepared = prepare(&request)?;
+    let mut prepared = prepare(&request)?;
+    prepared.options = fmu_options(arguments)?;
     let Prepared {
         system,
         motion,
         step,
         samples,
+        ..
     } = &prepared;
     let folder = arguments.out.clone().unwrap_or_else(|| {
         let name = format!("{}-{}", system.name, motion.name);
@@ -147,12 +164,43 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
         eprintln!("the run was repeated to the bit");
     }
-    if matches!(outcome.ended, Ended::Complete) {
+    if outcome.ended.is_regular() {
+        if let Ended::Terminated { .. } = outcome.ended {
+            eprintln!("note: {}", outcome.ended.message());
+        }
         return Ok(ExitCode::SUCCESS);
     }
     eprintln!("error: the run ended early: {}", outcome.ended.message());
     eprintln!("what was computed until then is saved");
     Ok(ExitCode::from(1))
+}
+
+/// How FMUs are run.
+///
+/// # Errors
+/// A trace that cannot be written.
+fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
+    let trace = arguments.trace.as_deref().map(|path| {
+        let created = Trace::create(path).map_err(|error| Error::File {
+            path: path.to_path_buf(),
+            reason: error.to_string(),
+        });
+        created.map(Arc::new)
+    });
+    let limit = arguments.call_limit.as_deref();
+    let limit = limit.map(|text| {
+        let seconds = quantity("--call-limit", text, "s")?;
+        Duration::try_from_secs_f64(seconds).map_err(|error| Error::Option {
+            option: "--call-limit",
+            reason: error.to_string(),
+        })
+    });
+    Ok(Options {
+        isolation: arguments.isolate,
+        call_limit: limit.transpose()?.unwrap_or(Options::CALL_LIMIT),
+        trace: trace.transpose()?,
+        log_categories: arguments.log.clone(),
+    })
 }
 
 /// The figures as a table for people.

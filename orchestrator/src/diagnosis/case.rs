@@ -51,7 +51,7 @@ pub(super) fn extend(
     match fmus(&model, results) {
         Ok(built) => {
             let first = found.modelled.first();
-            let home = first.map_or("ShakeTable", |named| component_of(named.effect));
+            let home = first.map_or("ShakeTable", |named| component_of(named.effect).name());
             let place = |fmu: &PackedFmu| folder.join(name(fmu));
             report.extended_fmu = find(&built, home).map(place);
             report.extended_fmus = built.iter().map(place).collect();

@@ -14,8 +14,8 @@ use identification::diagnosis::{GainAgainstNoise, GainReport};
 use crate::fmu::Fmu;
 use crate::master::{Algorithm, Ended, Pace, Simulation};
 use crate::motion::Motion;
-use crate::system::model::{shake_table_values, specimen_values};
 use crate::system::{ComponentFile, Origin, Quantity, SystemFile, VariableName, assemble};
+use plant::identified::nominal::{shake_table_values, specimen_values};
 
 /// Coupling steps of table and specimen in a sample, the finest that the rig's delays allow (they
 /// last at most thirty steps).
@@ -43,9 +43,9 @@ impl RigFmus {
     /// The same FMUs with the parameters of the nominal model.
     #[must_use]
     pub fn nominal(mut self, nominal: &Nominal) -> Self {
-        self.table.1 = shake_table_values(&nominal.shake_table).to_vec();
+        self.table.1 = shake_table_values(&nominal.shake_table);
         if let (Some(own), Some(specimen)) = (&mut self.specimen, &nominal.specimen) {
-            own.1 = specimen_values(specimen).to_vec();
+            own.1 = specimen_values(specimen);
         }
         self
     }

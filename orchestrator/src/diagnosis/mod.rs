@@ -102,9 +102,8 @@ fn fault(subject: &Path, error: DiagnosisError) -> Error {
         DiagnosisError::Rig(DescriptionError::Description { path, what }) => {
             file_fault(&path, what)
         }
-        DiagnosisError::Rig(DescriptionError::Data { path, line, what }) => {
-            file_fault(&path, format!("line {line}: {what}"))
-        }
+        DiagnosisError::Rig(DescriptionError::Data(error))
+        | DiagnosisError::Case(CaseError::Data(error)) => error.into(),
         DiagnosisError::DataOfACase => Error::Option {
             option: "--data",
             reason: error.to_string(),

@@ -14,7 +14,7 @@ use super::{DIAGNOSIS, pictures, rig, text};
 use crate::extended_model::ExtendedModel;
 use crate::report::number::significant;
 use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Report, Section, Table};
-use crate::system::model::{shake_table_values, specimen_values};
+use plant::identified::nominal::{shake_table_values, specimen_values};
 
 /// A table of `rows`, of which the first are the headings.
 fn table(caption: &str, rows: Vec<Vec<String>>) -> Table {
@@ -405,7 +405,7 @@ fn errors(case: &Case, diagnosis: &Diagnosis) -> [Section; 3] {
 }
 
 fn extended_case(case: &Case, model: &ExtendedModel) -> Section {
-    let mut nominal = shake_table_values(&case.nominal.shake_table).to_vec();
+    let mut nominal = shake_table_values(&case.nominal.shake_table);
     if let Some(specimen) = &case.nominal.specimen {
         nominal.extend(specimen_values(specimen));
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use identification::diagnosis::rigs::curves::{self, Curves};
 use identification::diagnosis::rigs::{
-    Description, DescriptionError, ExtendedRig, Measurement, Named, Rig, RigDiagnosis, of_kind,
+    Description, DescriptionError, ExtendedRig, Measurement, Rig, RigDiagnosis, of_kind,
 };
 
 use super::{EXTENDED_MODEL, fault, file_fault};
@@ -108,7 +108,7 @@ fn errors(curves: &Curves, model: &[f64]) -> Vec<f64> {
 }
 
 fn over_time(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
-    let (output, si) = rig.output();
+    let (output, si) = (rig.output().name(), rig.output().unit());
     let every = curves.time.len().div_ceil(DRAWN).max(1);
     let history = |name: &str, model: &[f64], colour| {
         let errors = thin(&errors(curves, model));
@@ -130,7 +130,7 @@ fn over_time(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
 }
 
 fn loops(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
-    let ((input, input_si), (output, si)): (Named, Named) = (rig.inputs()[0], rig.output());
+    let (input, output) = (rig.inputs()[0], rig.output());
     let places: Arc<[f64]> = thin(&curves.input).into();
     let path = |name: &str, values: &[f64], colour| {
         Series::line(name, Abscissa::At(places.clone()), thin(values))
@@ -139,8 +139,8 @@ fn loops(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
     };
     Panel {
         title: format!("{}, {}", found.name, curves.record),
-        x: Axis::linear(input, units(input_si)),
-        y: Axis::linear(output, units(si)),
+        x: Axis::linear(input.name(), units(input.unit())),
+        y: Axis::linear(output.name(), units(output.unit())),
         series: vec![
             path("measured", &curves.measured, 0),
             path("nominal", &curves.nominal, 2),
@@ -151,7 +151,7 @@ fn loops(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
 
 /// A fortieth of the record, where the nominal model is worst.
 fn close_look(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
-    let (output, si) = rig.output();
+    let (output, si) = (rig.output().name(), rig.output().unit());
     let samples = curves.measured.len();
     let errors = errors(curves, &curves.nominal);
     let length = (samples / 40).max(64).min(samples);

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use fmi_rs::{SHARED_LIBRARY_EXTENSION, fmi2, fmi3};
 use zip::ZipArchive;
 
+use super::folder::Folder;
 use super::{FmiVersion, FmuError};
 
 /// The largest FMU that is unpacked, in bytes; a small archive may claim much more than it holds.
@@ -21,7 +22,7 @@ pub(super) fn file_name(path: &Path) -> String {
 }
 
 /// Unpacks `bytes` (the file at `fmu`) into a new temporary directory.
-pub(super) fn unpack(fmu: &Path, bytes: &[u8]) -> Result<tempfile::TempDir, FmuError> {
+pub(super) fn unpack(fmu: &Path, bytes: &[u8]) -> Result<Folder, FmuError> {
     let broken = |reason: String| FmuError::Archive {
         fmu: fmu.to_path_buf(),
         reason,
@@ -60,9 +61,7 @@ pub(super) fn unpack(fmu: &Path, bytes: &[u8]) -> Result<tempfile::TempDir, FmuE
             "the archive has no modelDescription.xml at its top".to_string(),
         ));
     }
-    let directory = tempfile::Builder::new()
-        .prefix("shakebench-fmu-")
-        .tempdir()
+    let directory = Folder::new()
         .map_err(|error| broken(format!("no temporary directory to unpack it: {error}")))?;
     for (index, name) in names.iter().enumerate() {
         let target = directory.path().join(name);

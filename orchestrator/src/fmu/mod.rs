@@ -2,26 +2,43 @@
 //! instances look the same whether they are FMI 2.0 or 3.0.
 
 mod archive;
+mod call;
+mod convert;
+mod datum;
 mod description;
 mod error;
+mod folder;
 mod instance;
+pub mod isolation;
 mod messages;
+mod native;
+mod options;
+mod processes;
+mod trace;
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use sha2::{Digest, Sha256};
 
-pub use description::{Causality, Description, FmiVersion, Item, Kind, Variability, Variable};
+pub use datum::Datum;
+pub use description::{
+    BaseUnit, Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable,
+};
 pub use error::{CallError, FmuError};
-pub use instance::{Instance, State};
+pub use instance::{Instance, Progress, State};
 pub use messages::Message;
+pub use native::printing::Diverted;
+pub use options::{Isolation, Options};
+pub use processes::Processes;
+pub use trace::Trace;
 
 /// `fmi-rs` checks variable names with a parser that keeps its state in globals: one at a time.
 static PARSER: Mutex<()> = Mutex::new(());
 
 /// An FMU file: described and unpacked, not yet loaded.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Fmu {
     /// The file.
     pub path: PathBuf,
@@ -29,9 +46,11 @@ pub struct Fmu {
     pub description: Description,
     /// SHA-256 of the file, in hexadecimal.
     pub sha256: String,
+    /// Whether it is a component of this project, packed by this program; others are foreign.
+    pub is_own: bool,
     /// Platforms it has binaries for, as its folders are named.
     pub platforms: Vec<String>,
-    unpacked: tempfile::TempDir,
+    unpacked: Arc<folder::Folder>,
 }
 
 impl Fmu {
@@ -41,6 +60,21 @@ impl Fmu {
     /// A file that cannot be read, an archive that is broken or would write outside its directory,
     /// a description that cannot be used. Nothing of the FMU has been executed by then.
     pub fn open(path: &Path) -> Result<Arc<Self>, FmuError> {
+        Ok(Arc::new(Self::read(path)?))
+    }
+
+    /// Opens a component of this project that this program has packed itself.
+    ///
+    /// # Errors
+    /// As [`Fmu::open`].
+    pub fn open_own(path: &Path) -> Result<Arc<Self>, FmuError> {
+        Ok(Arc::new(Self {
+            is_own: true,
+            ..Self::read(path)?
+        }))
+    }
+
+    fn read(path: &Path) -> Result<Self, FmuError> {
         let bytes = std::fs::read(path).map_err(|source| FmuError::Unreadable {
             fmu: path.to_path_buf(),
             source,
@@ -48,16 +82,45 @@ impl Fmu {
         let unpacked = archive::unpack(path, &bytes)?;
         let description = {
             let _alone = PARSER.lock().unwrap_or_else(PoisonError::into_inner);
-            description::read(path, unpacked.path())?
+            description::read(path, unpacked.path(), &HashMap::new())?
         };
         let platforms = archive::platforms(unpacked.path());
-        Ok(Arc::new(Self {
+        Ok(Self {
             path: path.to_path_buf(),
             description,
             sha256: hexadecimal(&Sha256::digest(&bytes)),
+            is_own: false,
             platforms,
-            unpacked,
+            unpacked: Arc::new(unpacked),
+        })
+    }
+
+    /// The same FMU with structural parameters of these values, by position, so that its arrays
+    /// have other sizes.
+    ///
+    /// # Errors
+    /// Sizes that are too large.
+    pub fn resized(&self, sizes: &[(usize, u64)]) -> Result<Arc<Self>, FmuError> {
+        let variables = &self.description.variables;
+        let sizes = sizes
+            .iter()
+            .map(|&(position, size)| (variables[position].reference, size))
+            .collect();
+        let _alone = PARSER.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(Arc::new(Self {
+            description: description::read(&self.path, self.unpacked.path(), &sizes)?,
+            ..self.clone()
         }))
+    }
+
+    /// The same FMU as if no output depended directly on an input.
+    pub(crate) fn without_feedthrough(&self) -> Self {
+        let mut fmu = self.clone();
+        let none: Arc<[usize]> = [].into();
+        for variable in &mut fmu.description.variables {
+            variable.dependencies = none.clone();
+        }
+        fmu
     }
 
     /// The file's name, as messages give it.

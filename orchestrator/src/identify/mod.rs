@@ -11,8 +11,9 @@ use std::time::Instant;
 
 use identification::IdentificationError;
 use identification::data::Recording;
+use identification::identify::identified::RigIdentification;
 use identification::identify::model_file::ModelFile;
-use identification::identify::rig::{self, Options, RigIdentification};
+use identification::identify::rig::{self, Options};
 use identification::identify::specimen_file;
 
 pub use hydraulic::{EQUATION_COLUMNS, HydraulicIdentification, PARAMETER_COLUMNS};

@@ -1,7 +1,7 @@
 //! The report of an identification.
 
 use identification::data::Recording;
-use identification::identify::rig::RigIdentification;
+use identification::identify::identified::RigIdentification;
 
 use super::parameters::parameters;
 use super::responses;

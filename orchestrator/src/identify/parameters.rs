@@ -1,7 +1,7 @@
 //! The parameters of an identified rig as a table.
 
+use identification::identify::identified::RigIdentification;
 use identification::identify::model_file::{ModelFile, StandardErrors};
-use identification::identify::rig::RigIdentification;
 
 use crate::report::number::significant;
 

@@ -6,8 +6,7 @@ use identification::data::{Channel, Recording};
 use identification::estimation::frequency_response::{
     FrequencyResponseEstimate, direct, joint_input_output,
 };
-use identification::identify::model::rig_from;
-use identification::identify::rig::RigIdentification;
+use identification::identify::identified::RigIdentification;
 use plant::linear::{FrequencyResponse, TransferFunction, log_space};
 
 use crate::report::{Abscissa, Axis, Panel, Section, Series, Style, Units};
@@ -66,7 +65,9 @@ fn measured(found: &RigIdentification, recording: &Recording, index: usize) -> V
         .experiments
         .get(index)
         .is_some_and(|experiment| experiment.specimen);
-    let system = rig_from(&found.physical, payload, specimen)
+    let system = found
+        .physical
+        .rig(payload, specimen)
         .state_space()
         .sample(recording.period());
     let highest = SHOWN.1.min(0.5 / recording.period());

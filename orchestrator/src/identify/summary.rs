@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use identification::identify::rig::RigIdentification;
+use identification::identify::identified::RigIdentification;
 use serde::Serialize;
 
 /// What `--json` prints.

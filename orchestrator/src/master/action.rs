@@ -1,5 +1,6 @@
 //! What is done at a tick, prepared for doing it many times.
 
+use super::signals::Signals;
 use super::transfer::{Inputs, Outputs};
 use super::{MasterError, Part};
 
@@ -46,7 +47,7 @@ impl Action {
         &mut self,
         at: Moment,
         parts: &mut [Part],
-        signals: &mut [f64],
+        signals: &mut Signals,
         names: &[String],
     ) -> Result<(), MasterError> {
         match self {
@@ -55,7 +56,7 @@ impl Action {
                 inputs,
                 outputs,
             } => {
-                let instance = &parts[*part].instance;
+                let instance = &mut parts[*part].instance;
                 inputs.transfer(signals, instance)?;
                 outputs.read(signals, instance)?;
             }
@@ -67,9 +68,9 @@ impl Action {
                 if part.failure.is_some() {
                     return Ok(());
                 }
-                part.inputs.transfer(signals, &part.instance)?;
+                part.inputs.transfer(signals, &mut part.instance)?;
                 if !at.calls {
-                    return Ok(part.outputs.read(signals, &part.instance)?);
+                    return Ok(part.outputs.read(signals, &mut part.instance)?);
                 }
                 part.step(at.time, every as f64 * at.step)?;
                 if part.failure.is_none() {
@@ -89,11 +90,11 @@ impl Action {
                     part.instance.save_state(&mut part.state)?;
                 }
                 for pass in 1.. {
-                    last.copy_from_slice(signals);
+                    last.copy_from_slice(&signals.numbers);
                     for action in actions.iter_mut() {
                         action.perform(at, parts, signals, names)?;
                     }
-                    if converged(at.time, pass, last, signals, names)? {
+                    if converged(at.time, pass, last, &signals.numbers, names)? {
                         break;
                     }
                     for &part in called.iter().filter(|_| at.calls) {

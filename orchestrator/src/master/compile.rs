@@ -1,14 +1,15 @@
 //! From a checked system to a simulation: loads the FMUs and prepares every exchange of values.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::action::Action;
 use super::reference::Reference;
-use super::transfer::{Inputs, Outputs};
-use super::{Algorithm, EndSignals, MasterError, Part, Simulation, start};
-use crate::fmu::{Causality, Instance, Kind, State, Variability};
+use super::signals::{Place, Signals};
+use super::transfer::{Drive, Inputs, Outputs};
+use super::{Algorithm, EndSignals, MasterError, Part, Simulation, order, start};
+use crate::fmu::{Causality, Datum, Instance, Kind, Options, Processes, State, Variability};
 use crate::motion::Motion;
-use crate::system::{Operation, Quantity, Source, System};
+use crate::system::{Connection, Operation, Quantity, Source, System};
 
 impl Simulation {
     /// Loads and initializes `system` under `motion`, with a coupling step of `step` seconds.
@@ -22,6 +23,28 @@ impl Simulation {
         algorithm: Algorithm,
         step: f64,
     ) -> Result<Self, MasterError> {
+        let stop = motion.len() as f64 * motion.dt;
+        Self::with(system, motion, algorithm, (step, stop), &Options::default())
+    }
+
+    /// As [`Simulation::new`], for a run that ends at `stop` seconds, with FMUs run as `options`
+    /// say.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn with(
+        system: &System,
+        motion: &Motion,
+        algorithm: Algorithm,
+        (step, stop): (f64, f64),
+        options: &Options,
+    ) -> Result<Self, MasterError> {
+        // A Jacobi master sets, steps and reads: every FMU bears that.
+        let (system, notes) = match algorithm {
+            Algorithm::Jacobi => (system.clone(), Vec::new()),
+            _ => order::bearable(system, step, stop, options),
+        };
+        let system = &system;
         let ticks_per_row = ticks(motion.dt, step, "the sample time of the motion")?;
         let schedule = system.schedule(algorithm == Algorithm::Iterative)?;
         let mut reference = Reference::new(motion);
@@ -34,13 +57,17 @@ impl Simulation {
             }
         }
         let mut plan = Plan::new(system, &mut reference, &schedule.operations);
+        let mut processes = Processes::new(options);
         let mut parts = Vec::with_capacity(system.components.len());
         for (index, component) in system.components.iter().enumerate() {
             if algorithm == Algorithm::Iterative && !component.fmu.description.saves_state {
                 return Err(MasterError::NoState(component.name.clone()));
             }
-            let instance = Instance::new(&component.fmu, &component.name)?;
-            start::prepare(&instance, component)?;
+            let may_fail =
+                component.period.is_some() && system.stop.is_some_and(|(guard, _)| guard != index);
+            let (fmu, name) = (&component.fmu, &component.name);
+            let mut instance = Instance::within(fmu, name, &mut processes, may_fail)?;
+            start::prepare(&mut instance, component)?;
             let every = component
                 .period
                 .map(|period| ticks(period, step, &format!("the period of `{}`", component.name)));
@@ -50,9 +77,9 @@ impl Simulation {
                 inputs: plan.inputs(&mut reference, index, |_| true),
                 outputs: std::mem::take(&mut plan.outputs[index]),
                 state: State::default(),
-                may_fail: component.period.is_some()
-                    && system.stop.is_some_and(|(guard, _)| guard != index),
+                may_fail,
                 failure: None,
+                ended: None,
             });
         }
         let actions = schedule
@@ -60,23 +87,35 @@ impl Simulation {
             .iter()
             .map(|operation| plan.action(&mut reference, operation))
             .collect();
-        let end = system.end.map(|end| EndSignals {
-            when: plan.places[&end.when],
-            cause: end.cause.map(|(component, variable)| {
+        // What ends a run is Boolean, and its cause an enumeration: both are numbers.
+        let number = |place: &(usize, usize)| match plan.places.get(place) {
+            Some(Place::Number(signal)) => Some(*signal),
+            _ => None,
+        };
+        let end = system.end.and_then(|end| {
+            let cause = end.cause.and_then(|(component, variable)| {
                 let variables = &system.components[component].fmu.description.variables;
                 let items = match &variables[variable].kind {
                     Kind::Enumeration(items) => items.clone(),
                     _ => Vec::new(),
                 };
-                (plan.places[&(component, variable)], items)
-            }),
-            after: end.after,
+                Some((number(&(component, variable))?, items))
+            });
+            Some(EndSignals {
+                when: number(&end.when)?,
+                cause,
+                after: end.after,
+            })
         });
-        let stop = system.stop.map(|(part, variable)| {
+        let guard = system.stop.map(|(part, variable)| {
             let variables = &system.components[part].fmu.description.variables;
             (part, variables[variable].reference)
         });
-        let signals = vec![0.0; plan.names.len()];
+        let (exact_names, exact) = plan.exact.into_iter().unzip();
+        let signals = Signals {
+            numbers: vec![0.0; plan.names.len()],
+            exact,
+        };
         let mut simulation = Self {
             algorithm,
             step,
@@ -86,19 +125,30 @@ impl Simulation {
             last_signals: signals.clone(),
             signals,
             names: plan.names,
+            exact_names,
             reference,
             parts,
+            diverted: processes.diverted(),
             actions,
+            notes,
             end,
-            stop,
+            stop: guard,
         };
-        start::initialize(&mut simulation, motion.len() as f64 * motion.dt)?;
+        start::initialize(&mut simulation, stop)?;
         Ok(simulation)
     }
 }
 
+/// Shorter coupling steps are mistakes, s.
+const SHORTEST_STEP: f64 = 1e-9;
+
 /// How many steps make a period.
 fn ticks(period: f64, step: f64, what: &str) -> Result<usize, MasterError> {
+    if step.is_finite() && step < SHORTEST_STEP {
+        return Err(MasterError::Step(format!(
+            "--step: a coupling step of {step:e} s is shorter than a nanosecond"
+        )));
+    }
     let count = (period / step).round();
     if !step.is_finite() || step <= 0.0 || count < 1.0 || (count * step / period - 1.0).abs() > 1e-9
     {
@@ -115,12 +165,16 @@ fn ticks(period: f64, step: f64, what: &str) -> Result<usize, MasterError> {
 /// Where each signal stands.
 struct Plan<'a> {
     system: &'a System,
-    places: HashMap<(usize, usize), usize>,
+    places: HashMap<(usize, usize), Place>,
     names: Vec<String>,
+    /// Names and empty values of signals that numbers do not hold.
+    exact: Vec<(String, Datum)>,
     /// The outputs of each component.
     outputs: Vec<Outputs>,
     /// The outputs of each operation, by component and first output.
     groups: HashMap<(usize, usize), Outputs>,
+    /// Connections to each component, in their order.
+    incoming: Vec<Vec<&'a Connection>>,
 }
 
 impl<'a> Plan<'a> {
@@ -130,18 +184,22 @@ impl<'a> Plan<'a> {
             let source = Source::Reference { quantity, ahead: 0 };
             names[reference.tap(quantity, 0)] = system.origin(source).to_string();
         }
+        let mut incoming = vec![Vec::new(); system.components.len()];
         for connection in &system.connections {
             if let Source::Reference { quantity, ahead } = connection.source {
                 names[reference.tap(quantity, ahead)] =
                     system.origin(connection.source).to_string();
             }
+            incoming[connection.component].push(connection);
         }
         let mut plan = Self {
             system,
             places: HashMap::new(),
             names,
+            exact: Vec::new(),
             outputs: vec![Outputs::default(); system.components.len()],
             groups: HashMap::new(),
+            incoming,
         };
         for operation in operations {
             plan.place(operation);
@@ -160,8 +218,8 @@ impl<'a> Plan<'a> {
             Operation::Call { component } => {
                 let description = &self.system.components[*component].fmu.description;
                 let outputs = description.of(Causality::Output);
-                let numeric = outputs.filter(|&v| description.variables[v].kind.is_numeric());
-                (*component, numeric.collect())
+                let travelling = outputs.filter(|&v| description.variables[v].kind.travels());
+                (*component, travelling.collect())
             }
         };
         let variables = &self.system.components[component].fmu.description.variables;
@@ -173,31 +231,38 @@ impl<'a> Plan<'a> {
         }
         let mut group = Outputs::default();
         for kind in kinds {
-            let first = self.names.len();
-            let alike = outputs
-                .iter()
-                .copied()
-                .filter(|&v| variables[v].kind == *kind);
-            let alike: Vec<usize> = alike.collect();
-            for &output in &alike {
-                self.places.insert((component, output), self.names.len());
-                self.names
-                    .push(self.system.variable_name(component, output).to_string());
+            let first = match kind.is_exact() {
+                true => self.exact.len(),
+                false => self.names.len(),
+            };
+            let (mut references, mut count) = (Vec::new(), 0);
+            let alike = outputs.iter().filter(|&&v| variables[v].kind == *kind);
+            for &output in alike {
+                let name = self.system.variable_name(component, output).to_string();
+                let place = if kind.is_exact() {
+                    self.exact.push((name, Datum::empty(kind)));
+                    Place::Exact(first + count)
+                } else {
+                    self.names.push(name);
+                    Place::Number(first + count)
+                };
+                self.places.insert((component, output), place);
+                // The elements of an array stand side by side.
+                if variables[output].element.0 == 0 {
+                    references.push(variables[output].reference);
+                }
+                count += 1;
             }
-            group.add(
-                kind,
-                alike.iter().map(|&v| variables[v].reference).collect(),
-                first,
-            );
+            group.add(kind, references, count, first);
         }
         self.outputs[component].extend(&group);
         self.groups
             .insert((component, outputs.first().copied().unwrap_or(0)), group);
     }
 
-    fn signal(&self, reference: &mut Reference, source: Source) -> usize {
+    fn signal(&self, reference: &mut Reference, source: Source) -> Place {
         match source {
-            Source::Reference { quantity, ahead } => reference.tap(quantity, ahead),
+            Source::Reference { quantity, ahead } => Place::Number(reference.tap(quantity, ahead)),
             Source::Output {
                 component,
                 variable,
@@ -220,23 +285,49 @@ impl<'a> Plan<'a> {
         }
     }
 
+    /// The driven inputs of a component among the chosen ones; arrays as a whole.
     fn inputs(
         &self,
         reference: &mut Reference,
         component: usize,
         chosen: impl Fn(usize) -> bool,
     ) -> Inputs {
-        let variables = &self.system.components[component].fmu.description.variables;
+        let part = &self.system.components[component];
+        let variables = &part.fmu.description.variables;
         let mut inputs = Inputs::default();
-        for connection in &self.system.connections {
-            if connection.component == component && chosen(connection.input) {
-                let signal = self.signal(reference, connection.source);
-                let input = &variables[connection.input];
-                let is_smooth = self.is_smooth(connection.source)
-                    && input.kind == Kind::Float64
-                    && input.variability == Variability::Continuous;
-                inputs.add(input, signal, connection.factor, is_smooth);
+        // Elements of arrays, by the position of the first.
+        let mut arrays: HashMap<usize, Vec<Option<Drive>>> = HashMap::new();
+        let mut order = Vec::new();
+        for connection in &self.incoming[component] {
+            let input = &variables[connection.input];
+            let (element, size) = input.element;
+            let first = connection.input - element;
+            if !(first..first + size).any(&chosen) {
+                continue;
             }
+            let is_smooth = self.is_smooth(connection.source)
+                && input.kind == Kind::Float64
+                && input.variability == Variability::Continuous;
+            let drive = Drive {
+                signal: self.signal(reference, connection.source),
+                factor: connection.factor,
+                offset: connection.offset,
+                is_smooth,
+            };
+            let drives = arrays.entry(first).or_insert_with(|| {
+                order.push(first);
+                vec![None; size]
+            });
+            drives[element] = Some(drive);
+        }
+        let given = part.given();
+        for first in order {
+            let elements: Vec<_> = arrays[&first]
+                .iter()
+                .zip(first..)
+                .map(|(drive, position)| (*drive, part.start_value(&given, position)))
+                .collect();
+            inputs.add(&variables[first], &elements);
         }
         inputs
     }
@@ -246,15 +337,17 @@ impl<'a> Plan<'a> {
             Operation::Call { component } => Action::Call { part: *component },
             Operation::Read { component, outputs } => {
                 let variables = &self.system.components[*component].fmu.description.variables;
-                let needed = |input| {
-                    outputs
-                        .iter()
-                        .any(|&v| variables[v].dependencies.contains(&input))
-                };
+                // Outputs mostly share their lists of dependencies.
+                let mut known = HashSet::new();
+                let lists = outputs
+                    .iter()
+                    .map(|&output| &variables[output].dependencies);
+                let lists = lists.filter(|list| known.insert(list.as_ptr()));
+                let needed: HashSet<usize> = lists.flat_map(|list| list.iter().copied()).collect();
                 let group = (*component, outputs.first().copied().unwrap_or(0));
                 Action::Read {
                     part: *component,
-                    inputs: self.inputs(reference, *component, needed),
+                    inputs: self.inputs(reference, *component, |input| needed.contains(&input)),
                     outputs: self.groups.get(&group).cloned().unwrap_or_default(),
                 }
             }

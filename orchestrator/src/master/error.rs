@@ -26,6 +26,16 @@ pub enum MasterError {
          (its FMU does not offer it); choose --algorithm gauss-seidel"
     )]
     NoState(String),
+    /// Values that grow without bound.
+    #[error("the run diverges: `{variable}` is {value:e} at {time} s")]
+    Diverged {
+        /// Time, s.
+        time: f64,
+        /// The first variable that is too large.
+        variable: String,
+        /// Its value.
+        value: f64,
+    },
     /// An iteration that does not settle.
     #[error(
         "the values do not stand still at {time} s after {passes} repetitions: `{variable}` still \

@@ -22,7 +22,7 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     let (tick, time, step) = (simulation.tick, simulation.time(), simulation.step);
     let (now, last) = (&mut simulation.signals, &mut simulation.last_signals);
     if tick == 0 {
-        last.copy_from_slice(now);
+        last.copy_from(now);
     }
     for part in simulation
         .parts
@@ -30,9 +30,9 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
         .filter(|part| part.every.is_none())
     {
         part.inputs
-            .transfer_between(now, last, -0.5, &part.instance)?;
-        part.instance.do_step(time, step)?;
+            .transfer_between(now, last, -0.5, &mut part.instance)?;
+        part.step(time, step)?;
     }
-    last.copy_from_slice(now);
+    last.copy_from(now);
     Ok(())
 }

@@ -27,18 +27,18 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     for part in parts.iter_mut().filter(|part| part.every.is_none()) {
         part.instance.save_state(&mut part.state)?;
     }
-    next.copy_from_slice(signals);
+    next.copy_from(signals);
     for pass in 1.. {
-        last.copy_from_slice(next);
+        last.copy_from(next);
         for part in parts.iter_mut().filter(|part| part.every.is_none()) {
             part.inputs
-                .transfer_between(signals, next, 0.5, &part.instance)?;
-            part.instance.do_step(time, step)?;
+                .transfer_between(signals, next, 0.5, &mut part.instance)?;
+            part.step(time, step)?;
         }
         for action in actions.iter_mut().filter(|action| action.is_continuous()) {
             action.perform(end, parts, next, names)?;
         }
-        if converged(time, pass, last, next, names)? {
+        if converged(time, pass, &last.numbers, &next.numbers, names)? {
             return Ok(());
         }
         for part in parts.iter_mut().filter(|part| part.every.is_none()) {

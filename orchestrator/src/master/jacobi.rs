@@ -11,7 +11,8 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
         .iter_mut()
         .filter(|part| part.is_due(tick) && part.failure.is_none())
     {
-        part.inputs.transfer(&simulation.signals, &part.instance)?;
+        part.inputs
+            .transfer(&simulation.signals, &mut part.instance)?;
     }
     for part in parts.iter_mut().filter(|part| part.is_due(tick)) {
         let ticks = part.every.unwrap_or(1);

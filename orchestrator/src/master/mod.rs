@@ -11,9 +11,11 @@ mod error;
 mod gauss_seidel;
 mod iterative;
 mod jacobi;
+mod order;
 mod record;
 mod reference;
 mod run;
+mod signals;
 mod start;
 mod transfer;
 
@@ -23,9 +25,10 @@ pub use error::MasterError;
 pub use record::Record;
 pub use run::{Ended, Ending, LogLine, Outcome, Pace};
 
-use crate::fmu::{Instance, Item, State};
+use crate::fmu::{Diverted, Instance, Item, Progress, State};
 use action::{Action, Moment};
 use reference::Reference;
+use signals::Signals;
 use transfer::{Inputs, Outputs};
 
 /// The order in which components are called and values are exchanged.
@@ -72,20 +75,26 @@ pub struct Simulation {
     /// Ticks from one row of the record to the next: one sample of the motion.
     ticks_per_row: usize,
     /// The latest value of every source of connections and every output.
-    signals: Vec<f64>,
-    /// Their names.
+    signals: Signals,
+    /// Names of the numbers.
     names: Vec<String>,
+    /// Names of the values that numbers do not hold.
+    exact_names: Vec<String>,
     reference: Reference,
     parts: Vec<Part>,
+    /// While foreign FMUs live in this process, what they print does not go among the results.
+    diverted: Option<Diverted>,
     actions: Vec<Action>,
+    /// What the user should know of the order of calls.
+    notes: Vec<String>,
     /// What ends the run early.
     end: Option<EndSignals>,
     /// The part and input that is set when a sampled component fails.
     stop: Option<(usize, u32)>,
     /// The signals at the tick before; in [`Algorithm::Iterative`] those of the last repetition.
-    last_signals: Vec<f64>,
+    last_signals: Signals,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
-    next_signals: Vec<f64>,
+    next_signals: Signals,
 }
 
 /// What ends a run early.
@@ -113,24 +122,30 @@ struct Part {
     may_fail: bool,
     /// Why it is called no more; its outputs keep their last values.
     failure: Option<MasterError>,
+    /// When it asked to end the run, s.
+    ended: Option<f64>,
 }
 
 impl Part {
     /// Steps it; a failure that may be is kept instead of given.
     fn step(&mut self, time: f64, length: f64) -> Result<(), MasterError> {
-        if self.failure.is_some() {
+        if self.failure.is_some() || self.ended.is_some() {
             return Ok(());
         }
         match self.instance.do_step(time, length) {
             Err(error) if self.may_fail => self.failure = Some(error.into()),
-            done => done?,
+            done => {
+                if let Progress::Ended(at) = done? {
+                    self.ended = Some(at);
+                }
+            }
         }
         Ok(())
     }
 
     /// Reads its outputs into the signals; a failure that may be is kept instead of given.
-    fn read(&mut self, signals: &mut [f64]) -> Result<(), MasterError> {
-        match self.outputs.read(signals, &self.instance) {
+    fn read(&mut self, signals: &mut Signals) -> Result<(), MasterError> {
+        match self.outputs.read(signals, &mut self.instance) {
             Err(error) if self.may_fail => self.failure = Some(error.into()),
             done => done?,
         }
@@ -160,7 +175,7 @@ impl Simulation {
 
     /// The latest values, SI.
     pub fn signals(&self) -> &[f64] {
-        &self.signals
+        &self.signals.numbers
     }
 
     /// Makes the outputs at the present tick known; due sampled components are called.
@@ -169,7 +184,7 @@ impl Simulation {
     /// A call that an FMU did not complete, or a loop that does not converge.
     pub fn observe(&mut self) -> Result<(), MasterError> {
         self.reference
-            .sample(self.tick / self.ticks_per_row, &mut self.signals);
+            .sample(self.tick / self.ticks_per_row, &mut self.signals.numbers);
         match self.algorithm {
             Algorithm::Jacobi => Ok(()),
             Algorithm::GaussSeidel | Algorithm::Iterative => gauss_seidel::observe(self),

@@ -1,11 +1,16 @@
 //! What was recorded: a row a sample.
 
+use crate::fmu::Datum;
+
 /// Signals over time, SI units.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Record {
     /// Names of the columns, the first is `time`.
     pub columns: Vec<String>,
     values: Vec<f64>,
+    /// Names of columns that numbers do not hold: texts, binaries, whole numbers of 64 bits.
+    pub exact_columns: Vec<String>,
+    exact: Vec<Datum>,
 }
 
 impl Record {
@@ -14,12 +19,31 @@ impl Record {
         let mut columns = vec!["time".to_string()];
         columns.extend_from_slice(names);
         let values = Vec::with_capacity(rows * columns.len());
-        Self { columns, values }
+        Self {
+            columns,
+            values,
+            ..Self::default()
+        }
     }
 
-    pub(crate) fn push(&mut self, time: f64, signals: &[f64]) {
+    /// The same with columns that numbers do not hold.
+    pub(crate) fn beside(mut self, names: &[String]) -> Self {
+        self.exact_columns = names.to_vec();
+        self
+    }
+
+    pub(crate) fn push(&mut self, time: f64, signals: &[f64], exact: &[Datum]) {
         self.values.push(time);
         self.values.extend_from_slice(signals);
+        self.exact.extend_from_slice(exact);
+    }
+
+    /// The values of a row that numbers do not hold, in the order of `exact_columns`.
+    pub fn exact(&self, row: usize) -> &[Datum] {
+        let width = self.exact_columns.len();
+        self.exact
+            .get(row * width..(row + 1) * width)
+            .unwrap_or_default()
     }
 
     /// Number of rows.

@@ -4,8 +4,12 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use super::action::Moment;
 use super::{EndSignals, MasterError, Record, Simulation};
 use crate::fmu::{Kind, Message};
+
+/// A run with a value of this size diverges.
+const DIVERGED: f64 = 1e30;
 
 /// How a run ended, in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,16 +19,19 @@ pub enum Ending {
     Complete,
     /// The system asked to end it.
     Interlock,
+    /// A component asked to end it, as the standard lets it.
+    Terminated,
     /// A component failed.
     Failed,
 }
 
 impl Ending {
-    /// `complete`, `interlock` or `failed`.
+    /// `complete`, `interlock`, `terminated` or `failed`.
     pub fn word(self) -> &'static str {
         match self {
             Self::Complete => "complete",
             Self::Interlock => "interlock",
+            Self::Terminated => "terminated",
             Self::Failed => "failed",
         }
     }
@@ -44,6 +51,13 @@ pub enum Ended {
         /// Why, in words, where the component says it.
         cause: Option<String>,
     },
+    /// A component asked to end the run, as the standard lets it.
+    Terminated {
+        /// The component.
+        component: String,
+        /// When, s.
+        time: f64,
+    },
     /// A component failed.
     Failed(MasterError),
     /// A sampled component failed and the interlock brought the valve to null.
@@ -61,6 +75,7 @@ impl Ended {
         match self {
             Self::Complete => Ending::Complete,
             Self::Interlock { .. } => Ending::Interlock,
+            Self::Terminated { .. } => Ending::Terminated,
             Self::Failed(_) | Self::Stopped { .. } => Ending::Failed,
         }
     }
@@ -73,9 +88,16 @@ impl Ended {
     /// When the run was stopped before its end, s.
     pub fn time(&self) -> Option<f64> {
         match self {
-            Self::Interlock { time, .. } | Self::Stopped { time, .. } => Some(*time),
+            Self::Interlock { time, .. }
+            | Self::Stopped { time, .. }
+            | Self::Terminated { time, .. } => Some(*time),
             Self::Complete | Self::Failed(_) => None,
         }
+    }
+
+    /// Whether the run came to its regular end.
+    pub fn is_regular(&self) -> bool {
+        matches!(self, Self::Complete | Self::Terminated { .. })
     }
 
     /// What happened, for people.
@@ -90,6 +112,9 @@ impl Ended {
                 let cause = cause.as_ref();
                 let cause = cause.map_or(String::new(), |cause| format!(": {cause}"));
                 format!("`{signal}` became true at {time:.3} s{cause}")
+            }
+            Self::Terminated { component, time } => {
+                format!("`{component}` asked to end the run at {time} s")
             }
             Self::Stopped { error, time } => format!(
                 "{error}; the interlock was told to stop at {time:.3} s and brought the valve to null"
@@ -114,6 +139,8 @@ pub struct Outcome {
     pub wall: f64,
     /// What the FMUs logged.
     pub messages: Vec<LogLine>,
+    /// What the user should know of the order of calls.
+    pub notes: Vec<String>,
 }
 
 /// A line logged by a component's FMU.
@@ -139,11 +166,13 @@ impl Simulation {
     /// Plays `samples` samples; `progress` is told the number of samples reached now and then.
     /// What was computed is returned however the run ends.
     pub fn run(mut self, samples: usize, pace: Pace, progress: &mut dyn FnMut(usize)) -> Outcome {
-        let mut record = Record::with_capacity(&self.names, samples);
+        let mut record = Record::with_capacity(&self.names, samples).beside(&self.exact_names);
         let begin = Instant::now();
         let ended = self.play(samples, pace, progress, &mut record);
         let wall = begin.elapsed().as_secs_f64();
         progress(record.len());
+        self.close();
+        let notes = std::mem::take(&mut self.notes);
         let messages = self.parts.iter().flat_map(|part| {
             let component = &part.instance.name;
             part.instance
@@ -160,6 +189,7 @@ impl Simulation {
             step: self.step,
             wall,
             messages: messages.collect(),
+            notes,
             ended: match ended {
                 Ok(ended) => ended,
                 Err(error) => Ended::Failed(error),
@@ -184,7 +214,8 @@ impl Simulation {
             }
             self.observe()?;
             if self.tick.is_multiple_of(self.ticks_per_row) {
-                record.push(self.time(), &self.signals);
+                record.push(self.time(), &self.signals.numbers, &self.signals.exact);
+                self.check_bounds()?;
                 let sample = self.tick / self.ticks_per_row;
                 if sample.is_multiple_of(1024) {
                     progress(sample);
@@ -201,12 +232,13 @@ impl Simulation {
                 stopped = true;
             }
             if let Some(end) = &self.end {
-                if tripped.is_none() && self.signals[end.when] != 0.0 {
+                let numbers = &self.signals.numbers;
+                if tripped.is_none() && numbers[end.when] != 0.0 {
                     tripped = Some(Tripped {
                         time: self.time(),
                         end: self.time() + end.after,
                         signal: self.names[end.when].clone(),
-                        cause: end.cause_in_words(&self.signals),
+                        cause: end.cause_in_words(numbers),
                     });
                 }
                 if tripped.as_ref().is_some_and(|t| self.time() >= t.end) {
@@ -214,6 +246,9 @@ impl Simulation {
                 }
             }
             self.advance()?;
+            if let Some(ended) = self.terminated(record)? {
+                return Ok(ended);
+            }
         }
         let time = tripped.as_ref().map_or(self.time(), |t| t.time);
         if let Some(error) = self.parts.iter_mut().find_map(|part| part.failure.take()) {
@@ -250,11 +285,66 @@ impl EndSignals {
     }
 }
 
-impl Drop for Simulation {
-    fn drop(&mut self) {
+impl Simulation {
+    /// Values that no physical quantity has are a run that diverges.
+    fn check_bounds(&self) -> Result<(), MasterError> {
+        let numbers = &self.signals.numbers;
+        if numbers.iter().all(|value| value.abs() < DIVERGED) {
+            return Ok(());
+        }
+        let place = numbers.iter().position(|value| value.abs() >= DIVERGED);
+        Err(MasterError::Diverged {
+            time: self.time(),
+            variable: place.map_or(String::new(), |place| self.names[place].clone()),
+            value: place.map_or(0.0, |place| numbers[place]),
+        })
+    }
+
+    /// Whether a component has asked to end the run; the values at that moment are recorded.
+    fn terminated(&mut self, record: &mut Record) -> Result<Option<Ended>, MasterError> {
+        let mut asked = self.parts.iter().filter_map(|part| {
+            let time = part.ended?;
+            Some((part.instance.name.clone(), time))
+        });
+        let Some((component, time)) = asked.next() else {
+            return Ok(None);
+        };
+        // The others are at the end of the step: a row in between would mix two times.
+        let is_alone = self.parts.len() == 1;
+        let at_end = (time - self.time()).abs() <= 1e-9 * self.step;
+        if (is_alone && time > self.time() - self.step) || at_end {
+            let time = if at_end { self.time() } else { time };
+            let at = Moment {
+                tick: self.tick,
+                time,
+                step: self.step,
+                calls: false,
+            };
+            self.reference
+                .sample(self.tick / self.ticks_per_row, &mut self.signals.numbers);
+            for action in &mut self.actions {
+                action.perform(at, &mut self.parts, &mut self.signals, &self.names)?;
+            }
+            record.push(time, &self.signals.numbers, &self.signals.exact);
+        }
+        Ok(Some(Ended::Terminated { component, time }))
+    }
+
+    /// Gives states back, terminates the instances and frees them.
+    fn close(&mut self) {
         for part in &mut self.parts {
             // A state that cannot be given back is lost with its instance.
             let _ = part.instance.free_state(std::mem::take(&mut part.state));
         }
+        for part in &mut self.parts {
+            part.instance.close();
+        }
+        self.diverted = None;
+    }
+}
+
+impl Drop for Simulation {
+    fn drop(&mut self) {
+        self.close();
     }
 }

@@ -1,31 +1,61 @@
 //! Values on their way between signals and FMUs: value references prepared once, nothing allocated
 //! afterwards.
 
-use crate::fmu::{CallError, Instance, Kind, Variable};
+use super::signals::{Place, Signals};
+use crate::fmu::{CallError, Datum, Instance, Kind, Variability, Variable};
 
 type Outcome = Result<(), Box<CallError>>;
 
-/// Connected inputs of an instance, grouped by type.
+/// Connected inputs of an instance, grouped by type; an array is set as a whole, with the start
+/// values of elements that nothing drives.
 #[derive(Default)]
-pub(super) struct Inputs(Vec<InputGroup>);
+pub(super) struct Inputs {
+    groups: Vec<InputGroup>,
+    exact: Vec<ExactGroup>,
+}
 
 struct InputGroup {
     kind: Kind,
     references: Vec<u32>,
+    /// One for each driven value.
     sources: Vec<InputSource>,
     values: Vec<f64>,
+    /// Whether some of it may only change at events.
+    is_discrete: bool,
 }
 
 struct InputSource {
-    signal: usize,
+    /// Place among the values.
+    place: usize,
+    signal: Place,
     factor: f64,
+    offset: f64,
     /// It changes between samples.
     is_smooth: bool,
 }
 
+struct ExactGroup {
+    kind: Kind,
+    references: Vec<u32>,
+    sources: Vec<(usize, Place)>,
+    data: Vec<Datum>,
+}
+
+/// How an input follows a signal.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Drive {
+    pub signal: Place,
+    pub factor: f64,
+    pub offset: f64,
+    pub is_smooth: bool,
+}
+
 /// Outputs of an instance, grouped by type; each group's signals stand side by side.
 #[derive(Default, Clone)]
-pub(super) struct Outputs(Vec<OutputGroup>);
+pub(super) struct Outputs {
+    groups: Vec<OutputGroup>,
+    exact: Vec<ExactOutputs>,
+}
 
 #[derive(Clone)]
 struct OutputGroup {
@@ -36,68 +66,170 @@ struct OutputGroup {
     values: Vec<f64>,
 }
 
+#[derive(Clone)]
+struct ExactOutputs {
+    kind: Kind,
+    references: Vec<u32>,
+    first: usize,
+    count: usize,
+}
+
 impl Inputs {
-    /// Adds an input that takes `factor` times the value of `signal`.
-    pub(super) fn add(&mut self, variable: &Variable, signal: usize, factor: f64, is_smooth: bool) {
-        let known = self.0.iter().position(|group| group.kind == variable.kind);
-        let place = known.unwrap_or_else(|| {
-            self.0.push(InputGroup {
+    /// Adds a variable (all elements of an array): how each element is driven, if it is, and its
+    /// value if it is not.
+    pub(super) fn add(&mut self, variable: &Variable, elements: &[(Option<Drive>, Datum)]) {
+        if variable.kind.is_exact() {
+            return self.add_exact(variable, elements);
+        }
+        let fits = |group: &InputGroup| group.kind == variable.kind;
+        let place = self.groups.iter().position(fits).unwrap_or_else(|| {
+            self.groups.push(InputGroup {
                 kind: variable.kind.clone(),
                 references: Vec::new(),
                 sources: Vec::new(),
                 values: Vec::new(),
+                is_discrete: false,
             });
-            self.0.len() - 1
+            self.groups.len() - 1
         });
-        let group = &mut self.0[place];
+        let group = &mut self.groups[place];
         group.references.push(variable.reference);
-        group.sources.push(InputSource {
-            signal,
-            factor,
-            is_smooth,
+        group.is_discrete |= variable.variability != Variability::Continuous;
+        for (drive, value) in elements {
+            if let Some(drive) = drive {
+                group.sources.push(InputSource {
+                    place: group.values.len(),
+                    signal: drive.signal,
+                    factor: drive.factor,
+                    offset: drive.offset,
+                    is_smooth: drive.is_smooth,
+                });
+            }
+            group.values.push(value.number());
+        }
+    }
+
+    fn add_exact(&mut self, variable: &Variable, elements: &[(Option<Drive>, Datum)]) {
+        let known = self
+            .exact
+            .iter()
+            .position(|group| group.kind == variable.kind);
+        let place = known.unwrap_or_else(|| {
+            self.exact.push(ExactGroup {
+                kind: variable.kind.clone(),
+                references: Vec::new(),
+                sources: Vec::new(),
+                data: Vec::new(),
+            });
+            self.exact.len() - 1
         });
-        group.values.push(0.0);
+        let group = &mut self.exact[place];
+        group.references.push(variable.reference);
+        for (drive, value) in elements {
+            if let Some(drive) = drive {
+                group.sources.push((group.data.len(), drive.signal));
+            }
+            group.data.push(value.clone());
+        }
     }
 
     /// Sets the inputs from the signals.
-    pub(super) fn transfer(&mut self, signals: &[f64], instance: &Instance) -> Outcome {
-        for group in &mut self.0 {
-            for (value, source) in group.values.iter_mut().zip(&group.sources) {
-                *value = source.factor * signals[source.signal];
+    pub(super) fn transfer(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
+        for group in &mut self.groups {
+            for source in &group.sources {
+                group.values[source.place] = source.convert(source.now(signals));
             }
-            instance.set(&group.kind, &group.references, &group.values)?;
+            group.set(instance)?;
         }
-        Ok(())
+        self.transfer_exact(signals, instance)
     }
 
     /// As [`Inputs::transfer`], but inputs that change between samples are set to
     /// `now + share (other - now)`.
     pub(super) fn transfer_between(
         &mut self,
-        now: &[f64],
-        other: &[f64],
+        now: &Signals,
+        other: &Signals,
         share: f64,
-        instance: &Instance,
+        instance: &mut Instance,
     ) -> Outcome {
-        for group in &mut self.0 {
-            for (value, source) in group.values.iter_mut().zip(&group.sources) {
-                let at = now[source.signal];
-                let change = other[source.signal] - at;
+        for group in &mut self.groups {
+            for source in &group.sources {
+                let at = source.now(now);
+                let change = source.now(other) - at;
                 let share = if source.is_smooth { share } else { 0.0 };
-                *value = source.factor * (at + share * change);
+                group.values[source.place] = source.convert(at + share * change);
             }
-            instance.set(&group.kind, &group.references, &group.values)?;
+            group.set(instance)?;
+        }
+        self.transfer_exact(now, instance)
+    }
+
+    fn transfer_exact(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
+        for group in &mut self.exact {
+            for &(place, signal) in &group.sources {
+                group.data[place] = match signal {
+                    Place::Exact(signal) => signals.exact[signal].for_kind(&group.kind),
+                    Place::Number(signal) => {
+                        Datum::from_number(&group.kind, signals.numbers[signal])
+                    }
+                };
+            }
+            instance.begin_event()?;
+            instance.set_exact(&group.kind, &group.references, &group.data)?;
+            instance.end_event()?;
         }
         Ok(())
     }
 }
 
+impl InputGroup {
+    fn set(&self, instance: &mut Instance) -> Outcome {
+        if self.is_discrete {
+            instance.begin_event()?;
+        }
+        instance.set(&self.kind, &self.references, &self.values)?;
+        if self.is_discrete {
+            instance.end_event()?;
+        }
+        Ok(())
+    }
+}
+
+impl InputSource {
+    fn now(&self, signals: &Signals) -> f64 {
+        match self.signal {
+            Place::Number(signal) => signals.numbers[signal],
+            Place::Exact(signal) => signals.exact[signal].number(),
+        }
+    }
+
+    fn convert(&self, value: f64) -> f64 {
+        let value = self.factor * value;
+        // A sum with nothing would turn -0 into 0.
+        if self.offset == 0.0 {
+            value
+        } else {
+            value + self.offset
+        }
+    }
+}
+
 impl Outputs {
-    /// Adds `variables` (of one type), whose signals begin at `first`.
-    pub(super) fn add(&mut self, kind: &Kind, references: Vec<u32>, first: usize) {
-        self.0.push(OutputGroup {
+    /// Adds variables of one type with `count` values, whose signals begin at `first`.
+    pub(super) fn add(&mut self, kind: &Kind, references: Vec<u32>, count: usize, first: usize) {
+        if kind.is_exact() {
+            self.exact.push(ExactOutputs {
+                kind: kind.clone(),
+                references,
+                first,
+                count,
+            });
+            return;
+        }
+        self.groups.push(OutputGroup {
             kind: kind.clone(),
-            values: vec![0.0; references.len()],
+            values: vec![0.0; count],
             references,
             first,
         });
@@ -105,16 +237,22 @@ impl Outputs {
 
     /// Adds what `other` has.
     pub(super) fn extend(&mut self, other: &Self) {
-        self.0.extend(other.0.iter().cloned());
+        self.groups.extend(other.groups.iter().cloned());
+        self.exact.extend(other.exact.iter().cloned());
     }
 
     /// Reads the outputs into the signals, which keep their values where the instance fails.
-    pub(super) fn read(&mut self, signals: &mut [f64], instance: &Instance) -> Outcome {
-        for group in &mut self.0 {
+    pub(super) fn read(&mut self, signals: &mut Signals, instance: &mut Instance) -> Outcome {
+        for group in &mut self.groups {
             instance.get(&group.kind, &group.references, &mut group.values)?;
         }
-        for group in &self.0 {
-            signals[group.first..group.first + group.values.len()].copy_from_slice(&group.values);
+        for group in &self.exact {
+            let data = &mut signals.exact[group.first..group.first + group.count];
+            instance.get_exact(&group.kind, &group.references, data)?;
+        }
+        for group in &self.groups {
+            signals.numbers[group.first..group.first + group.values.len()]
+                .copy_from_slice(&group.values);
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
-use crate::fmu::FmiVersion;
+use crate::fmu::{FmiVersion, Options};
 use crate::library::FmuLibrary;
 use crate::master::{Algorithm, MasterError, Outcome, Pace, Simulation};
 use crate::motion::{self, Motion, Scaling};
@@ -69,6 +69,8 @@ pub struct Prepared {
     pub step: f64,
     /// Samples to play.
     pub samples: usize,
+    /// How FMUs are run.
+    pub options: Options,
 }
 
 impl Request {
@@ -99,7 +101,9 @@ impl Prepared {
     /// # Errors
     /// An FMU that cannot be loaded or refuses its parameters, a step that does not fit, a loop.
     pub fn simulation(&self, algorithm: Algorithm) -> Result<Simulation, MasterError> {
-        Simulation::new(&self.system, &self.motion, algorithm, self.step)
+        let stop = self.samples as f64 * self.motion.dt;
+        let plan = (self.step, stop);
+        Simulation::with(&self.system, &self.motion, algorithm, plan, &self.options)
     }
 
     /// Runs it as fast as it goes.
@@ -151,6 +155,7 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
         motion,
         step,
         samples,
+        options: Options::default(),
     })
 }
 

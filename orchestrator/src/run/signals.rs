@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use crate::error::Error;
+use crate::fmu::Datum;
 use crate::master::Record;
 
 /// Writes a record as CSV: a line of names, then a line a sample; every number reads back to the
@@ -14,9 +15,17 @@ use crate::master::Record;
 /// A disk that is full, and the like.
 pub fn write_csv(record: &Record, file: impl Write) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(file);
-    csv.write_record(&record.columns)?;
-    for row in record.rows() {
-        csv.serialize(row).map_err(io::Error::other)?;
+    if record.exact_columns.is_empty() {
+        csv.write_record(&record.columns)?;
+        for row in record.rows() {
+            csv.serialize(row).map_err(io::Error::other)?;
+        }
+        return csv.flush();
+    }
+    csv.write_record(record.columns.iter().chain(&record.exact_columns))?;
+    for (number, row) in record.rows().enumerate() {
+        let exact: Vec<String> = record.exact(number).iter().map(Datum::to_string).collect();
+        csv.serialize((row, exact)).map_err(io::Error::other)?;
     }
     csv.flush()
 }
@@ -51,7 +60,7 @@ pub fn read_csv(path: &Path) -> Result<Record, Error> {
         let values: Vec<f64> = row.iter().map(number).collect::<Result<_, _>>()?;
         // Every row is as long as the line of names, the reader sees to it.
         if let Some((time, signals)) = values.split_first() {
-            record.push(*time, signals);
+            record.push(*time, signals, &[]);
         }
     }
     Ok(record)

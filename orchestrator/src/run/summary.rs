@@ -67,8 +67,16 @@ impl Summary {
         let mut warnings: Vec<String> = outcome
             .messages
             .iter()
-            .map(|line| format!("`{}` logged: {}", line.component, line.message.text))
+            .map(|line| {
+                let times = match line.message.times {
+                    1 => String::new(),
+                    times => format!(" ({times} times)"),
+                };
+                format!("`{}` logged: {}{times}", line.component, line.message.text)
+            })
             .collect();
+        let notes = system.notes.iter().chain(&outcome.notes);
+        warnings.splice(0..0, notes.cloned());
         let tracking = Table::find(manifest, &outcome.record).and_then(|table| {
             let displacement = outcome.record.column(&table.name("displacement"))?;
             let acceleration = outcome.record.column(&table.name("acceleration"))?;

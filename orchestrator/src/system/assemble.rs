@@ -1,17 +1,18 @@
 //! From a system as written to one whose names, types, units and connections hold.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::checked::{Component, DEFAULT_PERIOD, End, System};
 use super::connection::connect;
 use super::error::SystemError;
 use super::file::{ComponentFile, SystemFile};
-use super::link::{Link, VariableName};
-use super::lookup::{component_index, find};
+use super::link::{Link, Origin, VariableName};
+use super::lookup::{component_index, find, find_settable};
 use super::model;
 use super::value::{self, Setting, Value};
-use crate::fmu::{Causality, Fmu, Kind, Variability};
+use crate::fmu::{Causality, Fmu, Kind, Variability, Variable};
 
 /// Finds the FMU of a component by what the system file calls it.
 pub type Library<'a> = dyn FnMut(&str) -> Result<Arc<Fmu>, Box<dyn std::error::Error>> + 'a;
@@ -44,7 +45,7 @@ pub fn assemble(
             component: name.clone(),
             reason: error.to_string(),
         })?;
-        components.push(component(file, name, part, fmu)?);
+        components.push(component(file, name, part, fmu, settings)?);
     }
     for setting in settings {
         set(&mut components, setting).map_err(|reason| SystemError::Place {
@@ -55,7 +56,11 @@ pub fn assemble(
     }
     let mut connections = Vec::new();
     let mut driven: HashMap<(usize, usize), &Link> = HashMap::new();
-    for link in &file.connections {
+    let links = file.connections.iter();
+    let links: Vec<Link> = links
+        .flat_map(|link| whole_arrays(&components, link))
+        .collect();
+    for link in &links {
         let wrong = |reason| file.fault(&link.place(), reason);
         let connection = connect(&components, link).map_err(wrong)?;
         let input = (connection.component, connection.input);
@@ -65,22 +70,20 @@ pub fn assemble(
         }
         connections.push(connection);
     }
+    let mut notes = Vec::new();
     for (index, part) in components.iter_mut().enumerate() {
         let variables = &part.fmu.description.variables;
         part.inputs
             .retain(|(input, _)| !driven.contains_key(&(index, *input)));
-        for input in part.fmu.description.of(Causality::Input) {
-            let given = part.inputs.iter().any(|(variable, _)| *variable == input);
-            if !given && !driven.contains_key(&(index, input)) {
-                let (name, input) = (&part.name, &variables[input].name);
-                return Err(at(
-                    format!("components.{name}"),
-                    format!(
-                        "the input `{name}.{input}` is open: connect it, or give it a value under \
-                         [components.{name}.inputs]"
-                    ),
-                ));
-            }
+        let given: HashSet<usize> = part.inputs.iter().map(|(input, _)| *input).collect();
+        let open = part.fmu.description.of(Causality::Input).filter(|input| {
+            variables[*input].kind.travels()
+                && !given.contains(input)
+                && !driven.contains_key(&(index, *input))
+        });
+        let open: Vec<usize> = open.collect();
+        if !open.is_empty() {
+            notes.push(left_open(part, &open));
         }
     }
     let end = end(file, &components)?;
@@ -91,8 +94,192 @@ pub fn assemble(
         components,
         connections,
         end,
+        notes,
         stop,
     })
+}
+
+/// A line on inputs that keep their own start values.
+fn left_open(part: &Component, open: &[usize]) -> String {
+    const SHOWN: usize = 8;
+    let given = HashMap::new();
+    let shown: Vec<String> = open
+        .iter()
+        .take(SHOWN)
+        .map(|&input| {
+            let variable = &part.fmu.description.variables[input];
+            let unit = variable
+                .unit
+                .as_ref()
+                .map_or(String::new(), |unit| format!(" {unit}"));
+            format!(
+                "`{}` ({}{unit})",
+                variable.name,
+                part.start_value(&given, input)
+            )
+        })
+        .collect();
+    let more = match open.len().saturating_sub(SHOWN) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let (noun, verb, their) = match open.len() {
+        1 => ("input", "keeps", "its start value"),
+        _ => ("inputs", "keep", "their start values"),
+    };
+    format!(
+        "`{}`: the open {noun} {}{more} {verb} {their}",
+        part.name,
+        shown.join(", ")
+    )
+}
+
+/// The links between the elements of two arrays of the same size, or the link as it is.
+fn whole_arrays(components: &[Component], link: &Link) -> Vec<Link> {
+    let elements = |name: &VariableName| {
+        let part = components.iter().find(|part| part.name == name.component)?;
+        let description = &part.fmu.description;
+        let names = description.array(&name.variable)?;
+        let names =
+            names.map(|at| VariableName::new(&name.component, &description.variables[at].name));
+        Some(names.collect::<Vec<_>>())
+    };
+    let Origin::Output(from) = &link.from else {
+        return vec![link.clone()];
+    };
+    match (elements(from), elements(&link.to)) {
+        (Some(many), Some(others)) if many.len() == others.len() => {
+            let pairs = many.into_iter().zip(others);
+            let link = |(from, to)| Link {
+                from: Origin::Output(from),
+                to,
+                line: link.line,
+            };
+            pairs.map(link).collect()
+        }
+        _ => vec![link.clone()],
+    }
+}
+
+/// The FMU with arrays as large as the structural parameters say that the file or the command line
+/// gives.
+fn resized(
+    fmu: Arc<Fmu>,
+    name: &str,
+    part: &ComponentFile,
+    settings: &[String],
+) -> Result<Arc<Fmu>, String> {
+    let description = &fmu.description;
+    let structural = |variable: &str| {
+        let position = description.position(variable)?;
+        let sizes_arrays = description.variables[position].is_structural;
+        sizes_arrays.then_some(position)
+    };
+    let mut sizes: Vec<(usize, u64)> = Vec::new();
+    let mut note = |position: usize, value: Value| {
+        let size = match value {
+            Value::Unsigned(size) => Some(size),
+            Value::Signed(size) => u64::try_from(size).ok(),
+            Value::Number(size) => Some(size as u64),
+            Value::Text(_) => None,
+        };
+        if let Some(size) = size {
+            sizes.retain(|(known, _)| *known != position);
+            sizes.push((position, size));
+        }
+    };
+    for (variable, written) in &part.parameters {
+        if let Some(position) = structural(variable) {
+            note(
+                position,
+                value::read(&description.variables[position], written)?,
+            );
+        }
+    }
+    for setting in settings {
+        if let Some((variable, text)) = setting.split_once('=')
+            && let Some((component, variable)) = variable.trim().split_once('.')
+            && component == name
+            && let Some(position) = structural(variable)
+        {
+            let variable = &description.variables[position];
+            note(
+                position,
+                value::read(variable, &as_toml(variable, text.trim()))?,
+            );
+        }
+    }
+    if sizes.is_empty() {
+        return Ok(fmu);
+    }
+    fmu.resized(&sizes).map_err(|error| error.to_string())
+}
+
+/// What stands on the command line as if it stood in a file.
+fn as_toml(variable: &Variable, text: &str) -> Setting {
+    match (&variable.kind, text.parse::<i64>()) {
+        (Kind::String | Kind::Binary, _) => Setting::from(text),
+        (_, Ok(number)) => Setting::from(number),
+        _ => match text {
+            "true" => Setting::from(true),
+            "false" => Setting::from(false),
+            _ => Setting::from(text),
+        },
+    }
+}
+
+/// Values for a variable, or for all elements of an array: a list, or a text with one value for
+/// each between spaces.
+fn values(
+    fmu: &Fmu,
+    name: &str,
+    positions: Range<usize>,
+    written: &Setting,
+) -> Result<Vec<(usize, Value)>, String> {
+    let variables = &fmu.description.variables;
+    if fmu.description.array(name).is_none() {
+        let position = positions.start;
+        return Ok(vec![(
+            position,
+            value::read(&variables[position], written)?,
+        )]);
+    }
+    let first = &variables[positions.start.min(variables.len().saturating_sub(1))];
+    let list: Vec<Setting> = match written {
+        Setting::List(list) => flat(list),
+        Setting::Text(text) if !matches!(first.kind, Kind::String) => text
+            .split_whitespace()
+            .map(|text| as_toml(first, text))
+            .collect(),
+        other => vec![other.clone()],
+    };
+    let count = positions.len();
+    let one = match list.as_slice() {
+        [one] => Some(one.clone()),
+        _ => None,
+    };
+    if one.is_none() && list.len() != count {
+        return Err(format!(
+            "{} values for an array of {count} elements",
+            list.len()
+        ));
+    }
+    positions
+        .enumerate()
+        .map(|(at, position)| {
+            let written = one.as_ref().unwrap_or_else(|| &list[at]);
+            Ok((position, value::read(&variables[position], written)?))
+        })
+        .collect()
+}
+
+/// A list of lists as one, row after row.
+fn flat(list: &[Setting]) -> Vec<Setting> {
+    let rows = list.iter().flat_map(|value| match value {
+        Setting::List(row) => flat(row),
+        other => vec![other.clone()],
+    });
+    rows.collect()
 }
 
 fn component(
@@ -100,8 +287,10 @@ fn component(
     name: &str,
     part: &ComponentFile,
     fmu: Arc<Fmu>,
+    settings: &[String],
 ) -> Result<Component, SystemError> {
     let at = |place: &str, reason| file.fault(&format!("components.{name}{place}"), reason);
+    let fmu = resized(fmu, name, part, settings).map_err(|reason| at("", reason))?;
     let description = &fmu.description;
     let mut parameters = Vec::new();
     if let Some(model) = &part.model {
@@ -110,26 +299,25 @@ fn component(
     }
     for (variable, written) in &part.parameters {
         let place = format!(".parameters.{variable}");
-        let found = find(&fmu, variable, Causality::Parameter);
-        let position = found.map_err(|reason| at(&place, reason))?;
-        let value = value::read(&description.variables[position], written);
-        put(
-            &mut parameters,
-            position,
-            value.map_err(|reason| at(&place, reason))?,
-        );
+        let found = find_settable(&fmu, variable).map_err(|reason| at(&place, reason))?;
+        let read = values(&fmu, variable, found, written).map_err(|reason| at(&place, reason))?;
+        read.into_iter()
+            .for_each(|(position, value)| put(&mut parameters, position, value));
     }
     let mut inputs = Vec::new();
     for (variable, written) in &part.inputs {
         let place = format!(".inputs.{variable}");
-        let found = find(&fmu, variable, Causality::Input);
-        let position = found.map_err(|reason| at(&place, reason))?;
-        let value = value::read(&description.variables[position], written);
-        put(
-            &mut inputs,
-            position,
-            value.map_err(|reason| at(&place, reason))?,
-        );
+        let found = match description.array(variable) {
+            Some(elements) => elements,
+            None => {
+                let found = find(&fmu, variable, Causality::Input);
+                let position = found.map_err(|reason| at(&place, reason))?;
+                position..position + 1
+            }
+        };
+        let read = values(&fmu, variable, found, written).map_err(|reason| at(&place, reason))?;
+        read.into_iter()
+            .for_each(|(position, value)| put(&mut inputs, position, value));
     }
     let period = match &part.period {
         Some(written) => Some(value::time(written).map_err(|reason| at(".period", reason))?),
@@ -180,26 +368,21 @@ fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
         }
         return Ok(());
     }
-    let is_input = fmu.description.variable(variable);
-    let is_input = is_input.is_some_and(|v| v.causality == Causality::Input);
-    let (causality, values) = if is_input {
-        (Causality::Input, &mut part.inputs)
+    let elements = find_settable(&fmu, variable)?;
+    let first = fmu.description.variables.get(elements.start);
+    let is_input = first.is_some_and(|v| v.causality == Causality::Input);
+    let list = if is_input {
+        &mut part.inputs
     } else {
-        (Causality::Parameter, &mut part.parameters)
+        &mut part.parameters
     };
-    let position = find(&fmu, variable, causality)?;
-    let variable = &fmu.description.variables[position];
-    let text = text.trim();
-    let written = match (&variable.kind, text.parse::<i64>()) {
-        (Kind::String, _) => Setting::from(text),
-        (_, Ok(number)) => Setting::from(number),
-        _ => match text {
-            "true" => Setting::from(true),
-            "false" => Setting::from(false),
-            _ => Setting::from(text),
-        },
+    let Some(first) = first else {
+        return Err(format!("`{variable}` has no elements"));
     };
-    put(values, position, value::read(variable, &written)?);
+    let written = as_toml(first, text.trim());
+    for (position, value) in values(&fmu, variable, elements, &written)? {
+        put(list, position, value);
+    }
     Ok(())
 }
 

@@ -1,12 +1,12 @@
 //! The systems that come with the program. A rig (plant and specimen) and a controller are files
 //! of their own; a system is a controller on a rig.
 
+use crate::units::hint;
 use plant::specimens::YieldingSpecimen;
 use plant::specimens::linear::LinearSpecimen;
 
 use super::error::SystemError;
 use super::file::SystemFile;
-use super::hint;
 use super::tuning::{self, Wanted};
 
 /// A part of a built-in system.

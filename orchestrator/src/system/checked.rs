@@ -1,10 +1,11 @@
 //! A system whose names, types, units and connections hold: what the master is given.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::link::{Link, Origin, Quantity, VariableName};
 use super::value::Value;
-use crate::fmu::Fmu;
+use crate::fmu::{Datum, Fmu};
 
 /// Sampling period of a controller for which nothing else is said, s (Section 5.3.1: 500 Hz).
 pub const DEFAULT_PERIOD: f64 = units::constants::SAMPLING_PERIOD;
@@ -22,6 +23,8 @@ pub struct System {
     pub connections: Vec<Connection>,
     /// What ends the run early.
     pub end: Option<End>,
+    /// What the user should know of it.
+    pub notes: Vec<String>,
     /// The Boolean input that is set when a sampled component fails, as component and variable.
     pub stop: Option<(usize, usize)>,
 }
@@ -52,7 +55,28 @@ pub struct Component {
     pub inputs: Vec<(usize, Value)>,
 }
 
-/// A connection of a [`System`]: an input takes `factor` times the source's value.
+impl Component {
+    /// What the system gives, by position.
+    pub(crate) fn given(&self) -> HashMap<usize, &Value> {
+        let given = self.parameters.iter().chain(&self.inputs);
+        given.map(|(position, value)| (*position, value)).collect()
+    }
+
+    /// The value of a variable before the run: what the system gives, or its own start value.
+    pub(crate) fn start_value(&self, given: &HashMap<usize, &Value>, position: usize) -> Datum {
+        let variable = &self.fmu.description.variables[position];
+        match given.get(&position) {
+            Some(value) => value.datum(&variable.kind),
+            None => variable
+                .start
+                .as_deref()
+                .and_then(|text| Datum::read(&variable.kind, text))
+                .unwrap_or_else(|| Datum::empty(&variable.kind)),
+        }
+    }
+}
+
+/// A connection of a [`System`]: an input takes `factor` times the source's value plus `offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Connection {
     /// Where the value comes from.
@@ -63,6 +87,8 @@ pub struct Connection {
     pub input: usize,
     /// Conversion between the units, 1 where they are the same.
     pub factor: f64,
+    /// Added after the factor, in the input's unit; 0 but for temperatures and the like.
+    pub offset: f64,
 }
 
 /// Where a connection's value comes from.

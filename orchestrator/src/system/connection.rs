@@ -3,7 +3,7 @@
 use super::checked::{Component, Connection, Source};
 use super::link::{Link, Origin};
 use super::lookup::{component_index, find};
-use crate::fmu::{Causality, Kind, Variable};
+use crate::fmu::{BaseUnit, Causality, Kind, Variable};
 use crate::units::Unit;
 
 /// The connection of a link, after its names, types and units were checked.
@@ -16,13 +16,18 @@ pub(super) fn connect(components: &[Component], link: &Link) -> Result<Connectio
     let input = find(&components[component].fmu, &to.variable, Causality::Input)?;
     let target = &components[component].fmu.description.variables[input];
 
-    let (source, kind, unit) = match from {
+    let (source, kind, unit, base) = match from {
         Origin::Reference { quantity, ahead } => {
             let source = Source::Reference {
                 quantity: *quantity,
                 ahead: *ahead,
             };
-            (source, &Kind::Float64, Some(quantity.unit()))
+            (
+                source,
+                &Kind::Float64,
+                Some(quantity.unit()),
+                Some(quantity.base_unit()),
+            )
         }
         Origin::Output(name) => {
             let component = component_index(components, &name.component)?;
@@ -33,38 +38,98 @@ pub(super) fn connect(components: &[Component], link: &Link) -> Result<Connectio
                 component,
                 variable,
             };
-            (source, &output.kind, output.unit.as_deref())
+            (
+                source,
+                &output.kind,
+                output.unit.as_deref(),
+                output.base_unit,
+            )
         }
     };
     fits(kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
-    let factor = factor(unit, target.unit.as_deref())
+    let (factor, offset) = conversion((unit, base), (target.unit.as_deref(), target.base_unit))
         .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
     Ok(Connection {
         source,
         component,
         input,
         factor,
+        offset,
     })
 }
 
 fn fits(kind: &Kind, target: &Variable) -> Result<(), String> {
-    let same = kind.name() == target.kind.name();
-    let widened = *kind == Kind::Int32 && target.kind == Kind::Float64;
-    if kind.is_numeric() && (same || widened) {
+    if kind.drives(&target.kind) {
         return Ok(());
     }
     let (from, to) = (kind.name(), target.kind.name());
     Err(format!("is a {from} and cannot drive the {to}"))
 }
 
-/// The factor from one unit to the other; a side without a unit takes the other's.
-fn factor(from: Option<&str>, to: Option<&str>) -> Result<f64, String> {
-    match (from, to) {
-        (Some(from), Some(to)) if from != to => {
-            let unit = |text: &str| Unit::parse(text).map_err(|error| error.to_string());
-            let factor = unit(from)?.factor_to(&unit(to)?);
-            factor.map_err(|error| error.to_string())
+/// A unit as a description names it, and what it is in SI where the description says so.
+type NamedUnit<'a> = (Option<&'a str>, Option<BaseUnit>);
+
+/// Factor and offset from one unit to the other; a side without a unit takes the other's.
+fn conversion(from: NamedUnit, to: NamedUnit) -> Result<(f64, f64), String> {
+    let ((Some(name), base), (Some(target), target_base)) = (from, to) else {
+        return Ok((1.0, 0.0));
+    };
+    let (Some(base), Some(target_base)) = (base, target_base) else {
+        if name == target {
+            return Ok((1.0, 0.0));
         }
-        _ => Ok(1.0),
+        let unit = |text: &str| Unit::parse(text).map_err(|error| error.to_string());
+        let factor = unit(name)?.factor_to(&unit(target)?);
+        return factor
+            .map(|factor| (factor, 0.0))
+            .map_err(|error| error.to_string());
+    };
+    if base == target_base {
+        return Ok((1.0, 0.0));
     }
+    if name == target {
+        return Err(format!(
+            "both are in `{name}`, but that is {} in one FMU and {} in the other",
+            in_si(&base),
+            in_si(&target_base)
+        ));
+    }
+    if base.exponents != target_base.exponents {
+        return Err(format!(
+            "`{name}` is {} and `{target}` is {}",
+            in_si(&base),
+            in_si(&target_base)
+        ));
+    }
+    // Written units that our own grammar knows keep its factors, which are exact.
+    let known = || Some((Unit::parse(name).ok()?, Unit::parse(target).ok()?));
+    if base.offset == 0.0
+        && target_base.offset == 0.0
+        && let Some((from, to)) = known()
+        && let Ok(factor) = from.factor_to(&to)
+        && (factor * target_base.factor / base.factor - 1.0).abs() < 1e-6
+    {
+        return Ok((factor, 0.0));
+    }
+    Ok((
+        base.factor / target_base.factor,
+        (base.offset - target_base.offset) / target_base.factor,
+    ))
+}
+
+/// A unit in SI, for people.
+fn in_si(base: &BaseUnit) -> String {
+    let names = ["kg", "m", "s", "A", "K", "mol", "cd"];
+    let mut text = base.factor.to_string();
+    for (name, &exponent) in names.iter().zip(&base.exponents) {
+        match exponent {
+            0 => {}
+            1 => text += &format!(" {name}"),
+            exponent => text += &format!(" {name}^{exponent}"),
+        }
+    }
+    if base.offset != 0.0 {
+        text += &format!(" + {}", base.offset);
+    }
+    text
 }

@@ -5,7 +5,7 @@
 //! depends on directly. Other inputs of a sampled component take the value of the last sample, if
 //! no newer one is known.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use super::checked::{Connection, Source, System};
 use super::error::SystemError;
@@ -37,11 +37,12 @@ pub struct Schedule {
     pub operations: Vec<Operation>,
 }
 
-/// An output of a continuous component, or a whole sampled one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// Outputs of a continuous component that depend on the same inputs, or a whole sampled one.
+#[derive(Debug, Clone)]
 struct Node {
     component: usize,
-    output: Option<usize>,
+    /// Positions; none for a sampled component.
+    outputs: Option<Vec<usize>>,
 }
 
 impl System {
@@ -56,13 +57,17 @@ impl System {
 
 fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
     let nodes = nodes(system);
-    let place: HashMap<Node, usize> = nodes.iter().enumerate().map(|(i, &n)| (n, i)).collect();
+    let graph = Graph::new(system, &nodes);
     let predecessors: Vec<Vec<usize>> = nodes
         .iter()
         .map(|node| {
-            drivers(system, node)
-                .filter_map(|connection| Some(place[&source_node(system, connection.source)?]))
-                .collect()
+            let sources = graph.drivers(node).into_iter();
+            let mut before: Vec<usize> = sources
+                .filter_map(|connection| graph.node_of(connection.source))
+                .collect();
+            before.sort_unstable();
+            before.dedup();
+            before
         })
         .collect();
     let groups = strongly_connected(&predecessors);
@@ -70,10 +75,10 @@ fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
     let mut operations: Vec<(usize, Operation)> = Vec::new();
     // Each group comes after those that it depends on.
     for group in groups {
-        let own = |p: &usize| group.contains(p);
+        let own = |p: &usize| group.binary_search(p).is_ok();
         let is_loop = group.len() > 1 || predecessors[group[0]].contains(&group[0]);
         if is_loop && !iterate {
-            return Err(cycle(system, &nodes, &predecessors, &group));
+            return Err(cycle(&graph, &predecessors, &group));
         }
         let before = group
             .iter()
@@ -108,6 +113,11 @@ fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
         }
         merged.push((at, next));
     }
+    for (_, operation) in &mut merged {
+        if let Operation::Read { outputs, .. } = operation {
+            outputs.sort_unstable();
+        }
+    }
     Ok(Schedule {
         operations: merged.into_iter().map(|(_, operation)| operation).collect(),
     })
@@ -119,58 +129,123 @@ fn nodes(system: &System) -> Vec<Node> {
         if part.period.is_some() {
             nodes.push(Node {
                 component,
-                output: None,
+                outputs: None,
             });
             continue;
         }
         let description = &part.fmu.description;
-        let outputs = description.of(Causality::Output);
-        let numeric = outputs.filter(|&v| description.variables[v].kind.is_numeric());
-        nodes.extend(numeric.map(|output| Node {
-            component,
-            output: Some(output),
-        }));
+        // Outputs with the same list of dependencies share it.
+        let mut alike: HashMap<*const usize, usize> = HashMap::new();
+        for output in description.of(Causality::Output) {
+            let variable = &description.variables[output];
+            if !variable.kind.travels() {
+                continue;
+            }
+            let place = *alike
+                .entry(variable.dependencies.as_ptr())
+                .or_insert_with(|| {
+                    nodes.push(Node {
+                        component,
+                        outputs: Some(Vec::new()),
+                    });
+                    nodes.len() - 1
+                });
+            if let Some(outputs) = &mut nodes[place].outputs {
+                outputs.push(output);
+            }
+        }
     }
     nodes
 }
 
-/// The connections that must have been carried out before `node`.
-fn drivers<'a>(system: &'a System, node: &Node) -> impl Iterator<Item = &'a Connection> {
-    let (component, output) = (node.component, node.output);
-    let description = &system.components[component].fmu.description;
-    let inputs: Vec<usize> = match output {
-        Some(output) => description.variables[output].dependencies.clone(),
-        None => description
-            .of(Causality::Output)
-            .flat_map(|output| description.variables[output].dependencies.iter().copied())
-            .collect(),
-    };
-    let connections = system.connections.iter();
-    connections.filter(move |c| c.component == component && inputs.contains(&c.input))
+/// Nodes and connections, found by what they belong to.
+struct Graph<'a> {
+    system: &'a System,
+    nodes: &'a [Node],
+    /// Connections to an input.
+    incoming: HashMap<(usize, usize), &'a Connection>,
+    /// The node of a continuous component's output.
+    of_output: HashMap<(usize, usize), usize>,
+    /// The node of a sampled component.
+    of_component: HashMap<usize, usize>,
 }
 
-fn source_node(system: &System, source: Source) -> Option<Node> {
-    let Source::Output {
-        component,
-        variable,
-    } = source
-    else {
-        return None;
-    };
-    let sampled = system.components[component].period.is_some();
-    Some(Node {
-        component,
-        output: (!sampled).then_some(variable),
-    })
+impl<'a> Graph<'a> {
+    fn new(system: &'a System, nodes: &'a [Node]) -> Self {
+        let connections = system.connections.iter();
+        let mut graph = Self {
+            system,
+            nodes,
+            incoming: connections.map(|c| ((c.component, c.input), c)).collect(),
+            of_output: HashMap::new(),
+            of_component: HashMap::new(),
+        };
+        for (place, node) in nodes.iter().enumerate() {
+            match &node.outputs {
+                None => {
+                    graph.of_component.insert(node.component, place);
+                }
+                Some(outputs) => {
+                    let all = outputs
+                        .iter()
+                        .map(|&output| ((node.component, output), place));
+                    graph.of_output.extend(all);
+                }
+            }
+        }
+        graph
+    }
+
+    /// The connections that must have been carried out before `node`.
+    fn drivers(&self, node: &Node) -> Vec<&'a Connection> {
+        let description = &self.system.components[node.component].fmu.description;
+        let driver = |input: &usize| self.incoming.get(&(node.component, *input)).copied();
+        match &node.outputs {
+            Some(outputs) => {
+                let first = outputs
+                    .first()
+                    .map(|&output| &description.variables[output]);
+                let inputs = first.map_or(&[][..], |output| &output.dependencies[..]);
+                inputs.iter().filter_map(driver).collect()
+            }
+            None => {
+                let outputs = description.of(Causality::Output);
+                let mut lists = HashMap::new();
+                for output in outputs {
+                    let list = &description.variables[output].dependencies;
+                    lists.insert(list.as_ptr(), list);
+                }
+                let inputs: BTreeSet<usize> = lists
+                    .values()
+                    .flat_map(|list| list.iter().copied())
+                    .collect();
+                inputs.iter().filter_map(driver).collect()
+            }
+        }
+    }
+
+    fn node_of(&self, source: Source) -> Option<usize> {
+        let Source::Output {
+            component,
+            variable,
+        } = source
+        else {
+            return None;
+        };
+        let sampled = self.of_component.get(&component);
+        sampled
+            .or_else(|| self.of_output.get(&(component, variable)))
+            .copied()
+    }
 }
 
 fn operation(node: &Node) -> Operation {
     let component = node.component;
-    match node.output {
+    match &node.outputs {
         None => Operation::Call { component },
-        Some(output) => Operation::Read {
+        Some(outputs) => Operation::Read {
             component,
-            outputs: vec![output],
+            outputs: outputs.clone(),
         },
     }
 }
@@ -245,12 +320,7 @@ fn strongly_connected(predecessors: &[Vec<usize>]) -> Vec<Vec<usize>> {
 }
 
 /// Names the variables round a loop in the group, in the direction in which values travel.
-fn cycle(
-    system: &System,
-    nodes: &[Node],
-    predecessors: &[Vec<usize>],
-    group: &[usize],
-) -> SystemError {
+fn cycle(graph: &Graph, predecessors: &[Vec<usize>], group: &[usize]) -> SystemError {
     // Walk against the direction of the values until a node comes again.
     let mut path = vec![group[0]];
     let start = loop {
@@ -263,12 +333,14 @@ fn cycle(
         }
         path.push(before);
     };
+    let system = graph.system;
     let round: Vec<usize> = path[start..].iter().rev().copied().collect();
     let mut variables = Vec::new();
     for (step, &node) in round.iter().enumerate() {
         let from = round[(step + round.len() - 1) % round.len()];
-        let connection = drivers(system, &nodes[node])
-            .find(|c| source_node(system, c.source) == Some(nodes[from]));
+        let drivers = graph.drivers(&graph.nodes[node]);
+        let mut drivers = drivers.into_iter();
+        let connection = drivers.find(|c| graph.node_of(c.source) == Some(from));
         if let Some(connection) = connection {
             variables.push(system.origin(connection.source).to_string());
             let input = system.variable_name(connection.component, connection.input);

@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::hint;
+use crate::fmu::BaseUnit;
+use crate::units::hint;
 
 /// A variable of a component, `component.variable`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
@@ -52,6 +53,20 @@ impl Quantity {
             Self::Displacement => "displacement",
             Self::Velocity => "velocity",
             Self::Acceleration => "acceleration",
+        }
+    }
+
+    /// Its unit in SI.
+    pub(super) fn base_unit(self) -> BaseUnit {
+        let seconds = match self {
+            Self::Displacement => 0,
+            Self::Velocity => -1,
+            Self::Acceleration => -2,
+        };
+        BaseUnit {
+            exponents: [0, 1, seconds, 0, 0, 0, 0],
+            factor: 1.0,
+            offset: 0.0,
         }
     }
 

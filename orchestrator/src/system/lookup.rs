@@ -1,8 +1,10 @@
 //! Components and variables by name.
 
+use std::ops::Range;
+
 use super::checked::Component;
-use super::hint;
 use crate::fmu::{Causality, Fmu};
+use crate::units::hint;
 
 /// The position of a component.
 ///
@@ -41,6 +43,33 @@ pub(super) fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize,
         return Err(format!("`{name}` is {}, expected {word}", article(found)));
     }
     Ok(position)
+}
+
+/// The positions of the variable or array `name`, which has to have a start value that can be set.
+///
+/// # Errors
+/// A variable that the FMU computes, or no such name (with the nearest one).
+pub(super) fn find_settable(fmu: &Fmu, name: &str) -> Result<Range<usize>, String> {
+    let description = &fmu.description;
+    let found = description
+        .array(name)
+        .or_else(|| description.position(name).map(|at| at..at + 1));
+    match found {
+        None => find(fmu, name, Causality::Parameter).map(|at| at..at + 1),
+        Some(found) => {
+            let first = description.variables.get(found.start);
+            if first.is_none_or(|variable| variable.is_settable) {
+                return Ok(found);
+            }
+            find(
+                fmu,
+                &description.variables[found.start].name,
+                Causality::Parameter,
+            )
+            .map(|_| found)
+            .map_err(|reason| format!("{reason}: its FMU computes it"))
+        }
+    }
 }
 
 fn words(causality: Causality) -> &'static str {

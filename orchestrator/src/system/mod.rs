@@ -24,18 +24,3 @@ pub use graph::{Operation, Schedule};
 pub use link::{Link, Origin, Quantity, VariableName};
 pub use rule::Rule;
 pub use value::{Setting, Value};
-
-/// ` (did you mean ...?)` with the nearest of the known names, or the known names themselves.
-pub(crate) fn hint<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
-    let known: Vec<&str> = known.collect();
-    let nearest = known
-        .iter()
-        .map(|candidate| (strsim::jaro_winkler(name, candidate), candidate))
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    match nearest {
-        Some((likeness, nearest)) if likeness > 0.75 => format!("; did you mean `{nearest}`?"),
-        Some(_) if known.len() <= 12 => format!("; there is `{}`", known.join("`, `")),
-        Some((_, nearest)) => format!("; the nearest name is `{nearest}`"),
-        None => "; there is none".to_string(),
-    }
-}

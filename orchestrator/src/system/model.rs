@@ -4,13 +4,14 @@ use std::path::Path;
 
 use identification::identify::model_file::ModelFile;
 use plant::identified::actuator::PublishedActuator;
+use plant::identified::effects::{self, Component};
+use plant::identified::nominal::{shake_table_values, specimen_values};
 use plant::identified::shake_table::ShakeTable;
 use plant::identified::table::Table;
-use plant::specimens::linear::LinearSpecimen;
 
-use super::hint;
 use super::value::Value;
 use crate::fmu::{Causality, Description};
+use crate::units::hint;
 
 /// Published models of `ShakeTable`.
 const PUBLISHED: [(&str, PublishedActuator); 3] = [
@@ -66,12 +67,12 @@ fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>
     let own = COMPONENTS
         .into_iter()
         .find(|(_, mark)| component.position(mark).is_some())
-        .map_or("", |(component, _)| component);
+        .map(|(component, _)| component);
     let mut values: Vec<(&str, f64)> = Vec::new();
-    if own == "ShakeTable" {
+    if own == Some(Component::ShakeTable) {
         let rig = file.shake_table(&name).map_err(|error| error.to_string())?;
         values.extend(shake_table_values(&rig));
-    } else if own != "Instrumentation" {
+    } else if own != Some(Component::Instrumentation) {
         let specimen = file.specimen(&name).map_err(|error| error.to_string())?;
         let specimen = specimen.ok_or_else(|| {
             format!(
@@ -88,7 +89,7 @@ fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>
         )
     })?;
     for (effect, parameters) in &file.effects {
-        if component_of(effect) != own {
+        if Some(component_of(effect)) != own {
             continue;
         }
         for (parameter, value) in parameters {
@@ -116,53 +117,15 @@ fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>
 }
 
 /// Components that a model file speaks of, each with a parameter that only it has.
-const COMPONENTS: [(&str, &str); 3] = [
-    ("ShakeTable", "actuator_a2"),
-    ("Specimen", "specimen_absent.absent"),
-    ("Instrumentation", "load_cell_bias.offset"),
+const COMPONENTS: [(Component, &str); 3] = [
+    (Component::ShakeTable, "actuator_a2"),
+    (Component::Specimen, "specimen_absent.absent"),
+    (Component::Instrumentation, "load_cell_bias.offset"),
 ];
 
-/// The component that has the parameters of an effect of the catalogue.
-pub fn component_of(effect: &str) -> &'static str {
-    const SENSORS: [&str; 4] = ["accelerometer_", "displacement_", "load_cell_", "mains_"];
-    if effect.starts_with("specimen_") {
-        "Specimen"
-    } else if SENSORS.iter().any(|sensor| effect.starts_with(sensor)) {
-        "Instrumentation"
-    } else {
-        "ShakeTable"
-    }
-}
-
-/// The parameters of the FMU `Specimen`, SI.
-pub fn specimen_values(specimen: &LinearSpecimen) -> [(&'static str, f64); 3] {
-    [
-        ("mass", specimen.mass),
-        ("damping", specimen.damping),
-        ("stiffness", specimen.stiffness),
-    ]
-}
-
-/// The parameters of the FMU `ShakeTable`, SI.
-pub fn shake_table_values(rig: &ShakeTable) -> [(&'static str, f64); 12] {
-    let ShakeTable { actuator, table } = rig;
-    let [a2, a1, a0] = actuator.denominator;
-    let [b2, b1, b0] = actuator.voltage_to_force;
-    let [e2, e1, e0] = actuator.velocity_to_force;
-    [
-        ("table_mass", table.mass),
-        ("table_damping", table.damping),
-        ("table_stiffness", table.stiffness),
-        ("actuator_a2", a2),
-        ("actuator_a1", a1),
-        ("actuator_a0", a0),
-        ("actuator_b2", b2),
-        ("actuator_b1", b1),
-        ("actuator_b0", b0),
-        ("actuator_e2", e2),
-        ("actuator_e1", e1),
-        ("actuator_e0", e0),
-    ]
+/// The component that has the parameters of an effect; of one that is unknown, the table.
+pub fn component_of(effect: &str) -> Component {
+    effects::find(effect).map_or(Component::ShakeTable, |effect| effect.component)
 }
 
 fn parameter_position(component: &Description, name: &str) -> Option<usize> {

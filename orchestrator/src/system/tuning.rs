@@ -26,8 +26,8 @@ use units::constants::SAMPLING_PERIOD;
 use super::control_model::ControlModel;
 use super::file::{ComponentFile, SystemFile};
 use super::link::{Link, Origin};
-use super::model::shake_table_values;
 use super::rule::Rule;
+use plant::identified::nominal::shake_table_values;
 
 /// Which parameters the controllers of a built-in system have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]

@@ -1,11 +1,11 @@
 //! Values as people write them, for variables with types and units.
 
+use crate::units::hint;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::hint;
-use crate::fmu::{Kind, Variable};
+use crate::fmu::{Datum, Kind, Variable};
 use crate::units;
 
 /// A value for a variable, in the variable's own unit.
@@ -14,8 +14,24 @@ use crate::units;
 pub enum Value {
     /// A number; an integer, a choice or a truth value as a number too.
     Number(f64),
-    /// A text.
+    /// A whole number of 64 bits.
+    Signed(i64),
+    /// A whole number of 64 bits, not negative.
+    Unsigned(u64),
+    /// A text; a binary in hexadecimal.
     Text(String),
+}
+
+impl Value {
+    /// As the FMU takes it.
+    pub(crate) fn datum(&self, kind: &Kind) -> Datum {
+        match self {
+            Self::Number(number) => Datum::Number(*number),
+            Self::Signed(number) => Datum::Signed(*number),
+            Self::Unsigned(number) => Datum::Unsigned(*number),
+            Self::Text(text) => Datum::read(kind, text).unwrap_or_else(|| Datum::empty(kind)),
+        }
+    }
 }
 
 /// A value as given to a variable of a system, before its type and unit are known.
@@ -33,6 +49,8 @@ pub enum Setting {
     Number(f64),
     /// A number with a unit, the name of a choice, or a text.
     Text(String),
+    /// Values of an array's elements, row after row.
+    List(Vec<Self>),
 }
 
 impl From<bool> for Setting {
@@ -67,6 +85,10 @@ impl fmt::Display for Setting {
             // With its point, as it was written.
             Self::Number(number) => write!(f, "{number:?}"),
             Self::Text(text) => text.fmt(f),
+            Self::List(list) => {
+                let all: Vec<String> = list.iter().map(Self::to_string).collect();
+                write!(f, "[{}]", all.join(", "))
+            }
         }
     }
 }
@@ -80,8 +102,8 @@ impl Setting {
         match self {
             Self::Number(number) => Ok(*number),
             Self::Integer(number) => Ok(*number as f64),
-            Self::Text(text) => number(text, Some(unit)),
-            Self::Boolean(truth) => Err(format!("`{truth}` is no number in {unit}")),
+            Self::Text(text) => units::value_in(text, unit).map_err(|error| error.to_string()),
+            Self::Boolean(_) | Self::List(_) => Err(format!("`{self}` is no number in {unit}")),
         }
     }
 }
@@ -91,7 +113,6 @@ impl Setting {
 /// # Errors
 /// What is wrong and what was expected.
 pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, String> {
-    let unit = variable.unit.as_deref();
     let misfit = |expected: &str| {
         Err(format!(
             "`{written}` is no value for a {}; expected {expected}",
@@ -99,16 +120,35 @@ pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, Stri
         ))
     };
     match (&variable.kind, written) {
-        (Kind::Float64, Setting::Number(number)) if number.is_finite() => {
+        (Kind::Float64 | Kind::Float32, Setting::Number(number)) if number.is_finite() => {
             Ok(Value::Number(*number))
         }
-        (Kind::Float64, Setting::Integer(number)) => Ok(Value::Number(*number as f64)),
-        (Kind::Float64, Setting::Text(text)) => number(text, unit).map(Value::Number),
-        (Kind::Float64, _) => misfit("a finite number, or a text with a unit such as \"1.5 in\""),
-        (Kind::Int32, Setting::Integer(number)) if i32::try_from(*number).is_ok() => {
+        (Kind::Float64 | Kind::Float32, Setting::Integer(number)) => {
             Ok(Value::Number(*number as f64))
         }
-        (Kind::Int32, _) => misfit("a whole number"),
+        (Kind::Float64 | Kind::Float32, Setting::Text(text)) => {
+            number(variable, text).map(Value::Number)
+        }
+        (Kind::Float64 | Kind::Float32, _) => {
+            misfit("a finite number, or a text with a unit such as \"1.5 in\"")
+        }
+        (kind, _) if kind.whole_range().is_some() => {
+            let (least, most) = kind.whole_range().unwrap_or_default();
+            let whole = match written {
+                Setting::Integer(number) => Some(i128::from(*number)),
+                Setting::Text(digits) if !kind.is_numeric() => digits.trim().parse().ok(),
+                _ => None,
+            };
+            let whole = whole.filter(|number| (least..=most).contains(number));
+            let Some(whole) = whole else {
+                return misfit(&format!("a whole number from {least} to {most}"));
+            };
+            Ok(match kind {
+                Kind::Int64 => Value::Signed(whole as i64),
+                Kind::UInt64 => Value::Unsigned(whole as u64),
+                _ => Value::Number(whole as f64),
+            })
+        }
         (Kind::Boolean, Setting::Boolean(truth)) => Ok(Value::Number(f64::from(u8::from(*truth)))),
         (Kind::Boolean, _) => misfit("true or false"),
         (Kind::Enumeration(items), Setting::Integer(number)) => {
@@ -135,7 +175,11 @@ pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, Stri
         (Kind::Enumeration(_), _) => misfit("the name of a choice"),
         (Kind::String, Setting::Text(text)) => Ok(Value::Text(text.clone())),
         (Kind::String, _) => misfit("a text"),
-        (Kind::Other(_), _) => misfit("nothing: variables of this type cannot be set"),
+        (Kind::Binary, Setting::Text(text)) if Datum::read(&Kind::Binary, text).is_some() => {
+            Ok(Value::Text(text.clone()))
+        }
+        (Kind::Binary, _) => misfit("bytes in hexadecimal, such as \"00ff\""),
+        (_, _) => misfit("nothing: clocks tick by themselves"),
     }
 }
 
@@ -145,7 +189,9 @@ pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, Stri
 /// What was expected.
 pub(super) fn time(written: &Setting) -> Result<f64, String> {
     let seconds = match written {
-        Setting::Boolean(_) => return Err(format!("`{written}` is no time, expected \"2 ms\"")),
+        Setting::Boolean(_) | Setting::List(_) => {
+            return Err(format!("`{written}` is no time, expected \"2 ms\""));
+        }
         _ => written.number("s")?,
     };
     if seconds.is_finite() && seconds > 0.0 {
@@ -154,7 +200,15 @@ pub(super) fn time(written: &Setting) -> Result<f64, String> {
     Err(format!("{seconds} s is no time, expected more than 0 s"))
 }
 
-/// A number in `unit`, which may stand behind it.
-fn number(text: &str, unit: Option<&str>) -> Result<f64, String> {
-    units::value_in(text, unit.unwrap_or("")).map_err(|error| error.to_string())
+/// A number in the variable's unit, which may stand behind it.
+fn number(variable: &Variable, text: &str) -> Result<f64, String> {
+    let unit = variable.unit.as_deref().unwrap_or("");
+    // Units that only the FMU knows may be written as it writes them.
+    if let Some(alone) = text.trim().strip_suffix(unit)
+        && let Ok(number) = alone.trim().parse::<f64>()
+        && number.is_finite()
+    {
+        return Ok(number);
+    }
+    units::value_in(text, unit).map_err(|error| error.to_string())
 }

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::path::Path;
 
-use shakebench::fmu::{Fmu, Instance};
+use shakebench::fmu::{Fmu, Instance, Options};
 use shakebench::pack;
 use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
 
@@ -165,7 +165,7 @@ fn complaint(version: pack::FmiVersion, change: impl Fn(&mut Entries)) -> String
     let path = folder.path().join("table.fmu");
     write(&path, &entries);
     let fmu = Fmu::open(&path).unwrap();
-    match Instance::new(&fmu, "table") {
+    match Instance::new(&fmu, "table", &Options::default()) {
         Ok(_) => panic!("an instance was made"),
         Err(error) => error.to_string(),
     }

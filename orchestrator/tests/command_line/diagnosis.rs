@@ -329,6 +329,47 @@ fn a_rig_is_reported_as_a_case_is() {
 }
 
 #[test]
+fn the_data_of_a_rig_may_be_spelt_as_a_spreadsheet_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    press(folder, 6, BLOCKS);
+    let diagnosed = |description: &str| -> Value {
+        let arguments = ["diagnose", description, "--json", "--out", "out"];
+        let output = shakebench(folder, &arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        serde_json::from_str(&stdout(&output)).unwrap()
+    };
+    let plain = diagnosed("press.toml");
+    // Byte-order mark, a line above the header, semicolons, decimal commas, ms, Windows line ends.
+    let text = fs::read_to_string(folder.join("data.csv")).unwrap();
+    let mut lines = text.lines();
+    let mut german = format!(
+        "\u{feff}Messung 3\r\n{}\r\n",
+        lines.next().unwrap().replace(',', ";")
+    );
+    for (k, line) in lines.enumerate() {
+        let (_, rest) = line.split_once(',').unwrap();
+        let rest = rest.replace(',', ";").replace('.', ",");
+        german += &format!("{k};{rest}\r\n");
+    }
+    fs::write(folder.join("data.csv"), german).unwrap();
+    let description = fs::read_to_string(folder.join("press.toml")).unwrap();
+    let description = description.replace(
+        r#"column = "t", unit = "s""#,
+        r#"column = "t", unit = "ms""#,
+    );
+    fs::write(folder.join("german.toml"), description).unwrap();
+    let other = diagnosed("german.toml");
+    assert_eq!(plain["verdict"], other["verdict"]);
+    for (one, two) in [(&plain, &other)].map(|(a, b)| (&a["effects"][0], &b["effects"][0])) {
+        assert_eq!(one["effect"], two["effect"]);
+        let delay = |e: &Value| e["parameters"]["delay"]["value"].as_f64().unwrap();
+        let apart = (delay(one) / delay(two) - 1.0).abs();
+        assert!(apart < 1e-9, "{apart:e}");
+    }
+}
+
+#[test]
 fn a_rig_that_cannot_be_diagnosed_is_refused_by_place() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

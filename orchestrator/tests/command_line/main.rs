@@ -3,9 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod archives;
+mod benchmark;
 mod contract;
 mod diagnosis;
 mod failures;
+mod hostile;
 mod motions;
 mod physical_rig;
 mod reports;

@@ -139,19 +139,16 @@ fn a_value_of_another_type() {
 }
 
 #[test]
-fn an_input_left_open() {
-    changed(
-        "specimen_force = \"0 lbf\"",
-        "",
-        &[
-            "the input `table.specimen_force` is open",
-            "[components.table.inputs]",
-        ],
-    );
-    changed(
-        "    \"control.valve_command -> table.valve_command\",\n",
-        "",
-        &["the input `table.valve_command` is open"],
+fn an_input_left_open_keeps_its_start_value_and_a_line_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let open = SYSTEM.replace("specimen_force = \"0 lbf\"", "");
+    fs::write(folder.path().join("rig.toml"), open).unwrap();
+    let output = shakebench(folder.path(), &["run", "rig.toml", "--duration", "1 s"]);
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(
+        said.contains("`table`: the open input `specimen_force` (0 N) keeps its start value"),
+        "{said}"
     );
 }
 

@@ -90,7 +90,7 @@ impl Default for PublishedNoise {
 impl PublishedNoise {
     fn symmetric(&mut self) -> f64 {
         self.state = 16_807 * self.state % 2_147_483_647;
-        2.0 * self.state as f64 * 4.656_612_875_245_796_9e-10 - 1.0
+        2.0 * self.state as f64 * 4.656_612_875_245_797e-10 - 1.0
     }
 }
 

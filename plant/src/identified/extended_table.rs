@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use crate::ModelError;
-use crate::identified::effects::Effects;
 use crate::identified::effects::valve::CommandPath;
+use crate::identified::effects::{Effects, Memory, TableMotion};
 use crate::identified::shake_table::{ShakeTable, ShakeTableState};
 use crate::integration::{inner_steps, runge_kutta_4};
 
@@ -42,6 +42,8 @@ pub struct ExtendedTableState {
     pub added: [f64; 5],
     /// Delay and play.
     pub path: CommandPath,
+    /// What the effects remember.
+    pub memory: Memory,
 }
 
 impl ExtendedTableState {
@@ -63,6 +65,14 @@ impl ExtendedTableState {
             velocity: s[4],
         };
         self.added.copy_from_slice(&s[SPOOL..]);
+    }
+}
+
+#[inline]
+fn motion(s: &[f64; STATES]) -> TableMotion {
+    TableMotion {
+        displacement: s[3],
+        velocity: s[4],
     }
 }
 
@@ -105,20 +115,12 @@ impl ExtendedTable {
         )
     }
 
-    /// True when one of `effects` acts on the table.
-    pub fn is_active(effects: &Effects) -> bool {
-        effects.valve.is_active()
-            || effects.hydraulics.is_active()
-            || effects.friction.is_active()
-            || effects.table.is_active()
-            || effects.foundation.frequency != 0.0
-    }
-
     /// Force of actuator, guide, damper and spring on the table, N.
     #[inline]
-    fn wall_force(&self, s: &[f64; STATES]) -> f64 {
-        let (x, v) = (s[3], s[4]);
-        s[0] - self.effects.friction.force(v)
+    fn wall_force(&self, s: &[f64; STATES], memory: &Memory) -> f64 {
+        let motion = motion(s);
+        let (x, v) = (motion.displacement, motion.velocity);
+        s[0] - self.effects.resisting_force(&motion, memory)
             - self.damping * v
             - self.stiffness * x
             - self.effects.table.cubic_stiffness * x * x * x
@@ -126,8 +128,14 @@ impl ExtendedTable {
 
     /// Absolute acceleration of the table under `specimen_force` (N), m/s².
     #[inline]
-    pub fn acceleration(&self, s: &[f64; STATES], specimen_force: f64) -> f64 {
-        (self.wall_force(s) + specimen_force) / self.mass
+    pub fn acceleration(&self, s: &[f64; STATES], memory: &Memory, specimen_force: f64) -> f64 {
+        (self.wall_force(s, memory) + specimen_force) / self.mass
+    }
+
+    /// Takes in where the table has come to after an inner step.
+    #[inline]
+    pub fn remember(&self, memory: &mut Memory, s: &[f64; STATES]) {
+        self.effects.remember(memory, &motion(s));
     }
 
     /// Rates of the states and the absolute acceleration (m/s²), with `drive` (V) at the spool.
@@ -135,6 +143,7 @@ impl ExtendedTable {
     pub fn rates(
         &self,
         s: &[f64; STATES],
+        memory: &Memory,
         drive: f64,
         specimen_force: f64,
     ) -> ([f64; STATES], f64) {
@@ -165,7 +174,7 @@ impl ExtendedTable {
         rate[1] = s[2] - a1 * s[0] + b1 * flow + e1 * v;
         rate[2] = -a0 * s[0] + b0 * flow + e0 * v;
 
-        let wall_force = self.wall_force(s);
+        let wall_force = self.wall_force(s, memory);
         let acceleration = (wall_force + specimen_force) / self.mass;
         rate[3] = v;
         rate[4] = acceleration;
@@ -193,7 +202,8 @@ impl ExtendedTable {
         } else {
             valve.play(state.path.play, valve_command)
         };
-        let (rate, acceleration) = self.rates(&state.continuous(), drive, specimen_force);
+        let (rate, acceleration) =
+            self.rates(&state.continuous(), &state.memory, drive, specimen_force);
         (acceleration, [rate[0], rate[1], rate[2]])
     }
 
@@ -213,7 +223,11 @@ impl ExtendedTable {
             let count = inner_steps(duration, LONGEST_STEP);
             let inner = duration / f64::from(count);
             for _ in 0..count {
-                s = runge_kutta_4(&s, inner, |s| self.rates(s, drive, specimen_force).0);
+                let memory = state.memory;
+                s = runge_kutta_4(&s, inner, |s| {
+                    self.rates(s, &memory, drive, specimen_force).0
+                });
+                self.remember(&mut state.memory, &s);
             }
         }
         state.set_continuous(&s);

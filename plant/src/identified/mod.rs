@@ -4,6 +4,7 @@ pub mod actuator;
 pub mod coupled;
 pub mod effects;
 pub mod extended_table;
+pub mod nominal;
 pub mod rig;
 pub mod shake_table;
 pub mod table;

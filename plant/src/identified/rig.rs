@@ -3,11 +3,13 @@
 use std::f64::consts::TAU;
 
 use crate::ModelError;
-use crate::identified::effects::valve::{CommandPath, MAX_DELAY_SAMPLES, RING, require_delay};
-use crate::identified::effects::{Effects, SensorEffects};
+use crate::delay_line::{DelayLine, require_delay};
+use crate::identified::effects::valve::CommandPath;
+use crate::identified::effects::{self, Effects, Memory};
 use crate::identified::extended_table::{self, ExtendedTable};
 use crate::identified::shake_table::ShakeTable;
 use crate::integration::runge_kutta_4;
+use crate::sensors::instrumentation::Instrumentation;
 use crate::specimens::extended::{self as extended_specimen, ExtendedSpecimen};
 use crate::specimens::linear::LinearSpecimen;
 use units::constants::G;
@@ -21,8 +23,9 @@ pub struct IdentifiedRig {
     pub specimen: Option<LinearSpecimen>,
     /// What the linear model lacks.
     pub effects: Effects,
-    /// What the sensors do to the channels.
-    pub sensors: SensorEffects,
+    /// What the sensors do to the channels; the velocity, noise, ranges and faults are not of
+    /// this rig.
+    pub sensors: Instrumentation,
 }
 
 /// Number of continuous states of [`IdentifiedRig`].
@@ -34,7 +37,7 @@ const HYSTERETIC: usize = 14;
 const LAGGED: usize = 15;
 
 /// State of [`IdentifiedRig`].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct IdentifiedRigState {
     /// The actuator's three, displacement and velocity (relative to the foundation), drift and
     /// drift velocity; then spool (2), mean demand, foundation (2), second mode (2), hysteretic
@@ -44,23 +47,11 @@ pub struct IdentifiedRigState {
     pub path: CommandPath,
     /// Largest drift so far, m.
     pub peak_drift: f64,
-    /// Past accelerations, m/s², a ring.
-    accelerations: [f64; RING],
-    at: usize,
+    /// What the effects remember of the table's motion.
+    pub memory: Memory,
+    /// Past accelerations, m/s².
+    accelerations: DelayLine,
     disturbance: f64,
-}
-
-impl Default for IdentifiedRigState {
-    fn default() -> Self {
-        Self {
-            continuous: [0.0; STATES],
-            path: CommandPath::default(),
-            peak_drift: 0.0,
-            accelerations: [0.0; RING],
-            at: 0,
-            disturbance: 0.0,
-        }
-    }
 }
 
 /// What the rig does, without sensors.
@@ -84,37 +75,21 @@ impl IdentifiedRig {
             specimen.validate()?;
         }
         self.effects.validate()?;
-        self.sensors.validate()
+        self.sensors.validate_values()
     }
 
     /// The rig without what is not linear about rest: offsets, thresholds, friction, yielding.
     pub fn linear_part(&self) -> Self {
         let mut rig = *self;
-        let Effects {
-            valve,
-            hydraulics,
-            friction,
-            table,
-            specimen,
-            ..
-        } = &mut rig.effects;
-        valve.null_bias = 0.0;
-        valve.dead_band = 0.0;
-        valve.asymmetry = 0.0;
-        valve.spool_limit = 0.0;
-        valve.hysteresis = 0.0;
-        hydraulics.stall_force = 0.0;
-        hydraulics.droop_loss = 0.0;
-        friction.coulomb_force = 0.0;
-        friction.stribeck_force = 0.0;
-        table.cubic_stiffness = 0.0;
-        specimen.yield_displacement = 0.0;
-        specimen.degradation_loss = 0.0;
-        specimen.uplift_displacement = 0.0;
-        rig.sensors.accelerometer_bias = 0.0;
-        rig.sensors.load_cell_bias = 0.0;
-        rig.sensors.hum_amplitude = 0.0;
+        for effect in effects::all().filter(|effect| !effect.is_linear) {
+            effect.turn_off(&mut rig.effects, &mut rig.sensors);
+        }
         rig
+    }
+
+    /// True when an effect is on that needs finer steps than the rig without it.
+    pub fn is_fast(&self) -> bool {
+        effects::all().any(|effect| effect.is_fast && effect.is_on(&self.effects, &self.sensors))
     }
 
     /// Indices into [`IdentifiedRigState::continuous`] of the states that move in the linear part.
@@ -132,7 +107,7 @@ impl IdentifiedRig {
         if self.has_specimen() && self.effects.specimen.second_mode_frequency > 0.0 {
             active.extend([SECOND_MODE, SECOND_MODE + 1]);
         }
-        if self.sensors.displacement_lag > 0.0 {
+        if self.sensors.displacement.corner > 0.0 {
             active.push(LAGGED);
         }
         active
@@ -145,21 +120,21 @@ impl IdentifiedRig {
 
     /// True when a specimen stands on the table.
     pub fn has_specimen(&self) -> bool {
-        self.specimen.is_some() && !self.effects.specimen.absent
+        self.specimen.is_some() && !self.effects.specimen.is_absent()
     }
 
     /// The rig ready to step with `period` s between samples, each in `substeps` Runge-Kutta
     /// steps of fourth order.
     ///
     /// Refuses what [`Self::validate`] refuses and delays longer than
-    /// [`MAX_DELAY_SAMPLES`] periods.
+    /// [`MAX_DELAY_SAMPLES`](crate::delay_line::MAX_DELAY_SAMPLES) periods.
     pub fn sample(&self, period: f64, substeps: usize) -> Result<SampledRig, ModelError> {
         self.validate()?;
         ModelError::require_positive("period", period)?;
         self.effects.valve.validate_delay(period)?;
         require_delay(
             "accelerometer_delay",
-            self.sensors.accelerometer_delay,
+            self.sensors.acceleration.delay,
             period,
         )?;
         Ok(SampledRig::new(*self, period, substeps.max(1)))
@@ -203,15 +178,21 @@ impl SampledRig {
             substeps,
             table: ExtendedTable::new(&rig.shake_table, &rig.effects),
             specimen: ExtendedSpecimen::new(rig.specimen, &rig.effects.specimen),
-            lag_rate: TAU * rig.sensors.displacement_lag,
+            lag_rate: TAU * rig.sensors.displacement.corner,
         }
     }
 
     #[inline]
-    fn derivative(&self, s: &[f64; STATES], command: f64, peak: f64) -> [f64; STATES] {
+    fn derivative(
+        &self,
+        s: &[f64; STATES],
+        memory: &Memory,
+        peak: f64,
+        command: f64,
+    ) -> [f64; STATES] {
         let (table, specimen) = (of_table(s), of_specimen(s));
         let force = self.specimen.force(&specimen, peak);
-        let (t, acceleration) = self.table.rates(&table, command, force);
+        let (t, acceleration) = self.table.rates(&table, memory, command, force);
         let d = self.specimen.rates(&specimen, force, acceleration);
         let mut rate = [
             t[0], t[1], t[2], t[3], t[4], d[0], d[1], t[5], t[6], t[7], t[8], t[9], d[2], d[3],
@@ -225,20 +206,18 @@ impl SampledRig {
 
     #[inline]
     fn runge_kutta(&self, state: &mut IdentifiedRigState, command: f64, h: f64) {
-        let peak = state.peak_drift;
-        state.continuous =
-            runge_kutta_4(&state.continuous, h, |s| self.derivative(s, command, peak));
+        let (memory, peak) = (state.memory, state.peak_drift);
+        state.continuous = runge_kutta_4(&state.continuous, h, |s| {
+            self.derivative(s, &memory, peak, command)
+        });
+        self.table
+            .remember(&mut state.memory, &of_table(&state.continuous));
         state.peak_drift = peak.max(state.continuous[5].abs());
     }
 
     /// One sampling period under a held `command` (V).
     #[inline]
     pub fn step(&self, state: &mut IdentifiedRigState, command: f64) {
-        state.at = if state.at + 1 == RING {
-            0
-        } else {
-            state.at + 1
-        };
         let valve = &self.rig.effects.valve;
         let w = state.disturbance;
         for (drive, duration) in state.path.advance(valve, command, self.period) {
@@ -261,7 +240,7 @@ impl SampledRig {
     /// Adds `correction` (m/s²) to the acceleration kept from `age` samples ago.
     #[inline]
     pub fn correct_past(&self, state: &mut IdentifiedRigState, age: usize, correction: f64) {
-        state.accelerations[(state.at + RING - age % RING) % RING] += correction;
+        state.accelerations.correct(age, correction);
     }
 
     /// What the rig does in `state`.
@@ -270,7 +249,7 @@ impl SampledRig {
         let s = &state.continuous;
         let specimen = of_specimen(s);
         let force = self.specimen.force(&specimen, state.peak_drift);
-        let acceleration = self.table.acceleration(&of_table(s), force);
+        let acceleration = self.table.acceleration(&of_table(s), &state.memory, force);
         RigMotion {
             displacement: s[3],
             acceleration,
@@ -287,30 +266,23 @@ impl SampledRig {
         let sensors = &self.rig.sensors;
         let motion = self.motion(state);
         let mut acceleration = motion.acceleration;
-        if sensors.accelerometer_delay > 0.0 {
-            state.accelerations[state.at] = acceleration;
-            let samples = sensors.accelerometer_delay / self.period;
-            let whole = (samples as usize).min(MAX_DELAY_SAMPLES);
-            let fraction = samples - whole as f64;
-            let past = |n: usize| state.accelerations[(state.at + RING - n) % RING];
-            acceleration = past(whole) + fraction * (past(whole + 1) - past(whole));
+        if sensors.acceleration.delay > 0.0 {
+            state.accelerations.push(acceleration);
+            let late = sensors.acceleration.delay / self.period;
+            acceleration = state.accelerations.behind(late);
         }
-        acceleration = (1.0 + sensors.accelerometer_scale) * acceleration
-            + sensors.accelerometer_bias
-            + G * sensors.accelerometer_tilt * motion.displacement;
-        if sensors.hum_amplitude != 0.0 {
-            acceleration += sensors.hum_amplitude
-                * (TAU * sensors.hum_frequency * time + sensors.hum_phase).sin();
-        }
+        acceleration = sensors.acceleration.scaled(acceleration)
+            + G * sensors.accelerometer_tilt * motion.displacement
+            + sensors.acceleration.hum(time);
         let displacement = if self.lag_rate > 0.0 {
             state.continuous[LAGGED]
         } else {
             motion.displacement
         };
         [
-            (1.0 + sensors.displacement_scale) * displacement,
+            sensors.displacement.scaled(displacement),
             acceleration,
-            (1.0 + sensors.load_cell_scale) * motion.actuator_force + sensors.load_cell_bias,
+            sensors.actuator_force.scaled(motion.actuator_force),
             motion.specimen_acceleration,
         ]
     }

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::ModelError;
+use crate::delay_line::{DelayLine, require_delay};
 
 /// What a channel does to a signal, in this order: lag, delay, scale and offset, mains and noise,
 /// range, resolution. Zero switches each of them off.
@@ -47,14 +48,10 @@ impl Default for Channel {
     }
 }
 
-/// Samples that a channel can be late, less one.
-const LENGTH: usize = 32;
-
 /// What a channel remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct ChannelState {
-    past: [f64; LENGTH],
-    at: usize,
+    past: DelayLine,
     started: bool,
     input: f64,
     lagged: f64,
@@ -97,18 +94,11 @@ impl ChannelState {
     /// Takes `value` and gives the one of `samples` ago, linearly between samples.
     pub fn delayed(&mut self, value: f64, samples: f64) -> f64 {
         if !self.started {
-            self.past = [value; LENGTH];
+            self.past = DelayLine::filled(value);
             self.started = true;
         }
-        self.at = (self.at + 1) % LENGTH;
-        self.past[self.at] = value;
-        let whole = samples as usize;
-        let part = samples - whole as f64;
-        let ago = |n: usize| self.past[(self.at + LENGTH - n.min(LENGTH - 1)) % LENGTH];
-        if part == 0.0 {
-            return ago(whole);
-        }
-        ago(whole) * (1.0 - part) + ago(whole + 1) * part
+        self.past.push(value);
+        self.past.behind(samples)
     }
 
     /// Takes `value` and gives it behind a lag of corner frequency `corner` (Hz), exact for inputs
@@ -127,9 +117,8 @@ impl ChannelState {
 }
 
 impl Channel {
-    /// Refuses values without meaning and delays (with a `common` one, s) that are longer than
-    /// the memory at the sampling `period` (s).
-    pub fn validate(&self, common: f64, period: f64) -> Result<(), ModelError> {
+    /// Refuses values without meaning.
+    pub fn validate(&self) -> Result<(), ModelError> {
         for (name, value) in [
             ("corner", self.corner),
             ("delay", self.delay),
@@ -143,15 +132,28 @@ impl Channel {
         ModelError::require_finite("scale_error", self.scale_error)?;
         ModelError::require_finite("bias", self.bias)?;
         ModelError::require_finite("hum_amplitude", self.hum_amplitude)?;
-        ModelError::require_finite("hum_phase", self.hum_phase)?;
-        if (self.delay + common) / period <= (LENGTH - 2) as f64 {
-            return Ok(());
+        ModelError::require_finite("hum_phase", self.hum_phase)
+    }
+
+    /// Refuses a delay (with a `common` one, s) that is longer than the memory at the sampling
+    /// `period` (s).
+    pub fn validate_delay(&self, common: f64, period: f64) -> Result<(), ModelError> {
+        require_delay("delay", self.delay + common, period)
+    }
+
+    /// `(1 + scale_error) y + bias`.
+    #[inline]
+    pub fn scaled(&self, y: f64) -> f64 {
+        (1.0 + self.scale_error) * y + self.bias
+    }
+
+    /// What the mains add at `time` (s).
+    #[inline]
+    pub fn hum(&self, time: f64) -> f64 {
+        if self.hum_amplitude == 0.0 {
+            return 0.0;
         }
-        Err(ModelError::Parameter {
-            name: "delay",
-            value: self.delay + common,
-            expected: "at most 30 samples",
-        })
+        self.hum_amplitude * (TAU * self.hum_frequency * time + self.hum_phase).sin()
     }
 
     /// The reading of `value`, with `delay` (s) besides the channel's own.
@@ -169,10 +171,7 @@ impl Channel {
             y = state.lag(y, self.corner, period);
         }
         y = state.delayed(y, (self.delay + delay) / period);
-        y += self.scale_error * y + self.bias;
-        if self.hum_amplitude != 0.0 {
-            y += self.hum_amplitude * (TAU * self.hum_frequency * time + self.hum_phase).sin();
-        }
+        y = self.scaled(y) + self.hum(time);
         if self.noise > 0.0 {
             y += self.noise * noise.gaussian();
         }
@@ -237,7 +236,7 @@ mod tests {
             delay: 0.1,
             ..Channel::default()
         };
-        assert!(long.validate(0.0, H).is_err());
+        assert!(long.validate_delay(0.0, H).is_err());
     }
 
     #[test]

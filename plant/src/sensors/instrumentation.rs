@@ -4,7 +4,6 @@
 //! told. All effects are off by default; [`Instrumentation::laboratory`] is a plausible set.
 
 use crate::ModelError;
-use crate::identified::effects::SensorEffects;
 use crate::linear::discrete_riccati;
 use crate::sensors::channel::{Channel, ChannelState, Noise};
 use units::constants::{G, INCH, LBF, STROKE};
@@ -85,7 +84,7 @@ pub struct Instrumentation {
     /// Acceleration of the specimen.
     pub specimen_acceleration: Channel,
     /// Pitch of the table per displacement, rad/m: the accelerometer reads `g tilt x` besides,
-    /// neither scaled nor late by its own channel (as [`crate::identified::rig`] has it).
+    /// neither scaled nor late by its own channel.
     pub accelerometer_tilt: f64,
     /// Lateness of all channels together, s.
     pub delay: f64,
@@ -167,22 +166,6 @@ impl Instrumentation {
         }
     }
 
-    /// Turns the catalogue's effects on the sensors on.
-    pub fn with_effects(mut self, effects: &SensorEffects) -> Self {
-        self.displacement.scale_error = effects.displacement_scale;
-        self.displacement.corner = effects.displacement_lag;
-        self.acceleration.bias = effects.accelerometer_bias;
-        self.acceleration.scale_error = effects.accelerometer_scale;
-        self.acceleration.delay = effects.accelerometer_delay;
-        self.acceleration.hum_amplitude = effects.hum_amplitude;
-        self.acceleration.hum_frequency = effects.hum_frequency;
-        self.acceleration.hum_phase = effects.hum_phase;
-        self.accelerometer_tilt = effects.accelerometer_tilt;
-        self.actuator_force.scale_error = effects.load_cell_scale;
-        self.actuator_force.bias = effects.load_cell_bias;
-        self
-    }
-
     /// The four channels in the order of [`CHANNELS`].
     fn channels(&self) -> [&Channel; 4] {
         [
@@ -193,11 +176,10 @@ impl Instrumentation {
         ]
     }
 
-    /// Refuses parameters that cannot be simulated at the sampling `period` (s).
-    pub fn validate(&self, period: f64) -> Result<(), ModelError> {
-        ModelError::require_positive("period", period)?;
+    /// Refuses values without meaning.
+    pub fn validate_values(&self) -> Result<(), ModelError> {
         for channel in self.channels() {
-            channel.validate(self.delay, period)?;
+            channel.validate()?;
         }
         ModelError::require_finite("accelerometer_tilt", self.accelerometer_tilt)?;
         ModelError::require_non_negative("delay", self.delay)?;
@@ -210,6 +192,16 @@ impl Instrumentation {
             });
         }
         ModelError::require_non_negative("velocity_lag", self.velocity_lag)
+    }
+
+    /// Refuses parameters that cannot be simulated at the sampling `period` (s).
+    pub fn validate(&self, period: f64) -> Result<(), ModelError> {
+        ModelError::require_positive("period", period)?;
+        self.validate_values()?;
+        for channel in self.channels() {
+            channel.validate_delay(self.delay, period)?;
+        }
+        Ok(())
     }
 
     /// Solves for the gains of the velocity's Kalman filter at the sampling `period` (s). The

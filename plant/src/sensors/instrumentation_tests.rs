@@ -82,23 +82,25 @@ fn tilt_lets_gravity_in() {
 
 #[test]
 fn sensor_effects_show_what_they_show_on_the_identified_rig() {
-    let effects = SensorEffects {
-        accelerometer_bias: 0.3,
-        accelerometer_scale: 0.1,
+    let mut sensors = Instrumentation {
         accelerometer_tilt: 0.9,
-        accelerometer_delay: 2.5 * PERIOD,
-        hum_amplitude: 0.2,
-        displacement_scale: -0.05,
-        load_cell_scale: 0.08,
-        load_cell_bias: 4.0,
-        ..SensorEffects::default()
+        ..Instrumentation::default()
     };
+    sensors.acceleration = Channel {
+        bias: 0.3,
+        scale_error: 0.1,
+        delay: 2.5 * PERIOD,
+        hum_amplitude: 0.2,
+        ..Channel::default()
+    };
+    sensors.displacement.scale_error = -0.05;
+    sensors.actuator_force.scale_error = 0.08;
+    sensors.actuator_force.bias = 4.0;
     let rig = crate::identified::rig::IdentifiedRig {
-        sensors: effects,
+        sensors,
         ..Default::default()
     };
     let sampled = rig.sample(PERIOD, 4).unwrap();
-    let sensors = Instrumentation::default().with_effects(&effects);
     let filter = sensors.velocity_filter(PERIOD).unwrap();
     let mut of_rig = crate::identified::rig::IdentifiedRigState::default();
     let mut state = InstrumentationState::default();

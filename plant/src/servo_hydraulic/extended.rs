@@ -5,8 +5,8 @@ use super::{
     Driven, INNER_STEP, STATES, ServoHydraulicInput, ServoHydraulicState, ServoHydraulicTable,
 };
 use crate::ModelError;
-use crate::identified::effects::FoundationEffects;
 use crate::identified::effects::valve::{CommandPath, ValveEffects};
+use crate::identified::effects::{Family, FoundationEffects};
 use crate::integration::{self, Dynamics};
 
 /// [`ServoHydraulicTable`] behind a command path and on a foundation; each effect is off at zero.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::ModelError;
-use crate::identified::effects::SpecimenEffects;
+use crate::identified::effects::{Family, SpecimenEffects};
 use crate::integration::{inner_steps, runge_kutta_4};
 use crate::specimens::linear::{LinearSpecimen, SpecimenState};
 
@@ -49,7 +49,7 @@ impl ExtendedSpecimenState {
 impl ExtendedSpecimen {
     /// Prepares `specimen`, if one stands on the table, with `effects`.
     pub fn new(specimen: Option<LinearSpecimen>, effects: &SpecimenEffects) -> Self {
-        let is_present = specimen.is_some() && !effects.absent;
+        let is_present = specimen.is_some() && !effects.is_absent();
         let mut specimen = specimen.unwrap_or_default();
         specimen.damping *= 1.0 + effects.damping_change;
         let upper = specimen.mass * effects.second_mode_mass_share;

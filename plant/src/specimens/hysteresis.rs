@@ -68,6 +68,25 @@ impl Default for BoucWen {
     }
 }
 
+/// Share of a deformation that loads the hysteretic part elastically, `1 - ν |z|^n w`, from `z` (its
+/// force over the yield force), the sharpness `n`, the loss of strength `ν` and the weight
+/// `w = γ + β sign(d' z)`.
+#[inline]
+pub fn elastic_share(z: f64, sharpness: f64, strength: f64, weight: f64) -> f64 {
+    if weight == 0.0 {
+        return 1.0;
+    }
+    let ratio = z.abs();
+    // The usual sharpnesses have a root where a power would take longer than the rest.
+    let power = match sharpness {
+        1.0 => ratio,
+        1.5 => ratio * ratio.sqrt(),
+        2.0 => ratio * ratio,
+        n => ratio.powf(n),
+    };
+    1.0 - strength * power * weight
+}
+
 impl BoucWen {
     /// Refuses parameters that cannot be simulated or that would make energy.
     pub fn validate(&self) -> Result<(), ModelError> {
@@ -143,10 +162,9 @@ impl BoucWen {
         let (z, work) = (state.z, state.work.max(0.0));
         let strength = 1.0 + self.strength_degradation * work;
         let stiffness = 1.0 + self.stiffness_degradation * work;
-        let power = self.power(z.abs());
         let sign = if velocity * z >= 0.0 { 1.0 } else { -1.0 };
-        let elastic = 1.0 - strength * power * (self.gamma + self.beta * sign);
-        let mut rate = speed * elastic / stiffness;
+        let weight = self.gamma + self.beta * sign;
+        let mut rate = speed * elastic_share(z, self.sharpness, strength, weight) / stiffness;
         if self.pinching > 0.0 {
             let off = (z * velocity.signum() - self.pinching_level) / self.pinching_width;
             rate *= 1.0 - self.pinching * (1.0 - (-2.0 * work).exp()) * (-off * off).exp();
@@ -154,16 +172,6 @@ impl BoucWen {
         Hysteresis {
             z: rate,
             work: (1.0 - self.post_yield_ratio) * z * speed,
-        }
-    }
-
-    /// `ratio^n`. The usual sharpnesses have a root where a power would take longer than the rest.
-    fn power(&self, ratio: f64) -> f64 {
-        match self.sharpness {
-            1.0 => ratio,
-            1.5 => ratio * ratio.sqrt(),
-            2.0 => ratio * ratio,
-            n => ratio.powf(n),
         }
     }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::{env, fs};
 
-use hidden_effects::catalogue::CATALOGUE;
+use hidden_effects::catalogue::entry;
 use hidden_effects::{Case, Kind, Settings};
 
 fn main() -> ExitCode {
@@ -24,7 +24,7 @@ fn main() -> ExitCode {
         "two" => Kind::Two,
         "nothing" => Kind::Nothing,
         "outside" => Kind::Outside,
-        name => match CATALOGUE.iter().find(|entry| entry.name == name) {
+        name => match entry(name) {
             Some(entry) => Kind::This(entry.name),
             None => {
                 eprintln!("`{name}` is not in the catalogue");

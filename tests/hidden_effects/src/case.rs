@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::catalogue::{CATALOGUE, Effect, Entry};
+use crate::catalogue::{CATALOGUE, Effect, Entry, entry};
 use crate::excitation::{EXCITATIONS, Excitation};
 use crate::form::Form;
 use crate::hidden::Hidden;
@@ -125,7 +125,6 @@ impl Case {
             form: Form::draw(&mut rng),
             ..Hidden::default()
         };
-        let entry = |name: &str| CATALOGUE.iter().find(|e| e.name == name).copied();
         let any = |rng: &mut ChaCha8Rng| CATALOGUE[rng.random_range(0..CATALOGUE.len())];
         let strength: f64 = rng.random_range(0.0..1.0);
         match settings.kind {

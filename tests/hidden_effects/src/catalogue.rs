@@ -94,6 +94,24 @@ pub const CATALOGUE: &[Entry] = entries! {
     "specimen": "specimen_absent" [];
 };
 
+/// Effects that came after the exchange format's: hidden only when asked for by name, so that the
+/// cases of a seed stay what they were.
+pub const LATER: &[Entry] = entries! {
+    "friction": "directional_friction" [
+        range("coulomb_force", "lbf", 0.4, 4.0), either_sign("difference", "lbf", 0.2, 2.0)];
+    "friction": "fading_friction" [
+        range("coulomb_force", "lbf", 0.8, 4.0), range("loss", "1", 0.3, 0.8)];
+};
+
+/// The effect of that name.
+pub fn entry(name: &str) -> Option<Entry> {
+    CATALOGUE
+        .iter()
+        .chain(LATER)
+        .find(|e| e.name == name)
+        .copied()
+}
+
 /// An effect with its values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {

@@ -40,6 +40,8 @@ pub struct Form {
     pub stribeck_velocity: f64,
     /// Exponent in the Stribeck bump.
     pub stribeck_exponent: f64,
+    /// Excursion over which friction fades, in.
+    pub fading_displacement: f64,
     /// Sharpness of yielding.
     pub yield_exponent: f64,
     /// Stiffness after yielding over stiffness before.
@@ -79,6 +81,7 @@ impl Default for Form {
             friction_width: 0.1,
             stribeck_velocity: 0.5,
             stribeck_exponent: 2.0,
+            fading_displacement: 0.3,
             yield_exponent: 3.0,
             yield_ratio: 0.05,
             uplift_ratio: 0.2,

@@ -62,6 +62,7 @@ pub struct Rig {
     play: f64,
     spring_play: f64,
     largest_drift: f64,
+    largest_excursion: f64,
     commands: Vec<f64>,
     accelerations: Vec<f64>,
 }
@@ -89,6 +90,7 @@ impl Rig {
             play: 0.0,
             spring_play: 0.0,
             largest_drift: 0.0,
+            largest_excursion: 0.0,
             commands: Vec::new(),
             accelerations: Vec::new(),
         }
@@ -149,6 +151,7 @@ impl Rig {
             self.integrate(u);
             self.time += STEP;
             self.largest_drift = self.largest_drift.max(self.state[D].abs());
+            self.largest_excursion = self.largest_excursion.max(self.state[X].abs());
             let table = self.forces(&self.state, u).table_acceleration;
             self.accelerations.push(table);
         }
@@ -295,6 +298,18 @@ impl Rig {
                         .abs()
                         .powf(h.form.stribeck_exponent))
                     .exp();
+        }
+        if let (Some(mean), Some(difference)) = (
+            h.get("directional_friction", 0),
+            h.get("directional_friction", 1),
+        ) {
+            friction += mean + difference * sign;
+        }
+        if let (Some(fresh), Some(loss)) =
+            (h.get("fading_friction", 0), h.get("fading_friction", 1))
+        {
+            let worn = self.largest_excursion.max(s[X].abs()) / h.form.fading_displacement;
+            friction += fresh * (1.0 - loss + loss * (-worn).exp());
         }
         if let Some(rise) = h.outside(Outside::PositionDependentFriction) {
             friction += rise * s[X] * s[X];

@@ -3,6 +3,7 @@
 use std::process::Command;
 
 use acceptance::hidden_suite::{Plan, rates, run_all, table};
+use hidden_effects::catalogue::LATER;
 
 #[test]
 fn the_generator_shares_no_code_with_the_plant() {
@@ -48,6 +49,7 @@ fn hidden_effects_are_found_and_nothing_where_nothing_is() {
     let plan = Plan {
         seed: seed.and_then(|text| text.parse().ok()).unwrap_or(SEED),
         one: 10,
+        effect: None,
         two: 6,
         nothing: 3,
         outside: 5,
@@ -71,5 +73,26 @@ fn hidden_effects_are_found_and_nothing_where_nothing_is() {
         let (right, wrong) = rates(&results, kind);
         assert!(right >= bound, "{kind}, seed {}\n{report}", plan.seed);
         assert!(wrong == 0.0, "{kind}, seed {}\n{report}", plan.seed);
+    }
+}
+
+#[test]
+fn effects_that_came_later_are_found_too() {
+    for entry in LATER {
+        let plan = Plan {
+            seed: 71100,
+            one: 2,
+            effect: Some(entry.name),
+            two: 0,
+            nothing: 0,
+            outside: 0,
+            mismatch: vec![0.01],
+            noise: vec![1.0],
+            verbose: false,
+        };
+        let results = run_all(&plan, |_| {});
+        println!("{plan:?}\n{}", table(&results));
+        let (right, wrong) = rates(&results, "one");
+        assert!(right == 1.0 && wrong == 0.0, "{}", entry.name);
     }
 }

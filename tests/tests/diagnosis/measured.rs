@@ -4,9 +4,10 @@
 use std::path::{Path, PathBuf};
 
 use acceptance::shared;
+use identification::data::Channel;
 use identification::diagnosis::engine::{Observer, Verdict};
 use identification::diagnosis::rigs::{
-    Description, Measurement, PartReport, RigDiagnosis, Series, diagnose,
+    Description, Measurement, PartReport, RigDiagnosis, RigRecording, diagnose,
 };
 
 /// Description and data of a rig; none where the data are missing.
@@ -71,12 +72,11 @@ fn value(part: &PartReport, effect: &str, parameter: &str) -> f64 {
 }
 
 /// The same measurements with a changed output.
-fn changed(measurement: &Measurement, change: impl Fn(&Series, usize) -> f64) -> Measurement {
+fn changed(measurement: &Measurement, change: impl Fn(&RigRecording, usize) -> f64) -> Measurement {
     let mut changed = measurement.clone();
-    for (series, original) in changed.series.iter_mut().zip(&measurement.series) {
-        for (k, y) in series.output.iter_mut().enumerate() {
-            *y = change(original, k);
-        }
+    for (recording, original) in changed.recordings.iter_mut().zip(&measurement.recordings) {
+        let output = (0..original.len()).map(|k| change(original, k)).collect();
+        recording.replace_output(output).unwrap();
     }
     changed
 }
@@ -197,7 +197,7 @@ fn four_more_milliseconds_of_delay_are_found_on_the_press() {
         return;
     };
     let before = diagnose(&description, &measurement, Observer::none()).unwrap();
-    let late = changed(&measurement, |series, k| series.output[k.saturating_sub(4)]);
+    let late = changed(&measurement, |s, k| s.output()[k.saturating_sub(4)]);
     let after = diagnose(&description, &late, Observer::none()).unwrap();
     print(&after);
     names(&after, &["delay", "asymmetric_gain"]);
@@ -220,7 +220,7 @@ fn a_bent_transducer_is_found_on_the_press() {
         return;
     };
     let bent = changed(&measurement, |s, k| {
-        s.output[k] * (1.0 + 40.0 * s.output[k])
+        s.output()[k] * (1.0 + 40.0 * s.output()[k])
     });
     let after = diagnose(&description, &bent, Observer::none()).unwrap();
     print(&after);
@@ -234,7 +234,9 @@ fn viscous_friction_put_on_the_damper_is_found() {
     let Some((description, measurement)) = rig("friction_damper_one_inch") else {
         return;
     };
-    let thick = changed(&measurement, |s, k| s.output[k] + 4e4 * s.inputs[1][k]);
+    let thick = changed(&measurement, |s, k| {
+        s.output()[k] + 4e4 * s.input(Channel::Velocity)[k]
+    });
     let after = diagnose(&description, &thick, Observer::none()).unwrap();
     print(&after);
     names(&after, &["asymmetric_coulomb_friction", "free_play"]);
@@ -254,7 +256,7 @@ fn a_delay_put_on_the_damper_is_found() {
     // The force by itself seems to lead a little, so that two delays are compared: what is added
     // must come out.
     let [less, more] = [31, 62].map(|samples| {
-        let late = changed(&measurement, |s, k| s.output[k.saturating_sub(samples)]);
+        let late = changed(&measurement, |s, k| s.output()[k.saturating_sub(samples)]);
         let after = diagnose(&description, &late, Observer::none()).unwrap();
         print(&after);
         names(
@@ -275,7 +277,7 @@ fn misalignment_put_on_the_drive_is_found() {
     // The loop pays for friction that grows along the travel with voltage, not with position.
     const SLOPE: f64 = 1.5;
     let misaligned = changed(&measurement, |s, k| {
-        let reference = &s.inputs[0];
+        let reference = s.input(Channel::Reference);
         let (before, after) = (k.saturating_sub(1), (k + 1).min(reference.len() - 1));
         let speed = reference[after] - reference[before];
         let side = if speed.abs() > 1e-6 {
@@ -283,7 +285,8 @@ fn misalignment_put_on_the_drive_is_found() {
         } else {
             0.0
         };
-        s.output[k] + 20.39 * SLOPE * (s.inputs[0][k] - s.middle) * side / 35.15065
+        s.output()[k]
+            + 20.39 * SLOPE * (s.input(Channel::Reference)[k] - s.middle) * side / 35.15065
     });
     let after = diagnose(&description, &misaligned, Observer::none()).unwrap();
     print(&after);
@@ -299,7 +302,7 @@ fn misalignment_put_on_the_drive_is_found() {
 /// without.
 fn put_on_top(
     description: &Description,
-    series: &Series,
+    recording: &RigRecording,
     report: &RigDiagnosis,
     effect: &str,
     values: &[f64],
@@ -328,8 +331,8 @@ fn put_on_top(
                 None => parameters.extend(&known.off),
             }
         }
-        let mut out = vec![0.0; series.output.len()];
-        rig.simulate(series, &nominal, &parameters, &mut out);
+        let mut out = vec![0.0; recording.len()];
+        rig.simulate(recording, &nominal, &parameters, &mut out);
         out
     };
     let without = output(false);
@@ -356,12 +359,12 @@ fn a_strength_differential_put_on_the_coupon_is_found() {
     );
     let more = put_on_top(
         &description,
-        &measurement.series[0],
+        &measurement.recordings[0],
         &before,
         "strength_differential",
         &[0.15],
     );
-    let stronger = changed(&measurement, |s, k| s.output[k] + more[k]);
+    let stronger = changed(&measurement, |s, k| s.output()[k] + more[k]);
     let after = diagnose(&description, &stronger, Observer::none()).unwrap();
     print(&after);
     names(&after, &["strength_differential"]);

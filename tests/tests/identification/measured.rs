@@ -2,27 +2,24 @@
 
 use std::ops::Range;
 
-use identification::data::fit_percent;
+use identification::data::{Sheet, Wanted, fit_percent};
 use identification::estimation::state_variable_filter::{Between, equal_lags, filter};
 use identification::estimation::transfer_function::{Structure, identify};
 
 /// Columns of a file under `measured`, or nothing and a word about it.
 fn measured(file: &str) -> Option<Vec<Vec<f64>>> {
     let path = acceptance::shared::folder()?.join("measured").join(file);
-    let Ok(text) = std::fs::read_to_string(&path) else {
+    if !path.is_file() {
         println!("skipped: {} is not there", path.display());
         return None;
-    };
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    for line in text.lines().skip(1) {
-        for (i, cell) in line.split(',').enumerate() {
-            if columns.len() <= i {
-                columns.push(Vec::new());
-            }
-            columns[i].push(cell.trim().parse().unwrap());
-        }
     }
-    Some(columns)
+    let wanted = Wanted {
+        is_column: &|cell| cell.parse::<f64>().is_err(),
+        header: "names of columns",
+    };
+    let sheet = Sheet::read(&path, wanted).unwrap();
+    let column = |(place, head): (usize, &String)| sheet.full_column(place, head).unwrap();
+    Some(sheet.heads().iter().enumerate().map(column).collect())
 }
 
 #[test]

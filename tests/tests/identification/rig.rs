@@ -2,8 +2,9 @@
 
 use acceptance::recordings::Test;
 use identification::data::Channel;
-use identification::identify::model::{DELAY, PHYSICAL_NAMES};
-use identification::identify::rig::{Options, RigIdentification, identify};
+use identification::identify::identified::RigIdentification;
+use identification::identify::parameters::Physical;
+use identification::identify::rig::{Options, identify};
 use nalgebra::Complex;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
@@ -139,7 +140,9 @@ fn the_slow_zero_is_claimed_only_where_the_excitation_reaches_it() {
             .warnings
             .iter()
             .any(|w| w.contains("slow pole and zero"));
-        (found.standard_error[5] / found.physical[5].abs(), told)
+        let slow = Physical::B0;
+        let relative = found.standard_error[slow] / found.physical[slow].abs();
+        (relative, told)
     };
     let (reached, told) = relative((0.02, 30.0));
     assert!(reached < 0.1 && !told, "{reached}");
@@ -162,12 +165,12 @@ fn ninety_five_per_cent_intervals_hold_the_truth_in_90_to_99_of_100() {
         .record();
         let found = identify(&[recording], Options::default())
             .unwrap_or_else(|error| panic!("seed {}: {error}", 1000 + seed));
-        for (i, want) in truth.iter().enumerate() {
-            let error = (found.physical[i] - want).abs();
-            held[i] += u64::from(error < 1.96 * found.standard_error[i]);
+        for ((held, want), &name) in held.iter_mut().zip(&truth).zip(Physical::ALL) {
+            let error = (found.physical[name] - want).abs();
+            *held += u64::from(error < 1.96 * found.standard_error[name]);
         }
     }
-    for (name, held) in PHYSICAL_NAMES.iter().zip(&held) {
+    for (name, held) in Physical::ALL.iter().map(|p| p.name()).zip(&held) {
         println!("{name}: {held} of {count}");
     }
     let all: u64 = held.iter().sum();
@@ -176,7 +179,7 @@ fn ninety_five_per_cent_intervals_hold_the_truth_in_90_to_99_of_100() {
     // A single parameter: within three standard deviations of a binomial count at 95 %.
     let expected = 0.95 * count as f64;
     let slack = 3.0 * (count as f64 * 0.95 * 0.05).sqrt();
-    for (name, held) in PHYSICAL_NAMES.iter().zip(&held) {
+    for (name, held) in Physical::ALL.iter().map(|p| p.name()).zip(&held) {
         assert!(*held as f64 > expected - slack, "{name}: {held} of {count}");
     }
 }
@@ -200,7 +203,10 @@ fn a_late_command_is_found_with_its_delay() {
         }
         .record();
         let found = identify(&[recording], Options::default()).unwrap();
-        let (got, error) = (found.physical[DELAY], found.standard_error[DELAY]);
+        let (got, error) = (
+            found.physical[Physical::CommandDelay],
+            found.standard_error[Physical::CommandDelay],
+        );
         let response = response_error(&found, 0.1, 30.0);
         println!("{delay}: {got:.7} s, standard error {error:.1e}, responses {response:.1e}");
         assert!(
@@ -229,7 +235,10 @@ fn a_punctual_command_has_no_delay() {
     )
     .unwrap();
     assert_eq!(
-        (found.physical[DELAY], found.standard_error[DELAY]),
+        (
+            found.physical[Physical::CommandDelay],
+            found.standard_error[Physical::CommandDelay]
+        ),
         (0.0, 0.0)
     );
 }

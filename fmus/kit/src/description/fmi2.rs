@@ -63,7 +63,7 @@ fn abilities<C: Component>(name: &str) -> Element {
 
 fn scalar<C: Component>(model: &Model<C>, index: usize, variable: &Variable<C>) -> Element {
     let typed = match &variable.access {
-        Access::Real(_) | Access::Element(..) => Element::new("Real")
+        Access::Real(_) | Access::Within(_) | Access::Element(..) => Element::new("Real")
             .optional("unit", variable.unit)
             .optional("displayUnit", variable.display_unit),
         Access::Integer(_) => Element::new("Integer"),

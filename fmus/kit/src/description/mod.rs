@@ -15,9 +15,9 @@ use crate::{
     checksum::fingerprint,
     component::Component,
     model::Model,
-    units::{BASE, Unit},
     variable::{Access, Causality, Dependency, Enumeration, Variability, Variable},
 };
+use units::{BaseUnit, Unit};
 use xml::Element;
 
 /// End of the default experiment, s.
@@ -100,6 +100,7 @@ fn start<C: Component>(variable: &Variable<C>) -> Option<String> {
     let mut start = C::default();
     Some(match &variable.access {
         Access::Real(field) => field(&mut start).to_string(),
+        Access::Within(place) => place(&mut start).to_string(),
         Access::Element(field, index) => field(&mut start)[*index].to_string(),
         Access::Integer(field) | Access::Choice(field, _) => field(&mut start).to_string(),
         Access::Boolean(field) => field(&mut start).to_string(),
@@ -132,14 +133,15 @@ fn unit_definitions<C: Component>(model: &Model<C>) -> Option<Element> {
     for (name, shown) in units {
         // The table was checked: its units can be read and converted.
         let unit = Unit::parse(name).ok()?;
+        let BaseUnit { exponents, factor } = unit.base_unit()?;
         let mut base = Element::new("BaseUnit");
-        for (name, exponent) in BASE.iter().zip(unit.exponents) {
+        for (name, exponent) in BaseUnit::NAMES.iter().zip(exponents) {
             base = base.optional(name, (exponent != 0).then_some(exponent));
         }
-        base = base.optional("factor", (unit.factor != 1.0).then_some(unit.factor));
+        base = base.optional("factor", (factor != 1.0).then_some(factor));
         let mut element = Element::new("Unit").attribute("name", name).child(base);
         for name in shown {
-            let factor = unit.factor_to(&Unit::parse(name).ok()?)?;
+            let factor = unit.factor_to(&Unit::parse(name).ok()?).ok()?;
             element = element.child(
                 Element::new("DisplayUnit")
                     .attribute("name", name)

@@ -4,10 +4,16 @@
 //! 1967: a valve-controlled cylinder integrates, the loop closes it to one pole).
 
 use super::table::{effects, nominal_parameters, size};
-use super::{Equations, Named, Series};
+use super::{Equations, RigRecording};
+use crate::data::Channel;
 
 /// The rig.
 pub struct ClosedLoopActuator;
+
+const COMMAND: Channel = Channel::Other {
+    name: "command",
+    unit: "m",
+};
 
 const STEPS: usize = 1;
 
@@ -59,10 +65,16 @@ impl Equations for ClosedLoopActuator {
     const KIND: &'static str = "closed_loop_actuator";
     type Nominal = Nominal;
     type Effects = Effects;
-    const INPUTS: &'static [Named] = &[("command", "m")];
-    const OUTPUT: Named = ("displacement", "m");
+    const INPUTS: &'static [Channel] = &[COMMAND];
+    const OUTPUT: Channel = Channel::Displacement;
 
-    fn simulate(&self, series: &Series, nominal: &Nominal, effects: &Effects, out: &mut [f64]) {
+    fn simulate(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        effects: &Effects,
+        out: &mut [f64],
+    ) {
         let Nominal {
             loop_gain: gain,
             command_lag: lag,
@@ -83,13 +95,13 @@ impl Equations for ClosedLoopActuator {
             free_play: FreePlay { gap },
             shared_disturbance: SharedDisturbance { coupling },
         } = *effects;
-        let command = &series.inputs[0];
-        let clean = &series.cleaned;
+        let command = recording.input(COMMAND);
+        let clean = &recording.cleaned;
         let loop_input = if coupling == 0.0 { command } else { clean };
         let Some(&first) = loop_input.first() else {
             return;
         };
-        let h = series.step / STEPS as f64;
+        let h = recording.period() / STEPS as f64;
         let keep = |time: f64| if time > 1e-5 { (-h / time).exp() } else { 0.0 };
         let (keep_command, keep_valve) = (keep(lag), keep(valve));
         let mut u = scale * first + offset;
@@ -104,7 +116,8 @@ impl Equations for ClosedLoopActuator {
                 *y += coupling * (command[k] - clean[k]);
             }
             for step in 0..STEPS {
-                let place = k as f64 + (step as f64 + 0.5) / STEPS as f64 - delay / series.step;
+                let place =
+                    k as f64 + (step as f64 + 0.5) / STEPS as f64 - delay / recording.period();
                 let place = place.max(0.0);
                 let before = (place as usize).min(last);
                 let share = place - before as f64;

@@ -4,7 +4,8 @@ use std::io::{Read, Write};
 
 use super::diagnosis::RigDiagnosis;
 use super::measured::Measured;
-use super::{Description, DescriptionError, Measurement, Named, Series};
+use super::{Description, DescriptionError, Measurement, RigRecording};
+use crate::data::Channel;
 use crate::diagnosis::engine::{ExtensibleModel, Point};
 
 /// Curves of one record, a sample a row, SI.
@@ -51,20 +52,22 @@ pub fn curves(
         effects: Vec::new(),
     };
     let is_timed = description.columns.contains_key("time");
-    let step = |series: &Series| if is_timed { series.step } else { 1.0 };
-    let all = measurement.series.iter().enumerate().map(|(s, series)| {
-        let samples = series.output.len();
-        Curves {
-            record: series.name.clone(),
+    let step = |one: &RigRecording| if is_timed { one.period() } else { 1.0 };
+    let input = description.rig()?.inputs().first().copied();
+    let all = measurement
+        .recordings
+        .iter()
+        .enumerate()
+        .map(|(s, one)| Curves {
+            record: one.name().to_owned(),
             is_timed,
-            time: (0..samples).map(|k| k as f64 * step(series)).collect(),
-            input: series.inputs.first().cloned().unwrap_or_default(),
-            measured: series.output.clone(),
+            time: (0..one.len()).map(|k| k as f64 * step(one)).collect(),
+            input: input.map_or_else(Vec::new, |input| one.input(input).to_vec()),
+            measured: one.output().to_vec(),
             nominal: measured.simulate(&origin, s),
             extended: measured.simulate(&found.as_described.point, s),
-            left_out: series.left_out.clone(),
-        }
-    });
+            left_out: one.left_out.clone(),
+        });
     Ok(all.collect())
 }
 
@@ -75,8 +78,8 @@ pub fn curves(
 /// A disk that is full, and the like.
 pub fn write(
     curves: &[Curves],
-    input: Named,
-    output: Named,
+    input: Channel,
+    output: Channel,
     file: impl Write,
 ) -> Result<(), csv::Error> {
     let mut csv = csv::Writer::from_writer(file);
@@ -84,8 +87,8 @@ pub fn write(
     csv.write_record(COLUMNS.map(|column| match column {
         "time" if is_timed => TIME.to_string(),
         "time" => "sample".to_string(),
-        "input" => format!("{} [{}]", input.0, input.1),
-        "measured" => format!("measured {} [{}]", output.0, output.1),
+        "input" => format!("{} [{}]", input.name(), input.unit()),
+        "measured" => format!("measured {} [{}]", output.name(), output.unit()),
         other => other.to_string(),
     }))?;
     for one in curves {
@@ -154,7 +157,9 @@ mod tests {
         };
         let curves = vec![one("first", 0.0), one("second", 0.7)];
         let mut file = Vec::new();
-        write(&curves, ("strain", "1"), ("stress", "Pa"), &mut file).unwrap();
+        let [strain, stress] =
+            [("strain", "1"), ("stress", "Pa")].map(|(name, unit)| Channel::Other { name, unit });
+        write(&curves, strain, stress, &mut file).unwrap();
         let header = "record,time [s],strain [1],measured stress [Pa],nominal,extended,left_out\n";
         assert!(file.starts_with(header.as_bytes()));
         assert_eq!(read(file.as_slice()).unwrap(), curves);

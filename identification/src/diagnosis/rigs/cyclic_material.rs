@@ -7,10 +7,20 @@
 //! samples; it then ran on to `strain_amplitude` (0: not known, the samples are all there is).
 
 use super::table::{effects, nominal_parameters, shape, size};
-use super::{Equations, Named, Series};
+use super::{Equations, RigRecording};
+use crate::data::Channel;
 
 /// The rig.
 pub struct CyclicMaterial;
+
+const STRAIN: Channel = Channel::Other {
+    name: "strain",
+    unit: "1",
+};
+const STRESS: Channel = Channel::Other {
+    name: "stress",
+    unit: "Pa",
+};
 
 /// Strain of one substep.
 const SUBSTEP: f64 = 5e-5;
@@ -75,11 +85,17 @@ impl Equations for CyclicMaterial {
     const KIND: &'static str = "cyclic_material";
     type Nominal = Nominal;
     type Effects = Effects;
-    const INPUTS: &'static [Named] = &[("strain", "1")];
-    const OUTPUT: Named = ("stress", "Pa");
+    const INPUTS: &'static [Channel] = &[STRAIN];
+    const OUTPUT: Channel = STRESS;
     const IS_HYSTERETIC: bool = true;
 
-    fn simulate(&self, series: &Series, nominal: &Nominal, effects: &Effects, out: &mut [f64]) {
+    fn simulate(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        effects: &Effects,
+        out: &mut [f64],
+    ) {
         let Nominal {
             modulus,
             yield_stress,
@@ -109,7 +125,7 @@ impl Equations for CyclicMaterial {
             frame_compliance: FrameCompliance { compliance },
             stress_late: StressLate { samples: late },
         } = *effects;
-        let strain = &series.inputs[0];
+        let strain = recording.input(STRAIN);
         let Some(&first) = strain.first() else { return };
         let mut state = Steel {
             modulus,
@@ -133,7 +149,7 @@ impl Equations for CyclicMaterial {
         let mut k = 0;
         while k <= last {
             // Where the strain was interpolated, only the reading behind it is known.
-            let interpolated = series.between.get(k) == Some(&true);
+            let interpolated = recording.between.get(k) == Some(&true);
             let reading = if interpolated { k + 1 } else { k };
             let next = strain[reading];
             if next != now {
@@ -255,9 +271,12 @@ impl Steel {
 mod tests {
     use super::super::EffectTable;
     use super::*;
+    use crate::data::Recording;
 
     fn stress(strain: &[f64], amplitude: f64, compliance: f64) -> Vec<f64> {
-        let series = Series::new("path", 1.0, vec![strain.to_vec()], vec![0.0; strain.len()]);
+        let channels = vec![(STRAIN, strain.to_vec()), (STRESS, vec![0.0; strain.len()])];
+        let recording = Recording::new("path", 1.0, channels).unwrap();
+        let recording = RigRecording::new(recording, CyclicMaterial::INPUTS, STRESS);
         let effects = Effects {
             frame_compliance: FrameCompliance { compliance },
             ..Effects::off().unwrap()
@@ -271,7 +290,7 @@ mod tests {
             strain_amplitude: amplitude,
         };
         let mut out = vec![0.0; strain.len()];
-        CyclicMaterial.simulate(&series, &nominal, &effects, &mut out);
+        CyclicMaterial.simulate(&recording, &nominal, &effects, &mut out);
         out
     }
 

@@ -103,7 +103,7 @@ pub fn diagnose(
     let rig = description.rig()?;
     let nominal = description.nominal(rig)?;
     let measured = Measured::new(rig, measurement, nominal);
-    let part = |fitted: Part| {
+    let part = |fitted: Part| -> Result<PartReport, DescriptionError> {
         let record = fitted as usize;
         observer.tell(|| Progress::Fitting(measured.record_name(record).to_owned()));
         let selected =
@@ -162,7 +162,7 @@ pub fn diagnose(
     Ok(RigDiagnosis {
         name: description.name.clone(),
         kind: description.kind.clone(),
-        output: rig.output().0.to_owned(),
+        output: rig.output().name().to_owned(),
         verdict,
         named,
         not_confirmed,

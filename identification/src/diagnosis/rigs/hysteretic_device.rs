@@ -4,10 +4,16 @@
 //! n = 1 is his curve, n between is Bouc and Wen's with no post-yield stiffness).
 
 use super::table::{effects, nominal_parameters, shape, size};
-use super::{Equations, Named, Series};
+use super::{Equations, RigRecording};
+use crate::data::Channel;
 
 /// The rig.
 pub struct HystereticDevice;
+
+const FORCE: Channel = Channel::Other {
+    name: "force",
+    unit: "N",
+};
 
 nominal_parameters! {
     coulomb_force: "N",
@@ -81,11 +87,17 @@ impl Equations for HystereticDevice {
     const KIND: &'static str = "hysteretic_device";
     type Nominal = Nominal;
     type Effects = Effects;
-    const INPUTS: &'static [Named] = &[("displacement", "m"), ("velocity", "m/s")];
-    const OUTPUT: Named = ("force", "N");
+    const INPUTS: &'static [Channel] = &[Channel::Displacement, Channel::Velocity];
+    const OUTPUT: Channel = FORCE;
     const IS_HYSTERETIC: bool = true;
 
-    fn simulate(&self, series: &Series, nominal: &Nominal, effects: &Effects, out: &mut [f64]) {
+    fn simulate(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        effects: &Effects,
+        out: &mut [f64],
+    ) {
         let Nominal {
             coulomb_force: coulomb,
             stiffness,
@@ -118,16 +130,19 @@ impl Equations for HystereticDevice {
                 },
             delay: Delay { delay },
         } = *effects;
-        let (x, v) = (&series.inputs[0], &series.inputs[1]);
+        let (x, v) = (
+            recording.input(Channel::Displacement),
+            recording.input(Channel::Velocity),
+        );
         // The device begins as it was left: where in the gap, the first measured force tells.
-        let mut force = series
-            .output
+        let mut force = recording
+            .output()
             .first()
             .map_or(0.0, |f| f.clamp(-coulomb, coulomb));
         // Travelled part of the gap, 0 at its negative end.
         let mut travelled = if force > 0.0 { gap } else { 0.0 };
         let (mut shown, mut shown_rate) = (0.0, 0.0);
-        let late = delay / series.step;
+        let late = delay / recording.period();
         let at = |values: &[f64], k: usize| {
             let place = (k as f64 - late).max(0.0);
             let before = place as usize;
@@ -202,7 +217,7 @@ impl Equations for HystereticDevice {
             }
             let total = force + damping * speed;
             if resonance > 0.0 {
-                let h = series.step / 8.0;
+                let h = recording.period() / 8.0;
                 for _ in 0..8 {
                     shown_rate += h * resonance * (resonance * (total - shown) - 0.2 * shown_rate);
                     shown += h * shown_rate;
@@ -219,6 +234,7 @@ impl Equations for HystereticDevice {
 mod tests {
     use super::super::EffectTable;
     use super::*;
+    use crate::data::Recording;
 
     #[test]
     fn asymmetry_fades_with_the_greatest_excursion() {
@@ -231,12 +247,13 @@ mod tests {
             .chain([0.008])
             .collect();
         let n = displacement.len();
-        let series = Series::new(
-            "slides",
-            1e-3,
-            vec![displacement, vec![0.0; n]],
-            vec![0.0; n],
-        );
+        let channels = vec![
+            (Channel::Displacement, displacement),
+            (Channel::Velocity, vec![0.0; n]),
+            (FORCE, vec![0.0; n]),
+        ];
+        let recording = Recording::new("slides", 1e-3, channels).unwrap();
+        let recording = RigRecording::new(recording, HystereticDevice::INPUTS, FORCE);
         let effects = Effects {
             asymmetric_coulomb_friction: AsymmetricCoulombFriction { asymmetry: -0.3 },
             excursion_memory: ExcursionMemory { decay: 50.0 },
@@ -247,7 +264,7 @@ mod tests {
             stiffness: 1e8,
         };
         let mut out = vec![0.0; n];
-        HystereticDevice.simulate(&series, &nominal, &effects, &mut out);
+        HystereticDevice.simulate(&recording, &nominal, &effects, &mut out);
         let fade = |excursion: f64| 0.3 * (-50.0 * excursion).exp();
         for (place, force) in [
             (500, 1e4 * (1.0 - fade(0.005))),

@@ -38,7 +38,7 @@ pub struct Measured<'a> {
     effects: Vec<Effect>,
     candidates: Vec<Candidate>,
     channel: [&'static str; 1],
-    /// Per record and series, the places of its samples.
+    /// Per record and recording, the places of its samples.
     places: Vec<Vec<Vec<usize>>>,
     /// Error that counts as one.
     scale: f64,
@@ -56,18 +56,18 @@ const NAMES: [&str; 6] = [
 impl<'a> Measured<'a> {
     /// The rig with nominal values and standard deviations in its order.
     pub fn new(rig: &'a dyn Rig, measurement: &'a Measurement, nominal: Vec<(f64, f64)>) -> Self {
-        let mut places = vec![vec![Vec::new(); measurement.series.len()]; NAMES.len()];
+        let mut places = vec![vec![Vec::new(); measurement.recordings.len()]; NAMES.len()];
         for part in 0..2 {
             let in_part = |out: &bool| usize::from(*out) == part;
             let count: usize = measurement
-                .series
+                .recordings
                 .iter()
-                .flat_map(|s| &s.left_out)
+                .flat_map(|one| &one.left_out)
                 .filter(|o| in_part(o))
                 .count();
             let mut seen = 0;
-            for (s, series) in measurement.series.iter().enumerate() {
-                for (k, _) in series
+            for (s, recording) in measurement.recordings.iter().enumerate() {
+                for (k, _) in recording
                     .left_out
                     .iter()
                     .enumerate()
@@ -87,7 +87,7 @@ impl<'a> Measured<'a> {
                 .map(|effect| effect.candidate.clone())
                 .collect(),
             effects,
-            channel: [rig.output().0],
+            channel: [rig.output().name()],
             rig,
             measurement,
             nominal,
@@ -130,21 +130,21 @@ impl<'a> Measured<'a> {
         values
     }
 
-    /// Simulated output of one series.
-    pub fn simulate(&self, point: &Point, series: usize) -> Vec<f64> {
-        let series = &self.measurement.series[series];
-        let mut out = vec![0.0; series.output.len()];
+    /// Simulated output of one recording.
+    pub fn simulate(&self, point: &Point, recording: usize) -> Vec<f64> {
+        let recording = &self.measurement.recordings[recording];
+        let mut out = vec![0.0; recording.len()];
         let (nominal, effects) = (self.nominal_values(point), self.effect_values(point));
-        self.rig.simulate(series, &nominal, &effects, &mut out);
+        self.rig.simulate(recording, &nominal, &effects, &mut out);
         out
     }
 
-    /// `||y - m|| / ||m - mean||` on the samples of `record`, the mean taken in each series.
+    /// `||y - m|| / ||m - mean||` on the samples of `record`, the mean taken in each recording.
     pub fn normalised_error(&self, point: &Point, record: usize) -> f64 {
         let errors = self.errors(point, record);
         let mut size = 0.0;
         for (s, places) in self.places[record].iter().enumerate() {
-            let measured = &self.measurement.series[s].output;
+            let measured = self.measurement.recordings[s].output();
             let mean =
                 places.iter().map(|&k| measured[k]).sum::<f64>() / places.len().max(1) as f64;
             size += places
@@ -218,7 +218,7 @@ impl SimulatedModel for Measured<'_> {
         for (s, places) in self.places[record].iter().enumerate() {
             if !places.is_empty() {
                 let simulated = self.simulate(point, s);
-                let measured = &self.measurement.series[s].output;
+                let measured = self.measurement.recordings[s].output();
                 errors.extend(places.iter().map(|&k| measured[k] - simulated[k]));
             }
         }

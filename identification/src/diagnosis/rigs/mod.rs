@@ -13,14 +13,20 @@ mod extended;
 mod hysteretic_device;
 mod measured;
 mod positioning_drive;
+mod reading;
+mod recording;
 pub mod shake_table;
 mod table;
 
-pub use description::{Description, DescriptionError, LeftOut, Measurement, Quantity, Series};
+pub use description::{Column, Description, DescriptionError, LeftOut, Quantity};
 pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, diagnose};
 pub use extended::ExtendedRig;
 
+pub use reading::Measurement;
+pub use recording::RigRecording;
 pub use table::{Effect, EffectTable, NominalTable};
+
+use crate::data::Channel;
 
 /// A quantity by name and SI unit.
 pub type Named = (&'static str, &'static str);
@@ -36,16 +42,16 @@ pub trait Equations: Sync {
     type Effects: EffectTable;
 
     /// What the data must hold beside the output.
-    const INPUTS: &'static [Named];
+    const INPUTS: &'static [Channel];
     /// What is simulated and compared.
-    const OUTPUT: Named;
+    const OUTPUT: Channel;
     /// True where the output depends on the input's path, which a loop shows best.
     const IS_HYSTERETIC: bool = false;
 
-    /// Output for the inputs of `series` alone.
+    /// Output for the inputs of `recording` alone.
     fn simulate(
         &self,
-        series: &Series,
+        recording: &RigRecording,
         nominal: &Self::Nominal,
         effects: &Self::Effects,
         out: &mut [f64],
@@ -58,10 +64,10 @@ pub trait Rig: Sync {
     fn kind(&self) -> &'static str;
 
     /// What the data must hold beside the output.
-    fn inputs(&self) -> &'static [Named];
+    fn inputs(&self) -> &'static [Channel];
 
     /// What is simulated and compared.
-    fn output(&self) -> Named;
+    fn output(&self) -> Channel;
 
     /// Whether the output depends on the input's path.
     fn is_hysteretic(&self) -> bool;
@@ -72,9 +78,9 @@ pub trait Rig: Sync {
     /// The effects.
     fn effects(&self) -> Vec<Effect>;
 
-    /// Output for the inputs of `series` alone, with values in the order of [`Self::parameters`] and
+    /// Output for the inputs of `recording` alone, with values in the order of [`Self::parameters`] and
     /// of all parameters of [`Self::effects`], SI; not a number where their count is another.
-    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]);
+    fn simulate(&self, recording: &RigRecording, nominal: &[f64], effects: &[f64], out: &mut [f64]);
 }
 
 impl<E: Equations> Rig for E {
@@ -82,11 +88,11 @@ impl<E: Equations> Rig for E {
         E::KIND
     }
 
-    fn inputs(&self) -> &'static [Named] {
+    fn inputs(&self) -> &'static [Channel] {
         E::INPUTS
     }
 
-    fn output(&self) -> Named {
+    fn output(&self) -> Channel {
         E::OUTPUT
     }
 
@@ -102,13 +108,19 @@ impl<E: Equations> Rig for E {
         E::Effects::table()
     }
 
-    fn simulate(&self, series: &Series, nominal: &[f64], effects: &[f64], out: &mut [f64]) {
+    fn simulate(
+        &self,
+        recording: &RigRecording,
+        nominal: &[f64],
+        effects: &[f64],
+        out: &mut [f64],
+    ) {
         match (
             E::Nominal::from_values(nominal),
             E::Effects::from_values(effects),
         ) {
             (Some(nominal), Some(effects)) => {
-                Equations::simulate(self, series, &nominal, &effects, out);
+                Equations::simulate(self, recording, &nominal, &effects, out);
             }
             _ => out.fill(f64::NAN),
         }
@@ -131,16 +143,21 @@ pub fn of_kind(kind: &str) -> Option<&'static dyn Rig> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::Recording;
 
     #[test]
     fn a_wrong_number_of_values_gives_no_number() {
-        let series = Series::new("none", 1.0, vec![vec![0.0; 16]; 2], vec![0.0; 16]);
         for rig in KINDS {
+            let mut channels = rig.inputs().to_vec();
+            channels.push(rig.output());
+            let channels = channels.into_iter().map(|c| (c, vec![0.0; 16])).collect();
+            let recording = Recording::new("none", 1.0, channels).unwrap();
+            let recording = RigRecording::new(recording, rig.inputs(), rig.output());
             let nominal = vec![1.0; rig.parameters().len()];
             let effects: Vec<f64> = rig.effects().into_iter().flat_map(|e| e.off).collect();
             for (nominal, effects) in [(&nominal[1..], &effects[..]), (&nominal, &effects[1..])] {
                 let mut out = vec![0.0; 16];
-                rig.simulate(&series, nominal, effects, &mut out);
+                rig.simulate(&recording, nominal, effects, &mut out);
                 assert!(out.iter().all(|y| y.is_nan()), "{}", rig.kind());
             }
         }

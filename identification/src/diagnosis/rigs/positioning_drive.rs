@@ -4,10 +4,20 @@
 //! (Janot, Gautier and Brunot, Data set and reference models of EMPS, 2019).
 
 use super::table::{effects, nominal_parameters, shape, size};
-use super::{Equations, Named, Series};
+use super::{Equations, RigRecording};
+use crate::data::Channel;
 
 /// The rig.
 pub struct PositioningDrive;
+
+const POSITION: Channel = Channel::Other {
+    name: "position",
+    unit: "m",
+};
+const MOTOR_VOLTAGE: Channel = Channel::Other {
+    name: "motor_voltage",
+    unit: "V",
+};
 
 const STEPS: usize = 2;
 /// Nominal leads of ball screws, m (ISO 3408-2).
@@ -71,10 +81,16 @@ impl Equations for PositioningDrive {
     const KIND: &'static str = "positioning_drive";
     type Nominal = Nominal;
     type Effects = Effects;
-    const INPUTS: &'static [Named] = &[("reference", "m"), ("position", "m")];
-    const OUTPUT: Named = ("motor_voltage", "V");
+    const INPUTS: &'static [Channel] = &[Channel::Reference, POSITION];
+    const OUTPUT: Channel = MOTOR_VOLTAGE;
 
-    fn simulate(&self, series: &Series, nominal: &Nominal, effects: &Effects, out: &mut [f64]) {
+    fn simulate(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        effects: &Effects,
+        out: &mut [f64],
+    ) {
         let Nominal {
             mass,
             viscous_friction: viscous,
@@ -104,17 +120,20 @@ impl Equations for PositioningDrive {
             quadratic_drag: QuadraticDrag { drag },
             flexibility: Flexibility { share, frequency },
         } = *effects;
-        let (reference, position) = (&series.inputs[0], &series.inputs[1]);
+        let (reference, position) = (
+            recording.input(Channel::Reference),
+            recording.input(POSITION),
+        );
         if reference.len() < 8 || position.len() < 8 {
             return;
         }
-        let sample = series.step;
+        let sample = recording.period();
         let h = sample / STEPS as f64;
         // The record may begin in motion: where and how fast is measured, over eight samples.
         let mut q = position[0];
         let mut v = start_speed(&position[..8], sample);
         let mut before = q - v * sample;
-        let middle = series.middle;
+        let middle = recording.middle;
         let (mut load_q, mut load_v) = (q, v);
         let load = share * mass;
         let motor = mass - load;

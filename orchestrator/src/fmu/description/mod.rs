@@ -2,11 +2,18 @@
 
 mod fmi2;
 mod fmi3;
+mod kind;
+mod structure;
 
 use std::collections::HashMap;
 use std::fmt;
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
+
+pub use kind::{Item, Kind};
+pub use structure::BaseUnit;
 
 use super::FmuError;
 
@@ -57,53 +64,6 @@ impl fmt::Display for FmiVersion {
     }
 }
 
-/// One of the choices of an enumeration.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Item {
-    /// Its name.
-    pub name: String,
-    /// Its value.
-    pub value: i64,
-    /// What it means; may be empty.
-    pub description: String,
-}
-
-/// The type of a variable, named as in FMI 3.0.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Kind {
-    /// FMI 2.0 Real.
-    Float64,
-    /// FMI 2.0 Integer.
-    Int32,
-    /// A choice.
-    Enumeration(Vec<Item>),
-    /// True or false.
-    Boolean,
-    /// Text.
-    String,
-    /// A type that this program neither sets nor reads.
-    Other(String),
-}
-
-impl Kind {
-    /// The type's name.
-    pub fn name(&self) -> &str {
-        match self {
-            Self::Float64 => "Float64",
-            Self::Int32 => "Int32",
-            Self::Enumeration(_) => "Enumeration",
-            Self::Boolean => "Boolean",
-            Self::String => "String",
-            Self::Other(name) => name,
-        }
-    }
-
-    /// Whether a value of it can travel along a connection.
-    pub fn is_numeric(&self) -> bool {
-        !matches!(self, Self::String | Self::Other(_))
-    }
-}
-
 /// What a variable is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Causality {
@@ -130,7 +90,7 @@ pub enum Variability {
     Continuous,
 }
 
-/// One variable.
+/// One variable, or one element of an array: `A[2,1]` is the element in row 2 and column 1 of `A`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variable {
     /// Its name.
@@ -145,14 +105,37 @@ pub struct Variable {
     pub variability: Variability,
     /// Unit, as the description writes it.
     pub unit: Option<String>,
+    /// What the unit is in SI, where the description says so.
+    pub base_unit: Option<BaseUnit>,
     /// Unit in which people want to see it.
     pub display_unit: Option<String>,
     /// Start value as written.
     pub start: Option<String>,
+    /// Whether a start value can be set before the run.
+    pub is_settable: bool,
+    /// Whether it is a parameter that sizes arrays.
+    pub is_structural: bool,
+    /// The clocks that it belongs to, by value reference.
+    pub clocks: Vec<u32>,
+    /// Place in its array, counted from 0, and number of elements; 0 of 1 where it is no array.
+    pub element: (usize, usize),
+    /// Whether it is an element of an array, perhaps of one element.
+    pub is_element: bool,
     /// One line for people.
     pub description: String,
     /// For outputs: positions of the inputs that it depends on directly.
-    pub dependencies: Vec<usize>,
+    pub dependencies: Arc<[usize]>,
+}
+
+/// How an FMU can be run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interface {
+    /// It steps itself.
+    CoSimulation,
+    /// It gives derivatives; a solver steps it.
+    ModelExchange,
+    /// Its parts are called by a scheduler, which this program has not.
+    ScheduledExecution,
 }
 
 /// What the master needs of a `modelDescription.xml`.
@@ -170,10 +153,24 @@ pub struct Description {
     pub about: String,
     /// The tool that made it.
     pub generation_tool: String,
+    /// How it is run.
+    pub interface: Interface,
+    /// Whether its events can be handled from outside.
+    pub has_event_mode: bool,
+    /// Whether a process takes one instance of it only.
+    pub only_one_per_process: bool,
+    /// Whether it needs the tool that made it.
+    pub needs_execution_tool: bool,
+    /// Categories of messages that it can be asked for.
+    pub log_categories: Vec<String>,
     /// Whether its state can be saved and restored.
     pub saves_state: bool,
     /// Whether it offers model exchange, too.
     pub offers_model_exchange: bool,
+    /// Continuous states, as far as the description tells (arrays count once).
+    pub states: usize,
+    /// Event indicators, as far as the description tells.
+    pub event_indicators: usize,
     /// Step size that it would like, s.
     pub preferred_step: Option<f64>,
     /// Whether the step size may differ from call to call.
@@ -183,9 +180,16 @@ pub struct Description {
     /// What the file does against the standard without being unusable.
     pub remarks: Vec<String>,
     positions: HashMap<String, usize>,
+    /// Elements of arrays, by the array's name.
+    arrays: HashMap<String, Range<usize>>,
 }
 
 impl Description {
+    /// Positions of the elements of an array.
+    pub fn array(&self, name: &str) -> Option<Range<usize>> {
+        self.arrays.get(name).cloned()
+    }
+
     /// The position of the variable of that name.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.positions.get(name).copied()
@@ -202,14 +206,18 @@ impl Description {
     }
 }
 
-/// Reads `modelDescription.xml` in the unpacked FMU.
-pub(super) fn read(fmu: &Path, unpacked: &Path) -> Result<Description, FmuError> {
+/// Values of structural parameters by value reference, in place of their start values.
+pub(super) type Sizes = HashMap<u32, u64>;
+
+/// Reads `modelDescription.xml` in the unpacked FMU, with arrays of the given sizes.
+pub(super) fn read(fmu: &Path, unpacked: &Path, sizes: &Sizes) -> Result<Description, FmuError> {
     let wrong = |reason: String| FmuError::Description {
         fmu: fmu.to_path_buf(),
         reason,
     };
-    let text = fs::read_to_string(unpacked.join("modelDescription.xml"))
-        .map_err(|error| wrong(format!("cannot be read as UTF-8 text ({error})")))?;
+    let bytes = fs::read(unpacked.join("modelDescription.xml"))
+        .map_err(|error| wrong(format!("cannot be read ({error})")))?;
+    let text = structure::decode(bytes).map_err(wrong)?;
     let xml = roxmltree::Document::parse(&text)
         .map_err(|error| wrong(format!("not well-formed XML: {error}")))?;
     let root = xml.root_element();
@@ -226,7 +234,7 @@ pub(super) fn read(fmu: &Path, unpacked: &Path) -> Result<Description, FmuError>
             ));
         }
         Some("2.0") => fmi2::read(&text).map_err(wrong)?,
-        Some(version) if version.starts_with("3.") => fmi3::read(&text).map_err(wrong)?,
+        Some(version) if version.starts_with("3.") => fmi3::read(&text, sizes).map_err(wrong)?,
         Some(version) => {
             return Err(wrong(format!(
                 "fmiVersion is \"{version}\", expected \"2.0\" or \"3.0\""
@@ -244,16 +252,7 @@ pub(super) fn read(fmu: &Path, unpacked: &Path) -> Result<Description, FmuError>
              so it cannot name a library"
         )));
     }
-    for (index, variable) in description.variables.iter().enumerate() {
-        if let Some(first) = description.positions.insert(variable.name.clone(), index) {
-            return Err(wrong(format!(
-                "the variable `{}` stands there twice (as number {} and {})",
-                variable.name,
-                first + 1,
-                index + 1
-            )));
-        }
-    }
+    structure::name(&mut description, root).map_err(wrong)?;
     Ok(description)
 }
 
@@ -262,26 +261,4 @@ fn preferred_step(
 ) -> Option<f64> {
     let step = experiment?.stepSize.as_ref()?.parse().ok()?;
     (step > 0.0).then_some(step)
-}
-
-/// Notes the inputs among `known` (all inputs, where nothing is said) as dependencies of an output.
-fn depend(
-    variables: &mut [Variable],
-    output: usize,
-    known: Option<impl Iterator<Item = usize>>,
-) -> Result<(), String> {
-    let is_input = |index: &usize| {
-        variables
-            .get(*index)
-            .is_some_and(|variable| variable.causality == Causality::Input)
-    };
-    let dependencies = match known {
-        Some(known) => known.filter(is_input).collect(),
-        None => (0..variables.len()).filter(is_input).collect(),
-    };
-    let output = variables.get_mut(output).ok_or_else(|| {
-        "<ModelStructure> lists an output that is not among the variables".to_string()
-    })?;
-    output.dependencies = dependencies;
-    Ok(())
 }

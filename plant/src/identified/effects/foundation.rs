@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use super::quantity::{FREQUENCY, RATIO};
+use super::{Component, Effect, Family, Parameter, Scale};
 use crate::ModelError;
 
 /// Reaction mass on a spring: `M (x_f'' + 2 zeta w x_f' + w² x_f) = -(force on the table from the
@@ -41,11 +43,55 @@ impl FoundationEffects {
         -force / (self.mass_ratio * table_mass)
             - omega * (2.0 * self.damping_ratio * velocity + omega * displacement)
     }
+}
 
-    /// Refuses a negative frequency or damping and a mass that is not positive.
-    pub fn validate(&self) -> Result<(), ModelError> {
+impl Family for FoundationEffects {
+    type Memory = ();
+
+    const EFFECTS: &'static [Effect] = &[Effect {
+        equation: "M (x_f'' + 2 zeta w x_f' + w² x_f) = -(F - c v - k x), w = 2 pi f",
+        sentence: "the reaction mass moves, with a natural frequency of {}",
+        parameters: &[
+            Parameter::new(
+                "frequency",
+                FREQUENCY,
+                "Natural frequency of the reaction mass, relative to which the piston moves; 0 is rigid",
+            )
+            .size(Scale::Logarithmic, 18.0, (3.0, 30.0))
+            .on_table(|e| &mut e.foundation.frequency)
+            .min(0.0),
+            Parameter::new("mass_ratio", RATIO, "Reaction mass in masses of the table")
+                .shape(Scale::Logarithmic, 12.0, 0.1, (4.0, 40.0))
+                .on_table(|e| &mut e.foundation.mass_ratio)
+                .min(1e-3),
+            Parameter::new("damping_ratio", RATIO, "Damping ratio of the reaction mass")
+                .shape(Scale::Logarithmic, 0.05, 0.25, (0.01, 0.3))
+                .on_table(|e| &mut e.foundation.damping_ratio)
+                .min(0.0),
+        ],
+        // A lightly damped mode is found from nearby only.
+        starts: &[
+            &[6.3, 12.0, 0.05],
+            &[7.3, 12.0, 0.05],
+            &[8.5, 12.0, 0.05],
+            &[9.8, 12.0, 0.05],
+            &[11.4, 12.0, 0.05],
+            &[13.2, 12.0, 0.05],
+            &[15.3, 12.0, 0.05],
+            &[17.7, 12.0, 0.05],
+        ],
+        is_linear: true,
+        needs_co_simulation: true,
+        ..Effect::new("foundation_compliance", Component::ShakeTable)
+    }];
+
+    fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_non_negative("foundation_frequency", self.frequency)?;
         ModelError::require_positive("foundation_mass_ratio", self.mass_ratio)?;
         ModelError::require_non_negative("foundation_damping_ratio", self.damping_ratio)
+    }
+
+    fn is_active(&self) -> bool {
+        self.frequency != 0.0
     }
 }

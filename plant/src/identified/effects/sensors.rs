@@ -1,70 +1,132 @@
-//! What the channels show instead of the truth.
+//! What the channels show instead of the truth, as parameters of the [`Instrumentation`].
+//!
+//! [`Instrumentation`]: crate::sensors::instrumentation::Instrumentation
 
-use crate::ModelError;
+use super::quantity::{ACCELERATION, ANGLE, FORCE, FREQUENCY, RATIO, TILT, TIME_CONSTANT};
+use super::{Component, Effect, Parameter, Reporting};
+use units::constants::{INCH, LBF};
 
-/// Errors of the sensors, zero is off.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SensorEffects {
-    /// Offset of the table's accelerometer, m/s².
-    pub accelerometer_bias: f64,
-    /// Relative error of its scale.
-    pub accelerometer_scale: f64,
-    /// Pitch per displacement, rad/m: gravity enters as `g tilt x`.
-    pub accelerometer_tilt: f64,
-    /// Lateness of its channel, s.
-    pub accelerometer_delay: f64,
-    /// Amplitude of the mains on it, m/s².
-    pub hum_amplitude: f64,
-    /// Frequency of the mains, Hz.
-    pub hum_frequency: f64,
-    /// Phase of the mains at time zero, rad.
-    pub hum_phase: f64,
-    /// Relative error of the displacement's scale.
-    pub displacement_scale: f64,
-    /// Corner of a first-order lag of the displacement, Hz; 0 is none.
-    pub displacement_lag: f64,
-    /// Relative error of the load cell's scale.
-    pub load_cell_scale: f64,
-    /// Offset of the load cell, N.
-    pub load_cell_bias: f64,
-}
-
-impl Default for SensorEffects {
-    fn default() -> Self {
-        Self {
-            accelerometer_bias: 0.0,
-            accelerometer_scale: 0.0,
-            accelerometer_tilt: 0.0,
-            accelerometer_delay: 0.0,
-            hum_amplitude: 0.0,
-            hum_frequency: 60.0,
-            hum_phase: 0.0,
-            displacement_scale: 0.0,
-            displacement_lag: 0.0,
-            load_cell_scale: 0.0,
-            load_cell_bias: 0.0,
-        }
+const fn effect(name: &'static str) -> Effect {
+    Effect {
+        is_linear: true,
+        ..Effect::new(name, Component::Instrumentation)
     }
 }
 
-impl SensorEffects {
-    /// Refuses a negative delay, lag or mains frequency.
-    pub fn validate(&self) -> Result<(), ModelError> {
-        for (name, value) in [
-            ("accelerometer_bias", self.accelerometer_bias),
-            ("accelerometer_scale", self.accelerometer_scale),
-            ("accelerometer_tilt", self.accelerometer_tilt),
-            ("hum_amplitude", self.hum_amplitude),
-            ("hum_phase", self.hum_phase),
-            ("displacement_scale", self.displacement_scale),
-            ("load_cell_scale", self.load_cell_scale),
-            ("load_cell_bias", self.load_cell_bias),
-        ] {
-            ModelError::require_finite(name, value)?;
-        }
-        ModelError::require_non_negative("accelerometer_delay", self.accelerometer_delay)?;
-        ModelError::require_non_negative("hum_frequency", self.hum_frequency)?;
-        ModelError::require_non_negative("displacement_lag", self.displacement_lag)
-    }
-}
+/// The effects on the sensors; their parameters on a channel are described by the FMU's channels.
+pub const EFFECTS: &[Effect] = &[
+    Effect {
+        equation: "y = a + b",
+        sentence: "the table's accelerometer has an offset of {}",
+        parameters: &[Parameter::new("offset", ACCELERATION, "offset")
+            .signed(1.5 * INCH, 15.0 * INCH)
+            .on_sensors(|s| &mut s.acceleration.bias)],
+        starts: &[&[0.0]],
+        is_linear: false,
+        ..effect("accelerometer_bias")
+    },
+    Effect {
+        equation: "y = (1 + p) a",
+        sentence: "the scale of the table's accelerometer is off by {}",
+        parameters: &[
+            Parameter::new("relative_change", RATIO, "relative error of the scale")
+                .relative(0.03, 0.2)
+                .on_sensors(|s| &mut s.acceleration.scale_error),
+        ],
+        starts: &[&[0.0]],
+        ..effect("accelerometer_scale")
+    },
+    Effect {
+        equation: "y = a + g tilt x",
+        sentence: "the table pitches as it moves, by {}",
+        parameters: &[
+            Parameter::new("tilt", TILT, "Pitch of the table per displacement")
+                .signed(0.004 / INCH, 0.05 / INCH)
+                .on_sensors(|s| &mut s.accelerometer_tilt),
+        ],
+        starts: &[&[0.0]],
+        ..effect("accelerometer_tilt")
+    },
+    Effect {
+        equation: "y(t) = a(t - T)",
+        sentence: "the channel of the table's accelerometer is {} late",
+        parameters: &[Parameter::new("delay", TIME_CONSTANT, "lateness")
+            .delay()
+            .on_sensors(|s| &mut s.acceleration.delay)],
+        starts: &[&[0.005], &[0.013]],
+        ..effect("accelerometer_delay")
+    },
+    Effect {
+        equation: "y = (1 + p) x",
+        sentence: "the scale of the displacement sensor is off by {}",
+        parameters: &[
+            Parameter::new("relative_change", RATIO, "relative error of the scale")
+                .relative(0.03, 0.15)
+                .on_sensors(|s| &mut s.displacement.scale_error),
+        ],
+        starts: &[&[0.0]],
+        ..effect("displacement_scale")
+    },
+    Effect {
+        equation: "y' = 2 pi f (x - y)",
+        sentence: "the displacement sensor lags, with a corner at {}",
+        parameters: &[
+            Parameter::new("frequency", FREQUENCY, "corner of the first-order lag")
+                .inverse(40.0, 6.0)
+                .on_sensors(|s| &mut s.displacement.corner),
+        ],
+        starts: &[&[25.0], &[10.0]],
+        ..effect("displacement_lag")
+    },
+    Effect {
+        equation: "y = (1 + p) F",
+        sentence: "the scale of the load cell is off by {}",
+        parameters: &[
+            Parameter::new("relative_change", RATIO, "relative error of the scale")
+                .relative(0.03, 0.2)
+                .on_sensors(|s| &mut s.actuator_force.scale_error),
+        ],
+        starts: &[&[0.0]],
+        ..effect("load_cell_scale")
+    },
+    Effect {
+        equation: "y = F + b",
+        sentence: "the load cell has an offset of {}",
+        parameters: &[Parameter::new("offset", FORCE, "offset")
+            .signed(0.3 * LBF, 4.0 * LBF)
+            .on_sensors(|s| &mut s.actuator_force.bias)],
+        starts: &[&[0.0]],
+        is_linear: false,
+        ..effect("load_cell_bias")
+    },
+    Effect {
+        equation: "y = a + A sin(2 pi f t + phi)",
+        sentence: "the table's accelerometer picks up the mains with {}",
+        parameters: &[
+            // Linear in what is estimated, unlike amplitude and phase.
+            Parameter::new("in_phase", ACCELERATION, "A cos(phi)")
+                .signed(1.5 * INCH, 15.0 * INCH)
+                .without_variable(),
+            Parameter::new("quadrature", ACCELERATION, "A sin(phi)")
+                .signed(1.5 * INCH, 15.0 * INCH)
+                .without_variable(),
+            Parameter::new("amplitude", ACCELERATION, "amplitude of the mains")
+                .on_sensors(|s| &mut s.acceleration.hum_amplitude)
+                .switch(),
+            Parameter::new("frequency", FREQUENCY, "frequency of the mains")
+                .on_sensors(|s| &mut s.acceleration.hum_frequency),
+            Parameter::new("phase", ANGLE, "phase of the mains at time zero")
+                .on_sensors(|s| &mut s.acceleration.hum_phase),
+        ],
+        starts: &[&[0.0, 0.0]],
+        is_linear: false,
+        settle: |_, sensors, values| {
+            if let [in_phase, quadrature] = *values {
+                sensors.acceleration.hum_amplitude = in_phase.hypot(quadrature);
+                sensors.acceleration.hum_phase = quadrature.atan2(in_phase);
+            }
+        },
+        reporting: Reporting::AmplitudeAndPhase,
+        ..effect("mains_hum")
+    },
+];

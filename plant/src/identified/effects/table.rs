@@ -1,6 +1,9 @@
 //! What the table carries and rubs against beyond Eq 2-5.
 
+use super::quantity::{CUBIC_STIFFNESS, DAMPING, MASS};
+use super::{AtStart, Component, Effect, Family, Parameter};
 use crate::ModelError;
+use units::constants::{INCH, LBF, LBF_S_PER_INCH, LBF_S2_PER_INCH};
 
 /// Mass, viscous damping and a hardening spring beside those of Eq 2-28.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
@@ -14,16 +17,63 @@ pub struct TableEffects {
     pub cubic_stiffness: f64,
 }
 
-impl TableEffects {
-    /// True when the table is not that of the model.
-    pub fn is_active(&self) -> bool {
+const LBF_PER_INCH3: f64 = LBF / (INCH * INCH * INCH);
+
+impl Family for TableEffects {
+    type Memory = ();
+
+    const EFFECTS: &'static [Effect] = &[
+        Effect {
+            equation: "(m + m_p) a = F - c v - k x",
+            sentence: "the table carries an unknown mass of {}",
+            parameters: &[Parameter::new(
+                "mass",
+                MASS,
+                "Mass on the table that the model does not know; 0 is off",
+            )
+            .positive(0.006 * LBF_S2_PER_INCH, 0.06 * LBF_S2_PER_INCH)
+            .on_table(|e| &mut e.table.added_mass)
+            .at_start(AtStart::Acceleration)],
+            starts: &[&[0.01 * LBF_S2_PER_INCH], &[0.035 * LBF_S2_PER_INCH]],
+            is_linear: true,
+            ..Effect::new("added_payload", Component::ShakeTable)
+        },
+        Effect {
+            equation: "m a = F - (c + c_a) v - k x",
+            sentence: "the table has extra damping of {}",
+            parameters: &[Parameter::new(
+                "damping",
+                DAMPING,
+                "Extra damping of the table; 0 is off",
+            )
+            .positive(0.05 * LBF_S_PER_INCH, 0.8 * LBF_S_PER_INCH)
+            .on_table(|e| &mut e.table.viscous_damping)],
+            starts: &[&[0.1 * LBF_S_PER_INCH], &[0.4 * LBF_S_PER_INCH]],
+            is_linear: true,
+            ..Effect::new("viscous_damping", Component::ShakeTable)
+        },
+        Effect {
+            equation: "m a = F - c v - k x - k3 x³",
+            sentence: "the table has an extra cubic stiffness of {}",
+            parameters: &[Parameter::new(
+                "stiffness",
+                CUBIC_STIFFNESS,
+                "k3 of an extra force k3 x^3; 0 is off",
+            )
+            .positive(2.0 * LBF_PER_INCH3, 30.0 * LBF_PER_INCH3)
+            .on_table(|e| &mut e.table.cubic_stiffness)],
+            starts: &[&[4.0 * LBF_PER_INCH3], &[15.0 * LBF_PER_INCH3]],
+            ..Effect::new("cubic_stiffness", Component::ShakeTable)
+        },
+    ];
+
+    fn is_active(&self) -> bool {
         [self.added_mass, self.viscous_damping, self.cubic_stiffness]
             .into_iter()
             .any(|size| size != 0.0)
     }
 
-    /// Refuses values that are not finite.
-    pub fn validate(&self) -> Result<(), ModelError> {
+    fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_finite("added_mass", self.added_mass)?;
         ModelError::require_finite("viscous_damping", self.viscous_damping)?;
         ModelError::require_finite("cubic_stiffness", self.cubic_stiffness)

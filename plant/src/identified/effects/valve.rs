@@ -2,7 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use super::quantity::{DELAY, FREQUENCY, RATIO, VOLTAGE};
+use super::{AtStart, Component, Effect, Family, Parameter, Scale};
 use crate::ModelError;
+use crate::delay_line::{DelayLine, MAX_DELAY_SAMPLES, require_delay};
 
 /// The valve: `command -> delay -> play -> spool lag -> offset -> travel limit -> overlap -> gain`.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -28,42 +31,13 @@ pub struct ValveEffects {
     pub hysteresis: f64,
 }
 
-/// Steps that a delayed command or channel can be late.
-pub const MAX_DELAY_SAMPLES: usize = 30;
-
-/// Refuses a delay (s) of more than [`MAX_DELAY_SAMPLES`] sampling periods (s).
-pub(crate) fn require_delay(name: &'static str, delay: f64, period: f64) -> Result<(), ModelError> {
-    if delay <= MAX_DELAY_SAMPLES as f64 * period {
-        return Ok(());
-    }
-    Err(ModelError::Parameter {
-        name,
-        value: delay,
-        expected: "at most thirty sampling periods",
-    })
-}
-
-/// Length of the memory of a delay.
-pub(crate) const RING: usize = MAX_DELAY_SAMPLES + 2;
-
 /// What lies between the command and the spool's drive: delay and play.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct CommandPath {
     /// Spool behind its play, V.
     pub play: f64,
-    /// Past commands, V, a ring.
-    commands: [f64; RING],
-    at: usize,
-}
-
-impl Default for CommandPath {
-    fn default() -> Self {
-        Self {
-            play: 0.0,
-            commands: [0.0; RING],
-            at: 0,
-        }
-    }
+    /// Past commands, V.
+    commands: DelayLine,
 }
 
 impl CommandPath {
@@ -72,8 +46,7 @@ impl CommandPath {
     /// falls between samples.
     #[inline]
     pub fn advance(&mut self, valve: &ValveEffects, command: f64, period: f64) -> [(f64, f64); 2] {
-        self.at = if self.at + 1 == RING { 0 } else { self.at + 1 };
-        self.commands[self.at] = command;
+        self.commands.push(command);
         if valve.command_delay == 0.0 {
             self.play = valve.play(self.play, command);
             return [(self.play, 0.0), (self.play, period)];
@@ -81,8 +54,7 @@ impl CommandPath {
         let samples = valve.command_delay / period;
         let whole = (samples as usize).min(MAX_DELAY_SAMPLES);
         let split = (samples - whole as f64) * period;
-        let behind = |n: usize| self.commands[(self.at + RING - n) % RING];
-        let (earlier, later) = (behind(whole + 1), behind(whole));
+        let (earlier, later) = (self.commands.ago(whole + 1), self.commands.ago(whole));
         let first = valve.play(self.play, earlier);
         self.play = valve.play(first, later);
         [(first, split), (self.play, period - split)]
@@ -105,9 +77,149 @@ impl Default for ValveEffects {
     }
 }
 
-impl ValveEffects {
-    /// Refuses negative widths, delays, limits and frequencies.
-    pub fn validate(&self) -> Result<(), ModelError> {
+impl Family for ValveEffects {
+    type Memory = ();
+
+    const EFFECTS: &'static [Effect] = &[
+        Effect {
+            equation: "u_s = u + b",
+            sentence: "the spool is off its null by {}",
+            parameters: &[
+                Parameter::new("offset", VOLTAGE, "Offset at the spool; 0 is off")
+                    .signed(0.03, 0.3)
+                    .on_table(|e| &mut e.valve.null_bias)
+                    .at_start(AtStart::ActuatorRates),
+            ],
+            starts: &[&[0.0]],
+            ..Effect::new("valve_null_bias", Component::ShakeTable)
+        },
+        Effect {
+            equation: "u_f = sign(u_s) max(|u_s| - w, 0)",
+            sentence: "the spool has a dead band of {} to either side",
+            parameters: &[Parameter::new(
+                "half_width",
+                VOLTAGE,
+                "Half width of the spool's overlap; 0 is off",
+            )
+            .positive(0.03, 0.25)
+            .on_table(|e| &mut e.valve.dead_band)
+            .min(0.0)
+            .at_start(AtStart::ActuatorRates)],
+            starts: &[&[0.04], &[0.15]],
+            ..Effect::new("valve_dead_band", Component::ShakeTable)
+        },
+        Effect {
+            equation: "u_f = (1 + g) u_s",
+            sentence: "the valve's flow gain is off by {}",
+            parameters: &[Parameter::new(
+                "relative_change",
+                RATIO,
+                "Relative change of the flow gain; 0 is off",
+            )
+            .relative(0.05, 0.25)
+            .on_table(|e| &mut e.valve.flow_gain)
+            .at_start(AtStart::ActuatorRates)],
+            starts: &[&[0.0]],
+            confounded_with: &["supply_pressure_droop", "load_cell_scale"],
+            is_linear: true,
+            ..Effect::new("valve_flow_gain", Component::ShakeTable)
+        },
+        Effect {
+            equation: "u_f = (1 + q sign(u_s)) u_s",
+            sentence: "the valve's flow gain is off by {} one way and by as much less the other",
+            parameters: &[Parameter::new(
+                "asymmetry",
+                RATIO,
+                "q of the gains 1 + q for positive and 1 - q for negative flow; 0 is off",
+            )
+            .signed(0.05, 0.25)
+            .on_table(|e| &mut e.valve.asymmetry)
+            .at_start(AtStart::ActuatorRates)],
+            starts: &[&[0.0]],
+            ..Effect::new("valve_asymmetric_gain", Component::ShakeTable)
+        },
+        Effect {
+            equation: "u_s'' + 2 zeta w u_s' + w² u_s = w² u, w = 2 pi f",
+            sentence: "the spool lags its command, with a natural frequency of {}",
+            parameters: &[
+                Parameter::new(
+                    "frequency",
+                    FREQUENCY,
+                    "Natural frequency of the second-order spool; 0 is an ideal spool",
+                )
+                .size(Scale::Inverse(60.0), 60.0, (4.0, 110.0))
+                .on_table(|e| &mut e.valve.spool_frequency)
+                .min(0.0)
+                .at_start(AtStart::ActuatorRates),
+                Parameter::new("damping_ratio", RATIO, "Damping ratio of the spool")
+                    .shape(Scale::Logarithmic, 0.7, 0.15, (0.3, 1.5))
+                    .on_table(|e| &mut e.valve.spool_damping)
+                    .min(1e-3),
+            ],
+            starts: &[&[40.0, 0.7], &[18.0, 0.7]],
+            is_linear: true,
+            is_fast: true,
+            needs_co_simulation: true,
+            ..Effect::new("valve_spool_lag", Component::ShakeTable)
+        },
+        Effect {
+            equation: "u_s(t) = u(t - T)",
+            sentence: "the command reaches the valve {} late",
+            parameters: &[Parameter::new(
+                "delay",
+                DELAY,
+                "Pure delay of the command, at most 30 steps; 0 is off",
+            )
+            .delay()
+            .on_table(|e| &mut e.valve.command_delay)
+            .min(0.0)
+            .at_start(AtStart::ActuatorRates)],
+            starts: &[&[0.005], &[0.013]],
+            is_linear: true,
+            needs_co_simulation: true,
+            ..Effect::new("command_delay", Component::ShakeTable)
+        },
+        Effect {
+            equation: "u_f = clamp(u_s, -L, L)",
+            sentence: "the spool's travel ends at {}",
+            parameters: &[
+                Parameter::new("limit", VOLTAGE, "Travel limit of the spool; 0 is none")
+                    .in_peak_commands(0.9, (0.05, 1.0))
+                    .on_table(|e| &mut e.valve.spool_limit)
+                    .min(0.0)
+                    .at_start(AtStart::ActuatorRates),
+            ],
+            starts: &[
+                &[0.85],
+                &[0.72],
+                &[0.6],
+                &[0.5],
+                &[0.42],
+                &[0.35],
+                &[0.28],
+                &[0.2],
+            ],
+            ..Effect::new("valve_spool_saturation", Component::ShakeTable)
+        },
+        Effect {
+            equation: "u_s = clamp(u_s before, u - w, u + w)",
+            sentence: "the spool has a play of {} to either side",
+            parameters: &[Parameter::new(
+                "half_width",
+                VOLTAGE,
+                "Half width of the play between command and spool; 0 is off",
+            )
+            .positive(0.03, 0.25)
+            .on_table(|e| &mut e.valve.hysteresis)
+            .min(0.0)
+            .at_start(AtStart::ActuatorRates)],
+            starts: &[&[0.04], &[0.15]],
+            needs_co_simulation: true,
+            ..Effect::new("valve_hysteresis", Component::ShakeTable)
+        },
+    ];
+
+    fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_finite("null_bias", self.null_bias)?;
         ModelError::require_finite("flow_gain", self.flow_gain)?;
         ModelError::require_finite("asymmetry", self.asymmetry)?;
@@ -119,8 +231,7 @@ impl ValveEffects {
         ModelError::require_non_negative("hysteresis", self.hysteresis)
     }
 
-    /// True when the valve is not ideal.
-    pub fn is_active(&self) -> bool {
+    fn is_active(&self) -> bool {
         let Self {
             null_bias,
             dead_band,
@@ -137,7 +248,9 @@ impl ValveEffects {
             .chain([command_delay, spool_limit, hysteresis])
             .any(|size| size != 0.0)
     }
+}
 
+impl ValveEffects {
     /// Refuses a delay of the command that is longer than the memory at `period` s.
     pub fn validate_delay(&self, period: f64) -> Result<(), ModelError> {
         require_delay("command_delay", self.command_delay, period)

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use plant::identified::effects::{Effects, SensorEffects};
+use plant::identified::effects::{self, Effects, Reporting};
 use plant::identified::shake_table::ShakeTable;
+use plant::sensors::instrumentation::Instrumentation;
 use plant::specimens::linear::LinearSpecimen;
 use units::constants::INCH;
 
@@ -18,9 +19,7 @@ use crate::diagnosis::case::{
 };
 use crate::diagnosis::engine::{ExtensibleModel, NamedEffect, Verdict, judge};
 use crate::diagnosis::engine::{Observer, Point, Role, Test};
-use crate::diagnosis::rigs::shake_table::catalogue::{
-    NUISANCE, Prepared, ShakeTableModel, nominal_parameters,
-};
+use crate::diagnosis::rigs::shake_table::catalogue::{Prepared, ShakeTableModel};
 use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Samples};
 
 /// R5 fires, and the recorded command is used, where it misses the law by more than this many
@@ -40,9 +39,9 @@ pub struct ExtendedModel {
     /// The effects found.
     pub effects: Effects,
     /// The sensors' effects found.
-    pub sensors: SensorEffects,
+    pub sensors: Instrumentation,
     /// Standard errors, SI: of the effects' parameters as `effect.parameter`, of the nominal ones
-    /// by their names in [`NUISANCE`].
+    /// by their names in [`PARAMETERS`](plant::identified::nominal::PARAMETERS).
     pub standard_errors: BTreeMap<String, f64>,
 }
 
@@ -297,13 +296,13 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
                 .map(|p| (format!("{}.{}", e.effect, p.name), p.standard_error))
         })
         .chain(
-            nominal_parameters(&model.nominal)
-                .into_iter()
+            model
+                .nominal_rig()
+                .parameters()
                 .zip(&judgement.nuisance_errors)
-                .zip(NUISANCE)
-                .map(|((value, error), name)| {
+                .map(|((parameter, value), error)| {
                     let error = value.abs() * model.uncertainty * error;
-                    (name.to_string(), error)
+                    (parameter.name.to_string(), error)
                 }),
         )
         .filter(|(_, error)| error.is_finite())
@@ -386,10 +385,13 @@ fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
     notes
 }
 
-/// The mains as amplitude and phase instead of two components.
-fn readable(mut effects: Vec<NamedEffect>) -> Vec<NamedEffect> {
-    for effect in &mut effects {
-        if let ("mains_hum", [a, b]) = (effect.effect, effect.parameters.as_mut_slice()) {
+/// Two quadratures as amplitude and phase, where the effect is told so.
+fn readable(mut named: Vec<NamedEffect>) -> Vec<NamedEffect> {
+    for effect in &mut named {
+        let reporting = effects::find(effect.effect).map(|known| known.reporting);
+        if let (Some(Reporting::AmplitudeAndPhase), [a, b]) =
+            (reporting, effect.parameters.as_mut_slice())
+        {
             let (p, q) = (a.value, b.value);
             let amplitude = p.hypot(q);
             a.name = "amplitude".into();
@@ -401,5 +403,5 @@ fn readable(mut effects: Vec<NamedEffect>) -> Vec<NamedEffect> {
             b.is_shape = true;
         }
     }
-    effects
+    named
 }

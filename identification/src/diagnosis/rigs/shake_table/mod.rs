@@ -11,4 +11,5 @@ mod sentence;
 
 pub use diagnosis::*;
 pub use health::RelationReport;
-pub use sentence::{amount, laboratory_unit, said, with_error};
+pub use plant::identified::effects::quantity::laboratory_unit;
+pub use sentence::{amount, said, with_error};

@@ -3,27 +3,8 @@
 use super::gain::Gain;
 use crate::diagnosis::engine::Test;
 use crate::diagnosis::engine::{NamedEffect, ParameterEstimate, Verdict};
+use plant::identified::effects::{find, quantity::laboratory_unit};
 use units::convert;
-
-/// The laboratory's unit for an SI unit of the catalogue.
-pub fn laboratory_unit(si: &str) -> &str {
-    match si {
-        "m" => "in",
-        "N" => "lbf",
-        "kg" => "lbf s^2/in",
-        "m/s" => "in/s",
-        "m/s^2" => "in/s^2",
-        "N s/m" => "lbf s/in",
-        "N/m^3" => "lbf/in^3",
-        "V/N" => "V/lbf",
-        "V s/N" => "V s/lbf",
-        "rad/m" => "rad/in",
-        "s" => "ms",
-        "1" => "%",
-        "1/V" => "%/V",
-        same => same,
-    }
-}
 
 /// Value and standard error of `parameter` in `unit`, as [`with_error`] writes them.
 pub fn amount(parameter: &ParameterEstimate, unit: &str) -> String {
@@ -68,54 +49,12 @@ pub fn with_error(value: f64, standard_error: f64, si: &str, unit: &str) -> Stri
         .to_string()
 }
 
-/// What an effect is, with a gap for the size of each of its parameters that tells one.
-fn phrase(effect: &str) -> &'static str {
-    match effect {
-        "valve_null_bias" => "the spool is off its null by {}",
-        "valve_dead_band" => "the spool has a dead band of {} to either side",
-        "valve_flow_gain" => "the valve's flow gain is off by {}",
-        "valve_asymmetric_gain" => {
-            "the valve's flow gain is off by {} one way and by as much less the other"
-        }
-        "valve_spool_lag" => "the spool lags its command, with a natural frequency of {}",
-        "command_delay" => "the command reaches the valve {} late",
-        "valve_flow_saturation" => "the flow falls with the load and stops at {}",
-        "valve_spool_saturation" => "the spool's travel ends at {}",
-        "valve_hysteresis" => "the spool has a play of {} to either side",
-        "supply_pressure_droop" => "the supply droops, with {} of the flow lost",
-        "coulomb_friction" => "the table has dry friction of {}",
-        "stribeck_friction" => "the table has dry friction of {} and {} more to break away",
-        "internal_leakage" => "oil leaks past the piston, {}",
-        "oil_column_compliance" => "the oil column is compressible, {}",
-        "added_payload" => "the table carries an unknown mass of {}",
-        "viscous_damping" => "the table has extra damping of {}",
-        "cubic_stiffness" => "the table has an extra cubic stiffness of {}",
-        "foundation_compliance" => "the reaction mass moves, with a natural frequency of {}",
-        "accelerometer_bias" => "the table's accelerometer has an offset of {}",
-        "accelerometer_scale" => "the scale of the table's accelerometer is off by {}",
-        "accelerometer_tilt" => "the table pitches as it moves, by {}",
-        "accelerometer_delay" => "the channel of the table's accelerometer is {} late",
-        "displacement_scale" => "the scale of the displacement sensor is off by {}",
-        "displacement_lag" => "the displacement sensor lags, with a corner at {}",
-        "load_cell_scale" => "the scale of the load cell is off by {}",
-        "load_cell_bias" => "the load cell has an offset of {}",
-        "mains_hum" => "the table's accelerometer picks up the mains with {}",
-        "specimen_yielding" => "the specimen yields at a drift of {}",
-        "specimen_stiffness" => "the specimen's stiffness is off by {}",
-        "specimen_damping" => "the specimen's damping is off by {}",
-        "specimen_second_mode" => "a part of the specimen swings by itself at {}",
-        "specimen_degradation" => "the specimen loses up to {} of its stiffness",
-        "specimen_uplift" => "the specimen lifts off beyond a drift of {}",
-        "specimen_absent" => "nothing stands on the table",
-        _ => "there is an effect of {}",
-    }
-}
-
 /// An effect in words, its sizes in the laboratory's units.
 pub fn said(effect: &NamedEffect) -> String {
     let mut sizes = effect.parameters.iter().filter(|p| !p.is_shape);
     let mut text = String::new();
-    let mut pieces = phrase(effect.effect).split("{}").peekable();
+    let phrase = find(effect.effect).map_or("there is an effect of {}", |known| known.sentence);
+    let mut pieces = phrase.split("{}").peekable();
     while let Some(piece) = pieces.next() {
         text += piece;
         if pieces.peek().is_some() {

@@ -1,15 +1,13 @@
 //! The identified shake table as the engine sees it: fifteen uncertain nominal parameters, the
 //! catalogue, and the innovations of every record.
 
-mod effects;
-mod entry;
-mod sensors_and_specimen;
+mod candidates;
 
-pub use effects::catalogue;
-pub use entry::Apply;
+pub use candidates::catalogue;
 
+use plant::identified::effects::Effect;
+use plant::identified::nominal::{NominalRig, PARAMETERS};
 use plant::identified::rig::IdentifiedRig;
-use plant::identified::shake_table::ShakeTable;
 
 use crate::data::OUTPUT_NAMES;
 use crate::diagnosis::case::Nominal;
@@ -45,42 +43,7 @@ pub struct ShakeTableModel {
     /// The records.
     pub records: Vec<Prepared>,
     candidates: Vec<Candidate>,
-    apply: Vec<Apply>,
-}
-
-/// Names of the uncertain nominal parameters, in the order of [`Point::nuisance`].
-pub const NUISANCE: [&str; 15] = [
-    "actuator.denominator[1]",
-    "actuator.denominator[2]",
-    "actuator.denominator[3]",
-    "actuator.voltage_to_force[1]",
-    "actuator.voltage_to_force[2]",
-    "actuator.voltage_to_force[3]",
-    "actuator.velocity_to_force[1]",
-    "actuator.velocity_to_force[2]",
-    "actuator.velocity_to_force[3]",
-    "table.mass",
-    "table.damping",
-    "table.stiffness",
-    "specimen.mass",
-    "specimen.damping",
-    "specimen.stiffness",
-];
-
-/// The parameters of `rig` in the order of [`NUISANCE`], SI; without a specimen the first twelve.
-pub fn nominal_parameters(rig: &IdentifiedRig) -> Vec<f64> {
-    let ShakeTable { actuator, table } = rig.shake_table;
-    let mut values = Vec::with_capacity(NUISANCE.len());
-    values.extend(actuator.denominator);
-    values.extend(actuator.voltage_to_force);
-    values.extend(actuator.velocity_to_force);
-    values.extend([table.mass, table.damping, table.stiffness]);
-    values.extend(
-        rig.specimen
-            .iter()
-            .flat_map(|s| [s.mass, s.damping, s.stiffness]),
-    );
-    values
+    effects: Vec<&'static Effect>,
 }
 
 impl ShakeTableModel {
@@ -95,7 +58,7 @@ impl ShakeTableModel {
             .unwrap_or_default()
             .iter()
             .fold(1e-3f64, |peak, u| peak.max(u.abs()));
-        let (candidates, apply) = catalogue(peak, period).into_iter().unzip();
+        let (candidates, effects) = catalogue(peak, period).into_iter().unzip();
         Self {
             nominal: IdentifiedRig {
                 shake_table: nominal.shake_table,
@@ -108,37 +71,41 @@ impl ShakeTableModel {
             disturbance: Disturbance::beside_command(nominal.command_noise, period),
             records,
             candidates,
-            apply,
+            effects,
         }
     }
 
     /// The nominal rig with `nuisance` (in standard deviations of the parameters' logarithms, so that
     /// factors add up) and no effects.
     pub fn rig_without_effects(&self, nuisance: &[f64]) -> IdentifiedRig {
-        let mut rig = self.nominal;
-        let mut factors = nuisance.iter().map(|p| (self.uncertainty * p).exp());
-        let mut scale = |value: &mut f64| *value *= factors.next().unwrap_or(1.0);
-        let actuator = &mut rig.shake_table.actuator;
-        actuator.denominator.iter_mut().for_each(&mut scale);
-        actuator.voltage_to_force.iter_mut().for_each(&mut scale);
-        actuator.velocity_to_force.iter_mut().for_each(&mut scale);
-        let table = &mut rig.shake_table.table;
-        scale(&mut table.mass);
-        scale(&mut table.damping);
-        scale(&mut table.stiffness);
-        if let Some(specimen) = &mut rig.specimen {
-            scale(&mut specimen.mass);
-            scale(&mut specimen.damping);
-            scale(&mut specimen.stiffness);
+        let mut nominal = self.nominal_rig();
+        for (parameter, deviation) in PARAMETERS.iter().zip(nuisance) {
+            if let Some(value) = nominal.place(parameter) {
+                *value *= (self.uncertainty * deviation).exp();
+            }
         }
-        rig
+        IdentifiedRig {
+            shake_table: nominal.shake_table,
+            specimen: nominal.specimen,
+            ..self.nominal
+        }
+    }
+
+    /// The nominal actuator, table and specimen, whose parameters are in the order of
+    /// [`Point::nuisance`].
+    pub fn nominal_rig(&self) -> NominalRig {
+        NominalRig {
+            shake_table: self.nominal.shake_table,
+            specimen: self.nominal.specimen,
+        }
     }
 
     /// The rig at `point`.
     pub fn rig(&self, point: &Point) -> IdentifiedRig {
         let mut rig = self.rig_without_effects(&point.nuisance);
         for (candidate, internal) in &point.effects {
-            self.apply[*candidate](&mut rig, &self.candidates[*candidate].values(internal));
+            let values = self.candidates[*candidate].values(internal);
+            self.effects[*candidate].apply(&mut rig.effects, &mut rig.sensors, &values);
         }
         rig
     }
@@ -154,11 +121,7 @@ impl ExtensibleModel for ShakeTableModel {
     type Predictor = ShakeTablePredictor;
 
     fn nuisance(&self) -> usize {
-        if self.nominal.specimen.is_some() {
-            15
-        } else {
-            12
-        }
+        self.nominal_rig().parameters().count()
     }
 
     fn candidates(&self) -> &[Candidate] {
@@ -341,16 +304,16 @@ mod tests {
         };
         for hidden in [vec![], vec!["load_cell_bias", "valve_dead_band"]] {
             rig.effects.valve.dead_band = f64::from(hidden.contains(&"valve_dead_band")) * 0.12;
-            rig.sensors.load_cell_bias = f64::from(hidden.contains(&"load_cell_bias")) * 8.0;
+            rig.sensors.actuator_force.bias = f64::from(hidden.contains(&"load_cell_bias")) * 8.0;
             let model = model(&rig, 31);
             let straight = judge(&model, &[0], &[1], Observer::none()).unwrap();
             assert_eq!(said(&straight).1, hidden);
 
             let mut turned = model.clone();
             turned.candidates.reverse();
-            turned.apply.reverse();
+            turned.effects.reverse();
             turned.candidates.rotate_left(7);
-            turned.apply.rotate_left(7);
+            turned.effects.rotate_left(7);
             assert_eq!(
                 said(&judge(&turned, &[0], &[1], Observer::none()).unwrap()),
                 said(&straight)

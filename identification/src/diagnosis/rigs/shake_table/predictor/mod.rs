@@ -8,7 +8,6 @@
 
 use nalgebra::{DMatrix, DVector};
 use plant::ModelError;
-use plant::identified::effects::SensorEffects;
 use plant::identified::rig::{IdentifiedRig, IdentifiedRigState, STATES, SampledRig};
 use plant::linear::discrete_riccati;
 
@@ -97,22 +96,17 @@ impl Predictor {
         let rig = rig.linear_part();
         let sampled = rig.sample(period, 2)?;
         let continuous = rig.active_states();
-        let late = (rig.sensors.accelerometer_delay / period).floor();
-        let past = if rig.sensors.accelerometer_delay > 0.0 {
+        let late = (rig.sensors.acceleration.delay / period).floor();
+        let past = if rig.sensors.acceleration.delay > 0.0 {
             late as usize + 1
         } else {
             0
         };
         let n = continuous.len();
         let order = n + 1 + past;
-        let undelayed = IdentifiedRig {
-            sensors: SensorEffects {
-                accelerometer_delay: 0.0,
-                ..rig.sensors
-            },
-            ..rig
-        }
-        .sample(period, 1)?;
+        let mut undelayed = rig;
+        undelayed.sensors.acceleration.delay = 0.0;
+        let undelayed = undelayed.sample(period, 1)?;
 
         // The linear system, column by column from unit perturbations (balanced below).
         let mut a = DMatrix::<f64>::zeros(order, order);
@@ -128,7 +122,7 @@ impl Predictor {
                 c[(i, j)] = now[i];
             }
             if past > 0 {
-                c[(1, j)] -= (1.0 + rig.sensors.accelerometer_scale) * acceleration;
+                c[(1, j)] -= (1.0 + rig.sensors.acceleration.scale_error) * acceleration;
                 a[(n + 1, j)] = acceleration;
             }
             sampled.step_disturbed(&mut state, 0.0, if j < n { 0.0 } else { 1.0 });
@@ -138,9 +132,9 @@ impl Predictor {
         }
         a[(n, n)] = disturbance.phi;
         if past > 0 {
-            let samples = rig.sensors.accelerometer_delay / period;
+            let samples = rig.sensors.acceleration.delay / period;
             let (whole, fraction) = (late as usize, samples - late);
-            let scale = 1.0 + rig.sensors.accelerometer_scale;
+            let scale = 1.0 + rig.sensors.acceleration.scale_error;
             // Past accelerations: entry 1 is one sample old.
             for (age, weight) in [(whole, 1.0 - fraction), (whole + 1, fraction)] {
                 if age == 0 {
@@ -272,11 +266,7 @@ impl Predictor {
 
     /// Sampled form of `rig` for this predictor; friction and a fast spool get finer steps.
     pub fn sample(&self, rig: &IdentifiedRig) -> Result<SampledRig, ModelError> {
-        let effects = &rig.effects;
-        let fine = effects.friction.is_active()
-            || effects.valve.spool_frequency > 0.0
-            || effects.hydraulics.compliance != 0.0;
-        rig.sample(self.period, if fine { 2 } else { 1 })
+        rig.sample(self.period, if rig.is_fast() { 2 } else { 1 })
     }
 }
 

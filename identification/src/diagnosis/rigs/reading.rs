@@ -1,0 +1,238 @@
+//! The data that a description names, read as recordings.
+
+use std::path::{Path, PathBuf};
+
+use super::description::{Description, DescriptionError, LeftOut};
+use super::{Rig, RigRecording};
+use crate::data::{Channel, DataError, Pick, Recording, RoundedStamps, Sheet, Wanted};
+
+/// Samples that a file must have at least.
+const SHORTEST: usize = 128;
+/// Samples that must be on either side of what is left out.
+const FEWEST: usize = 64;
+/// Deviation of a step from their mean, in the mean, beyond which samples are not evenly spaced.
+const UNEVEN: f64 = 0.5;
+
+/// All data of a rig, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurement {
+    /// One per file.
+    pub recordings: Vec<RigRecording>,
+}
+
+impl Description {
+    /// Reads the data: the description's own files, or `files` in their place.
+    ///
+    /// # Errors
+    /// A file that cannot be read, by place; too little data on either side of what is left out.
+    pub fn measurement(&self, files: &[PathBuf]) -> Result<Measurement, DescriptionError> {
+        let rig = self.rig()?;
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let own: Vec<PathBuf> = self.data.iter().map(|file| folder.join(file)).collect();
+        let files = if files.is_empty() { &own } else { files };
+        if files.is_empty() {
+            return Err(self.wrong("`data` names no file".to_owned()));
+        }
+        let mut recordings = files
+            .iter()
+            .map(|file| self.recording(file, rig))
+            .collect::<Result<Vec<_>, _>>()?;
+        self.leave_out(&mut recordings, files)?;
+        Ok(Measurement { recordings })
+    }
+
+    fn leave_out(
+        &self,
+        recordings: &mut [RigRecording],
+        files: &[PathBuf],
+    ) -> Result<(), DescriptionError> {
+        match &self.left_out {
+            LeftOut::EverySecondBlock(length) => {
+                let (length, _) = self.si("left_out.every_second_block", length, "s")?;
+                for one in recordings.iter_mut() {
+                    let block = (length / one.period()).round().max(1.0) as usize;
+                    for (k, out) in one.left_out.iter_mut().enumerate() {
+                        *out = (k / block) % 2 == 1;
+                    }
+                }
+            }
+            LeftOut::SecondHalf(false) => {
+                return Err(self.wrong(
+                    "`left_out.second_half` = false leaves nothing out to test on: expected true, \
+                     or `every_second_block` or `files` in its place"
+                        .to_owned(),
+                ));
+            }
+            LeftOut::SecondHalf(true) => {
+                for one in recordings.iter_mut() {
+                    let half = one.left_out.len() / 2;
+                    one.left_out[half..].fill(true);
+                }
+            }
+            LeftOut::Files(names) => {
+                for name in names {
+                    let place = files
+                        .iter()
+                        .position(|file| file.file_name() == name.file_name());
+                    let Some(place) = place else {
+                        let what = format!(
+                            "`left_out.files` names {}, which is no data file",
+                            name.display()
+                        );
+                        return Err(self.wrong(what));
+                    };
+                    recordings[place].left_out.fill(true);
+                }
+            }
+        }
+        let count = |out: bool| -> usize {
+            let all = recordings.iter().flat_map(|one| &one.left_out);
+            all.filter(|o| **o == out).count()
+        };
+        if count(true) < FEWEST || count(false) < FEWEST {
+            return Err(self.wrong(format!(
+                "`left_out` leaves fewer than {FEWEST} samples on one side"
+            )));
+        }
+        Ok(())
+    }
+
+    fn recording(&self, path: &Path, rig: &dyn Rig) -> Result<RigRecording, DescriptionError> {
+        let is_timed = self.columns.contains_key(Channel::Time.name());
+        let mut wanted = rig.inputs().to_vec();
+        wanted.push(rig.output());
+        wanted.extend(is_timed.then_some(Channel::Time));
+        let picks = wanted
+            .into_iter()
+            .map(|channel| {
+                let (name, si) = (channel.name(), channel.unit());
+                let column = self.columns.get(name).ok_or_else(|| {
+                    self.wrong(format!("`columns.{name}` is missing: a column in {si}"))
+                })?;
+                units::convert(1.0, &column.unit, si)
+                    .map_err(|why| self.wrong(format!("`columns.{name}`: {why}")))?;
+                Ok(Pick {
+                    channel,
+                    head: &column.column,
+                    unit: &column.unit,
+                })
+            })
+            .collect::<Result<Vec<_>, DescriptionError>>()?;
+        let heads: Vec<&str> = picks.iter().map(|pick| pick.head).collect();
+        let sheet = Sheet::read(
+            path,
+            Wanted {
+                is_column: &|cell| heads.contains(&cell),
+                header: &heads.join(","),
+            },
+        )?;
+        let name = path
+            .file_stem()
+            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let read = Recording::pick(&sheet, &name, &picks)?;
+        let mut channels: Vec<(Channel, Vec<f64>)> = read
+            .channels()
+            .map(|(channel, values)| (channel, values.to_vec()))
+            .collect();
+        let all = channels
+            .iter()
+            .map(|(channel, values)| (*channel, &values[..]));
+        for (channel, values) in all.chain(read.stamps().map(|t| (Channel::Time, t))) {
+            if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+                let what = format!(
+                    "`{}` has no number, expected one in every row",
+                    channel.name()
+                );
+                return Err(DataError::line(path, sheet.line(row), what).into());
+            }
+        }
+        if !is_timed {
+            read_repeats_once(&mut channels);
+        }
+        let samples = channels.first().map_or(0, |(_, values)| values.len());
+        if samples < SHORTEST {
+            let what = format!("{samples} samples: expected at least {SHORTEST}");
+            return Err(DataError::file(path, what).into());
+        }
+        let period = match (read.stamps(), &self.time_step) {
+            (Some(stamps), _) => period(stamps).map_err(|row| {
+                DataError::line(path, sheet.line(row), "the times are not evenly spaced")
+            })?,
+            (None, Some(step)) => self.si("time_step", step, "s")?.0,
+            (None, None) => {
+                return Err(
+                    self.wrong("neither `columns.time` nor `time_step` is given".to_owned())
+                );
+            }
+        };
+        let recording = Recording::new(&name, period, channels)
+            .map_err(|error| DataError::file(path, error.to_string()))?;
+        Ok(RigRecording::new(recording, rig.inputs(), rig.output()))
+    }
+}
+
+/// Mean spacing of even time stamps, s, or that behind rounded ones; the row where they are uneven.
+fn period(stamps: &[f64]) -> Result<f64, usize> {
+    let last = stamps.len() - 1;
+    let mean = (stamps[last] - stamps[0]) / last as f64;
+    let stray = |t: &[f64]| ((t[1] - t[0]) / mean - 1.0).abs() > UNEVEN;
+    let uneven = stamps.windows(2).position(stray);
+    match uneven.or((mean <= 0.0).then_some(0)) {
+        None => Ok(mean),
+        Some(row) => RoundedStamps::of(stamps, None)
+            .and_then(|rounded| rounded.period)
+            .ok_or(row + 1),
+    }
+}
+
+/// Rows without a time are points of a path, where a row that repeats the one before to rounding
+/// says nothing new.
+fn read_repeats_once(channels: &mut [(Channel, Vec<f64>)]) {
+    let rows = channels.first().map_or(0, |(_, values)| values.len());
+    let near: Vec<f64> = channels
+        .iter()
+        .map(|(_, values)| 1e-10 * values.iter().fold(0.0, |size: f64, c| size.max(c.abs())))
+        .collect();
+    let new: Vec<bool> = (0..rows)
+        .map(|k| {
+            let mut pairs = channels.iter().zip(&near);
+            k == 0 || pairs.any(|((_, v), near)| (v[k] - v[k - 1]).abs() > *near)
+        })
+        .collect();
+    for (_, values) in channels {
+        let mut keep = new.iter();
+        values.retain(|_| keep.next() == Some(&true));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_repeat_are_read_once() {
+        let mut channels = [
+            (
+                Channel::Displacement,
+                vec![0.0, 1.0, 1.0, 1.0, 2.0, 2.0 + 1e-14],
+            ),
+            (Channel::Velocity, vec![0.0, 5.0, 5.0, 6.0, 7.0, 7.0]),
+        ];
+        read_repeats_once(&mut channels);
+        assert_eq!(channels[0].1, [0.0, 1.0, 1.0, 2.0]);
+        assert_eq!(channels[1].1, [0.0, 5.0, 6.0, 7.0]);
+    }
+
+    #[test]
+    fn stamps_that_were_rounded_tell_the_period_behind_them() {
+        let exact: Vec<f64> = (0..400).map(|k| 0.004 * f64::from(k)).collect();
+        assert!((period(&exact).unwrap() - 0.004).abs() < 1e-12);
+        let rounded: Vec<f64> = exact.iter().map(|t| (t * 100.0).round() / 100.0).collect();
+        assert!((period(&rounded).unwrap() - 0.004).abs() < 1e-9);
+        let gap: Vec<f64> = exact
+            .iter()
+            .map(|t| if *t > 1.0 { t + 0.1 } else { *t })
+            .collect();
+        assert_eq!(period(&gap), Err(251));
+    }
+}

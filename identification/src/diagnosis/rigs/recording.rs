@@ -1,0 +1,115 @@
+//! One recording of a rig as its equations read it.
+
+use crate::IdentificationError;
+use crate::data::{Channel, Recording};
+
+/// A recording on an even base, with what equations ask of it beside its channels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigRecording {
+    /// The channels, SI.
+    recording: Recording,
+    /// What is simulated and compared.
+    output: Channel,
+    /// The first input without what a median of five samples takes out.
+    pub cleaned: Vec<f64>,
+    /// True where the first input lies half way between its neighbours to rounding: such a sample
+    /// was interpolated, not measured.
+    pub between: Vec<bool>,
+    /// Middle of the first input's range.
+    pub middle: f64,
+    /// True where a sample is left out of the fit.
+    pub left_out: Vec<bool>,
+}
+
+impl RigRecording {
+    /// A recording of which nothing is left out; `inputs` are the rig's.
+    pub fn new(recording: Recording, inputs: &[Channel], output: Channel) -> Self {
+        let first = inputs
+            .first()
+            .map_or(&[][..], |input| recording.samples(*input));
+        let low = first.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = first.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self {
+            cleaned: median_of_five(first),
+            between: half_way(first, high - low),
+            middle: 0.5 * (low + high),
+            left_out: vec![false; recording.len()],
+            output,
+            recording,
+        }
+    }
+
+    /// What it is called.
+    pub fn name(&self) -> &str {
+        &self.recording.name
+    }
+
+    /// Sampling period, s.
+    pub fn period(&self) -> f64 {
+        self.recording.period()
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.recording.len()
+    }
+
+    /// True without samples.
+    pub fn is_empty(&self) -> bool {
+        self.recording.is_empty()
+    }
+
+    /// Samples of an input, SI; none where the rig does not have it.
+    pub fn input(&self, channel: Channel) -> &[f64] {
+        self.recording.samples(channel)
+    }
+
+    /// The measured output, SI.
+    pub fn output(&self) -> &[f64] {
+        self.recording.samples(self.output)
+    }
+
+    /// Puts another output in the place of the measured one.
+    ///
+    /// # Errors
+    /// Samples of another number.
+    pub fn replace_output(&mut self, values: Vec<f64>) -> Result<(), IdentificationError> {
+        self.recording.replace(self.output, values)
+    }
+}
+
+/// Single samples half way between two that differ.
+fn half_way(values: &[f64], range: f64) -> Vec<bool> {
+    let mut between = vec![false; values.len()];
+    for (k, v) in values.windows(3).enumerate() {
+        let step = v[2] - v[0];
+        between[k + 1] = !between[k]
+            && (v[1] - v[0] - 0.5 * step).abs() < 1e-10 * range
+            && step.abs() > 1e-10 * range;
+    }
+    between
+}
+
+fn median_of_five(values: &[f64]) -> Vec<f64> {
+    let mut cleaned = values.to_vec();
+    for (window, middle) in values.windows(5).zip(cleaned.iter_mut().skip(2)) {
+        let mut sorted = [window[0], window[1], window[2], window[3], window[4]];
+        sorted.sort_by(f64::total_cmp);
+        *middle = sorted[2];
+    }
+    cleaned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_half_way_between_two_readings_are_told_from_readings() {
+        let between = half_way(&[0.0, 1.0, 2.0, 4.0, 6.0, 6.5, 9.0, 9.0], 9.0);
+        assert_eq!(
+            between,
+            [false, true, false, true, false, false, false, false]
+        );
+    }
+}

@@ -1,0 +1,67 @@
+//! Benchmarks as scripts use them.
+
+use crate::{refused, shakebench, stderr, stdout};
+
+#[test]
+fn scores_are_one_json_object_and_repeat() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [
+        "benchmark",
+        "vrths",
+        "--case",
+        "1",
+        "--motion",
+        "built-in",
+        "--controller",
+        "inverse,adaptive-inverse",
+        "--perturbed",
+        "1",
+        "--seed",
+        "5",
+        "--json",
+        "--out",
+        "scores",
+    ];
+    let scores = || {
+        let output = shakebench(folder.path(), &arguments);
+        assert!(output.status.success(), "{}", stderr(&output));
+        serde_json::from_str::<serde_json::Value>(&stdout(&output)).unwrap()
+    };
+    let first = scores();
+    let controllers = first["controllers"].as_object().unwrap();
+    assert_eq!(controllers.len(), 2);
+    for score in controllers.values() {
+        assert_eq!(score["runs"], 2);
+        assert_eq!(score["unstable"], 0);
+        for figures in ["mean", "max"] {
+            assert_eq!(score[figures].as_array().unwrap().len(), 9);
+            assert!(score["true_tracking_percent"][figures].is_number());
+        }
+    }
+    assert!(first["wall_s"].is_number());
+    assert_eq!(scores()["controllers"], first["controllers"]);
+    for file in ["report.html", "scores.json", "runs.csv"] {
+        assert!(folder.path().join("scores").join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn what_cannot_be_benchmarked_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (options, words) in [
+        (["--case", "5"], ["--case", "1, 2, 3 or 4"]),
+        (
+            ["--controller", "adaptive-invers"],
+            ["--controller", "did you mean `adaptive-inverse`"],
+        ),
+        (["--motion", "el-centr"], ["--motion", "el-centro"]),
+        (["--motion", "none.csv"], ["none.csv", "no such file"]),
+        (["--data", "nowhere"], ["nowhere", "no such folder"]),
+        (["--intensity", "-1"], ["--intensity", "positive"]),
+        (["--corners", "0"], ["--corners", "standard deviations"]),
+    ] {
+        let [option, value] = options;
+        let argument = format!("{option}={value}");
+        refused(folder.path(), &["benchmark", "vrths", &argument], &words);
+    }
+}

@@ -1,0 +1,348 @@
+//! FMUs in C that crash, print, never return or break the standard: each ends as an error that names
+//! FMU, call and time, with what was computed until then saved.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::Path;
+use std::process::Command;
+
+use zip::{ZipWriter, write::SimpleFileOptions};
+
+use crate::{shakebench, stderr, stdout};
+
+/// Compiles `tests/importers/hostile/hostile.c` with a behaviour and packs it as `hostile.fmu`.
+fn pack(folder: &Path, behaviour: &str, attributes: &str) {
+    pack_as(folder, "hostile.fmu", behaviour, attributes, "");
+}
+
+/// As [`pack`], under another name, with attributes for the output's `Unknown`.
+fn pack_as(folder: &Path, name: &str, behaviour: &str, attributes: &str, unknown: &str) {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let source = source.join("../tests/importers/hostile/hostile.c");
+    let library = folder.join("hostile.so");
+    let done = Command::new("cc")
+        .args(["-shared", "-fPIC", "-O1", "-o"])
+        .arg(&library)
+        .arg(format!("-DBEHAVIOUR={behaviour}"))
+        .arg(source)
+        .output()
+        .expect("a C compiler");
+    assert!(done.status.success(), "{}", stderr(&done));
+    let description = format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="hostile" guid="{{1}}" generationTool="by hand">
+<CoSimulation modelIdentifier="hostile" canHandleVariableCommunicationStepSize="true" {attributes}/>
+<ModelVariables>
+<ScalarVariable name="y" valueReference="0" causality="output" variability="continuous" initial="calculated"><Real/></ScalarVariable>
+<ScalarVariable name="u" valueReference="1" causality="input" variability="continuous"><Real start="0.25"/></ScalarVariable>
+<ScalarVariable name="at" valueReference="2" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable>
+</ModelVariables>
+<ModelStructure><Outputs><Unknown index="1" {unknown}/></Outputs><InitialUnknowns><Unknown index="1"/></InitialUnknowns></ModelStructure>
+</fmiModelDescription>"#
+    );
+    let mut archive = ZipWriter::new(File::create(folder.join(name)).unwrap());
+    for (name, content) in [
+        ("modelDescription.xml", description.into_bytes()),
+        ("binaries/linux64/hostile.so", fs::read(library).unwrap()),
+    ] {
+        let options = SimpleFileOptions::default();
+        archive.start_file(name, options).unwrap();
+        archive.write_all(&content).unwrap();
+    }
+    archive.finish().unwrap();
+}
+
+const ALONE: &str = r#"
+    connections = ["reference.displacement -> it.u"]
+    [components.it]
+    fmu = "hostile.fmu"
+    [experiment]
+    duration = "2 s"
+"#;
+
+struct Run {
+    status: Option<i32>,
+    said: String,
+    summary: serde_json::Value,
+    /// Rows of the results.
+    rows: Vec<Vec<f64>>,
+}
+
+fn run(folder: &Path, system: &str, more: &[&str]) -> Run {
+    fs::write(folder.join("rig.toml"), system).unwrap();
+    let mut arguments = vec!["run", "rig.toml", "--out", "out", "--json"];
+    arguments.extend(more);
+    let output = shakebench(folder, &arguments);
+    let said = stderr(&output);
+    let results = fs::read_to_string(folder.join("out/results.csv")).unwrap_or_default();
+    Run {
+        status: output.status.code(),
+        summary: serde_json::from_str(&stdout(&output))
+            .unwrap_or_else(|error| panic!("{error}: {}\n{said}", stdout(&output))),
+        rows: results
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
+            .collect(),
+        said,
+    }
+}
+
+/// It ends early with status 1, the rows until then saved, and a message with these words.
+#[track_caller]
+fn ends(behaviour: &str, more: &[&str], rows: usize, words: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    pack(folder.path(), behaviour, "");
+    let run = run(folder.path(), ALONE, more);
+    assert_eq!(run.status, Some(1), "{behaviour}: {}", run.said);
+    assert_eq!(run.summary["ended"], "failed", "{behaviour}");
+    assert_eq!(run.rows.len(), rows, "{behaviour}: {}", run.said);
+    for word in ["`it`", "hostile.fmu", "fmi2DoStep", "at 1 s"]
+        .iter()
+        .chain(words)
+    {
+        assert!(
+            run.said.contains(word),
+            "{behaviour}: `{word}` is not in {}",
+            run.said
+        );
+    }
+}
+
+/// It ends regularly; gives what was said.
+#[track_caller]
+fn survives(behaviour: &str, more: &[&str]) -> Run {
+    let folder = tempfile::tempdir().unwrap();
+    pack(folder.path(), behaviour, "");
+    let run = run(folder.path(), ALONE, more);
+    assert_eq!(run.status, Some(0), "{behaviour}: {}", run.said);
+    assert_eq!(run.rows.len(), 1000, "{behaviour}: {}", run.said);
+    run
+}
+
+#[test]
+fn an_fmu_that_ends_its_process_ends_the_run_only() {
+    // A row at 1 s, then the step from there.
+    ends("SEGFAULT", &[], 501, &["segmentation fault"]);
+    ends("ABORT", &[], 501, &["abort"]);
+    ends("EXIT", &[], 501, &["exit(0)"]);
+    ends(
+        "LOOP",
+        &["--call-limit", "0.5 s"],
+        501,
+        &["did not return within 0.5 s"],
+    );
+}
+
+#[test]
+fn an_unknown_status_is_an_error_that_names_the_number() {
+    for isolate in ["none", "foreign"] {
+        ends(
+            "UNKNOWN_STATUS",
+            &["--isolate", isolate],
+            501,
+            &["returned 17"],
+        );
+        ends(
+            "DISCARDS",
+            &["--isolate", isolate],
+            501,
+            &["discard", "it came to 1 s"],
+        );
+    }
+}
+
+#[test]
+fn callbacks_are_there_for_as_long_as_the_instance_lives() {
+    for isolate in ["none", "foreign"] {
+        let run = survives("KEEPS_CALLBACKS", &["--isolate", isolate]);
+        for word in ["stepped from 1.5 s", "terminated at 2 s", "freed at 2 s"] {
+            assert!(run.said.contains(word), "{isolate}: {word}: {}", run.said);
+        }
+        let run = survives("NULL_MESSAGE", &["--isolate", isolate]);
+        assert!(run.said.contains("without a text"), "{}", run.said);
+    }
+}
+
+#[test]
+fn what_an_fmu_says_cannot_break_the_output() {
+    for isolate in ["none", "foreign"] {
+        let run = survives("PRINTS", &["--isolate", isolate]);
+        assert!(
+            run.said.contains("printed at 1.5 s"),
+            "{isolate}: {}",
+            run.said
+        );
+        let run = survives("ESCAPES", &["--isolate", isolate]);
+        assert!(!run.said.contains('\u{1b}'), "{}", run.said);
+        assert!(run.said.contains("\\u{1b}[2J"), "{}", run.said);
+        let run = survives("REPEATS", &["--isolate", isolate]);
+        assert!(
+            run.said.contains("again and again (500 times)"),
+            "{}",
+            run.said
+        );
+    }
+}
+
+#[test]
+fn an_fmu_that_asks_to_end_the_run_ends_it_regularly() {
+    for isolate in ["none", "foreign"] {
+        let folder = tempfile::tempdir().unwrap();
+        pack(folder.path(), "ENDS", "");
+        let run = run(folder.path(), ALONE, &["--isolate", isolate]);
+        assert_eq!(run.status, Some(0), "{}", run.said);
+        assert_eq!(run.summary["ended"], "terminated");
+        assert!(
+            run.said.contains("asked to end the run at 1 s"),
+            "{}",
+            run.said
+        );
+    }
+}
+
+#[test]
+fn an_fmu_that_dies_before_or_after_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    pack(folder.path(), "DIES_WHEN_LOADED", "");
+    fs::write(folder.path().join("rig.toml"), ALONE).unwrap();
+    let output = shakebench(folder.path(), &["run", "rig.toml", "--out", "out"]);
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("hostile.fmu") && said.contains("abort"),
+        "{said}"
+    );
+    assert!(!folder.path().join("out").exists());
+    survives("DIES_WHEN_FREED", &[]);
+}
+
+#[test]
+fn one_instance_a_process_is_heeded() {
+    let folder = tempfile::tempdir().unwrap();
+    pack(
+        folder.path(),
+        "ONCE",
+        "canBeInstantiatedOnlyOncePerProcess=\"true\"",
+    );
+    let system = r#"
+        connections = ["reference.displacement -> a.u", "a.y -> b.u", "b.y -> c.u"]
+        [components.a]
+        fmu = "hostile.fmu"
+        [components.b]
+        fmu = "hostile.fmu"
+        [components.c]
+        fmu = "hostile.fmu"
+        [experiment]
+        duration = "1 s"
+    "#;
+    for isolate in ["none", "foreign", "all"] {
+        let run = run(folder.path(), system, &["--isolate", isolate]);
+        assert_eq!(run.status, Some(0), "{isolate}: {}", run.said);
+    }
+}
+
+#[test]
+fn a_process_of_its_own_changes_no_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    pack(folder.path(), "HONEST", "");
+    let here = run(folder.path(), ALONE, &["--isolate", "none"]);
+    let apart = run(folder.path(), ALONE, &[]);
+    assert_eq!(here.rows, apart.rows);
+    assert!(here.rows.iter().any(|row| row[4] != 0.0));
+    let traced = run(folder.path(), ALONE, &["--trace", "calls.txt"]);
+    assert_eq!(here.rows, traced.rows);
+    let calls = fs::read_to_string(folder.path().join("calls.txt")).unwrap();
+    for call in [
+        "fmi2Instantiate() -> 0",
+        "stop 2,",
+        "fmi2DoStep(1.998, 0.002) -> 0",
+        "fmi2Terminate() -> 0",
+    ] {
+        assert!(calls.contains(call), "{call}");
+    }
+}
+
+#[test]
+fn an_fmu_that_refuses_get_after_set_runs_and_says_so_once() {
+    for isolate in ["none", "foreign"] {
+        let folder = tempfile::tempdir().unwrap();
+        pack(folder.path(), "STRICT", "");
+        let run = run(folder.path(), ALONE, &["--isolate", isolate]);
+        assert_eq!(run.status, Some(0), "{isolate}: {}", run.said);
+        assert_eq!(
+            run.said.matches("refuses to give outputs").count(),
+            1,
+            "{}",
+            run.said
+        );
+        // y = 2 u of the step before.
+        let [reference, y] =
+            [1, 4].map(|at| -> Vec<f64> { run.rows.iter().map(|row| row[at]).collect() });
+        assert!(
+            y[2..]
+                .iter()
+                .zip(&reference[1..])
+                .all(|(y, u)| *y == 2.0 * u)
+        );
+    }
+}
+
+#[test]
+fn an_fmu_that_computes_in_its_step_only_is_reported_and_called_without_delay_on_demand() {
+    let folder = tempfile::tempdir().unwrap();
+    pack(folder.path(), "LATE", "");
+    let run_late = run(folder.path(), ALONE, &[]);
+    assert_eq!(run_late.status, Some(0), "{}", run_late.said);
+    assert!(
+        run_late.said.contains("computes it in its steps only"),
+        "{}",
+        run_late.said
+    );
+    let sampled = ALONE.replace("fmu = ", "period = \"2 ms\"\n    fmu = ");
+    let run_sampled = run(folder.path(), &sampled, &[]);
+    assert!(
+        !run_sampled.said.contains("in its steps only"),
+        "{}",
+        run_sampled.said
+    );
+    assert!(run_sampled.rows.iter().all(|row| row[4] == 2.0 * row[1]));
+    // What gives its outputs at once, or says that they do not depend directly, is not reported.
+    pack(folder.path(), "DIRECT", "");
+    let direct = run(folder.path(), ALONE, &[]);
+    assert!(
+        !direct.said.contains("in its steps only"),
+        "{}",
+        direct.said
+    );
+    assert!(direct.rows.iter().all(|row| row[4] == 2.0 * row[1]));
+    pack_as(
+        folder.path(),
+        "hostile.fmu",
+        "LATE",
+        "",
+        "dependencies=\"\"",
+    );
+    let declared = run(folder.path(), ALONE, &[]);
+    assert!(
+        !declared.said.contains("in its steps only"),
+        "{}",
+        declared.said
+    );
+}
+
+#[test]
+fn an_open_input_keeps_its_start_value_and_a_line_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    pack(folder.path(), "DIRECT", "");
+    let system = ALONE.replace("connections = [\"reference.displacement -> it.u\"]", "");
+    let run = run(folder.path(), &system, &[]);
+    assert_eq!(run.status, Some(0), "{}", run.said);
+    assert!(
+        run.said
+            .contains("`it`: the open input `u` (0.25) keeps its start value"),
+        "{}",
+        run.said
+    );
+    assert!(run.rows.iter().all(|row| row[4] == 0.5));
+}

@@ -1,0 +1,361 @@
+//! FMUs that others wrote, run alone, among each other and with ours, beside fmpy.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::fs::{self, File};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+use acceptance::{python, shared};
+use shakebench::fmu::{Datum, FmiVersion, Options};
+use shakebench::library::FmuLibrary;
+use shakebench::master::{Algorithm, Ended, Outcome, Pace, Simulation};
+use shakebench::motion::Motion;
+use shakebench::system::{SystemFile, assemble};
+use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
+
+/// A motion at rest.
+fn rest(step: f64, samples: usize) -> Motion {
+    Motion {
+        name: "rest".to_string(),
+        dt: step,
+        displacement: vec![0.0; samples],
+        velocity: vec![0.0; samples],
+        acceleration: vec![0.0; samples],
+        notes: Vec::new(),
+        seed: None,
+    }
+}
+
+fn run(system: &str, settings: &[&str], step: f64, samples: usize) -> Outcome {
+    let file = SystemFile::parse("test", system).unwrap();
+    let settings: Vec<String> = settings.iter().map(|text| text.to_string()).collect();
+    let mut library = FmuLibrary::new(FmiVersion::V3, None);
+    let system = assemble(&file, &settings, &mut |name| library.find(name)).unwrap();
+    let motion = rest(step, samples);
+    let plan = (step, (samples - 1) as f64 * step);
+    let options = Options::default();
+    Simulation::with(&system, &motion, Algorithm::GaussSeidel, plan, &options)
+        .unwrap()
+        .run(samples, Pace::Fastest, &mut |_| {})
+}
+
+fn alone(fmu: &Path) -> String {
+    format!("[components.it]\nfmu = \"{}\"\n", fmu.display())
+}
+
+/// What fmpy computes: names and rows.
+fn fmpy(
+    fmu: &Path,
+    step: f64,
+    stop: f64,
+    kind: &str,
+    values: &[&str],
+) -> (Vec<String>, Vec<Vec<f64>>) {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("fmpy.csv");
+    let (step, stop) = (step.to_string(), stop.to_string());
+    let mut arguments: Vec<String> = vec![
+        fmu.display().to_string(),
+        out.display().to_string(),
+        step,
+        stop,
+        kind.to_string(),
+    ];
+    arguments.extend(values.iter().map(|value| value.to_string()));
+    python::run_script("fmpy_reference.py", &arguments);
+    let text = fs::read_to_string(out).unwrap();
+    let mut lines = text.lines().map(|line| line.split(','));
+    let names = lines.next().unwrap().map(str::to_string).collect();
+    let rows = lines.map(|line| line.map(|cell| cell.parse().unwrap()).collect());
+    (names, rows.collect())
+}
+
+fn foreign(version: &str, name: &str) -> Option<PathBuf> {
+    let path = shared::folder()?.join(format!("foreign-fmus/{version}/{name}.fmu"));
+    path.is_file().then_some(path)
+}
+
+/// A column of a run, also of whole numbers of 64 bits.
+fn column(outcome: &Outcome, name: &str) -> Vec<f64> {
+    let record = &outcome.record;
+    if let Some(values) = record.column(name) {
+        return values;
+    }
+    let place = record
+        .exact_columns
+        .iter()
+        .position(|column| column == name);
+    let place = place.unwrap_or_else(|| panic!("no column {name}"));
+    (0..record.len())
+        .map(|row| match &record.exact(row)[place] {
+            Datum::Signed(value) => *value as f64,
+            Datum::Unsigned(value) => *value as f64,
+            other => panic!("{name} is {other:?}"),
+        })
+        .collect()
+}
+
+/// The largest difference to fmpy over all outputs.
+fn difference(fmu: &Path, step: f64, stop: f64, kind: &str) -> f64 {
+    let samples = (stop / step).round() as usize + 1;
+    let (names, rows) = fmpy(fmu, step, stop, kind, &[]);
+    let ours = run(&alone(fmu), &[], step, samples);
+    assert!(
+        ours.ended.is_regular(),
+        "{}: {}",
+        fmu.display(),
+        ours.ended.message()
+    );
+    assert_eq!(ours.record.len(), rows.len(), "{}", fmu.display());
+    let mut largest: f64 = 0.0;
+    for (place, name) in names.iter().enumerate().skip(1) {
+        if name == "h_ft" {
+            // An alias: a name of `h`, not a result of its own.
+            continue;
+        }
+        let values = column(&ours, &format!("it.{name}"));
+        for (value, row) in values.iter().zip(&rows) {
+            largest = largest.max((value - row[place]).abs());
+        }
+    }
+    largest
+}
+
+#[test]
+fn reference_fmus_give_the_bits_of_fmpy() {
+    let mut tried = 0;
+    for (name, step, stop) in [
+        ("BouncingBall", 0.01, 3.0),
+        ("Dahlquist", 0.1, 10.0),
+        ("Feedthrough", 0.1, 2.0),
+        ("Resource", 0.5, 1.0),
+        ("Stair", 0.2, 10.0),
+        ("StateSpace", 1.0, 10.0),
+        ("VanDerPol", 0.01, 20.0),
+    ] {
+        for version in ["fmi2", "fmi3"] {
+            let Some(fmu) = foreign(version, name) else {
+                continue;
+            };
+            let largest = difference(&fmu, step, stop, "CoSimulation");
+            println!("{version} {name}: differs from fmpy by {largest:e}");
+            assert!(largest == 0.0, "{version} {name}: {largest:e}");
+            tried += 1;
+        }
+    }
+    if shared::folder().is_some() {
+        assert_eq!(tried, 13);
+    }
+}
+
+/// The FMU without its co-simulation, in a folder of the test.
+fn exchange_only(fmu: &Path, folder: &Path) -> PathBuf {
+    let path = folder.join(fmu.file_name().unwrap());
+    let mut from = ZipArchive::new(File::open(fmu).unwrap()).unwrap();
+    let mut to = ZipWriter::new(File::create(&path).unwrap());
+    for index in 0..from.len() {
+        let mut entry = from.by_index(index).unwrap();
+        let name = entry.name().unwrap().into_owned();
+        if name.ends_with('/') {
+            continue;
+        }
+        let mut content = Vec::new();
+        entry.read_to_end(&mut content).unwrap();
+        if name == "modelDescription.xml" {
+            let text = String::from_utf8(content).unwrap();
+            let (before, rest) = text.split_once("<CoSimulation").unwrap();
+            let end = match rest.find("</CoSimulation>") {
+                Some(at) => at + "</CoSimulation>".len(),
+                None => rest.find("/>").unwrap() + 2,
+            };
+            content = format!("{before}{}", &rest[end..]).into_bytes();
+        }
+        to.start_file(name, SimpleFileOptions::default()).unwrap();
+        to.write_all(&content).unwrap();
+    }
+    to.finish().unwrap();
+    path
+}
+
+#[test]
+fn model_exchange_agrees_with_cvode() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, step, stop, within) in [
+        ("BouncingBall", 0.01, 2.5, 1e-6),
+        ("Stair", 0.2, 8.0, 0.0),
+        ("VanDerPol", 0.01, 20.0, 1e-6),
+        ("Dahlquist", 0.1, 10.0, 1e-8),
+    ] {
+        for version in ["fmi2", "fmi3"] {
+            let Some(fmu) = foreign(version, name) else {
+                continue;
+            };
+            let fmu = exchange_only(&fmu, folder.path());
+            let largest = difference(&fmu, step, stop, "ModelExchange");
+            println!("{version} {name}: differs from CVode by {largest:e}");
+            assert!(largest <= within, "{version} {name}: {largest:e}");
+        }
+    }
+}
+
+#[test]
+fn every_type_goes_through_parameters_and_connections() {
+    let Some(fmu) = foreign("fmi3", "Feedthrough") else {
+        return;
+    };
+    let types = [
+        ("Float32_continuous", "0.1"),
+        ("Float64_continuous", "-1.5"),
+        ("Int8", "-128"),
+        ("UInt8", "255"),
+        ("Int16", "-32768"),
+        ("UInt16", "65535"),
+        ("Int32", "-2147483648"),
+        ("UInt32", "4294967295"),
+        ("Int64", "-9223372036854775808"),
+        ("UInt64", "18446744073709551615"),
+        ("Boolean", "true"),
+        ("String", "a \"text\", with commas"),
+        ("Binary", "00ff10"),
+        ("Enumeration", "Option 2"),
+    ];
+    let connections: Vec<String> = types
+        .iter()
+        .map(|(name, _)| format!("\"first.{name}_output -> second.{name}_input\""))
+        .collect();
+    let system = format!(
+        "connections = [{}]\n[components.first]\nfmu = \"{1}\"\n[components.second]\nfmu = \"{1}\"\n",
+        connections.join(", "),
+        fmu.display()
+    );
+    let settings: Vec<String> = types
+        .iter()
+        .map(|(name, value)| format!("first.{name}_input={value}"))
+        .collect();
+    let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
+    let outcome = run(&system, &settings, 0.1, 3);
+    assert!(
+        matches!(outcome.ended, Ended::Complete),
+        "{}",
+        outcome.ended.message()
+    );
+    let record = &outcome.record;
+    for (name, written) in types {
+        let name = format!("second.{name}_output");
+        let Some(place) = record
+            .exact_columns
+            .iter()
+            .position(|column| *column == name)
+        else {
+            let expected = match written {
+                "true" => 1.0,
+                "Option 2" => 2.0,
+                "0.1" => f64::from(0.1_f32),
+                number => number.parse().unwrap(),
+            };
+            assert_eq!(record.column(&name).unwrap(), [expected; 3], "{name}");
+            continue;
+        };
+        assert_eq!(record.exact(2)[place].to_string(), written, "{name}");
+    }
+}
+
+#[test]
+fn arrays_follow_structural_parameters() {
+    let Some(fmu) = foreign("fmi3", "StateSpace") else {
+        return;
+    };
+    // y = D u with two inputs, three outputs and no states.
+    let settings = [
+        "it.m=2",
+        "it.n=1",
+        "it.r=3",
+        "it.A=0",
+        "it.B=0 0",
+        "it.C=0 0 0",
+        "it.D=1 2 3 4 5 6",
+        "it.x0=0",
+        "it.u=10 1",
+    ];
+    let outcome = run(&alone(&fmu), &settings, 1.0, 3);
+    assert!(
+        matches!(outcome.ended, Ended::Complete),
+        "{}",
+        outcome.ended.message()
+    );
+    for (name, expected) in [("it.y[1]", 12.0), ("it.y[2]", 34.0), ("it.y[3]", 56.0)] {
+        assert_eq!(
+            outcome.record.column(name).unwrap(),
+            [expected; 3],
+            "{name}"
+        );
+    }
+    assert!(outcome.record.column("it.y[4]").is_none());
+}
+
+#[test]
+fn foreign_fmus_run_among_each_other_and_with_ours() {
+    let (Some(ball), Some(oscillator), Some(through)) = (
+        foreign("fmi2", "BouncingBall"),
+        foreign("fmi3", "VanDerPol"),
+        foreign("fmi3", "Feedthrough"),
+    ) else {
+        return;
+    };
+    let system = format!(
+        r#"
+        connections = [
+            "ball.h -> through.Float64_continuous_input",
+            "oscillator.x0 -> through.Float32_continuous_input",
+            "through.Float64_continuous_output -> specimen.table_acceleration",
+        ]
+        [components.ball]
+        fmu = "{}"
+        parameters = {{ h = 2.0 }}
+        [components.oscillator]
+        fmu = "{}"
+        [components.through]
+        fmu = "{}"
+        [components.specimen]
+        fmu = "Specimen"
+        "#,
+        ball.display(),
+        oscillator.display(),
+        through.display()
+    );
+    let outcome = run(&system, &[], 0.002, 500);
+    assert!(
+        matches!(outcome.ended, Ended::Complete),
+        "{}",
+        outcome.ended.message()
+    );
+    let record = &outcome.record;
+    let heights = record.column("ball.h").unwrap();
+    assert_eq!(heights[0], 2.0, "a start value of an output is set");
+    assert_eq!(
+        heights,
+        record.column("through.Float64_continuous_output").unwrap()
+    );
+}
+
+#[test]
+fn scheduled_execution_is_refused_in_words() {
+    let Some(fmu) = foreign("fmi3", "Clocks") else {
+        return;
+    };
+    let file = SystemFile::parse("test", &alone(&fmu)).unwrap();
+    let mut library = FmuLibrary::new(FmiVersion::V3, None);
+    let system = assemble(&file, &[], &mut |name| library.find(name)).unwrap();
+    let plan = (0.1, 1.0);
+    let options = Options::default();
+    let made = Simulation::with(
+        &system,
+        &rest(0.1, 3),
+        Algorithm::GaussSeidel,
+        plan,
+        &options,
+    );
+    let said = made.err().unwrap().to_string();
+    assert!(said.contains("scheduled execution only"), "{said}");
+}
