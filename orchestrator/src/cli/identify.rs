@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use identification::identify::rig::RigIdentification;
+use identification::identify::identified::RigIdentification;
 
 use crate::error::Error;
 use crate::identify::{
