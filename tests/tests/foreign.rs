@@ -33,7 +33,8 @@ fn run(system: &str, settings: &[&str], step: f64, samples: usize) -> Outcome {
     let mut library = FmuLibrary::new(FmiVersion::V3, None);
     let system = assemble(&file, &settings, &mut |name| library.find(name)).unwrap();
     let motion = rest(step, samples);
-    let plan = (step, (samples - 1) as f64 * step);
+    // The last sample is stepped over as well.
+    let plan = (step, samples as f64 * step);
     let options = Options::default();
     Simulation::with(&system, &motion, Algorithm::GaussSeidel, plan, &options)
         .unwrap()
