@@ -1,6 +1,5 @@
 //! Hydraulic shake tables as FMI components, co-simulated
 
-
 pub mod benchmark;
 pub mod cli;
 pub mod comparison;

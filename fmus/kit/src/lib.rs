@@ -37,7 +37,6 @@
 //! }
 //! ```
 
-
 mod checksum;
 mod component;
 mod derivative;
