@@ -3,8 +3,6 @@
 //! One law, one file; every law meets [`Controller`]. Laws are sampled: they are called once a
 //! period with what the sensors gave, and the command they return is held until the next call.
 
-#![warn(clippy::missing_errors_doc)]
-
 pub mod allocation;
 pub mod hierarchy;
 pub mod hybrid;

@@ -1,7 +1,5 @@
 //! Hydraulic shake tables as FMI components, co-simulated
 
-#![warn(clippy::missing_errors_doc)]
-
 pub mod benchmark;
 pub mod cli;
 pub mod comparison;

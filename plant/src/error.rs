@@ -43,6 +43,9 @@ pub enum ModelError {
 
 impl ModelError {
     /// Checks that a parameter is finite and positive.
+    ///
+    /// # Errors
+    /// Names the parameter and its value otherwise.
     pub fn require_positive(name: &'static str, value: f64) -> Result<(), Self> {
         if value.is_finite() && value > 0.0 {
             return Ok(());
@@ -55,6 +58,9 @@ impl ModelError {
     }
 
     /// Checks that a parameter is finite and not negative.
+    ///
+    /// # Errors
+    /// Names the parameter and its value otherwise.
     pub fn require_non_negative(name: &'static str, value: f64) -> Result<(), Self> {
         if value.is_finite() && value >= 0.0 {
             return Ok(());
@@ -67,6 +73,9 @@ impl ModelError {
     }
 
     /// Checks that a parameter is finite.
+    ///
+    /// # Errors
+    /// Names the parameter and its value otherwise.
     pub fn require_finite(name: &'static str, value: f64) -> Result<(), Self> {
         if value.is_finite() {
             return Ok(());

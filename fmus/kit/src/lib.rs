@@ -37,8 +37,6 @@
 //! }
 //! ```
 
-#![warn(clippy::missing_errors_doc)]
-
 mod checksum;
 mod component;
 mod derivative;

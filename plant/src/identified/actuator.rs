@@ -34,8 +34,11 @@ impl IdentifiedActuator {
         }
     }
 
-    /// Refuses coefficients that are not finite or that put a zero of G1 in the right half plane
-    /// (a valve that answers in the wrong direction at first or for good).
+    /// Checks the coefficients.
+    ///
+    /// # Errors
+    /// A coefficient that is not finite, or a zero of G1 in the right half plane: a valve that
+    /// answers in the wrong direction at first or for good.
     pub fn validate(&self) -> Result<(), ModelError> {
         let all = self.denominator.iter().chain(&self.voltage_to_force);
         for &value in all.chain(&self.velocity_to_force) {
@@ -171,7 +174,10 @@ impl PublishedActuator {
         )
     }
 
-    /// The actuator to simulate; Eq 2-11 is refused with the reason.
+    /// The actuator to simulate.
+    ///
+    /// # Errors
+    /// Eq 2-11 as printed, with the reason.
     pub fn for_simulation(self) -> Result<IdentifiedActuator, ModelError> {
         let actuator = self.transfer_functions();
         actuator.validate().map_err(|error| match (self, error) {

@@ -99,7 +99,10 @@ impl ExtendedTable {
         }
     }
 
-    /// Refuses effects that cannot be simulated on a table of `mass` (kg).
+    /// Checks effects on a table of `mass` (kg).
+    ///
+    /// # Errors
+    /// Names the first parameter with which they cannot be simulated.
     pub fn validate(effects: &Effects, mass: f64) -> Result<(), ModelError> {
         effects.validate()?;
         if effects.hydraulics.droop_form == 0.0 {

@@ -68,7 +68,10 @@ pub struct RigMotion {
 }
 
 impl IdentifiedRig {
-    /// Refuses parameters that cannot be simulated.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first of table, specimen, effects or sensors that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
         self.shake_table.validate()?;
         if let Some(specimen) = &self.specimen {
@@ -126,7 +129,8 @@ impl IdentifiedRig {
     /// The rig ready to step with `period` s between samples, each in `substeps` Runge-Kutta
     /// steps of fourth order.
     ///
-    /// Refuses what [`Self::validate`] refuses and delays longer than
+    /// # Errors
+    /// What [`Self::validate`] refuses, and delays longer than
     /// [`MAX_DELAY_SAMPLES`](crate::delay_line::MAX_DELAY_SAMPLES) periods.
     pub fn sample(&self, period: f64, substeps: usize) -> Result<SampledRig, ModelError> {
         self.validate()?;

@@ -48,7 +48,10 @@ impl ShakeTable {
         }
     }
 
-    /// Refuses parameters that cannot be simulated.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first of actuator or table that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
         self.actuator.validate()?;
         self.table.validate()

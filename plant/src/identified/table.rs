@@ -44,7 +44,10 @@ impl Table {
         Self::from_thesis_units(1.0 / gain, damping / gain, stiffness / gain)
     }
 
-    /// Refuses a mass or stiffness that is not positive and negative damping.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// A mass or stiffness that is not positive, a negative damping.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_positive("table_mass", self.mass)?;
         ModelError::require_non_negative("table_damping", self.damping)?;

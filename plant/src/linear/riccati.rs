@@ -11,8 +11,10 @@ const MAX_DOUBLINGS: usize = 80;
 /// Stabilising `X` of `A' X A - X - A' X B (R + B' X B)^-1 B' X A + Q = 0` (Eq 5-8 with `A`, `C`
 /// transposed).
 ///
-/// Shapes: `A`, `Q` n x n, `B` n x m, `R` m x m. Fails where `R` is singular or no stabilising
-/// solution exists.
+/// Shapes: `A`, `Q` n x n, `B` n x m, `R` m x m.
+///
+/// # Errors
+/// A singular `R`, or no stabilising solution.
 pub fn discrete_riccati(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -53,8 +55,10 @@ pub fn discrete_riccati_residual(
 
 /// Stabilising `X` of `A' X + X A - X B R^-1 B' X + Q = 0`.
 ///
-/// Shapes: `A`, `Q` n x n, `B` n x m, `R` m x m. Fails where `R` is singular or no stabilising
-/// solution exists.
+/// Shapes: `A`, `Q` n x n, `B` n x m, `R` m x m.
+///
+/// # Errors
+/// A singular `R`, or no stabilising solution.
 pub fn continuous_riccati(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

@@ -56,7 +56,10 @@ fn check_shapes(
 }
 
 impl StateSpace {
-    /// Joins four matrices; refuses shapes that do not fit.
+    /// Joins four matrices.
+    ///
+    /// # Errors
+    /// Shapes that do not fit.
     pub fn new(
         a: DMatrix<f64>,
         b: DMatrix<f64>,
@@ -109,7 +112,10 @@ impl StateSpace {
 }
 
 impl DiscreteStateSpace {
-    /// Joins four matrices; refuses shapes that do not fit.
+    /// Joins four matrices.
+    ///
+    /// # Errors
+    /// Shapes that do not fit.
     pub fn new(
         a: DMatrix<f64>,
         b: DMatrix<f64>,

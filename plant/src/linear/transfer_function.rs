@@ -15,7 +15,8 @@ pub struct TransferFunction {
 impl TransferFunction {
     /// Takes coefficients in descending powers; leading zeros are dropped.
     ///
-    /// Refuses a denominator that is zero.
+    /// # Errors
+    /// A denominator that is zero.
     pub fn new(numerator: &[f64], denominator: &[f64]) -> Result<Self, ModelError> {
         let denominator = trim(denominator);
         if denominator == [0.0] {
@@ -83,7 +84,8 @@ impl TransferFunction {
 
     /// Observer canonical form: the first state is the output less the feedthrough.
     ///
-    /// Refuses a numerator of higher order than the denominator.
+    /// # Errors
+    /// A numerator of higher order than the denominator.
     pub fn to_state_space(&self) -> Result<StateSpace, ModelError> {
         let n = self.denominator.len() - 1;
         if self.numerator.len() > n + 1 {

@@ -117,7 +117,10 @@ impl ChannelState {
 }
 
 impl Channel {
-    /// Refuses values without meaning.
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// Names the first without meaning.
     pub fn validate(&self) -> Result<(), ModelError> {
         for (name, value) in [
             ("corner", self.corner),
@@ -135,8 +138,10 @@ impl Channel {
         ModelError::require_finite("hum_phase", self.hum_phase)
     }
 
-    /// Refuses a delay (with a `common` one, s) that is longer than the memory at the sampling
-    /// `period` (s).
+    /// Checks the delay, with a `common` one (s), at the sampling `period` (s).
+    ///
+    /// # Errors
+    /// A delay that is longer than the memory.
     pub fn validate_delay(&self, common: f64, period: f64) -> Result<(), ModelError> {
         require_delay("delay", self.delay + common, period)
     }

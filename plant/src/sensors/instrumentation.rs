@@ -176,7 +176,10 @@ impl Instrumentation {
         ]
     }
 
-    /// Refuses values without meaning.
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// Names the first without meaning.
     pub fn validate_values(&self) -> Result<(), ModelError> {
         for channel in self.channels() {
             channel.validate()?;
@@ -194,7 +197,10 @@ impl Instrumentation {
         ModelError::require_non_negative("velocity_lag", self.velocity_lag)
     }
 
-    /// Refuses parameters that cannot be simulated at the sampling `period` (s).
+    /// Checks the parameters at the sampling `period` (s).
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated.
     pub fn validate(&self, period: f64) -> Result<(), ModelError> {
         ModelError::require_positive("period", period)?;
         self.validate_values()?;
@@ -207,6 +213,9 @@ impl Instrumentation {
     /// Solves for the gains of the velocity's Kalman filter at the sampling `period` (s). The
     /// noises are those of the two channels, but never below 1e-4 in and 0.01 g, since sensors are
     /// late and tilted besides being noisy; the accelerometer's bias may wander by 0.01 g in 10 s.
+    ///
+    /// # Errors
+    /// No stabilising solution of the Riccati equation.
     pub fn velocity_filter(&self, period: f64) -> Result<VelocityFilter, ModelError> {
         let h = period;
         let displacement = self.displacement.noise.max(1e-4 * INCH);

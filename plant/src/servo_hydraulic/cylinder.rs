@@ -37,7 +37,10 @@ impl Default for Cylinder {
 }
 
 impl Cylinder {
-    /// Refuses parameters that cannot be simulated with a piston that moves `reach` (m) either way.
+    /// Checks the parameters for a piston that moves `reach` (m) either way.
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated.
     pub fn validate(&self, reach: f64) -> Result<(), ModelError> {
         ModelError::require_positive("piston_area", self.area)?;
         ModelError::require_positive("bulk_modulus", self.bulk_modulus)?;

@@ -37,14 +37,20 @@ pub struct ExtendedServoHydraulicState {
 const ALL: usize = STATES + 2;
 
 impl ExtendedServoHydraulicTable {
-    /// Refuses parameters that cannot be simulated, by name.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
         self.table.validate()?;
         self.valve().validate()?;
         self.foundation.validate()
     }
 
-    /// Refuses a delay of the command that is longer than the memory at steps of `period` s.
+    /// Checks the delay of the command at steps of `period` s.
+    ///
+    /// # Errors
+    /// A delay that is longer than the memory.
     pub fn validate_delay(&self, period: f64) -> Result<(), ModelError> {
         self.valve().validate_delay(period)
     }

@@ -56,7 +56,11 @@ impl SealFriction {
         }
     }
 
-    /// Refuses parameters that cannot be simulated.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated, such as a static friction below the Coulomb
+    /// friction.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_non_negative("coulomb_friction", self.coulomb)?;
         ModelError::require_non_negative("seal_viscous_friction", self.viscous)?;

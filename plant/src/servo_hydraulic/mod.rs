@@ -118,7 +118,10 @@ pub struct ServoHydraulicInput {
 pub const INNER_STEP: f64 = 2e-4;
 
 impl ServoHydraulicTable {
-    /// Refuses parameters that cannot be simulated, by name.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
         self.supply.validate()?;
         self.valve.validate()?;

@@ -33,7 +33,10 @@ impl Default for Stops {
 }
 
 impl Stops {
-    /// Refuses parameters that cannot be simulated.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated; the cushion is shorter than the stroke.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_positive("stroke", self.stroke)?;
         ModelError::require_positive("stop_stiffness", self.stiffness)?;

@@ -37,7 +37,10 @@ impl Default for Supply {
 }
 
 impl Supply {
-    /// Refuses parameters that cannot be simulated.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first that is not positive.
     pub fn validate(&self) -> Result<(), ModelError> {
         for (name, value) in [
             ("supply_pressure", self.pressure),

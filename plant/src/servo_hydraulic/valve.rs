@@ -66,7 +66,10 @@ fn turbulent(drop: f64) -> f64 {
 }
 
 impl ServoValve {
-    /// Refuses parameters that cannot be simulated.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_positive("valve_frequency", self.frequency)?;
         ModelError::require_positive("valve_damping_ratio", self.damping_ratio)?;

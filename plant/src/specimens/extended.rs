@@ -152,7 +152,10 @@ impl ExtendedSpecimen {
         state.added.copy_from_slice(&s[SECOND_MODE..]);
     }
 
-    /// Refuses effects that cannot be simulated.
+    /// Checks the effects.
+    ///
+    /// # Errors
+    /// Names the first parameter with which they cannot be simulated.
     pub fn validate(effects: &SpecimenEffects) -> Result<(), ModelError> {
         effects.validate()?;
         if effects.second_mode_mass_share < 1.0 {

@@ -88,7 +88,10 @@ pub fn elastic_share(z: f64, sharpness: f64, strength: f64, weight: f64) -> f64 
 }
 
 impl BoucWen {
-    /// Refuses parameters that cannot be simulated or that would make energy.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated or that would make energy.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_positive("yield_force", self.yield_force)?;
         ModelError::require_positive("yield_displacement", self.yield_displacement)?;

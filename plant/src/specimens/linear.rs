@@ -36,7 +36,10 @@ impl LinearSpecimen {
         Self::from_period(100.0 * LBF / (386.4 * INCH), 1.0, 0.05)
     }
 
-    /// Refuses a mass that is not positive and negative damping or stiffness.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// A mass that is not positive, negative damping or stiffness.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_positive("mass", self.mass)?;
         ModelError::require_non_negative("damping", self.damping)?;

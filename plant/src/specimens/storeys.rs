@@ -37,7 +37,10 @@ impl Storeys {
         }
     }
 
-    /// Refuses parameters that cannot be simulated.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// A number of storeys out of range, or what a storey refuses.
     pub fn validate(&self) -> Result<(), ModelError> {
         if !(1..=MAX_STOREYS).contains(&self.count) {
             return Err(ModelError::Parameter {

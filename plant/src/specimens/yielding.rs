@@ -41,7 +41,10 @@ impl YieldingSpecimen {
         }
     }
 
-    /// Refuses parameters that cannot be simulated.
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// A mass that is not positive, negative damping, or what the columns refuse.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_positive("mass", self.mass)?;
         ModelError::require_non_negative("damping", self.damping)?;

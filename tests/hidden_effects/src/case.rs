@@ -226,6 +226,9 @@ impl Case {
     }
 
     /// Writes `nominal.toml` and the records into `folder`, and nothing about the truth.
+    ///
+    /// # Errors
+    /// A folder or file that cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
         fs::create_dir_all(folder)?;
         fs::write(folder.join("nominal.toml"), self.nominal())?;

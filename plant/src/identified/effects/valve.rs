@@ -251,7 +251,10 @@ impl Family for ValveEffects {
 }
 
 impl ValveEffects {
-    /// Refuses a delay of the command that is longer than the memory at `period` s.
+    /// Checks the delay of the command at samples `period` s apart.
+    ///
+    /// # Errors
+    /// A delay that is longer than the memory.
     pub fn validate_delay(&self, period: f64) -> Result<(), ModelError> {
         require_delay("command_delay", self.command_delay, period)
     }

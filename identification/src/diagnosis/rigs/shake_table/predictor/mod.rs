@@ -87,6 +87,9 @@ impl Samples {
 impl Predictor {
     /// Designs the gain on the linear part of `rig` for channels with `noise` (one standard
     /// deviation, SI; infinite for a channel that is missing).
+    ///
+    /// # Errors
+    /// A rig that cannot be simulated, or one for which there is no stabilising gain.
     pub fn design(
         rig: &IdentifiedRig,
         period: f64,
@@ -265,6 +268,9 @@ impl Predictor {
     }
 
     /// Sampled form of `rig` for this predictor; friction and a fast spool get finer steps.
+    ///
+    /// # Errors
+    /// A rig that cannot be simulated.
     pub fn sample(&self, rig: &IdentifiedRig) -> Result<SampledRig, ModelError> {
         rig.sample(self.period, if rig.is_fast() { 2 } else { 1 })
     }
