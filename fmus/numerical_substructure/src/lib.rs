@@ -116,7 +116,7 @@ impl Component for NumericalSubstructure {
         variables.extend(accelerations.into_iter().map(|element| {
             element
                 .depends_on(&["ground_acceleration"], fmu_kit::Dependency::Dependent)
-                .initially_depends_on(&["ground_acceleration"])
+                .initially_depends_on(&["ground_acceleration", "specimen_mass"])
         }));
         variables
     }
