@@ -7,7 +7,7 @@ use acceptance::shared;
 use identification::data::Channel;
 use identification::diagnosis::engine::{Observer, Verdict};
 use identification::diagnosis::rigs::{
-    Description, Measurement, PartReport, RigDiagnosis, RigRecording, diagnose,
+    Description, Measurement, PartReport, RigDiagnosis, RigRecording, Values, diagnose,
 };
 
 /// Description and data of a rig; none where the data are missing.
@@ -332,7 +332,12 @@ fn put_on_top(
             }
         }
         let mut out = vec![0.0; recording.len()];
-        rig.simulate(recording, &nominal, &parameters, &mut out);
+        let values = Values {
+            nominal: nominal.clone(),
+            effects: parameters,
+            session: vec![0.0; rig.session().len()],
+        };
+        rig.simulate(recording, &values, &mut out);
         out
     };
     let without = output(false);

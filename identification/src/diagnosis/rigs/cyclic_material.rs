@@ -26,11 +26,16 @@ const STRESS: Channel = Channel::Other {
 const SUBSTEP: f64 = 5e-5;
 
 nominal_parameters! {
+    /// E: Young's.
     modulus: "Pa",
+    /// σ_y: at first yield.
     yield_stress: "Pa",
+    /// C: of the backstress.
     hardening: "Pa",
+    /// γ: of the backstress.
     recovery: "1",
-    strain_amplitude: "1",
+    /// Of the test where turns lie between samples; 0 where the samples are all there is.
+    strain_amplitude: "1" = 0.0,
 }
 
 effects! {
@@ -85,15 +90,18 @@ impl Equations for CyclicMaterial {
     const KIND: &'static str = "cyclic_material";
     type Nominal = Nominal;
     type Effects = Effects;
+    type Session = ();
     const INPUTS: &'static [Channel] = &[STRAIN];
     const OUTPUT: Channel = STRESS;
     const IS_HYSTERETIC: bool = true;
+    const IS_PATH: bool = true;
 
     fn simulate(
         &self,
         recording: &RigRecording,
         nominal: &Nominal,
         effects: &Effects,
+        (): &(),
         out: &mut [f64],
     ) {
         let Nominal {
@@ -143,13 +151,13 @@ impl Equations for CyclicMaterial {
             back: [0.0; 3],
             path: 0.0,
         };
-        let last = strain.len() - 1;
+        let last = strain.len().min(out.len()).saturating_sub(1);
         let mut now = first;
         let mut direction = 0.0f64;
         let mut k = 0;
         while k <= last {
             // Where the strain was interpolated, only the reading behind it is known.
-            let interpolated = recording.between.get(k) == Some(&true);
+            let interpolated = recording.between.get(k) == Some(&true) && k < last;
             let reading = if interpolated { k + 1 } else { k };
             let next = strain[reading];
             if next != now {
@@ -290,7 +298,7 @@ mod tests {
             strain_amplitude: amplitude,
         };
         let mut out = vec![0.0; strain.len()];
-        CyclicMaterial.simulate(&recording, &nominal, &effects, &mut out);
+        CyclicMaterial.simulate(&recording, &nominal, &effects, &(), &mut out);
         out
     }
 

@@ -3,7 +3,7 @@
 //! Nominal: `M v' = G u - F_v v - F_c sgn v - o`, `u = k_p k_v (r - q) - k_v Δq/h`, sampled
 //! (Janot, Gautier and Brunot, Data set and reference models of EMPS, 2019).
 
-use super::table::{effects, nominal_parameters, shape, size};
+use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Equations, RigRecording};
 use crate::data::Channel;
 
@@ -20,20 +20,31 @@ const MOTOR_VOLTAGE: Channel = Channel::Other {
 };
 
 const STEPS: usize = 2;
-/// Nominal leads of ball screws, m (ISO 3408-2).
-const LEADS: [f64; 12] = [
-    1e-3, 1.25e-3, 2e-3, 2.5e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3, 10e-3, 12e-3, 20e-3,
-];
+/// Most samples by which the voltage may be late.
+const LATEST: usize = 64;
 
 nominal_parameters! {
+    /// M: all that moves.
     mass: "kg",
+    /// F_v.
     viscous_friction: "N s/m",
+    /// F_c.
     coulomb_friction: "N",
+    /// o: steady force against the motion forward.
     offset: "N",
+    /// G: motor force over voltage.
     force_gain: "N/V",
+    /// k_p of the position loop.
     position_gain: "1/s",
+    /// k_v of the velocity loop.
     velocity_gain: "V s/m",
+    /// Of the amplifier.
     voltage_limit: "V",
+}
+
+session_parameters! {
+    /// Shift of the position's zero against the screw.
+    screw_shift: "m" within 0.01 begins false,
 }
 
 effects! {
@@ -52,15 +63,15 @@ effects! {
     force_ripple: ForceRipple {
         cosine: size("N", 0.2, (-20.0, 20.0)),
         sine: size("N", 0.2, (-20.0, 20.0)),
-        period: shape("m", 3e-3, 1.0),
-    } from LEADS.map(|lead| [0.5, 0.5, lead]);
+        period: shape("m", 5e-3, 1.5),
+    } from [[0.5, 0.5, 5e-3]];
     /// Current loop: T F' = G u - F.
     actuation_lag: ActuationLag {
         time_constant: size("s", 1e-4, (0.0, 0.02)),
     } from [[5e-4]], like ["delay"];
     /// u acts late.
     delay: Delay {
-        delay: size("s", 1e-4, (0.0, 2e-3)),
+        delay: size("s", 1e-4, (0.0, 0.02)),
     } from [[5e-4]], like ["actuation_lag"];
     /// F_c (1 + c (q - q_0)), q_0 in the middle of the travel: misalignment.
     position_dependent_friction: PositionDependentFriction {
@@ -81,6 +92,7 @@ impl Equations for PositioningDrive {
     const KIND: &'static str = "positioning_drive";
     type Nominal = Nominal;
     type Effects = Effects;
+    type Session = Session;
     const INPUTS: &'static [Channel] = &[Channel::Reference, POSITION];
     const OUTPUT: Channel = MOTOR_VOLTAGE;
 
@@ -89,6 +101,7 @@ impl Equations for PositioningDrive {
         recording: &RigRecording,
         nominal: &Nominal,
         effects: &Effects,
+        session: &Session,
         out: &mut [f64],
     ) {
         let Nominal {
@@ -140,25 +153,34 @@ impl Equations for PositioningDrive {
         let (spring, damper) = (load * frequency * frequency, 2.0 * 0.05 * load * frequency);
         let keep = if lag > 1e-6 { (-h / lag).exp() } else { 0.0 };
         let mut force = f64::NAN;
-        let mut last = 0.0;
+        // The voltages that may still be on their way, the newest at its sample's place.
+        let mut voltages = [0.0; LATEST + 2];
+        let late = (delay / sample).clamp(0.0, LATEST as f64);
         for (k, y) in out.iter_mut().enumerate() {
             let u =
                 (kp * kv * (reference[k] - q) - kv * (q - before) / sample).clamp(-limit, limit);
             *y = u;
             before = q;
             if k == 0 {
-                last = u;
+                voltages.fill(u);
                 force = force_gain * u;
             }
+            let ring = voltages.len();
+            voltages[k % ring] = u;
             for step in 0..STEPS {
-                // The voltage of the last sample acts until the delay is over.
-                let (from, to) = (step as f64 * h, (step + 1) as f64 * h);
-                let late = ((delay - from) / (to - from)).clamp(0.0, 1.0);
-                let wanted = force_gain * (late * last + (1.0 - late) * u);
+                // Held from sample to sample: what acts in this step began to act this many samples
+                // ago at its begin and at its end.
+                let from = late - step as f64 / STEPS as f64;
+                let to = from - 1.0 / STEPS as f64;
+                let held = |ago: f64| voltages[(k + ring - (ago.ceil().max(0.0) as usize)) % ring];
+                let (older, newer) = (held(from), held(to));
+                // Share of the step until the newer one arrives.
+                let until = ((from - to.ceil().max(0.0)) * STEPS as f64).clamp(0.0, 1.0);
+                let wanted = force_gain * (until * older + (1.0 - until) * newer);
                 force = keep * force + (1.0 - keep) * wanted;
                 let mut drive = force - offset;
                 if cosine != 0.0 || sine != 0.0 {
-                    let angle = std::f64::consts::TAU * q / period;
+                    let angle = std::f64::consts::TAU * (q - session.screw_shift) / period;
                     drive -= cosine * angle.cos() + sine * angle.sin();
                 }
                 if load > 0.0 {
@@ -183,9 +205,57 @@ impl Equations for PositioningDrive {
                 };
                 q += h * v;
             }
-            last = u;
         }
     }
+
+    fn starts(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)> {
+        let Some(period) = strongest_period(recording.input(POSITION), errors) else {
+            return Vec::new();
+        };
+        let size = 0.05 * nominal.coulomb_friction.max(f64::MIN_POSITIVE);
+        [(size, size), (-size, size), (size, -size), (-size, -size)]
+            .map(|(cosine, sine)| ("force_ripple", vec![cosine, sine, period]))
+            .to_vec()
+    }
+}
+
+/// Period of the sine over position that explains most of `errors` where the drive moves: a
+/// periodogram over even and uneven positions alike (Lomb, Astrophysics and Space Science 39, 1976).
+fn strongest_period(position: &[f64], errors: &[f64]) -> Option<f64> {
+    let low = position.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = position.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let travel = high - low;
+    let pairs: Vec<(f64, f64)> = position
+        .iter()
+        .zip(errors)
+        .filter(|(_, e)| e.is_finite())
+        .map(|(q, e)| (*q, *e))
+        .collect();
+    if travel.is_nan() || travel <= 0.0 || pairs.len() < 1000 {
+        return None;
+    }
+    // Ten thousand samples tell the period; every other one of more is left.
+    let every = pairs.len().div_ceil(10_000);
+    let power = |cycles: f64| {
+        let (mut c, mut s) = (0.0, 0.0);
+        for (q, e) in pairs.iter().step_by(every) {
+            let (sine, cosine) = (std::f64::consts::TAU * cycles * (q - low) / travel).sin_cos();
+            c += e * cosine;
+            s += e * sine;
+        }
+        c * c + s * s
+    };
+    // From four to two hundred cycles over the travel, in quarters of a cycle.
+    let best = (16..800)
+        .map(|quarters| f64::from(quarters) / 4.0)
+        .map(|cycles| (cycles, power(cycles)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(travel / best.0)
 }
 
 /// Slope of the least-squares line through `positions`, at their begin.
