@@ -23,7 +23,7 @@ use super::search::{Selection, search};
 /// tried, so that one in a thousand times would be chance.
 const LEAST_DEVIATE: f64 = 3.0;
 /// Share of the squared error below which an effect is not worth a name.
-const LEAST_GAIN: f64 = 0.01;
+const LEAST_GAIN: f64 = 0.05;
 /// A candidate that gains this share of what the one taken gains is its rival.
 const RIVAL: f64 = 0.9;
 /// A candidate whose fit gains less than this share of the best one's is not tested on unseen data.
@@ -31,7 +31,11 @@ const WORTH_TESTING: f64 = 0.7;
 /// Effects in one model.
 const MOST_EFFECTS: usize = 8;
 /// Candidates that are fitted to the end in a round.
-const FINALISTS: usize = 4;
+const FINALISTS: usize = 6;
+/// Candidates that are followed by one effect more before one is taken, where that is cheap, and the
+/// share of the best gain that each must have.
+const AHEAD: usize = 3;
+const WORTH_FOLLOWING: f64 = 0.6;
 /// Starts of the nominal model beside the stated values, and how far they lie from these, in stated
 /// standard deviations.
 const OTHER_STARTS: usize = 6;
@@ -240,8 +244,19 @@ impl<M: SimulatedModel> CrossValidation<'_, M> {
         let (model, record) = (self.model, self.record);
         let screen = model.screen(record);
         let candidates = model.candidates();
-        let start = solution(model, &base.point, screen)?;
-        let frozen = Columns::at(model, &start, screen)?;
+        // A model without an effect bends its parameters towards it: from the stated ones the way to
+        // the right effect may be straighter.
+        let mut stated = base.point.clone();
+        for (i, p) in stated.nuisance.iter_mut().enumerate() {
+            *p = if model.block_of(i).is_some() { *p } else { 0.0 };
+        }
+        let bases: Vec<(Point, Columns)> = [base.point.clone(), stated]
+            .into_par_iter()
+            .filter_map(|point| {
+                let start = solution(model, &point, screen)?;
+                Some((point, Columns::at(model, &start, screen)?))
+            })
+            .collect();
         let in_base = |effect: usize| {
             let alike = candidates[effect].look_alikes;
             let held = |i: usize| i == effect || alike.contains(&candidates[i].effect);
@@ -255,11 +270,13 @@ impl<M: SimulatedModel> CrossValidation<'_, M> {
                 let candidate = &candidates[effect];
                 let own = suggested.iter().filter(|(i, _)| *i == effect);
                 let own = own.map(|(_, values)| values);
-                let starts = candidate.starts.iter().chain(own).filter_map(|values| {
-                    let mut point = base.point.clone();
-                    point.effects.push((effect, candidate.internal(values)));
-                    let free = Free::Frozen(&frozen);
-                    least_squares(model, &point, screen, &free, LOOK)
+                let values: Vec<&Vec<f64>> = candidate.starts.iter().chain(own).collect();
+                let starts = bases.iter().flat_map(|(base, frozen)| {
+                    values.iter().filter_map(move |values| {
+                        let mut point = base.clone();
+                        point.effects.push((effect, candidate.internal(values)));
+                        least_squares(model, &point, screen, &Free::Frozen(frozen), LOOK)
+                    })
                 });
                 let best = starts.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
                 Some((effect, best))
@@ -272,6 +289,38 @@ impl<M: SimulatedModel> CrossValidation<'_, M> {
             Some((*effect, settled))
         });
         Some(settled.collect())
+    }
+
+    /// Whether an effect of `point` stands at a bound other than zero.
+    fn is_at_bound(&self, point: &Point) -> bool {
+        let candidates = self.model.candidates();
+        point.effects.iter().any(|(i, q)| candidates[*i].bound(q).is_some())
+    }
+
+    /// Puts first the one with which, and with one effect more, the part is fitted best: of effects
+    /// that stand in for a pair the best may be neither of the pair.
+    fn look_ahead(&self, level: &mut [Simulated], all: &[usize]) {
+        let Some(best) = level.first().map(|one| one.gain) else {
+            return;
+        };
+        let near = level.iter().take(AHEAD);
+        let near = near.filter(|one| one.gain > WORTH_FOLLOWING * best).count();
+        if near < 2 || !self.model.is_cheap() {
+            return;
+        }
+        let beyond = |one: &Simulated| {
+            let next = self.fitted(one, all).unwrap_or_default();
+            let clear = next.iter().filter(|(_, one)| !self.is_at_bound(&one.point));
+            clear.map(|(_, one)| one.squares).fold(one.squares, f64::min)
+        };
+        let taken = level[..near]
+            .iter()
+            .map(beyond)
+            .enumerate()
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((place, _)) = taken {
+            level[..=place].rotate_right(1);
+        }
     }
 
     /// Whether `rival` in the place of the effect that `without` lacks gains nearly what that gains.
@@ -318,6 +367,8 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
     fn extensions(&mut self, current: &Simulated, _: &[Simulated]) -> Option<Vec<Simulated>> {
         let all: Vec<usize> = (0..self.model.candidates().len()).collect();
         let mut fitted = self.fitted(current, &all)?;
+        // What stands at its bound is never named, and stands in for something else.
+        fitted.retain(|(_, one)| !self.is_at_bound(&one.point));
         let gained = |one: &Simulated| current.squares - one.squares;
         let best = fitted.iter().map(|(_, one)| gained(one));
         let best = best.fold(0.0, f64::max);
@@ -340,7 +391,9 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
         }
         let pays = |fitted: &Simulated| fitted.squares < (1.0 - LEAST_GAIN) * current.squares;
         tried.retain(|(inside, fitted)| inside.holds() && pays(fitted));
-        Some(tried.into_iter().map(|(_, fitted)| fitted).collect())
+        let mut level: Vec<Simulated> = tried.into_iter().map(|(_, fitted)| fitted).collect();
+        self.look_ahead(&mut level, &all);
+        Some(level)
     }
 
     fn round(&mut self, taken: &Simulated, lost: &[Simulated]) {

@@ -8,13 +8,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::model::{Candidate, Point};
+use super::model::{Candidate, Point, Scale};
 use super::resampling::correlation_time;
 
 /// A prior counts as if it were this many times as wide as stated.
 const WEAK: f64 = 10.0;
-/// Steps of difference quotients, in internal units: nominal parameters and effects.
-const DIFFERENCE: (f64, f64) = (4e-3, 1e-3);
+/// Steps of difference quotients, in internal units: nominal parameters, sizes of effects, and what is
+/// counted by its logarithm, of which a period may repeat a hundred times in a record.
+const DIFFERENCE: (f64, f64, f64) = (4e-3, 1e-3, 1e-4);
 /// A nominal parameter moves at most by this many of its stated standard deviations in a step.
 const LONGEST_STEP: f64 = 6.0;
 /// Gain in twice the logarithm of the likelihood below which a fit stands still.
@@ -49,6 +50,11 @@ pub trait SimulatedModel: Sync {
 
     /// A record that stands for `record` where many candidates are looked at.
     fn screen(&self, record: usize) -> usize;
+
+    /// Whether a simulation costs so little that more may be tried.
+    fn is_cheap(&self) -> bool {
+        true
+    }
 
     /// The name of a record.
     fn record_name(&self, record: usize) -> &str;
@@ -130,6 +136,8 @@ fn column<M: SimulatedModel>(
     let is_nuisance = coordinate < at.point.nuisance.len();
     let size = if is_nuisance {
         DIFFERENCE.0
+    } else if is_logarithmic(&at.point, coordinate, model.candidates()) {
+        DIFFERENCE.2
     } else {
         DIFFERENCE.1
     };
@@ -164,6 +172,14 @@ fn column<M: SimulatedModel>(
         *c = (*c - o) / width;
     }
     column.iter().all(|c| c.is_finite()).then_some(column)
+}
+
+fn is_logarithmic(point: &Point, coordinate: usize, candidates: &[Candidate]) -> bool {
+    let mut scales = point
+        .effects
+        .iter()
+        .flat_map(|(i, _)| candidates[*i].parameters.iter().map(|p| p.scale));
+    scales.nth(coordinate - point.nuisance.len()) == Some(Scale::Logarithmic)
 }
 
 impl Columns {
@@ -386,7 +402,7 @@ pub fn deviations<M: SimulatedModel>(model: &M, at: &Solution, record: usize) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::engine::{EffectParameter, Role, Scale};
+    use crate::diagnosis::engine::{EffectParameter, Role};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

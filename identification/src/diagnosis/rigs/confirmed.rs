@@ -8,7 +8,7 @@ use super::diagnosis::NamedValue;
 use super::measured::{EVERYTHING, Measured, Part, file};
 use crate::diagnosis::engine::resampling::gain_interval;
 use crate::diagnosis::engine::{
-    Point, Role, Scale, SimulatedModel, all_errors, completed, estimates, refit,
+    Point, Role, SimulatedModel, all_errors, completed, estimates, refit,
 };
 use crate::diagnosis::report::ends_or_not_a_number;
 
@@ -17,8 +17,6 @@ use crate::diagnosis::report::ends_or_not_a_number;
 const DIFFERS: f64 = 3.5;
 /// A refitted nominal parameter is surprising where it lies this many stated deviations off.
 const SURPRISING: f64 = 3.0;
-/// Share of its range within which a parameter is at its bound.
-const AT_BOUND: f64 = 1e-3;
 /// Samples that a file must bring to be fitted by itself.
 const FEWEST: usize = 500;
 
@@ -61,33 +59,22 @@ pub(super) fn unfit(measured: &Measured<'_>, point: &Point, deviations: &[f64]) 
     let mut place = point.nuisance.len();
     for (index, internal) in &point.effects {
         let candidate = &measured.candidates()[*index];
-        let mut clear = false;
-        let mut sizes = false;
-        let mut bound = None;
+        let (mut clear, mut sizes) = (false, false);
         for (parameter, &q) in candidate.parameters.iter().zip(internal) {
             let error = deviations.get(place).copied().unwrap_or(f64::NAN);
             place += 1;
-            let is_log = parameter.scale == Scale::Logarithmic;
-            if is_log && parameter.role_is_shape() {
-                continue;
-            }
-            sizes = true;
-            clear |= q.abs() > 1.96 * error;
-            let [low, high] = [parameter.bounds.0, parameter.bounds.1]
-                .map(|value| parameter.scale.to_internal(value));
-            let (low, high) = (low.min(high), low.max(high));
-            let near = AT_BOUND * (high - low);
-            // Zero as a bound is no effect; that is asked of the interval.
-            let at = |end: f64| end != 0.0 && (q - end).abs() < near.max(1e-9 * end.abs());
-            if at(low) || at(high) {
-                bound = Some(format!(
-                    "`{}` stands at its bound of {:.4e} {}",
-                    parameter.name,
-                    parameter.scale.to_value(q),
-                    parameter.unit
-                ));
+            if !matches!(parameter.role, Role::Shape { .. }) {
+                sizes = true;
+                clear |= q.abs() > 1.96 * error;
             }
         }
+        let bound = candidate.bound(internal).map(|parameter| {
+            let values = candidate.parameters.iter().zip(internal);
+            let own = values.into_iter().find(|(p, _)| p.name == parameter.name);
+            let value = own.map_or(f64::NAN, |(p, &q)| p.scale.to_value(q));
+            let (name, unit) = (parameter.name, parameter.unit);
+            format!("`{name}` stands at its bound of {value:.4e} {unit}")
+        });
         if let Some(reason) = bound {
             refused.push((*index, reason));
         } else if sizes && !clear {
@@ -348,11 +335,5 @@ fn surprises(
                 unit = value.unit,
             ));
         }
-    }
-}
-
-impl crate::diagnosis::engine::EffectParameter {
-    fn role_is_shape(&self) -> bool {
-        matches!(self.role, Role::Shape { .. })
     }
 }

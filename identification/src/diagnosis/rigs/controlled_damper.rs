@@ -45,10 +45,10 @@ effects! {
         force: size("N", 0.01, (0.0, 30.0)),
         build_up: shape("m", 0.05, 1.0),
     } from [[0.1, 0.05], [0.5, 0.05], [0.5, 0.2]];
-    /// The friction grows with the command, F_h (1 + g w).
+    /// The friction grows with the command, F_h (1 + g (w - 1 V)): F_h is that at one volt.
     friction_by_command: FrictionByCommand {
-        growth: size("1/V", 0.02, (-1.0, 100.0)),
-    } from [[0.1], [1.0]];
+        growth: size("1/V", 0.02, (-3.0, 3.0)),
+    } from [[0.1], [0.5]];
     /// The damping grows with the command, c + g w.
     damping_by_command: DampingByCommand {
         growth: size("N s/m/V", 0.01, (-30.0, 30.0)),
@@ -146,7 +146,7 @@ impl Equations for ControlledDamper {
                 let moved = if k == 0 { 0.0 } else { place - x[k - 1] };
                 let left = (-moved.abs() / friction.build_up).exp();
                 taken_up = left * taken_up + (1.0 - left) * moved.signum();
-                let growth = 1.0 + e.friction_by_command.growth * strength;
+                let growth = 1.0 + e.friction_by_command.growth * (strength - 1.0);
                 force += friction.force * growth.max(0.0) * taken_up;
             }
             force *= 1.0 + e.asymmetry.share * speed.signum();

@@ -302,6 +302,10 @@ impl SimulatedModel for Measured<'_> {
         if record < 2 { 6 + record } else { record }
     }
 
+    fn is_cheap(&self) -> bool {
+        self.rig.screened() == usize::MAX
+    }
+
     fn record_name(&self, record: usize) -> &str {
         let of_file = || Some(self.measurement.recordings.get(record.checked_sub(NAMES.len())?)?.name());
         NAMES.get(record).copied().or_else(of_file).unwrap_or("none")

@@ -20,6 +20,11 @@ const MOTOR_VOLTAGE: Channel = Channel::Other {
 };
 
 const STEPS: usize = 2;
+/// Samples while moving that a ripple is looked for in: at least, and about as many at most.
+const FEWEST: usize = 1000;
+const LOOKED_AT: usize = 10_000;
+/// Periods that fits of a ripple begin from.
+const PEAKS: usize = 4;
 /// Most samples by which the voltage may be late.
 const LATEST: usize = 64;
 
@@ -214,48 +219,60 @@ impl Equations for PositioningDrive {
         nominal: &Nominal,
         errors: &[f64],
     ) -> Vec<(&'static str, Vec<f64>)> {
-        let Some(period) = strongest_period(recording.input(POSITION), errors) else {
-            return Vec::new();
-        };
-        let size = 0.05 * nominal.coulomb_friction.max(f64::MIN_POSITIVE);
-        [(size, size), (-size, size), (size, -size), (-size, -size)]
-            .map(|(cosine, sine)| ("force_ripple", vec![cosine, sine, period]))
-            .to_vec()
+        let size = 0.02 * nominal.coulomb_friction.max(f64::MIN_POSITIVE);
+        let periods = strongest_periods(recording.input(POSITION), errors).into_iter();
+        let phases = [(size, size), (-size, size), (size, -size), (-size, -size)];
+        periods
+            .flat_map(|period| phases.map(|(c, s)| ("force_ripple", vec![c, s, period])))
+            .collect()
     }
 }
 
-/// Period of the sine over position that explains most of `errors` where the drive moves: a
-/// periodogram over even and uneven positions alike (Lomb, Astrophysics and Space Science 39, 1976).
-fn strongest_period(position: &[f64], errors: &[f64]) -> Option<f64> {
+/// Periods of the sines over position that explain most of `errors` where the drive moves: peaks of a
+/// periodogram over uneven positions (Lomb, Astrophysics and Space Science 39, 1976), forward and
+/// backward by themselves, since a loop answers late.
+fn strongest_periods(position: &[f64], errors: &[f64]) -> Vec<f64> {
     let low = position.iter().copied().fold(f64::INFINITY, f64::min);
     let high = position.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let travel = high - low;
-    let pairs: Vec<(f64, f64)> = position
-        .iter()
-        .zip(errors)
-        .filter(|(_, e)| e.is_finite())
-        .map(|(q, e)| (*q, *e))
-        .collect();
-    if travel.is_nan() || travel <= 0.0 || pairs.len() < 1000 {
-        return None;
-    }
-    // Ten thousand samples tell the period; every other one of more is left.
-    let every = pairs.len().div_ceil(10_000);
-    let power = |cycles: f64| {
-        let (mut c, mut s) = (0.0, 0.0);
-        for (q, e) in pairs.iter().step_by(every) {
-            let (sine, cosine) = (std::f64::consts::TAU * cycles * (q - low) / travel).sin_cos();
-            c += e * cosine;
-            s += e * sine;
-        }
-        c * c + s * s
+    let moving = |k: usize| {
+        let (before, after) = (k.saturating_sub(5), (k + 5).min(position.len() - 1));
+        position[after] - position[before]
     };
-    // From four to two hundred cycles over the travel, in quarters of a cycle.
-    let best = (16..800)
+    let samples: Vec<(f64, f64, bool)> = errors
+        .iter()
+        .enumerate()
+        .filter(|(k, e)| e.is_finite() && moving(*k).abs() > 1e-4 * travel)
+        .map(|(k, e)| (position[k], *e, moving(k) > 0.0))
+        .collect();
+    if travel.is_nan() || travel <= 0.0 || samples.len() < FEWEST {
+        return Vec::new();
+    }
+    let mean = samples.iter().map(|s| s.1).sum::<f64>() / samples.len() as f64;
+    let every = samples.len().div_ceil(LOOKED_AT);
+    let power = |cycles: f64| {
+        let mut sums = [0.0; 4];
+        for (q, e, forward) in samples.iter().step_by(every) {
+            let (sine, cosine) = (std::f64::consts::TAU * cycles * (q - low) / travel).sin_cos();
+            let side = 2 * usize::from(*forward);
+            sums[side] += (e - mean) * cosine;
+            sums[side + 1] += (e - mean) * sine;
+        }
+        sums.iter().map(|s| s * s).sum::<f64>()
+    };
+    // From ten to two hundred cycles over the travel, in quarters of a cycle.
+    let powers: Vec<(f64, f64)> = (40..800)
         .map(|quarters| f64::from(quarters) / 4.0)
         .map(|cycles| (cycles, power(cycles)))
-        .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some(travel / best.0)
+        .collect();
+    let mut peaks: Vec<(f64, f64)> = powers
+        .windows(3)
+        .filter(|w| w[1].1 > w[0].1 && w[1].1 > w[2].1)
+        .map(|w| w[1])
+        .collect();
+    peaks.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let strongest = peaks.iter().take(PEAKS);
+    strongest.map(|(cycles, _)| travel / cycles).collect()
 }
 
 /// Slope of the least-squares line through `positions`, at their begin.
