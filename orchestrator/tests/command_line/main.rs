@@ -11,6 +11,7 @@ mod hostile;
 mod motions;
 mod physical_rig;
 mod reports;
+mod rigs;
 mod systems;
 
 use std::path::Path;

@@ -275,7 +275,12 @@ impl<M: SimulatedModel> CrossValidation<'_, M> {
                     values.iter().filter_map(move |values| {
                         let mut point = base.clone();
                         point.effects.push((effect, candidate.internal(values)));
-                        least_squares(model, &point, screen, &Free::Frozen(frozen), LOOK)
+                        let free = if model.is_cheap() {
+                            Free::All
+                        } else {
+                            Free::Frozen(frozen)
+                        };
+                        least_squares(model, &point, screen, &free, LOOK)
                     })
                 });
                 let best = starts.min_by(|a, b| a.cost.total_cmp(&b.cost))?;

@@ -8,6 +8,9 @@ const RUNS: usize = 16;
 /// Share of the output's variation that a first look must see.
 const SEEN: f64 = 0.3;
 
+/// Samples up to which more may be tried.
+const CHEAP: usize = 40_000;
+
 /// The selections of samples that can be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
@@ -303,7 +306,8 @@ impl SimulatedModel for Measured<'_> {
     }
 
     fn is_cheap(&self) -> bool {
-        self.rig.screened() == usize::MAX
+        let all = self.places[EVERYTHING].iter();
+        self.rig.screened() == usize::MAX && all.map(Vec::len).sum::<usize>() < CHEAP
     }
 
     fn record_name(&self, record: usize) -> &str {
