@@ -56,12 +56,16 @@ pub struct Examination {
     pub findings: Vec<Finding>,
 }
 
-/// Packages of Python that import FMUs, with what they are asked for.
-const IMPORTERS: [(&str, &str); 4] = [
-    ("fmpy", "running the FMUs from Python"),
-    ("ecospy", "running the FMUs in ecos"),
-    ("libcosimpy", "running the FMUs in libcosim"),
-    ("shakebench", "driving this program from Python"),
+/// Packages of Python: what each is needed for, and what pip is told.
+const PACKAGES: [(&str, &str, &str); 4] = [
+    ("fmpy", "running the FMUs from Python", "fmpy"),
+    ("ecospy", "running the FMUs in ecos", "ecospy tbb"),
+    ("libcosimpy", "running the FMUs in libcosim", "libcosimpy"),
+    (
+        "shakebench",
+        "driving this program from Python",
+        "the wheel of the release",
+    ),
 ];
 
 /// Examines the installation.
@@ -71,7 +75,7 @@ pub fn examine() -> Examination {
     findings.extend(components());
     findings.push(own_process());
     findings.push(cargo());
-    findings.extend(importers());
+    findings.extend(packages());
     Examination {
         shakebench: supply::VERSION,
         platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
@@ -222,11 +226,11 @@ fn cargo() -> Finding {
     }
 }
 
-fn importers() -> Vec<Finding> {
+fn packages() -> Vec<Finding> {
     let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_string());
-    IMPORTERS
+    PACKAGES
         .into_iter()
-        .map(|(package, needed_for)| {
+        .map(|(package, needed_for, wanted)| {
             let script = format!("import importlib.metadata as m; print(m.version('{package}'))");
             let version = first_line(Command::new(&python).args(["-c", &script]));
             Finding {
@@ -234,7 +238,7 @@ fn importers() -> Vec<Finding> {
                 state: found_or_absent(version.is_some()),
                 cure: version
                     .is_none()
-                    .then(|| format!("{python} -m pip install {package}")),
+                    .then(|| format!("{python} -m pip install {wanted}")),
                 found: match version {
                     Some(version) => format!("{version}, of {python}"),
                     None => format!("not found by {python}"),

@@ -47,7 +47,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             built_in::DEFAULT_SPECIMEN,
             Wanted::default(),
         )?)?,
-        _ if pack::all_fmus()?.iter().any(|known| known.name == name) => {
+        None if pack::all_fmus()?.iter().any(|known| known.name == name) => {
             let packed = component(&name, FmiVersion::V3).map_err(|error| Error::File {
                 path: path.clone(),
                 reason: error.to_string(),
@@ -55,7 +55,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             fmu(&*Fmu::open_own(&packed.path)?)
         }
         _ => {
-            let mut components: Vec<&str> = pack::all_fmus()?
+            let mut components: Vec<&str> = pack::all_fmus()
+                .unwrap_or_default()
                 .iter()
                 .map(|fmu| fmu.name.as_str())
                 .collect();

@@ -13,7 +13,7 @@ pub enum PackError {
     /// The program does not run inside its workspace.
     #[error(
         "no workspace with `fmus/kit` found above {0}: components are built from source, so run \
-         this inside the project's folder"
+         this inside the project's folder (a release holds them ready built)"
     )]
     NoWorkspace(PathBuf),
     /// Cargo could not be started.
