@@ -60,9 +60,10 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<PackedFmu>, PackErro
 /// Adds the libraries of one archive to those of another that is otherwise the same.
 fn join(together: &mut Entries, other: Entries) -> Result<(), String> {
     let is_library = |name: &str| name.starts_with("binaries/");
+    // An empty folder may have an entry of its own or not.
     let rest = |entries: &Entries| -> Vec<String> {
-        let names = entries.keys().filter(|name| !is_library(name));
-        names.cloned().collect()
+        let files = entries.keys().filter(|name| !name.ends_with('/'));
+        files.filter(|name| !is_library(name)).cloned().collect()
     };
     let (here, there) = (rest(together), rest(&other));
     if here != there {
