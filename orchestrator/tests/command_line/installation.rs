@@ -165,7 +165,10 @@ fn folder_of_fmus_is_named_by_option_or_environment() {
     assert!(by_environment.output().unwrap().status.success());
     // One version alone is enough for that version.
     let other = [&by_option[..], &["--fmi", "2"]].concat();
-    installed.refuses(&other, &["`ThreeVariableControl`", "no component in", "fmi2"]);
+    installed.refuses(
+        &other,
+        &["`ThreeVariableControl`", "no component in", "fmi2"],
+    );
     let nowhere = [&run[..], &["--fmus", "nowhere"]].concat();
     installed.refuses(&nowhere, &["nowhere: no FMUs", "named by --fmus", "fmi3"]);
 }

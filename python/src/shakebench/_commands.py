@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Union
 
 from ._program import PathLike, call, optional_path, options, text
 from ._results import Result
@@ -12,12 +13,20 @@ from ._results import Result
 Quantity = Union[str, float]
 
 
-def _folder(out: Optional[PathLike]) -> Tuple[Path, Optional[tempfile.TemporaryDirectory]]:
-    """The folder for results and, where it is not given, what removes it."""
-    if out is not None:
-        return Path(out), None
-    kept = tempfile.TemporaryDirectory(prefix="shakebench-")
-    return Path(kept.name) / "results", kept
+def _finished(
+    arguments: Sequence[str], out: Optional[PathLike], traces: Optional[str] = None
+) -> Result:
+    """Runs a command that writes into a folder: ``out``, or one that goes with the result."""
+    folder = Path(tempfile.mkdtemp(prefix="shakebench-") if out is None else out)
+    try:
+        # The program makes a folder of results whole, so it is given one that is not there yet.
+        results = folder / "results" if out is None else folder
+        values = call([*arguments, "--out", str(results), "--json"])
+    except BaseException:
+        if out is None:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return Result(values, results, traces, folder if out is None else None)
 
 
 def _paths(files: Union[PathLike, Sequence[PathLike]]) -> List[str]:
@@ -58,7 +67,6 @@ def run(
     Raises :class:`shakebench.InputError` for input at fault. A run that ended early is returned:
     ``result["ended"]`` is then not ``"complete"`` and ``result["ended_because"]`` tells why.
     """
-    folder, kept = _folder(out)
     arguments = ["run", *([] if system is None else [text(system)])]
     for name, value in (set or {}).items():
         arguments += ["--set", f"{name}={text(value)}"]
@@ -80,8 +88,7 @@ def run(
             **more,
         }
     )
-    values = call([*arguments, "--out", str(folder), "--json"])
-    return Result(values, folder, "results.csv", kept)
+    return _finished(arguments, out, "results.csv")
 
 
 def compare(
@@ -101,7 +108,6 @@ def compare(
 
     Raises :class:`shakebench.InputError` for unknown names or records at fault.
     """
-    folder, kept = _folder(out)
     arguments = options(
         {
             "controllers": None if controllers is None else ",".join(controllers),
@@ -112,8 +118,7 @@ def compare(
             **more,
         }
     )
-    values = call(["compare", *arguments, "--out", str(folder), "--json"])
-    return Result(values, folder, None, kept)
+    return _finished(["compare", *arguments], out)
 
 
 def design(loop: Optional[str] = None, **more: Any) -> Dict[str, Any]:
@@ -141,13 +146,17 @@ def identify(
 
     Raises :class:`shakebench.InputError` for data at fault, with file, row and what was expected.
     """
-    kept = None
-    if out is None:
-        kept = tempfile.TemporaryDirectory(prefix="shakebench-")
-        out = Path(kept.name) / "model.toml"
     named = options({"fit_part": fit_part, "specimen": optional_path(specimen), **more})
-    values = call(["identify", *_paths(data), "--out", text(out), *named, "--json"])
-    return Result(values, Path(out).resolve().parent, None, kept)
+    arguments = ["identify", *_paths(data), *named, "--json"]
+    if out is not None:
+        return Result(call([*arguments, "--out", text(out)]), Path(out).resolve().parent)
+    folder = Path(tempfile.mkdtemp(prefix="shakebench-"))
+    try:
+        values = call([*arguments, "--out", str(folder / "model.toml")])
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return Result(values, folder, None, folder)
 
 
 def diagnose(
@@ -164,12 +173,10 @@ def diagnose(
 
     Raises :class:`shakebench.InputError` for a case at fault.
     """
-    folder, kept = _folder(out)
     named: List[str] = []
     for file in [] if data is None else _paths(data):
         named += ["--data", file]
-    values = call(["diagnose", text(case), *named, *options(more), "--out", str(folder), "--json"])
-    return Result(values, folder, None, kept)
+    return _finished(["diagnose", text(case), *named, *options(more)], out)
 
 
 def doctor() -> Dict[str, Any]:

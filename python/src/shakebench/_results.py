@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-import tempfile
+import shutil
+import weakref
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Dict, Iterator, Optional
@@ -27,15 +28,16 @@ class Result(Mapping):
         values: Dict[str, Any],
         folder: Path,
         traces: Optional[str] = None,
-        kept: Optional[tempfile.TemporaryDirectory] = None,
+        temporary: Optional[Path] = None,
     ) -> None:
         #: The JSON object.
         self.json: Dict[str, Any] = values
         #: Folder of the files. Without ``out`` it is a temporary one, removed with this object.
         self.folder: Path = folder
         self._file = traces
-        self._kept = kept
         self._traces: Optional[Dict[str, np.ndarray]] = None
+        if temporary is not None:
+            weakref.finalize(self, shutil.rmtree, temporary, ignore_errors=True)
 
     def __getitem__(self, name: str) -> Any:
         return self.json[name]
