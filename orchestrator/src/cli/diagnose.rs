@@ -40,8 +40,7 @@ pub struct Arguments {
     #[arg(long, value_name = "EXTENDED.toml", conflicts_with_all = ["case", "data"])]
     model: Option<PathBuf>,
     /// Score the model on these files
-    #[arg(long, value_name = "FILE", num_args = 1.., requires = "model",
-          required_unless_present_any = ["case", "template", "predict"])]
+    #[arg(long, value_name = "FILE", num_args = 1.., requires = "model")]
     validate: Vec<PathBuf>,
     /// Predict the output for every row of this file, whose output cells may be empty
     #[arg(long, value_name = "FILE", requires = "model", conflicts_with = "validate")]
@@ -125,6 +124,11 @@ fn with_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
                 found.prediction.display()
             );
         }
+    } else if arguments.validate.is_empty() {
+        return Err(Error::Option {
+            option: "--model",
+            reason: "expected --validate FILE... or --predict FILE with it".into(),
+        });
     } else {
         let found = model::validate(path, columns, &arguments.validate)?;
         if arguments.json {

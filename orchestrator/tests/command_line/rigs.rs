@@ -144,7 +144,8 @@ fn templates_and_what_is_wrong_with_a_model_are_told() {
         refused(here, &[&["diagnose"], arguments].concat(), words);
     };
     diagnose(&["--template", "oscilator"], &["did you mean `oscillator`"]);
-    diagnose(&[], &["[CASE]"]);
+    diagnose(&[], &["CASE"]);
+    diagnose(&["--model", "rig.toml"], &["--validate", "--predict"]);
     fs::write(here.join("rig.toml"), DESCRIPTION).unwrap();
     diagnose(&["rig.toml"], &["record.csv"]);
     // A description is no extended model.

@@ -35,7 +35,7 @@ nominal_parameters! {
 
 session_parameters! {
     /// Of the displacement's transducer.
-    zero: "m" within 0.05 begins false,
+    zero: "m" within 0.05 as Setup,
 }
 
 effects! {

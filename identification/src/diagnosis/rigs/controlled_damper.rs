@@ -34,9 +34,9 @@ nominal_parameters! {
 
 session_parameters! {
     /// Of the load cell.
-    zero: "N" within 0.02 begins false,
+    zero: "N" within 0.02 as Setup,
     /// Share of the friction that is taken up at the first sample.
-    taken_up: "1" within 0.5 begins true,
+    taken_up: "1" within 0.5 as Start,
 }
 
 effects! {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::description::{Column, Description, DescriptionError, LeftOut, Quantity};
 use super::diagnosis::{NamedValue, RigDiagnosis};
 use super::measured::{EVERYTHING, Measured};
-use super::{Measurement, Rig};
+use super::{Measurement, Rig, SessionRole};
 use crate::diagnosis::engine::{Free, Point, SimulatedModel, completed, least_squares};
 use units::convert;
 
@@ -126,7 +126,7 @@ impl ExtendedRig {
             .collect();
         let session = rig.session().iter().enumerate();
         let session = session
-            .filter(|(_, own)| !own.is_start)
+            .filter(|(_, own)| own.role != SessionRole::Start)
             .map(|(i, own)| {
                 let values: Vec<f64> = sessions.iter().map(|s| s[i]).collect();
                 let (value, deviation) = crate::data::mean_and_deviation(&values);
@@ -274,7 +274,7 @@ impl ExtendedRig {
     ) -> Result<(Measured<'a>, Point), DescriptionError> {
         let description = self.description(nominal);
         let rig = description.rig()?;
-        let measured = Measured::new(rig, measurement, description.nominal(rig)?);
+        let measured = Measured::new(rig, measurement, description.nominal(rig)?).of_later_files();
         let mut point = measured.origin();
         let session = self.session_values(rig)?;
         measured.set_session(&mut point, &session);
@@ -343,7 +343,11 @@ impl ExtendedRig {
         let (measured, mut point) = self.measured(&measurement, &self.nominal, true)?;
         if given > 0 {
             // The rest of what a file has for itself stays as the model's files had it.
-            let starts: Vec<bool> = rig.session().iter().map(|own| own.is_start).collect();
+            let starts: Vec<bool> = rig
+                .session()
+                .iter()
+                .map(|own| own.role == SessionRole::Start)
+                .collect();
             let is_start = |i: usize| starts.get(i).copied().unwrap_or(false);
             let free = Free::Chosen(&is_start);
             let found = least_squares(&measured, &point, EVERYTHING, &free, 30);

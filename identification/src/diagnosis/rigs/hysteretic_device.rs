@@ -32,9 +32,9 @@ nominal_parameters! {
 
 session_parameters! {
     /// Of the load cell.
-    zero: "N" within 0.02 begins false,
+    zero: "N" within 0.02 as Setup,
     /// Part of a gap that was travelled before the test, less one half.
-    gap_travelled: "1" within 0.2 begins true,
+    gap_travelled: "1" within 0.2 as Start,
 }
 
 effects! {

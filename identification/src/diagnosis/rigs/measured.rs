@@ -1,6 +1,6 @@
 //! A rig with its measurements, as the engine of the diagnosis sees it.
 
-use super::{Effect, Measurement, Natural, Rig, Values};
+use super::{Effect, Measurement, Natural, Rig, SessionRole, Values};
 use crate::diagnosis::engine::{Candidate, Point, SimulatedModel, all_errors};
 
 /// Runs into which a part is cut for the check inside it.
@@ -50,6 +50,8 @@ pub struct Measured<'a> {
     candidates: Vec<Candidate>,
     /// Per record and recording, the places of its samples.
     places: Vec<Vec<Vec<usize>>>,
+    /// Whether the first file is the one that others are told against.
+    holds_first: bool,
 }
 
 const NAMES: [&str; 9] = [
@@ -109,6 +111,7 @@ impl<'a> Measured<'a> {
                 .collect(),
             effects,
             places: places(measurement, rig.screened()),
+            holds_first: true,
             rig,
             measurement,
             nominal,
@@ -171,7 +174,22 @@ impl<'a> Measured<'a> {
     pub fn session_values(&self, point: &Point, recording: usize) -> Vec<f64> {
         let first = self.uncertain.len() + recording * self.session.len();
         let own = point.nuisance.iter().skip(first);
-        own.zip(&self.session).map(|(p, one)| p * one).collect()
+        let is_first = recording == 0 && self.holds_first;
+        let table = self.rig.session().iter();
+        own.zip(&self.session)
+            .zip(table)
+            .map(|((p, one), of)| match of.role {
+                SessionRole::AgainstFirst if is_first => 0.0,
+                _ => p * one,
+            })
+            .collect()
+    }
+
+    /// The same where the first file is none of those that the model was fitted to.
+    #[must_use]
+    pub fn of_later_files(mut self) -> Self {
+        self.holds_first = false;
+        self
     }
 
     /// Puts the same parameters of a file into every one.

@@ -34,7 +34,7 @@ pub use natural::Natural;
 pub use reading::Measurement;
 pub use recording::RigRecording;
 pub use template::template;
-pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionTable};
+pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole, SessionTable};
 
 use crate::data::Channel;
 

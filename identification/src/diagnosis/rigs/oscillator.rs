@@ -39,11 +39,11 @@ nominal_parameters! {
 
 session_parameters! {
     /// Of the displacement's transducer.
-    zero: "m" within 0.05 begins false,
+    zero: "m" within 0.05 as Setup,
     /// Displacement at the first sample.
-    start: "m" within 1.0 begins true,
+    start: "m" within 1.0 as Start,
     /// Velocity at the first sample.
-    start_speed: "m/s" within 1.0 begins true,
+    start_speed: "m/s" within 1.0 as Start,
 }
 
 effects! {

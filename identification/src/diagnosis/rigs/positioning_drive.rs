@@ -49,7 +49,7 @@ nominal_parameters! {
 
 session_parameters! {
     /// Shift of the position's zero against the screw.
-    screw_shift: "m" within 0.01 begins false,
+    screw_shift: "m" within 0.01 as AgainstFirst,
 }
 
 effects! {

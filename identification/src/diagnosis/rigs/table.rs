@@ -54,8 +54,19 @@ pub struct SessionParameter {
     pub unit: &'static str,
     /// One standard deviation in the rig's natural units.
     pub spread: f64,
-    /// Whether it tells how the file begins, and nothing of the rig on that day.
-    pub is_start: bool,
+    /// What it tells.
+    pub role: SessionRole,
+}
+
+/// What a parameter of a file tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SessionRole {
+    /// How the rig was set up on that day.
+    Setup,
+    /// As [`Self::Setup`], against the first file that the model is fitted to.
+    AgainstFirst,
+    /// How the file begins, and nothing of the rig.
+    Start,
 }
 
 /// A struct of parameters that differ from file to file, made by `session_parameters!`.
@@ -201,10 +212,10 @@ macro_rules! nominal_parameters {
 }
 
 /// A struct of parameters that every file has for itself, each with its SI unit and its spread in
-/// natural units, and `begins` where it tells how the file begins:
-/// `session_parameters! { zero: "m" within 0.1 begins false }` makes `Session`.
+/// natural units and its [`SessionRole`]:
+/// `session_parameters! { zero: "m" within 0.1 as Setup }` makes `Session`.
 macro_rules! session_parameters {
-    ($($(#[$about:meta])* $field:ident: $unit:literal within $spread:literal begins $start:literal),*
+    ($($(#[$about:meta])* $field:ident: $unit:literal within $spread:literal as $role:ident),*
      $(,)?) => {
         /// Parameters of a file, SI.
         #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -218,7 +229,7 @@ macro_rules! session_parameters {
                     name: stringify!($field),
                     unit: $unit,
                     spread: $spread,
-                    is_start: $start,
+                    role: $crate::diagnosis::rigs::table::SessionRole::$role,
                 }),*];
 
             fn from_values(values: &[f64]) -> Option<Self> {
