@@ -169,26 +169,20 @@ fn the_damper_has_asymmetric_friction_free_play_and_a_memory() {
 }
 
 #[test]
-fn the_coupon_hardens_and_its_halves_differ() {
+fn the_coupon_hardens() {
     let Some(report) = report("steel_coupon") else {
         return;
     };
+    assert_eq!(report.verdict, Verdict::Named);
     assert!(
-        report.as_described.extended_error < 0.05,
-        "{}",
-        report.as_described.extended_error
+        report.confirmed.error < 0.08 && report.confirmed.swapped_error < 0.08,
+        "{} {}",
+        report.confirmed.error,
+        report.confirmed.swapped_error
     );
-    assert!(report.as_described.gain_interval.0 > 0.0);
     names(&report, &["second_backstress"]);
-    let [here, there] = [&report.as_described, &report.swapped]
-        .map(|part| value(part, "second_backstress", "recovery"));
-    assert!((here / there).ln().abs() < 0.4, "{here} {there}");
-    // The plateau and most of the hardening are over in the later half: the report says that these
-    // causes are not the same on both.
-    for gone in ["isotropic_hardening", "initial_softening"] {
-        assert!(report.not_confirmed.iter().any(|name| name == gone));
-    }
-    assert_ne!(report.verdict, Verdict::Named);
+    let hardens = |name: &String| name.contains("isotropic_hardening");
+    assert!(report.named.iter().any(hardens), "{:?}", report.named);
 }
 
 #[test]

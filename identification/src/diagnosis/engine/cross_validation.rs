@@ -32,10 +32,6 @@ const WORTH_TESTING: f64 = 0.7;
 const MOST_EFFECTS: usize = 8;
 /// Candidates that are fitted to the end in a round.
 const FINALISTS: usize = 6;
-/// Candidates that are followed by one effect more before one is taken, where that is cheap, and the
-/// share of the best gain that each must have.
-const AHEAD: usize = 3;
-const WORTH_FOLLOWING: f64 = 0.6;
 /// Starts of the nominal model beside the stated values, and how far they lie from these, in stated
 /// standard deviations.
 const OTHER_STARTS: usize = 6;
@@ -225,7 +221,42 @@ struct CrossValidation<'a, M: SimulatedModel> {
     without: Vec<Simulated>,
 }
 
-impl<M: SimulatedModel> CrossValidation<'_, M> {
+impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
+    fn new(model: &'a M, record: usize, observer: Observer<'a>) -> Self {
+        Self {
+            model,
+            record,
+            observer,
+            rivals: Vec::new(),
+            deviates: Vec::new(),
+            without: Vec::new(),
+        }
+    }
+
+    /// The effects that another search ends with, fitted here and without those that do not pay here.
+    fn end_of(&mut self, mut other: CrossValidation<'_, M>) -> Option<Simulated> {
+        let found = search(&mut other)?.best?;
+        self.rivals.append(&mut other.rivals);
+        let mut current = settle(self.model, &found.point, self.record, TO_THE_END)?;
+        while !current.point.effects.is_empty() {
+            match self.reduced(&current)? {
+                Some(smaller) => current = smaller,
+                None => break,
+            }
+        }
+        let named = !current.point.effects.is_empty() && !self.is_at_bound(&current.point);
+        named.then_some(current)
+    }
+
+    /// Whether `one` predicts each fold from the other better than `two` does.
+    fn predicts_better(&self, one: &Simulated, two: &Simulated) -> bool {
+        let sum = |fitted: &Simulated| {
+            let errors = self.crossed(fitted)?;
+            Some(errors.iter().map(|fold| squares(fold)).sum::<f64>())
+        };
+        matches!((sum(one), sum(two)), (Some(one), Some(two)) if one < two)
+    }
+
     /// Errors of `fitted` on each fold when its parameters are refitted to the other.
     fn crossed(&self, fitted: &Simulated) -> Option<[Vec<f64>; 2]> {
         let model = self.model;
@@ -275,12 +306,7 @@ impl<M: SimulatedModel> CrossValidation<'_, M> {
                     values.iter().filter_map(move |values| {
                         let mut point = base.clone();
                         point.effects.push((effect, candidate.internal(values)));
-                        let free = if model.is_cheap() {
-                            Free::All
-                        } else {
-                            Free::Frozen(frozen)
-                        };
-                        least_squares(model, &point, screen, &free, LOOK)
+                        least_squares(model, &point, screen, &Free::Frozen(frozen), LOOK)
                     })
                 });
                 let best = starts.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
@@ -300,32 +326,6 @@ impl<M: SimulatedModel> CrossValidation<'_, M> {
     fn is_at_bound(&self, point: &Point) -> bool {
         let candidates = self.model.candidates();
         point.effects.iter().any(|(i, q)| candidates[*i].bound(q).is_some())
-    }
-
-    /// Puts first the one with which, and with one effect more, the part is fitted best: of effects
-    /// that stand in for a pair the best may be neither of the pair.
-    fn look_ahead(&self, level: &mut [Simulated], all: &[usize]) {
-        let Some(best) = level.first().map(|one| one.gain) else {
-            return;
-        };
-        let near = level.iter().take(AHEAD);
-        let near = near.filter(|one| one.gain > WORTH_FOLLOWING * best).count();
-        if near < 2 || !self.model.is_cheap() {
-            return;
-        }
-        let beyond = |one: &Simulated| {
-            let next = self.fitted(one, all).unwrap_or_default();
-            let clear = next.iter().filter(|(_, one)| !self.is_at_bound(&one.point));
-            clear.map(|(_, one)| one.squares).fold(one.squares, f64::min)
-        };
-        let taken = level[..near]
-            .iter()
-            .map(beyond)
-            .enumerate()
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((place, _)) = taken {
-            level[..=place].rotate_right(1);
-        }
     }
 
     /// Whether `rival` in the place of the effect that `without` lacks gains nearly what that gains.
@@ -396,9 +396,7 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
         }
         let pays = |fitted: &Simulated| fitted.squares < (1.0 - LEAST_GAIN) * current.squares;
         tried.retain(|(inside, fitted)| inside.holds() && pays(fitted));
-        let mut level: Vec<Simulated> = tried.into_iter().map(|(_, fitted)| fitted).collect();
-        self.look_ahead(&mut level, &all);
-        Some(level)
+        Some(tried.into_iter().map(|(_, fitted)| fitted).collect())
     }
 
     fn round(&mut self, taken: &Simulated, lost: &[Simulated]) {
@@ -439,15 +437,24 @@ pub fn select<M: SimulatedModel>(
     record: usize,
     observer: Observer<'_>,
 ) -> Option<Selected> {
-    let mut selection = CrossValidation {
-        model,
-        record,
-        observer,
-        rivals: Vec::new(),
-        deviates: Vec::new(),
-        without: Vec::new(),
-    };
-    let found = search(&mut selection)?;
+    let mut selection = CrossValidation::new(model, record, observer);
+    let mut found = search(&mut selection)?;
+    if model.is_cheap() {
+        // Free parameters may bend to stand in for an effect, and the first effects that are taken to
+        // straighten them again. With parameters held near what was stated the way is another; the
+        // end is fitted and judged as ever.
+        let held = model.held();
+        let begun = CrossValidation::new(&held, record, observer);
+        if let Some(other) = selection.end_of(begun)
+            && selection.predicts_better(&other, found.best.as_ref().unwrap_or(&found.nominal))
+        {
+            found.best = Some(other);
+        }
+        // What the last look backward left behind belongs to the one that was chosen.
+        if let Some(best) = &found.best {
+            selection.reduced(best)?;
+        }
+    }
     let nominal = found.nominal;
     let extended = found.best.unwrap_or_else(|| nominal.clone());
     // What came near while other effects were still missing may be far behind at the end.

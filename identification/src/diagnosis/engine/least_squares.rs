@@ -12,7 +12,7 @@ use super::model::{Candidate, Point, Scale};
 use super::resampling::correlation_time;
 
 /// A prior counts as if it were this many times as wide as stated.
-const WEAK: f64 = 10.0;
+pub(in crate::diagnosis) const WEAK: f64 = 10.0;
 /// Steps of difference quotients, in internal units: nominal parameters, sizes of effects, and what is
 /// counted by its logarithm, of which a period may repeat a hundred times in a record.
 const DIFFERENCE: (f64, f64, f64) = (4e-3, 1e-3, 1e-4);
@@ -56,6 +56,17 @@ pub trait SimulatedModel: Sync {
         true
     }
 
+    /// How much wider than stated the priors of the nominal parameters count.
+    fn prior_width(&self) -> f64 {
+        WEAK
+    }
+
+    /// The same model with its nominal parameters held near what was stated.
+    #[must_use]
+    fn held(&self) -> Self
+    where
+        Self: Sized;
+
     /// The name of a record.
     fn record_name(&self, record: usize) -> &str;
 
@@ -98,9 +109,10 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-fn prior(point: &Point, candidates: &[Candidate]) -> f64 {
-    let nuisance: f64 = point.nuisance.iter().map(|p| (p / WEAK).powi(2)).sum();
-    let shapes = point.prior_rows(candidates);
+fn prior<M: SimulatedModel>(model: &M, point: &Point) -> f64 {
+    let nuisance = point.nuisance.iter().enumerate();
+    let nuisance: f64 = nuisance.map(|(i, p)| (p / width(model, i)).powi(2)).sum();
+    let shapes = point.prior_rows(model.candidates());
     nuisance
         + shapes
             .iter()
@@ -108,12 +120,21 @@ fn prior(point: &Point, candidates: &[Candidate]) -> f64 {
             .sum::<f64>()
 }
 
+/// Width of the prior of a nuisance coordinate; what belongs to a file is as free as ever.
+fn width<M: SimulatedModel>(model: &M, i: usize) -> f64 {
+    if model.block_of(i).is_some() {
+        WEAK
+    } else {
+        model.prior_width()
+    }
+}
+
 /// Errors and cost at `point`; none where they are not finite.
 pub fn solution<M: SimulatedModel>(model: &M, point: &Point, record: usize) -> Option<Solution> {
     let errors = all_errors(model, point, record);
     let sum = squares(&errors);
     let cost = errors.len() as f64 * sum.max(f64::MIN_POSITIVE).ln()
-        + prior(point, model.candidates());
+        + prior(model, point);
     (sum.is_finite() && cost.is_finite()).then(|| Solution {
         point: point.clone(),
         errors,
@@ -311,8 +332,9 @@ fn normal<M: SimulatedModel>(
     let sees = |hessian: &DMatrix<f64>, i: usize| hessian[(i, i)] > 0.0;
     for (i, p) in point.nuisance.iter().enumerate() {
         if sees(&hessian, i) {
-            hessian[(i, i)] += WEAK.powi(-2);
-            gradient[i] -= p * WEAK.powi(-2);
+            let weight = width(model, i).powi(-2);
+            hessian[(i, i)] += weight;
+            gradient[i] -= p * weight;
         }
     }
     for (place, off, spread) in point.prior_rows(model.candidates()) {
@@ -481,6 +503,12 @@ mod tests {
         }
         fn screen(&self, record: usize) -> usize {
             record
+        }
+        fn held(&self) -> Self {
+            Self {
+                candidates: self.candidates.clone(),
+                measured: self.measured.clone(),
+            }
         }
         fn record_name(&self, _: usize) -> &'static str {
             "decay"

@@ -14,6 +14,7 @@ mod verdict;
 pub use adequacy::Test;
 pub use cross_validation::{Rival, Selected, Simulated, completed, nominal, refit, select};
 pub use fit::{Fit, Jacobian, evaluate, fit, polish};
+pub(super) use least_squares::WEAK;
 pub use least_squares::{
     Columns, Free, SimulatedModel, Solution, all_errors, deviations, least_squares, solution,
 };

@@ -34,8 +34,8 @@ nominal_parameters! {
 }
 
 session_parameters! {
-    /// Of the displacement's transducer.
-    zero: "m" within 0.05 as Setup,
+    /// Of the displacement's transducer; of the first file the offset tells it.
+    zero: "m" within 0.05 as AgainstFirst,
 }
 
 effects! {

@@ -206,7 +206,7 @@ pub(super) fn confirm(
     );
     let mut all = listed(measured, point, deviations);
     differences(measured, &fits, &mut all, findings);
-    surprises(measured, point, &all, findings);
+    surprises(measured, &all, findings);
     let scattered: Vec<f64> = all.iter().map(|value| value.standard_error).collect();
     let own = parameters(measured, point, deviations);
     let count = own.len();
@@ -316,16 +316,11 @@ fn differences(
 }
 
 /// Tells which nominal parameters are not what was stated.
-fn surprises(
-    measured: &Measured<'_>,
-    point: &Point,
-    all: &[NamedValue],
-    findings: &mut Vec<String>,
-) {
-    for (i, (value, p)) in all.iter().zip(&point.nuisance).take(measured.uncertain()).enumerate() {
+fn surprises(measured: &Measured<'_>, all: &[NamedValue], findings: &mut Vec<String>) {
+    for (i, value) in all.iter().take(measured.uncertain()).enumerate() {
         let (stated, deviation) = measured.stated(i);
-        let error = value.standard_error / deviation;
-        if p.abs() > SURPRISING && p.abs() > SURPRISING * error {
+        let off = (value.value - stated).abs();
+        if off > SURPRISING * deviation && off > SURPRISING * value.standard_error {
             findings.push(format!(
                 "`{}` is {:.4e} ± {:.1e} {unit} by these data, stated were {stated:.4e} ± \
                  {deviation:.1e} {unit}",

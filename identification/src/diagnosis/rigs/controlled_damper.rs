@@ -33,8 +33,8 @@ nominal_parameters! {
 }
 
 session_parameters! {
-    /// Of the load cell.
-    zero: "N" within 0.02 as Setup,
+    /// Of the load cell; of the first file the offset tells it.
+    zero: "N" within 0.02 as AgainstFirst,
     /// Share of the friction that is taken up at the first sample.
     taken_up: "1" within 0.5 as Start,
 }

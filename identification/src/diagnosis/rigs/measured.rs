@@ -1,7 +1,7 @@
 //! A rig with its measurements, as the engine of the diagnosis sees it.
 
 use super::{Effect, Measurement, Natural, Rig, SessionRole, Values};
-use crate::diagnosis::engine::{Candidate, Point, SimulatedModel, all_errors};
+use crate::diagnosis::engine::{Candidate, Point, SimulatedModel, WEAK, all_errors};
 
 /// Runs into which a part is cut for the check inside it.
 const RUNS: usize = 16;
@@ -30,6 +30,9 @@ impl Part {
     }
 }
 
+/// Width of the priors that hold: a hundred neighbouring samples are about as good as one.
+const HELD: f64 = 0.1;
+
 /// The record of all samples.
 pub const EVERYTHING: usize = 8;
 
@@ -52,6 +55,8 @@ pub struct Measured<'a> {
     places: Vec<Vec<Vec<usize>>>,
     /// Whether the first file is the one that others are told against.
     holds_first: bool,
+    /// How much wider than stated the priors of nominal parameters count.
+    width: f64,
 }
 
 const NAMES: [&str; 9] = [
@@ -112,6 +117,7 @@ impl<'a> Measured<'a> {
             effects,
             places: places(measurement, rig.screened()),
             holds_first: true,
+            width: WEAK,
             rig,
             measurement,
             nominal,
@@ -321,6 +327,25 @@ impl SimulatedModel for Measured<'_> {
 
     fn screen(&self, record: usize) -> usize {
         if record < 2 { 6 + record } else { record }
+    }
+
+    fn prior_width(&self) -> f64 {
+        self.width
+    }
+
+    fn held(&self) -> Self {
+        Self {
+            rig: self.rig,
+            measurement: self.measurement,
+            nominal: self.nominal.clone(),
+            uncertain: self.uncertain.clone(),
+            session: self.session.clone(),
+            effects: self.effects.clone(),
+            candidates: self.candidates.clone(),
+            places: self.places.clone(),
+            holds_first: self.holds_first,
+            width: HELD,
+        }
     }
 
     fn is_cheap(&self) -> bool {
