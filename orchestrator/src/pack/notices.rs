@@ -246,13 +246,22 @@ mod tests {
             if let Some(text) = licence {
                 fs::write(place.join("LICENSE-MIT"), text).unwrap();
             }
+            let named = ["a", "b", "builder", "bare", "macros", "idle"].map(|other| {
+                let is_optional = ["b", "idle"].contains(&other);
+                serde_json::json!({"name": other, "rename": null, "optional": is_optional})
+            });
             serde_json::json!({
                 "id": name, "name": name, "version": "1.0.0", "license": "MIT",
                 "repository": null, "manifest_path": place.join("Cargo.toml"),
                 "source": if name == "own" { None } else { Some("registry") },
+                "targets": [{"kind": [if name == "macros" { "proc-macro" } else { "lib" }]}],
+                "features": {"with": ["dep:b"], "fast": ["idle?/fast"]},
+                "dependencies": named,
             })
         };
         let dependency = |name: &str, kind: Option<&str>| serde_json::json!({"pkg": name, "dep_kinds": [{"kind": kind}]});
+        let direct = [dependency("a", None), dependency("builder", Some("build"))];
+        let indirect = ["b", "bare", "macros", "idle"].map(|name| dependency(name, None));
         let metadata = serde_json::json!({
             "packages": [
                 package("own", Some("ours")), package("a", Some("free\r\n")),
@@ -260,10 +269,8 @@ mod tests {
                 package("bare", None), package("macros", None), package("idle", None),
             ],
             "resolve": {"nodes": [
-                {"id": "own", "features": [],
-                 "deps": [dependency("a", None), dependency("builder", Some("build"))]},
-                {"id": "a", "features": ["with", "fast"],
-                 "deps": ["b", "bare", "macros", "idle"].map(|name| dependency(name, None))},
+                {"id": "own", "features": [], "deps": direct},
+                {"id": "a", "features": ["with", "fast"], "deps": indirect},
             ]},
         });
         let notices = Notices::read(&metadata.to_string()).unwrap();
