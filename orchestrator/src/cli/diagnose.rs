@@ -8,6 +8,7 @@ use identification::diagnosis::engine::{Observer, Progress};
 
 use crate::diagnosis::{diagnose, files, text};
 use crate::error::Error;
+use crate::results::unused;
 
 /// What `diagnose` takes.
 #[derive(Debug, Args)]
@@ -48,7 +49,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             place.file_stem()
         };
         let name = name.unwrap_or_default().to_string_lossy();
-        Path::new("shakebench-results").join(format!("diagnosis-{name}"))
+        let folder = Path::new("shakebench-results").join(format!("diagnosis-{name}"));
+        unused(&folder, |_| false)
     });
     let tell = |event: &Progress| eprintln!("{event}");
     let observer = if arguments.verbose {

@@ -3,6 +3,7 @@
 pub mod benchmark;
 pub mod build;
 pub mod compare;
+pub mod compare_runs;
 pub mod design;
 pub mod diagnose;
 pub mod identify;
@@ -17,6 +18,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use crate::fmu::{FmiVersion, isolation};
+use crate::report::UnitSystem;
+use crate::results;
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -31,6 +34,19 @@ use crate::fmu::{FmiVersion, isolation};
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    /// Units of what is printed and drawn: us (in, lbf) or si (mm, kN); accelerations in g. Files of
+    /// numbers are SI always [default: us, and the reader of a page chooses]
+    #[arg(
+        long,
+        value_enum,
+        global = true,
+        value_name = "SYSTEM",
+        hide_possible_values = true
+    )]
+    units: Option<UnitSystem>,
+    /// Replace files of results that are there already and differ
+    #[arg(long, global = true)]
+    force: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -41,6 +57,8 @@ enum Command {
     Build(build::Arguments),
     /// Run controllers on records and print the thesis's tables beside the results
     Compare(compare::Arguments),
+    /// Lay any runs over each other and say what differs between them
+    CompareRuns(compare_runs::Arguments),
     /// Print margins of the loops and draw their frequency responses
     Design(design::Arguments),
     /// Name what a model gets wrong, from records of the rig
@@ -63,11 +81,19 @@ enum Command {
 
 /// Reads the command line, does what it says and gives the exit status.
 pub fn main() -> ExitCode {
-    let done = match Cli::parse().command {
+    let cli = Cli::parse();
+    if let Some(units) = cli.units {
+        units.choose();
+    }
+    if cli.force {
+        results::allow_overwriting();
+    }
+    let done = match cli.command {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
         Some(Command::Build(arguments)) => build::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
+        Some(Command::CompareRuns(arguments)) => compare_runs::execute(&arguments),
         Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
