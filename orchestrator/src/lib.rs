@@ -8,6 +8,7 @@ pub mod design;
 pub mod diagnosis;
 pub mod error;
 pub mod extended_model;
+pub mod figures;
 pub mod fmu;
 pub mod identify;
 pub mod library;

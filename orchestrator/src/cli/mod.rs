@@ -6,8 +6,10 @@ pub mod compare;
 pub mod compare_runs;
 pub mod design;
 pub mod diagnose;
+pub mod figures;
 pub mod identify;
 pub mod info;
+mod progress;
 pub mod report;
 mod rig;
 pub mod run;
@@ -63,6 +65,8 @@ enum Command {
     Design(design::Arguments),
     /// Name what a model gets wrong, from records of the rig
     Diagnose(diagnose::Arguments),
+    /// Draw the thesis's figures with what this program computes
+    Figures(figures::Arguments),
     /// Find a rig's parameters from measured data
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
@@ -96,6 +100,7 @@ pub fn main() -> ExitCode {
         Some(Command::CompareRuns(arguments)) => compare_runs::execute(&arguments),
         Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
+        Some(Command::Figures(arguments)) => figures::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),

@@ -19,7 +19,7 @@ use serde::Serialize;
 pub use figures::{Figures, LoopFigures};
 pub use loops::LoopName;
 use loops::NamedLoop;
-pub use page::write;
+pub use page::{thesis_figures, write};
 pub use table::table;
 
 /// What is designed.

@@ -17,6 +17,7 @@ use super::loops::{LoopName, NamedLoop};
 use super::table::table;
 use super::{Design, bode};
 use crate::error::Error;
+use crate::figures::Figure;
 use crate::report::{
     self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units, identity,
 };
@@ -163,6 +164,40 @@ fn comparison(all: &[NamedLoop]) -> Section {
         ],
         ..Section::default()
     }
+}
+
+/// Figures 3-3, 3-4, 3-7, 3-9 and 3-10, of a design with all loops.
+pub fn thesis_figures(design: &Design) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    let pairs = design.drawn.iter().zip(&design.loops);
+    for (number, name, text) in [
+        ("3-3", LoopName::DisplacementPid, "The displacement PID, Eq 3-6."),
+        ("3-4", LoopName::ForcePid, "The force PID, Eq 3-7, which as sampled at 500 Hz is unstable."),
+    ] {
+        let found = pairs.clone().find(|(one, _)| one.name == name);
+        figures.extend(found.map(|(one, own)| Figure {
+            number,
+            text: text.into(),
+            panels: bode::section(one, own).panels,
+        }));
+    }
+    let mut closed = comparison(&design.drawn).panels.into_iter();
+    for (number, text) in [
+        ("3-7", "Closed loops of PID and three-variable control."),
+        ("3-10", "Closed loops of PID and loop shaping."),
+    ] {
+        figures.extend(closed.next().map(|panel| Figure {
+            number,
+            text: text.into(),
+            panels: vec![panel],
+        }));
+    }
+    figures.push(Figure {
+        number: "3-9",
+        text: "The synthesis of the loop-shaping controller, Eq 3-10.".into(),
+        panels: shaping(&design.shaping).panels,
+    });
+    figures
 }
 
 /// Fig 3-9: plant, controller, loop and target.

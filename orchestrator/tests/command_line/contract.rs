@@ -119,7 +119,8 @@ fn a_manifest_repeats_a_run_to_the_bit_and_notices_a_difference() {
     assert!(manifest.contains(given), "{manifest}");
     let other = manifest.replace(given, "control.integral_gain=0.6 V/(in s)");
     fs::write(folder.path().join("first/manifest.json"), other).unwrap();
-    let output = shakebench(folder.path(), &again);
+    let elsewhere = ["run", "--manifest", "first/manifest.json", "--out", "other"];
+    let output = shakebench(folder.path(), &elsewhere);
     assert_eq!(output.status.code(), Some(1));
     let said = stderr(&output);
     assert!(

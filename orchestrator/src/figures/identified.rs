@@ -1,0 +1,161 @@
+//! Figures of the identification: 2-6, 2-7, 2-9, 2-10.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::Figure;
+use super::tracking::{Run, over_time, run};
+use crate::error::Error;
+use crate::identify::{self, Form};
+use crate::metrics::rms;
+use crate::report::{Abscissa, Panel, Series, Style, Units};
+
+/// Noise on every recorded channel, as a part of its root mean square, and its seed.
+const NOISE: f64 = 0.01;
+const SEED: u64 = 1;
+/// Name in the recording, signal and unit of every channel.
+const CHANNELS: [(&str, &str, &str); 6] = [
+    ("valve_command", "control.valve_command", "V"),
+    ("displacement", "table.displacement", "m"),
+    ("acceleration", "table.acceleration", "m/s^2"),
+    ("actuator_force", "table.actuator_force", "N"),
+    ("specimen_acceleration", "specimen.acceleration", "m/s^2"),
+    ("reference", "reference.displacement", "m"),
+];
+
+/// Data of the identified rig with noise, and what `shakebench identify` makes of them.
+pub(super) fn figures(record: Option<&Path>) -> Result<Vec<Figure>, Error> {
+    let rig = run("three-variable", "identified", "linear", record)?;
+    let velocity = rig.history("velocity", "table.velocity", 2);
+    let mut figures = vec![
+        Figure {
+            number: "2-6",
+            text: "Input and output data of the actuator model: valve command and table velocity in, \
+                   force out. The thesis measured them under the Hokkaido record; these are of the \
+                   identified rig under three-variable control."
+                .into(),
+            panels: vec![
+                over_time(
+                    "Input: valve command",
+                    "command",
+                    Units::VOLTAGE,
+                    vec![rig.history("valve command", "control.valve_command", 3)],
+                ),
+                over_time("Input: velocity", "velocity", Units::VELOCITY, vec![velocity]),
+                over_time(
+                    "Output: force of the actuator",
+                    "force",
+                    Units::FORCE,
+                    vec![rig.history("force", "table.actuator_force", 1)],
+                ),
+            ],
+        },
+        Figure {
+            number: "2-9",
+            text: "Input and output data of the table model: force in, displacement out.".into(),
+            panels: vec![
+                over_time(
+                    "Input: force of the actuator",
+                    "force",
+                    Units::FORCE,
+                    vec![rig.history("force", "table.actuator_force", 1)],
+                ),
+                over_time(
+                    "Output: displacement",
+                    "displacement",
+                    Units::DISPLACEMENT,
+                    vec![rig.history("displacement", "table.displacement", 2)],
+                ),
+            ],
+        },
+    ];
+    figures.extend(fits(&rig)?);
+    Ok(figures)
+}
+
+/// What the identified models make of the part that they were not fitted to.
+fn fits(rig: &Run) -> Result<Vec<Figure>, Error> {
+    let fault = |error: std::io::Error| Error::Option {
+        option: "figures",
+        reason: error.to_string(),
+    };
+    let folder = tempfile::tempdir().map_err(fault)?;
+    let data = folder.path().join("recording.csv");
+    std::fs::write(&data, recording(rig)).map_err(fault)?;
+    let found = identify::identify(&identify::Request {
+        data: vec![data],
+        model: folder.path().join("model.toml"),
+        fit_part: 0.75,
+        specimen: None,
+    })?;
+    let Form::General(found) = &found.form else {
+        return Ok(Vec::new());
+    };
+    let period = found.model.experiments.first().map_or(1.0, |own| own.period);
+    let figure = |number, channel: &str, label: &str, units: Units| -> Option<Figure> {
+        let fit = found.fits.iter().find(|fit| fit.channel == channel)?;
+        let line = |name: &str, values: &[f64]| {
+            let step = Abscissa::Even {
+                start: fit.start,
+                step: period,
+            };
+            Series::line(name, step, values.to_vec())
+        };
+        let panel: Panel = over_time(
+            &format!("{label}, fit {:.2} %", fit.simulated),
+            label,
+            units,
+            vec![
+                line("measured", &fit.measured).coloured(0),
+                line("simulated", &fit.model).styled(Style::Dashed).coloured(2),
+            ],
+        );
+        Some(Figure {
+            number,
+            text: format!(
+                "Measured and simulated {label} on the part of the recording that was not fitted; \
+                 noise of 1 % on every channel (seed {SEED})."
+            ),
+            panels: vec![panel],
+        })
+    };
+    let figures = [
+        figure("2-7", "actuator_force", "force", Units::FORCE),
+        figure("2-10", "displacement", "displacement", Units::DISPLACEMENT),
+    ];
+    Ok(figures.into_iter().flatten().collect())
+}
+
+/// A recording of the rig with noise, as a laboratory would have it.
+fn recording(rig: &Run) -> String {
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let columns: Vec<Vec<f64>> = CHANNELS
+        .iter()
+        .map(|(name, signal, _)| {
+            let mut values = rig.column(signal);
+            // The command and the reference are known exactly.
+            let is_measured = !matches!(*name, "valve_command" | "reference");
+            let size = if is_measured { NOISE * rms(&values) } else { 0.0 };
+            for value in &mut values {
+                let noise: f64 = StandardNormal.sample(&mut random);
+                *value += size * noise;
+            }
+            values
+        })
+        .collect();
+    let mut text = "time [s]".to_string();
+    for (name, _, unit) in CHANNELS {
+        let _ = write!(text, ",{name} [{unit}]");
+    }
+    for sample in 0..columns.iter().map(Vec::len).min().unwrap_or(0) {
+        let _ = write!(text, "\n{}", sample as f64 * rig.motion.dt);
+        for column in &columns {
+            let _ = write!(text, ",{}", column[sample]);
+        }
+    }
+    text + "\n"
+}
