@@ -65,7 +65,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.verbose {
         bar.finish_and_clear();
     }
-    let report = diagnose(&arguments.case, &arguments.data, &folder, Observer::new(&tell));
+    let report = diagnose(
+        &arguments.case,
+        &arguments.data,
+        &folder,
+        Observer::new(&tell),
+    );
     bar.finish_and_clear();
     let report = report?;
     if arguments.json {

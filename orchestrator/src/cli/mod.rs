@@ -6,6 +6,7 @@ pub mod compare;
 pub mod compare_runs;
 pub mod design;
 pub mod diagnose;
+pub mod doctor;
 pub mod figures;
 pub mod identify;
 pub mod info;
@@ -20,6 +21,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use crate::fmu::{FmiVersion, isolation};
+use crate::pack::supply;
 use crate::report::UnitSystem;
 use crate::results;
 
@@ -49,6 +51,9 @@ pub struct Cli {
     /// Replace files of results that are there already and differ
     #[arg(long, global = true)]
     force: bool,
+    /// Folder of the components' FMUs [default: beside the program, or built from the workspace]
+    #[arg(long, global = true, value_name = "DIR")]
+    fmus: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -67,6 +72,8 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Draw the thesis's figures with what this program computes
     Figures(figures::Arguments),
+    /// Say what is here, what is missing, and the cure
+    Doctor(doctor::Arguments),
     /// Find a rig's parameters from measured data
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
@@ -92,6 +99,9 @@ pub fn main() -> ExitCode {
     if cli.force {
         results::allow_overwriting();
     }
+    if let Some(folder) = &cli.fmus {
+        supply::take_from(folder);
+    }
     let done = match cli.command {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
@@ -101,6 +111,7 @@ pub fn main() -> ExitCode {
         Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
         Some(Command::Figures(arguments)) => figures::execute(&arguments),
+        Some(Command::Doctor(arguments)) => doctor::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),

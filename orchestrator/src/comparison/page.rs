@@ -129,22 +129,24 @@ fn bars(comparison: &Comparison) -> Vec<Bars> {
         let place = controllers.iter().position(|own| *own == name);
         1 + place.unwrap_or(0) % 8
     };
-    let groups = motions(&comparison.rows).into_iter().map(|motion| BarGroup {
-        label: motion.to_string(),
-        bars: comparison
-            .rows
-            .iter()
-            .filter(|row| row.record == motion && row.is_complete())
-            .filter_map(|row| {
-                Some(Bar {
-                    name: row.controller.clone(),
-                    value: row.time_domain_percent?,
-                    interval: None,
-                    colour: colour(&row.controller),
+    let groups = motions(&comparison.rows)
+        .into_iter()
+        .map(|motion| BarGroup {
+            label: motion.to_string(),
+            bars: comparison
+                .rows
+                .iter()
+                .filter(|row| row.record == motion && row.is_complete())
+                .filter_map(|row| {
+                    Some(Bar {
+                        name: row.controller.clone(),
+                        value: row.time_domain_percent?,
+                        interval: None,
+                        colour: colour(&row.controller),
+                    })
                 })
-            })
-            .collect(),
-    });
+                .collect(),
+        });
     vec![Bars {
         title: "Normalised RMS acceleration error, %".into(),
         groups: groups.collect(),

@@ -171,8 +171,16 @@ pub fn thesis_figures(design: &Design) -> Vec<Figure> {
     let mut figures = Vec::new();
     let pairs = design.drawn.iter().zip(&design.loops);
     for (number, name, text) in [
-        ("3-3", LoopName::DisplacementPid, "The displacement PID, Eq 3-6."),
-        ("3-4", LoopName::ForcePid, "The force PID, Eq 3-7, which as sampled at 500 Hz is unstable."),
+        (
+            "3-3",
+            LoopName::DisplacementPid,
+            "The displacement PID, Eq 3-6.",
+        ),
+        (
+            "3-4",
+            LoopName::ForcePid,
+            "The force PID, Eq 3-7, which as sampled at 500 Hz is unstable.",
+        ),
     ] {
         let found = pairs.clone().find(|(one, _)| one.name == name);
         figures.extend(found.map(|(one, own)| Figure {

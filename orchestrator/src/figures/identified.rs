@@ -34,10 +34,11 @@ pub(super) fn figures(record: Option<&Path>) -> Result<Vec<Figure>, Error> {
     let mut figures = vec![
         Figure {
             number: "2-6",
-            text: "Input and output data of the actuator model: valve command and table velocity in, \
+            text:
+                "Input and output data of the actuator model: valve command and table velocity in, \
                    force out. The thesis measured them under the Hokkaido record; these are of the \
                    identified rig under three-variable control."
-                .into(),
+                    .into(),
             panels: vec![
                 over_time(
                     "Input: valve command",
@@ -45,7 +46,12 @@ pub(super) fn figures(record: Option<&Path>) -> Result<Vec<Figure>, Error> {
                     Units::VOLTAGE,
                     vec![rig.history("valve command", "control.valve_command", 3)],
                 ),
-                over_time("Input: velocity", "velocity", Units::VELOCITY, vec![velocity]),
+                over_time(
+                    "Input: velocity",
+                    "velocity",
+                    Units::VELOCITY,
+                    vec![velocity],
+                ),
                 over_time(
                     "Output: force of the actuator",
                     "force",
@@ -95,7 +101,11 @@ fn fits(rig: &Run) -> Result<Vec<Figure>, Error> {
     let Form::General(found) = &found.form else {
         return Ok(Vec::new());
     };
-    let period = found.model.experiments.first().map_or(1.0, |own| own.period);
+    let period = found
+        .model
+        .experiments
+        .first()
+        .map_or(1.0, |own| own.period);
     let figure = |number, channel: &str, label: &str, units: Units| -> Option<Figure> {
         let fit = found.fits.iter().find(|fit| fit.channel == channel)?;
         let line = |name: &str, values: &[f64]| {
@@ -111,7 +121,9 @@ fn fits(rig: &Run) -> Result<Vec<Figure>, Error> {
             units,
             vec![
                 line("measured", &fit.measured).coloured(0),
-                line("simulated", &fit.model).styled(Style::Dashed).coloured(2),
+                line("simulated", &fit.model)
+                    .styled(Style::Dashed)
+                    .coloured(2),
             ],
         );
         Some(Figure {
@@ -139,7 +151,11 @@ fn recording(rig: &Run) -> String {
             let mut values = rig.column(signal);
             // The command and the reference are known exactly.
             let is_measured = !matches!(*name, "valve_command" | "reference");
-            let size = if is_measured { NOISE * rms(&values) } else { 0.0 };
+            let size = if is_measured {
+                NOISE * rms(&values)
+            } else {
+                0.0
+            };
             for value in &mut values {
                 let noise: f64 = StandardNormal.sample(&mut random);
                 *value += size * noise;

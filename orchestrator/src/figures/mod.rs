@@ -40,7 +40,10 @@ pub fn figures(
     if let Some(wrong) = only.iter().find(|own| !NUMBERS.contains(&own.as_str())) {
         return Err(Error::Option {
             option: "--figure",
-            reason: format!("`{wrong}` is not drawn; expected some of {}", NUMBERS.join(", ")),
+            reason: format!(
+                "`{wrong}` is not drawn; expected some of {}",
+                NUMBERS.join(", ")
+            ),
         });
     }
     let is_wanted = |number: &str| only.is_empty() || only.iter().any(|own| own == number);
@@ -52,7 +55,10 @@ pub fn figures(
         progress("2-6 to 2-10");
         add(identified::figures(record)?);
     }
-    if ["3-3", "3-4", "3-7", "3-9", "3-10"].into_iter().any(is_wanted) {
+    if ["3-3", "3-4", "3-7", "3-9", "3-10"]
+        .into_iter()
+        .any(is_wanted)
+    {
         progress("3-3 to 3-10");
         let fault = |error: controllers::ModelError| Error::Option {
             option: "figures",

@@ -81,21 +81,21 @@ fn two(runs: [(&str, &Run); 2]) -> Vec<Panel> {
         ("velocity", Units::VELOCITY),
         ("acceleration", Units::ACCELERATION),
     ];
-    let mut panels: Vec<Panel> = quantities
-        .into_iter()
-        .map(|(quantity, units)| {
-            let wanted = format!("reference.{quantity}");
-            let mut series = vec![first.history("reference", &wanted, 0)];
-            series.extend(runs.iter().enumerate().map(|(n, (name, run))| {
-                run.history(name, &format!("table.{quantity}"), 2 - n)
-            }));
-            let title = format!("{}{}", quantity[..1].to_uppercase(), &quantity[1..]);
-            over_time(&title, quantity, units, series)
-        })
-        .collect();
+    let mut panels: Vec<Panel> =
+        quantities
+            .into_iter()
+            .map(|(quantity, units)| {
+                let wanted = format!("reference.{quantity}");
+                let mut series = vec![first.history("reference", &wanted, 0)];
+                series.extend(runs.iter().enumerate().map(|(n, (name, run))| {
+                    run.history(name, &format!("table.{quantity}"), 2 - n)
+                }));
+                let title = format!("{}{}", quantity[..1].to_uppercase(), &quantity[1..]);
+                over_time(&title, quantity, units, series)
+            })
+            .collect();
     let amplitudes = |name: &str, values: &[f64], colour| {
-        let (frequency, amplitude) =
-            fourier_amplitudes(values, first.motion.dt, HIGHEST_FREQUENCY);
+        let (frequency, amplitude) = fourier_amplitudes(values, first.motion.dt, HIGHEST_FREQUENCY);
         Series::line(name, Abscissa::At(frequency.into()), amplitude).coloured(colour)
     };
     let mut series = vec![amplitudes(
@@ -103,9 +103,11 @@ fn two(runs: [(&str, &Run); 2]) -> Vec<Panel> {
         &first.column("reference.acceleration"),
         0,
     )];
-    series.extend(runs.iter().enumerate().map(|(n, (name, run))| {
-        amplitudes(name, &run.column("table.acceleration"), 2 - n)
-    }));
+    series.extend(
+        runs.iter()
+            .enumerate()
+            .map(|(n, (name, run))| amplitudes(name, &run.column("table.acceleration"), 2 - n)),
+    );
     panels.push(Panel {
         title: "Fourier amplitude of acceleration".into(),
         x: Axis::logarithmic("frequency", Units::FREQUENCY).between(0.1, HIGHEST_FREQUENCY),
@@ -120,9 +122,10 @@ fn figure_3_6(record: Option<&Path>) -> Result<Figure, Error> {
     let three = run("three-variable", "identified", "none", record)?;
     Ok(Figure {
         number: "3-6",
-        text: "Time histories under PID (Eq 3-6) and three-variable control (Table 3-2) on the bare \
+        text:
+            "Time histories under PID (Eq 3-6) and three-variable control (Table 3-2) on the bare \
                identified table. The thesis plays Irpinia (1980)."
-            .into(),
+                .into(),
         panels: two([("PID", &pid), ("three-variable", &three)]),
     })
 }
@@ -158,7 +161,12 @@ fn figure_4_6(record: Option<&Path>) -> Result<Figure, Error> {
     })
 }
 
-fn predictive(number: &'static str, specimen: &str, text: &str, record: Option<&Path>) -> Result<Figure, Error> {
+fn predictive(
+    number: &'static str,
+    specimen: &str,
+    text: &str,
+    record: Option<&Path>,
+) -> Result<Figure, Error> {
     let three = run("three-variable", "identified", specimen, record)?;
     let predictive = run("mpc", "identified", specimen, record)?;
     Ok(Figure {
