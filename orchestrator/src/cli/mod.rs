@@ -18,7 +18,7 @@ pub mod run;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::fmu::{FmiVersion, isolation};
 use crate::pack::supply;
@@ -66,6 +66,14 @@ enum Command {
     Compare(compare::Arguments),
     /// Lay any runs over each other and say what differs between them
     CompareRuns(compare_runs::Arguments),
+    /// Print what makes a shell complete commands and options
+    #[command(
+        after_help = "Example:\n  shakebench completions bash > ~/.local/share/bash-completion/completions/shakebench"
+    )]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
     /// Print margins of the loops and draw their frequency responses
     Design(design::Arguments),
     /// Name what a model gets wrong, from records of the rig
@@ -108,6 +116,11 @@ pub fn main() -> ExitCode {
         Some(Command::Build(arguments)) => build::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::CompareRuns(arguments)) => compare_runs::execute(&arguments),
+        Some(Command::Completions { shell }) => {
+            let mut words = Cli::command();
+            clap_complete::generate(shell, &mut words, "shakebench", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
         Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
         Some(Command::Figures(arguments)) => figures::execute(&arguments),

@@ -3,6 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use identification::data::Recording;
+use identification::identify::rig;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -10,21 +12,30 @@ use rand_distr::{Distribution, StandardNormal};
 use super::Figure;
 use super::tracking::{Run, over_time, run};
 use crate::error::Error;
-use crate::identify::{self, Form};
-use crate::metrics::rms;
 use crate::report::{Abscissa, Panel, Series, Style, Units};
+use crate::units::{INCH, POUND_FORCE};
 
-/// Noise on every recorded channel, as a part of its root mean square, and its seed.
-const NOISE: f64 = 0.01;
+/// Seed of the sensors' noise.
 const SEED: u64 = 1;
-/// Name in the recording, signal and unit of every channel.
-const CHANNELS: [(&str, &str, &str); 6] = [
-    ("valve_command", "control.valve_command", "V"),
-    ("displacement", "table.displacement", "m"),
-    ("acceleration", "table.acceleration", "m/s^2"),
-    ("actuator_force", "table.actuator_force", "N"),
-    ("specimen_acceleration", "specimen.acceleration", "m/s^2"),
-    ("reference", "reference.displacement", "m"),
+/// Name in the recording, signal and unit of every channel, with the noise of a laboratory's sensor:
+/// 5e-4 in, 1.5 in/s², 0.3 lbf.
+const CHANNELS: [(&str, &str, &str, f64); 6] = [
+    ("valve_command", "control.valve_command", "V", 0.0),
+    ("displacement", "table.displacement", "m", 5e-4 * INCH),
+    ("acceleration", "table.acceleration", "m/s^2", 1.5 * INCH),
+    (
+        "actuator_force",
+        "table.actuator_force",
+        "N",
+        0.3 * POUND_FORCE,
+    ),
+    (
+        "specimen_acceleration",
+        "specimen.acceleration",
+        "m/s^2",
+        1.0 * INCH,
+    ),
+    ("reference", "reference.displacement", "m", 0.0),
 ];
 
 /// Data of the identified rig with noise, and what `shakebench identify` makes of them.
@@ -84,23 +95,16 @@ pub(super) fn figures(record: Option<&Path>) -> Result<Vec<Figure>, Error> {
 }
 
 /// What the identified models make of the part that they were not fitted to.
-fn fits(rig: &Run) -> Result<Vec<Figure>, Error> {
+fn fits(run: &Run) -> Result<Vec<Figure>, Error> {
     let fault = |error: std::io::Error| Error::Option {
         option: "figures",
         reason: error.to_string(),
     };
     let folder = tempfile::tempdir().map_err(fault)?;
     let data = folder.path().join("recording.csv");
-    std::fs::write(&data, recording(rig)).map_err(fault)?;
-    let found = identify::identify(&identify::Request {
-        data: vec![data],
-        model: folder.path().join("model.toml"),
-        fit_part: 0.75,
-        specimen: None,
-    })?;
-    let Form::General(found) = &found.form else {
-        return Ok(Vec::new());
-    };
+    std::fs::write(&data, recording(run)).map_err(fault)?;
+    let (pieces, _) = Recording::read(&data, "recording")?.on_even_base()?;
+    let found = rig::identify(&pieces, rig::Options::default())?;
     let period = found
         .model
         .experiments
@@ -130,7 +134,7 @@ fn fits(rig: &Run) -> Result<Vec<Figure>, Error> {
             number,
             text: format!(
                 "Measured and simulated {label} on the part of the recording that was not fitted; \
-                 noise of 1 % on every channel (seed {SEED})."
+                 with the noise of a laboratory's sensors (seed {SEED})."
             ),
             panels: vec![panel],
         })
@@ -147,15 +151,8 @@ fn recording(rig: &Run) -> String {
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let columns: Vec<Vec<f64>> = CHANNELS
         .iter()
-        .map(|(name, signal, _)| {
+        .map(|(_, signal, _, size)| {
             let mut values = rig.column(signal);
-            // The command and the reference are known exactly.
-            let is_measured = !matches!(*name, "valve_command" | "reference");
-            let size = if is_measured {
-                NOISE * rms(&values)
-            } else {
-                0.0
-            };
             for value in &mut values {
                 let noise: f64 = StandardNormal.sample(&mut random);
                 *value += size * noise;
@@ -164,7 +161,7 @@ fn recording(rig: &Run) -> String {
         })
         .collect();
     let mut text = "time [s]".to_string();
-    for (name, _, unit) in CHANNELS {
+    for (name, _, unit, _) in CHANNELS {
         let _ = write!(text, ",{name} [{unit}]");
     }
     for sample in 0..columns.iter().map(Vec::len).min().unwrap_or(0) {

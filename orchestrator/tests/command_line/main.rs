@@ -4,6 +4,7 @@
 
 mod archives;
 mod benchmark;
+mod book;
 mod browser;
 mod contract;
 mod diagnosis;
