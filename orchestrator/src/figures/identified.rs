@@ -1,18 +1,21 @@
 //! Figures of the identification: 2-6, 2-7, 2-9, 2-10.
 
+use std::f64::consts::TAU;
 use std::fmt::Write;
-use std::path::Path;
 
 use identification::data::Recording;
 use identification::identify::rig;
-use rand::SeedableRng;
+use plant::linear::log_space;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::Figure;
-use super::tracking::{Run, over_time, run};
+use super::tracking::{Run, over_time};
 use crate::error::Error;
+use crate::motion::Motion;
 use crate::report::{Abscissa, Panel, Series, Style, Units};
+use crate::run::experiment::{Request, prepare};
 use crate::units::{INCH, POUND_FORCE};
 
 /// Seed of the sensors' noise.
@@ -38,9 +41,74 @@ const CHANNELS: [(&str, &str, &str, f64); 6] = [
     ("reference", "reference.displacement", "m", 0.0),
 ];
 
+/// Length of the excitation, s, its frequencies, Hz, and its largest displacement, m.
+const LENGTH: f64 = 60.0;
+const BAND: (f64, f64, usize) = (0.02, 30.0, 120);
+const PEAK: f64 = 0.8 * INCH;
+
+/// Sines of random phase over the whole band of the rig, beginning at rest.
+fn excitation(dt: f64) -> Motion {
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let sines: Vec<[f64; 3]> = log_space(BAND.0, BAND.1, BAND.2)
+        .into_iter()
+        .map(|frequency| {
+            let size = 1.0 / (1.0 + (frequency / 0.6).powi(2));
+            [TAU * frequency, random.random_range(0.0..TAU), size]
+        })
+        .collect();
+    let samples = (LENGTH / dt) as usize;
+    let mut motion = Motion {
+        name: "sines of 0.02 to 30 Hz".into(),
+        dt,
+        displacement: Vec::with_capacity(samples),
+        velocity: Vec::with_capacity(samples),
+        acceleration: Vec::with_capacity(samples),
+        notes: Vec::new(),
+        seed: Some(SEED),
+    };
+    for sample in 0..samples {
+        let t = sample as f64 * dt;
+        let [mut s, mut s1, mut s2] = [0.0; 3];
+        for [omega, phase, size] in &sines {
+            let (sine, cosine) = (omega * t + phase).sin_cos();
+            s += size * sine;
+            s1 += size * omega * cosine;
+            s2 -= size * omega * omega * sine;
+        }
+        // Faded in by w = 1 - exp(-t²/2), with its derivatives.
+        let fade = (-0.5 * t * t).exp();
+        let [w, w1, w2] = [1.0 - fade, t * fade, (1.0 - t * t) * fade];
+        motion.displacement.push(w * s);
+        motion.velocity.push(w1 * s + w * s1);
+        motion.acceleration.push(w2 * s + 2.0 * w1 * s1 + w * s2);
+    }
+    let factor = PEAK / motion.peak_displacement().max(f64::MIN_POSITIVE);
+    for history in [
+        &mut motion.displacement,
+        &mut motion.velocity,
+        &mut motion.acceleration,
+    ] {
+        history.iter_mut().for_each(|value| *value *= factor);
+    }
+    motion
+}
+
+/// The rig under three-variable control and the excitation.
+fn rig() -> Result<Run, Error> {
+    let request = Request::built_in("three-variable");
+    let mut prepared = prepare(&request)?;
+    prepared.motion = excitation(prepared.motion.dt);
+    prepared.samples = prepared.motion.len();
+    let outcome = prepared.run(request.algorithm)?;
+    Ok(Run {
+        motion: prepared.motion,
+        record: outcome.record,
+    })
+}
+
 /// Data of the identified rig with noise, and what `shakebench identify` makes of them.
-pub(super) fn figures(record: Option<&Path>) -> Result<Vec<Figure>, Error> {
-    let rig = run("three-variable", "identified", "linear", record)?;
+pub(super) fn figures() -> Result<Vec<Figure>, Error> {
+    let rig = rig()?;
     let velocity = rig.history("velocity", "table.velocity", 2);
     let mut figures = vec![
         Figure {
@@ -48,7 +116,7 @@ pub(super) fn figures(record: Option<&Path>) -> Result<Vec<Figure>, Error> {
             text:
                 "Input and output data of the actuator model: valve command and table velocity in, \
                    force out. The thesis measured them under the Hokkaido record; these are of the \
-                   identified rig under three-variable control."
+                   identified rig under three-variable control and sines of 0.02 to 30 Hz."
                     .into(),
             panels: vec![
                 over_time(

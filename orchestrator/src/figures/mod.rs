@@ -53,7 +53,7 @@ pub fn figures(
     };
     if ["2-6", "2-7", "2-9", "2-10"].into_iter().any(is_wanted) {
         progress("2-6 to 2-10");
-        add(identified::figures(record)?);
+        add(identified::figures()?);
     }
     if ["3-3", "3-4", "3-7", "3-9", "3-10"]
         .into_iter()
