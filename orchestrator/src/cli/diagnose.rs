@@ -7,8 +7,10 @@ use std::process::ExitCode;
 use clap::Args;
 use identification::diagnosis::engine::{Observer, Progress};
 
+use super::progress;
 use crate::diagnosis::{diagnose, files, model, template, text};
 use crate::error::Error;
+use crate::results::unused;
 
 /// What `diagnose` takes.
 #[derive(Debug, Args)]
@@ -84,16 +86,26 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             place.file_stem()
         };
         let name = name.unwrap_or_default().to_string_lossy();
-        Path::new("shakebench-results").join(format!("diagnosis-{name}"))
+        let folder = Path::new("shakebench-results").join(format!("diagnosis-{name}"));
+        unused(&folder, |_| false)
     });
-    let tell = |event: &Progress| eprintln!("{event}");
-    let observer = if arguments.verbose {
-        Observer::new(&tell)
-    } else {
-        Observer::none()
+    let bar = progress::spinner("reading");
+    let tell = |event: &Progress| {
+        if arguments.verbose {
+            eprintln!("{event}");
+        } else {
+            let words = event.to_string();
+            bar.set_message(words.lines().next().unwrap_or_default().to_string());
+        }
     };
+    if arguments.verbose {
+        bar.finish_and_clear();
+    }
     let columns = arguments.columns.as_deref();
-    let report = diagnose(case, &arguments.data, columns, &folder, observer)?;
+    let observer = Observer::new(&tell);
+    let report = diagnose(case, &arguments.data, columns, &folder, observer);
+    bar.finish_and_clear();
+    let report = report?;
     if arguments.json {
         println!("{}", serde_json::json!(report));
     } else {

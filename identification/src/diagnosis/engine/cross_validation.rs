@@ -26,6 +26,8 @@ const LEAST_DEVIATE: f64 = 3.0;
 const LEAST_GAIN: f64 = 0.05;
 /// A candidate that gains this share of what the one taken gains is its rival.
 const RIVAL: f64 = 0.9;
+/// And what it leaves is at most so many times what that leaves.
+const LEAVES: f64 = 1.5;
 /// A candidate whose fit gains less than this share of the best one's is not tested on unseen data.
 const WORTH_TESTING: f64 = 0.7;
 /// Effects in one model.
@@ -144,7 +146,7 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         .min_by(|a, b| a.squares.total_cmp(&b.squares))
 }
 
-/// `point`, of which the nuisance of blocks that `fitted` does not hold is fitted to `tested`: a
+/// `point`, of which the nuisance of a block that `fitted` does not tell is fitted to `tested`: a
 /// transducer's zero and the like belong to a file and not to the rig.
 pub fn completed<M: SimulatedModel>(
     model: &M,
@@ -152,15 +154,17 @@ pub fn completed<M: SimulatedModel>(
     fitted: Option<usize>,
     tested: usize,
 ) -> Point {
-    let unseen = |block: usize| {
-        fitted.is_none_or(|fitted| model.samples(fitted, block) == 0)
-            && model.samples(tested, block) > 0
+    let open = |i: usize| {
+        let is_held = |block| {
+            model.samples(tested, block) == 0
+                || fitted.is_some_and(|fitted| model.tells(fitted, i, tested))
+        };
+        i < model.nuisance() && model.block_of(i).is_some_and(|block| !is_held(block))
     };
-    let any = (0..model.nuisance()).any(|i| model.block_of(i).is_some_and(unseen));
-    if !any {
+    if !(0..model.nuisance()).any(open) {
         return point.clone();
     }
-    least_squares(model, point, tested, &Free::Blocks(&unseen), AGAIN)
+    least_squares(model, point, tested, &Free::Chosen(&open), AGAIN)
         .map_or_else(|| point.clone(), |found| found.point)
 }
 
@@ -179,6 +183,12 @@ impl Inside {
     fn holds(&self) -> bool {
         self.both && self.deviate > LEAST_DEVIATE && self.gain > LEAST_GAIN
     }
+}
+
+/// Whether an effect with this `gain` rivals the one `taken`: it takes away nearly as much, and leaves
+/// little more.
+fn rivals(gain: f64, taken: f64) -> bool {
+    gain > RIVAL * taken && 1.0 - gain < LEAVES * (1.0 - taken)
 }
 
 /// Compares two models by their errors from [`CrossValidation::crossed`].
@@ -333,7 +343,7 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         let (_, replaced) = self.fitted(without, &[rival])?.pop()?;
         let before = self.crossed(without)?;
         let gain = |fitted: &Simulated| Some(compare(&before, &self.crossed(fitted)?).gain);
-        Some(gain(&replaced)? > RIVAL * gain(current)?)
+        Some(rivals(gain(&replaced)?, gain(current)?))
     }
 
     fn tell(&self, fitted: &Simulated, inside: &Inside) {
@@ -401,7 +411,7 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
 
     fn round(&mut self, taken: &Simulated, lost: &[Simulated]) {
         let newest = |fitted: &Simulated| fitted.point.effects.last().map(|(i, _)| *i);
-        let near = lost.iter().filter(|one| one.gain > RIVAL * taken.gain);
+        let near = lost.iter().filter(|one| rivals(one.gain, taken.gain));
         self.rivals.extend(near.filter_map(|rival| {
             Some(Rival {
                 effect: newest(rival)?,

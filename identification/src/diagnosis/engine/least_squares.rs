@@ -39,6 +39,11 @@ pub trait SimulatedModel: Sync {
     /// The only block that nuisance coordinate `i` acts on, if it is one.
     fn block_of(&self, i: usize) -> Option<usize>;
 
+    /// Whether a fit to record `fitted` tells nuisance coordinate `i` of a block for `tested` as well.
+    fn tells(&self, fitted: usize, i: usize, _tested: usize) -> bool {
+        self.block_of(i).is_none_or(|block| self.samples(fitted, block) > 0)
+    }
+
     /// Number of samples of `block` in `record`.
     fn samples(&self, record: usize, block: usize) -> usize;
 
@@ -230,8 +235,6 @@ pub enum Free<'a> {
     All,
     /// Everything; the derivatives by the first coordinates are these throughout.
     Frozen(&'a Columns),
-    /// Nuisance that acts on a block for which this is true.
-    Blocks(&'a dyn Fn(usize) -> bool),
     /// Coordinates for which this is true.
     Chosen(&'a dyn Fn(usize) -> bool),
 }
@@ -249,9 +252,6 @@ pub fn least_squares<M: SimulatedModel>(
     let n = best.errors.len() as f64;
     let is_free = |i: usize| match free {
         Free::All | Free::Frozen(_) => true,
-        Free::Blocks(chosen) => {
-            i < start.nuisance.len() && model.block_of(i).is_some_and(|block| chosen(block))
-        }
         Free::Chosen(chosen) => chosen(i),
     };
     let held = match free {
@@ -550,8 +550,8 @@ mod tests {
     #[test]
     fn a_block_by_itself_leaves_the_rest_alone() {
         let model = Decay::new([1.0, 1.0, 0.0, 0.3, -0.2], 0.001);
-        let second = |block: usize| block == 1;
-        let free = Free::Blocks(&second);
+        let second = |i: usize| model.block_of(i) == Some(1);
+        let free = Free::Chosen(&second);
         let found = least_squares(&model, &origin(), 0, &free, 20).unwrap();
         let p = &found.point.nuisance;
         assert_eq!(&p[..3], &[0.0; 3]);

@@ -305,6 +305,17 @@ impl SimulatedModel for Measured<'_> {
         own.checked_div(self.session.len())
     }
 
+    fn tells(&self, fitted: usize, i: usize, tested: usize) -> bool {
+        let Some(own) = i.checked_sub(self.uncertain.len()) else {
+            return true;
+        };
+        let (block, place) = (own / self.session.len(), own % self.session.len());
+        let [fitted, tested] = [fitted, tested].map(|record| &self.places[record][block]);
+        // How a file begins has died away where a later part of it was fitted.
+        let is_start = self.rig.session()[place].role == SessionRole::Start;
+        !fitted.is_empty() && !(is_start && tested.first() < fitted.first())
+    }
+
     fn samples(&self, record: usize, block: usize) -> usize {
         self.places[record][block].len()
     }
