@@ -33,7 +33,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             100.0 * part.extended_error
         );
         for effect in &part.effects {
-            println!("  {} {:.3} {:?}", effect.effect, effect.share, effect.objection);
+            println!(
+                "  {} {:.3} {:?}",
+                effect.effect, effect.share, effect.objection
+            );
         }
     };
     part("as described", &found.as_described);
@@ -46,7 +49,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         100.0 * confirmed.fitted_error
     );
     let model = ExtendedRig::new(&description, &measurement, &found)?;
-    println!("{}\n{:.1} s", model.to_toml()?, begun.elapsed().as_secs_f64());
+    println!(
+        "{}\n{:.1} s",
+        model.to_toml()?,
+        begun.elapsed().as_secs_f64()
+    );
     for file in model.validate(&validated)? {
         println!("{file:?}");
     }

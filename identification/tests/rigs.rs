@@ -20,7 +20,14 @@ fn record(gain: f64, period: f64, late: usize) -> String {
     let keep = (-gain * period).exp();
     for k in 0..(10.0 / period) as usize {
         let noise = 0.004 * (k as f64 * 91.7).sin() * (k as f64 * 13.31).cos();
-        writeln!(text, "{:.4},{:.5},{:.5}", k as f64 * period, command(k), x + noise).unwrap();
+        writeln!(
+            text,
+            "{:.4},{:.5},{:.5}",
+            k as f64 * period,
+            command(k),
+            x + noise
+        )
+        .unwrap();
         let [now, next] = [k, k + 1].map(|k| command(k.saturating_sub(late)));
         // The particular solution of a ramp lags it by slope over gain.
         let slope = (next - now) / period;
@@ -60,10 +67,18 @@ fn a_gain_far_from_what_was_stated_is_a_finding_and_no_effect() {
         assert!(part.nominal_error > 0.05, "{}", part.nominal_error);
         assert!(part.refitted_error < 0.002, "{}", part.refitted_error);
         assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.named);
-        let gain = found.confirmed.parameters.iter().find(|p| p.name == "loop_gain");
+        let gain = found
+            .confirmed
+            .parameters
+            .iter()
+            .find(|p| p.name == "loop_gain");
         let gain = gain.unwrap();
         assert!((gain.value - 90.0).abs() < 1.0, "{gain:?}");
-        assert!(found.findings.iter().any(|f| f.contains("loop_gain")), "{:?}", found.findings);
+        assert!(
+            found.findings.iter().any(|f| f.contains("loop_gain")),
+            "{:?}",
+            found.findings
+        );
     }
 }
 
@@ -72,7 +87,11 @@ fn a_delay_is_found_at_its_size() {
     let folder = tempfile::tempdir().unwrap();
     let found = diagnosed(folder.path(), &record(60.0, 0.004, 5));
     assert_eq!(found.verdict, Verdict::Named, "{:?}", found.set_aside);
-    assert!(found.named.iter().any(|name| name.contains("delay")), "{:?}", found.named);
+    assert!(
+        found.named.iter().any(|name| name.contains("delay")),
+        "{:?}",
+        found.named
+    );
     let delay = &found.confirmed.effects[0];
     assert_eq!(delay.0, "delay");
     assert!((delay.1[0].value - 0.020).abs() < 1e-3, "{delay:?}");

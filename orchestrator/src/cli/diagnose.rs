@@ -45,7 +45,12 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "model")]
     validate: Vec<PathBuf>,
     /// Predict the output for every row of this file, whose output cells may be empty
-    #[arg(long, value_name = "FILE", requires = "model", conflicts_with = "validate")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "model",
+        conflicts_with = "validate"
+    )]
     predict: Option<PathBuf>,
     /// The predicted file is a period of a motion that goes on: predict its steady state
     #[arg(long, requires = "predict")]

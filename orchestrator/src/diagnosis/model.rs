@@ -86,7 +86,10 @@ pub fn predict(
     let mut results = Results::begin(folder.unwrap_or(Path::new(".")))?;
     results.write(&name.to_string_lossy(), |file| {
         writeln!(file, "{PREDICTION}")?;
-        found.rows.iter().try_for_each(|row| writeln!(file, "{row}"))
+        found
+            .rows
+            .iter()
+            .try_for_each(|row| writeln!(file, "{row}"))
     })?;
     results.finish()?;
     Ok(Predicted {
@@ -112,7 +115,14 @@ fn read(model: &Path, columns: Option<&Path>) -> Result<ExtendedRig, Error> {
 impl Validation {
     /// What is printed without `--json`.
     pub fn text(&self) -> String {
-        let heading = ["file", "channel", "as described", "refitted", "extended", "rms error"];
+        let heading = [
+            "file",
+            "channel",
+            "as described",
+            "refitted",
+            "extended",
+            "rms error",
+        ];
         let mut rows = vec![heading.map(String::from).to_vec()];
         for one in &self.records {
             let percent = |value: f64| format!("{value:.2} %");

@@ -231,7 +231,12 @@ pub(super) fn parts(rig: &RigDiagnosis) -> Vec<Vec<String>> {
     vec![
         heading.map(String::from).to_vec(),
         last,
-        confirmed("the same, parts swapped", &rig.swapped, own.swapped_error, ""),
+        confirmed(
+            "the same, parts swapped",
+            &rig.swapped,
+            own.swapped_error,
+            "",
+        ),
         row("all that this part asks for", &rig.as_described),
         row("the same, parts swapped", &rig.swapped),
     ]

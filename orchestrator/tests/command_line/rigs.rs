@@ -42,8 +42,17 @@ fn record(samples: usize, size: f64, shift: f64, zero: f64, given: usize) -> (St
         let t = k as f64 / RATE;
         let shown = 1e3 * x + zero + 0.005 * noise(k);
         measured.push(shown);
-        let cell = if k < given { format!("{shown:.5}") } else { String::new() };
-        writeln!(text, "{t:.4};{:.6};{cell};21.5", 1e-3 * force(t, size, shift)).unwrap();
+        let cell = if k < given {
+            format!("{shown:.5}")
+        } else {
+            String::new()
+        };
+        writeln!(
+            text,
+            "{t:.4};{:.6};{cell};21.5",
+            1e-3 * force(t, size, shift)
+        )
+        .unwrap();
         for i in 0..STEPS {
             let t = t + (i as f64 + 0.5) * h;
             let half = x + 0.5 * h * v;
@@ -90,7 +99,10 @@ fn a_rig_in_ten_lines_and_its_model_on_later_records() {
     let size = &effects[0]["parameters"]["stiffness"];
     let (value, error) = (size["value"].as_f64(), size["standard_error"].as_f64());
     let (value, error) = (value.unwrap(), error.unwrap());
-    assert!((value / CUBIC - 1.0).abs() < 0.02 && error < 0.02 * CUBIC, "{size}");
+    assert!(
+        (value / CUBIC - 1.0).abs() < 0.02 && error < 0.02 * CUBIC,
+        "{size}"
+    );
     assert!(here.join("out/report.html").is_file());
 
     // A later record, larger, whose transducer was set up anew; in other columns.
@@ -98,8 +110,18 @@ fn a_rig_in_ten_lines_and_its_model_on_later_records() {
     write("later.csv", &later.replace("Stroke (mm)", "Weg (mm)"));
     write("map.toml", "displacement = \"Weg (mm)\"\n");
     let model = "out/extended_model.toml";
-    let arguments = ["diagnose", "--model", model, "--columns", "map.toml", "--json"];
-    let found = json(here, &[&arguments[..], &["--validate", "later.csv"]].concat());
+    let arguments = [
+        "diagnose",
+        "--model",
+        model,
+        "--columns",
+        "map.toml",
+        "--json",
+    ];
+    let found = json(
+        here,
+        &[&arguments[..], &["--validate", "later.csv"]].concat(),
+    );
     let one = &found["records"][0];
     let percent = |name: &str| one[name].as_f64().unwrap();
     assert_eq!(one["channel"], "displacement");
@@ -112,7 +134,10 @@ fn a_rig_in_ten_lines_and_its_model_on_later_records() {
     let (begun, whole) = record(2000, 9.0, 0.4, 0.0, 50);
     write("begun.csv", &begun);
     let arguments = ["diagnose", "--model", model, "--predict", "begun.csv"];
-    let told = json(here, &[&arguments[..], &["--out", "prediction.csv", "--json"]].concat());
+    let told = json(
+        here,
+        &[&arguments[..], &["--out", "prediction.csv", "--json"]].concat(),
+    );
     assert_eq!(told["rows"], 2000);
     assert_eq!(told["given"], 50);
     let text = fs::read_to_string(here.join("prediction.csv")).unwrap();

@@ -85,7 +85,10 @@ impl File {
         let in_units = |values: &mut [f64], unit: f64| values.iter_mut().for_each(|v| *v /= unit);
         in_units(&mut self.actuator.voltage_to_force, LBF);
         in_units(&mut self.actuator.velocity_to_force, LBF_S_PER_INCH);
-        for body in [Some(&mut self.table), self.specimen.as_mut()].into_iter().flatten() {
+        for body in [Some(&mut self.table), self.specimen.as_mut()]
+            .into_iter()
+            .flatten()
+        {
             body.mass /= LBF_S2_PER_INCH;
             body.damping /= LBF_S_PER_INCH;
             body.stiffness /= LBF_PER_INCH;

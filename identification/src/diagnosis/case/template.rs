@@ -61,7 +61,11 @@ pub fn template() -> String {
     );
     for channel in Channel::KNOWN {
         let also = channel.aliases().join(", ");
-        text += &format!("#   {} [{}], also called {also}\n", channel.name(), channel.unit());
+        text += &format!(
+            "#   {} [{}], also called {also}\n",
+            channel.name(),
+            channel.unit()
+        );
     }
     text + "\n" + NOMINAL
 }
@@ -76,7 +80,10 @@ mod tests {
         assert!(Nominal::parse(&template()).is_err());
         let wrong = template().replace("\"si\"", "\"metre\"");
         let refused = Nominal::parse(&wrong).unwrap_err();
-        assert!(refused.contains("metre") && refused.contains("laboratory"), "{refused}");
+        assert!(
+            refused.contains("metre") && refused.contains("laboratory"),
+            "{refused}"
+        );
         // All that is to be filled in are numbers.
         Nominal::parse(&template().replace("nan", "1.0")).unwrap();
     }
@@ -108,7 +115,10 @@ mod tests {
         let metre = Nominal::parse(&text("si", 0.0254, 4.448_221_615_260_5)).unwrap();
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
         near(inch.shake_table.table.mass, metre.shake_table.table.mass);
-        near(inch.shake_table.table.stiffness, metre.shake_table.table.stiffness);
+        near(
+            inch.shake_table.table.stiffness,
+            metre.shake_table.table.stiffness,
+        );
         for (a, b) in inch.noise.iter().zip(metre.noise) {
             near(*a, b);
         }

@@ -126,7 +126,11 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         for (i, p) in start.nuisance.iter_mut().enumerate() {
             let off = random.random_range(-APART..APART);
             // What differs from file to file begins as it is.
-            *p = if model.block_of(i).is_some() { 0.0 } else { off };
+            *p = if model.block_of(i).is_some() {
+                0.0
+            } else {
+                off
+            };
         }
         starts.push(start);
     }
@@ -136,7 +140,9 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         .filter_map(|start| least_squares(model, start, screen, &Free::All, LOOK))
         .collect();
     let first = looked.first()?.clone();
-    let best = looked.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let best = looked
+        .into_iter()
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     // The look may have been at a part of the record only.
     let ends: Vec<Simulated> = [first, best]
         .par_iter()
@@ -335,7 +341,10 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
     /// Whether an effect of `point` stands at a bound other than zero.
     fn is_at_bound(&self, point: &Point) -> bool {
         let candidates = self.model.candidates();
-        point.effects.iter().any(|(i, q)| candidates[*i].bound(q).is_some())
+        point
+            .effects
+            .iter()
+            .any(|(i, q)| candidates[*i].bound(q).is_some())
     }
 
     /// Whether `rival` in the place of the effect that `without` lacks gains nearly what that gains.

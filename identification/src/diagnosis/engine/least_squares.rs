@@ -41,7 +41,8 @@ pub trait SimulatedModel: Sync {
 
     /// Whether a fit to record `fitted` tells nuisance coordinate `i` of a block for `tested` as well.
     fn tells(&self, fitted: usize, i: usize, _tested: usize) -> bool {
-        self.block_of(i).is_none_or(|block| self.samples(fitted, block) > 0)
+        self.block_of(i)
+            .is_none_or(|block| self.samples(fitted, block) > 0)
     }
 
     /// Number of samples of `block` in `record`.
@@ -138,8 +139,7 @@ fn width<M: SimulatedModel>(model: &M, i: usize) -> f64 {
 pub fn solution<M: SimulatedModel>(model: &M, point: &Point, record: usize) -> Option<Solution> {
     let errors = all_errors(model, point, record);
     let sum = squares(&errors);
-    let cost = errors.len() as f64 * sum.max(f64::MIN_POSITIVE).ln()
-        + prior(model, point);
+    let cost = errors.len() as f64 * sum.max(f64::MIN_POSITIVE).ln() + prior(model, point);
     (sum.is_finite() && cost.is_finite()).then(|| Solution {
         point: point.clone(),
         errors,

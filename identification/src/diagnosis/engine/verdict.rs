@@ -89,11 +89,7 @@ pub struct Judgement {
 
 /// Estimates of the effects at `point`, with `deviations` of all coordinates, nuisance first; not a
 /// number where they are unknown.
-pub fn estimates(
-    candidates: &[Candidate],
-    point: &Point,
-    deviations: &[f64],
-) -> Vec<NamedEffect> {
+pub fn estimates(candidates: &[Candidate], point: &Point, deviations: &[f64]) -> Vec<NamedEffect> {
     let mut deviations = deviations.iter().skip(point.nuisance.len());
     point
         .effects

@@ -130,7 +130,9 @@ impl Equations for ClosedLoopActuator {
         let shortest = sample / MOST_STEPS / STIFFNESS;
         let pole = |time: f64| if time > shortest { 1.0 / time } else { 0.0 };
         let (command_pole, valve_pole) = (pole(lag), pole(valve));
-        let fastest = (gain * (1.0 + asymmetry.abs())).max(command_pole).max(valve_pole);
+        let fastest = (gain * (1.0 + asymmetry.abs()))
+            .max(command_pole)
+            .max(valve_pole);
         let steps = (sample * fastest / STIFFNESS).ceil().clamp(1.0, MOST_STEPS);
         let h = sample / steps;
         let last = loop_input.len() - 1;
@@ -198,7 +200,10 @@ mod tests {
         for rate in [1000.0, 100.0, 25.0] {
             let n = 200;
             let ramp: Vec<f64> = (0..n).map(|k| f64::from(k) / rate).collect();
-            let channels = vec![(COMMAND, ramp), (Channel::Displacement, vec![0.0; n as usize])];
+            let channels = vec![
+                (COMMAND, ramp),
+                (Channel::Displacement, vec![0.0; n as usize]),
+            ];
             let recording = Recording::new("ramp", 1.0 / rate, channels).unwrap();
             let recording =
                 RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
@@ -217,7 +222,10 @@ mod tests {
                 let t = k as f64 / rate;
                 let fading = |time: f64| time * time * (-t / time).exp();
                 let exact = t - slow - lag + (fading(slow) - fading(lag)) / (slow - lag);
-                assert!((y - exact).abs() < 2e-4 * slow, "{rate} Hz, {k}: {y} {exact}");
+                assert!(
+                    (y - exact).abs() < 2e-4 * slow,
+                    "{rate} Hz, {k}: {y} {exact}"
+                );
             }
         }
     }

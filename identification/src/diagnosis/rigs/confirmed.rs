@@ -78,7 +78,10 @@ pub(super) fn unfit(measured: &Measured<'_>, point: &Point, deviations: &[f64]) 
         if let Some(reason) = bound {
             refused.push((*index, reason));
         } else if sizes && !clear {
-            refused.push((*index, "the 95 % interval of its size holds zero".to_owned()));
+            refused.push((
+                *index,
+                "the 95 % interval of its size holds zero".to_owned(),
+            ));
         }
     }
     refused
@@ -191,7 +194,9 @@ pub(super) fn confirm(
         if out.is_empty() {
             break fits;
         }
-        start.effects.retain(|(i, _)| out.iter().all(|(o, _)| o != i));
+        start
+            .effects
+            .retain(|(i, _)| out.iter().all(|(o, _)| o != i));
         for (index, reason) in out {
             if refused.iter().all(|(known, _)| *known != index) {
                 refused.push((index, reason));
@@ -287,13 +292,19 @@ fn differences(
             continue;
         }
         let mean = own.iter().map(|(_, v)| v.value).sum::<f64>() / n;
-        let variance = own.iter().map(|(_, v)| (v.value - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        let variance = own
+            .iter()
+            .map(|(_, v)| (v.value - mean).powi(2))
+            .sum::<f64>()
+            / (n - 1.0);
         let scatter = (variance / n).sqrt();
         if scatter > parameter.standard_error || parameter.standard_error.is_nan() {
             parameter.standard_error = scatter;
         }
         let ends = |order: fn(f64, f64) -> bool| {
-            own.iter().copied().reduce(|a, b| if order(a.1.value, b.1.value) { a } else { b })
+            own.iter()
+                .copied()
+                .reduce(|a, b| if order(a.1.value, b.1.value) { a } else { b })
         };
         let (Some(low), Some(high)) = (ends(|a, b| a < b), ends(|a, b| a > b)) else {
             continue;

@@ -124,9 +124,17 @@ impl Equations for ControlledDamper {
         );
         let command = recording.input(COMMAND);
         let h = recording.period();
-        let keep = |time: f64| if time > 0.01 * h { (-h / time).exp() } else { 0.0 };
-        let (keep_command, keep_force) =
-            (keep(e.command_lag.time_constant), keep(e.force_lag.time_constant));
+        let keep = |time: f64| {
+            if time > 0.01 * h {
+                (-h / time).exp()
+            } else {
+                0.0
+            }
+        };
+        let (keep_command, keep_force) = (
+            keep(e.command_lag.time_constant),
+            keep(e.force_lag.time_constant),
+        );
         let friction = &e.hysteretic_friction;
         let mut taken_up = session.taken_up.clamp(-1.0, 1.0);
         let mut acting = command.first().copied().unwrap_or(0.0);
@@ -150,7 +158,8 @@ impl Equations for ControlledDamper {
                 force += friction.force * growth.max(0.0) * taken_up;
             }
             force *= 1.0 + e.asymmetry.share * speed.signum();
-            force += nominal.offset + place * (nominal.stiffness + e.cubic_stiffness.stiffness * place * place);
+            force += nominal.offset
+                + place * (nominal.stiffness + e.cubic_stiffness.stiffness * place * place);
             if e.inertia.mass != 0.0 {
                 let (before, after) = (v[k.saturating_sub(1)], v[(k + 1).min(last)]);
                 force += e.inertia.mass * (after - before) / (2.0 * h);

@@ -237,17 +237,19 @@ impl Description {
         known
             .iter()
             .zip(rig.defaults())
-            .map(|((name, si), default)| match (self.nominal.get(*name), default) {
-                (Some(quantity), _) => self.si(&format!("nominal.{name}"), quantity, si),
-                (None, Some(default)) => Ok((*default, 0.0)),
-                (None, None) => {
-                    let found: Vec<&str> = self.nominal.keys().map(String::as_str).collect();
-                    Err(self.wrong(format!(
-                        "`nominal.{name}` is missing: a value in {si}; found {}",
-                        listed(&found)
-                    )))
-                }
-            })
+            .map(
+                |((name, si), default)| match (self.nominal.get(*name), default) {
+                    (Some(quantity), _) => self.si(&format!("nominal.{name}"), quantity, si),
+                    (None, Some(default)) => Ok((*default, 0.0)),
+                    (None, None) => {
+                        let found: Vec<&str> = self.nominal.keys().map(String::as_str).collect();
+                        Err(self.wrong(format!(
+                            "`nominal.{name}` is missing: a value in {si}; found {}",
+                            listed(&found)
+                        )))
+                    }
+                },
+            )
             .collect()
     }
 }

@@ -8,8 +8,8 @@ use super::measured::{Measured, Part};
 use super::{Description, DescriptionError, Measurement};
 use crate::diagnosis::engine::resampling::gain_interval;
 use crate::diagnosis::engine::{
-    Observer, Point, Progress, Selected, SimulatedModel, Verdict, all_errors, completed,
-    estimates, select,
+    Observer, Point, Progress, Selected, SimulatedModel, Verdict, all_errors, completed, estimates,
+    select,
 };
 
 /// A parameter of the extended model, SI.
@@ -128,8 +128,7 @@ pub fn diagnose(
     let part = |fitted: Part| -> Result<PartReport, DescriptionError> {
         let record = fitted as usize;
         observer.tell(|| Progress::Fitting(measured.record_name(record).to_owned()));
-        let selected =
-            select(&measured, record, observer).ok_or_else(|| no_output(description))?;
+        let selected = select(&measured, record, observer).ok_or_else(|| no_output(description))?;
         Ok(part_report(&measured, fitted, &selected))
     };
     let as_described = part(Part::Fitted)?;
@@ -170,9 +169,14 @@ pub fn diagnose(
     let mut refused: Vec<Refused> = Vec::new();
     for (part, others) in [(&as_described, &swapped), (&swapped, &as_described)] {
         for effect in &part.effects {
-            let other = others.effects.iter().find(|o| alike(&effect.effect, &o.effect));
+            let other = others
+                .effects
+                .iter()
+                .find(|o| alike(&effect.effect, &o.effect));
             let Some(other) = other else { continue };
-            let reasons = [effect, other].into_iter().filter_map(|one| one.objection.clone());
+            let reasons = [effect, other]
+                .into_iter()
+                .filter_map(|one| one.objection.clone());
             if let Some(reason) = reasons.into_iter().next() {
                 refused.push((index(&effect.effect), reason));
             }
@@ -198,10 +202,12 @@ pub fn diagnose(
     let named: Vec<String> = confirmed
         .effects
         .iter()
-        .map(|(name, _)| match there.iter().find(|other| alike(name, other)) {
-            Some(other) if other != name => format!("{name} or {other}"),
-            _ => name.clone(),
-        })
+        .map(
+            |(name, _)| match there.iter().find(|other| alike(name, other)) {
+                Some(other) if other != name => format!("{name} or {other}"),
+                _ => name.clone(),
+            },
+        )
         .collect();
     let pays = confirmed.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
     let is_named = |effect: &str| confirmed.effects.iter().any(|(name, _)| name == effect);

@@ -235,10 +235,16 @@ impl ExtendedRig {
             let names = known.iter().map(|e| e.candidate.effect);
             let place = place.ok_or_else(|| {
                 let hint = units::hint(name, names);
-                self.wrong(format!("`effects.{name}` is unknown to {}{hint}", self.kind))
+                self.wrong(format!(
+                    "`effects.{name}` is unknown to {}{hint}",
+                    self.kind
+                ))
             })?;
             let parameters = &known[place].candidate.parameters;
-            if let Some(extra) = values.keys().find(|k| parameters.iter().all(|p| p.name != **k)) {
+            if let Some(extra) = values
+                .keys()
+                .find(|k| parameters.iter().all(|p| p.name != **k))
+            {
                 return Err(self.wrong(format!("`effects.{name}.{extra}` is unknown")));
             }
             let own = parameters.iter().map(|p| {
@@ -254,7 +260,11 @@ impl ExtendedRig {
 
     fn session_values(&self, rig: &dyn Rig) -> Result<Vec<f64>, DescriptionError> {
         let known = rig.session();
-        if let Some(extra) = self.session.keys().find(|k| known.iter().all(|own| own.name != **k)) {
+        if let Some(extra) = self
+            .session
+            .keys()
+            .find(|k| known.iter().all(|own| own.name != **k))
+        {
             return Err(self.wrong(format!("`session.{extra}` is unknown to {}", self.kind)));
         }
         let own = known.iter().map(|own| match self.session.get(own.name) {
@@ -319,7 +329,9 @@ impl ExtendedRig {
                     extended_percent,
                     extended_rms,
                     unit: rig.output().unit().to_owned(),
-                    session: named.map(|(own, value)| (own.name.to_owned(), value)).collect(),
+                    session: named
+                        .map(|(own, value)| (own.name.to_owned(), value))
+                        .collect(),
                 })
             })
             .collect()

@@ -351,7 +351,13 @@ mod tests {
             stiffness: 1e8,
         };
         let mut out = vec![0.0; n];
-        HystereticDevice.simulate(&recording, &nominal, &effects, &Session::default(), &mut out);
+        HystereticDevice.simulate(
+            &recording,
+            &nominal,
+            &effects,
+            &Session::default(),
+            &mut out,
+        );
         let fade = |excursion: f64| 0.3 * (-50.0 * excursion).exp();
         for (place, force) in [
             (500, 1e4 * (1.0 - fade(0.005))),

@@ -30,8 +30,8 @@ impl Part {
     }
 }
 
-/// Width of the priors that hold: a hundred neighbouring samples are about as good as one.
-const HELD: f64 = 0.1;
+/// Width of the priors that hold: nothing moves.
+const HELD: f64 = 1e-3;
 
 /// The record of all samples.
 pub const EVERYTHING: usize = 8;
@@ -224,7 +224,11 @@ impl<'a> Measured<'a> {
 
     /// Simulated output of one recording.
     pub fn simulate(&self, point: &Point, recording: usize) -> Vec<f64> {
-        self.simulate_to(point, recording, self.measurement.recordings[recording].len())
+        self.simulate_to(
+            point,
+            recording,
+            self.measurement.recordings[recording].len(),
+        )
     }
 
     fn simulate_to(&self, point: &Point, recording: usize, samples: usize) -> Vec<f64> {
@@ -365,8 +369,19 @@ impl SimulatedModel for Measured<'_> {
     }
 
     fn record_name(&self, record: usize) -> &str {
-        let of_file = || Some(self.measurement.recordings.get(record.checked_sub(NAMES.len())?)?.name());
-        NAMES.get(record).copied().or_else(of_file).unwrap_or("none")
+        let of_file = || {
+            Some(
+                self.measurement
+                    .recordings
+                    .get(record.checked_sub(NAMES.len())?)?
+                    .name(),
+            )
+        };
+        NAMES
+            .get(record)
+            .copied()
+            .or_else(of_file)
+            .unwrap_or("none")
     }
 
     fn starts(&self, base: &Point, record: usize) -> Vec<(usize, Vec<f64>)> {

@@ -25,16 +25,14 @@ mod template;
 
 pub use confirmed::Confirmed;
 pub use description::{Column, Description, DescriptionError, LeftOut, Quantity, renamed};
-pub use diagnosis::{
-    NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, diagnose,
-};
+pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
 pub use extended::{ExtendedRig, FileErrors, Prediction};
 
 pub use natural::Natural;
 pub use reading::Measurement;
 pub use recording::RigRecording;
-pub use template::template;
 pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole, SessionTable};
+pub use template::template;
 
 use crate::data::Channel;
 

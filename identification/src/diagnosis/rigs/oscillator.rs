@@ -169,7 +169,8 @@ impl<'a> Law<'a> {
         } else {
             y
         };
-        let mut resisting = n.stiffness * (stretch + e.asymmetric_stiffness.asymmetry * stretch.abs());
+        let mut resisting =
+            n.stiffness * (stretch + e.asymmetric_stiffness.asymmetry * stretch.abs());
         resisting += y * y * (e.quadratic_stiffness.stiffness + e.cubic_stiffness.stiffness * y);
         if e.stops.stiffness > 0.0 {
             resisting += e.stops.stiffness * (y.abs() - e.stops.gap).max(0.0).copysign(y);
@@ -304,7 +305,15 @@ impl Equations for Oscillator {
         let h = sample / steps as f64;
         let first = between[0];
         let start = session.start;
-        let mut state: State = [start, session.start_speed, 0.0, first, start, start, session.start_speed];
+        let mut state: State = [
+            start,
+            session.start_speed,
+            0.0,
+            first,
+            start,
+            start,
+            session.start_speed,
+        ];
         let shown = |state: &State| {
             let y = if effects.sensor_lag.time_constant > 0.0 {
                 state[4]
@@ -323,7 +332,10 @@ impl Equations for Oscillator {
                     // A staircase jumps at the end of its step, where the old stair still acts.
                     let mut forces = [place, place + stride, place + 2 * stride].map(at);
                     if held != 0.0 && late == 0.0 {
-                        forces[2] = forces[2] + held * (at_stair(between, k) - at_stair(between, (place + 2 * stride) / PLACES));
+                        forces[2] = forces[2]
+                            + held
+                                * (at_stair(between, k)
+                                    - at_stair(between, (place + 2 * stride) / PLACES));
                     }
                     *state = law.step(state, h, forces);
                 }
@@ -335,8 +347,10 @@ impl Equations for Oscillator {
             for _ in 0..PASSES {
                 let before = state;
                 pass(&mut state, samples, &mut []);
-                let moved = (state[0] - before[0]).abs() / (state[0].abs() + before[0].abs()).max(f64::MIN_POSITIVE);
-                let turned = (state[1] - before[1]).abs() / (state[1].abs() + before[1].abs()).max(f64::MIN_POSITIVE);
+                let moved = (state[0] - before[0]).abs()
+                    / (state[0].abs() + before[0].abs()).max(f64::MIN_POSITIVE);
+                let turned = (state[1] - before[1]).abs()
+                    / (state[1].abs() + before[1].abs()).max(f64::MIN_POSITIVE);
                 if moved < SETTLED && turned < SETTLED {
                     break;
                 }

@@ -110,7 +110,11 @@ impl Description {
             .chain([Channel::Time])
             .collect();
         let names: Vec<&str> = known.iter().map(|channel| channel.name()).collect();
-        if let Some(extra) = self.columns.keys().find(|key| !names.contains(&key.as_str())) {
+        if let Some(extra) = self
+            .columns
+            .keys()
+            .find(|key| !names.contains(&key.as_str()))
+        {
             return Err(self.wrong(format!(
                 "`columns.{extra}` is unknown: expected {}{}",
                 names.join(", "),

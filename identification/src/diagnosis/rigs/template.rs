@@ -17,7 +17,9 @@ pub fn template(rig: &dyn Rig) -> String {
         text.push('\n');
     };
     let kind = rig.kind();
-    line(format!("# A rig of kind {kind}. Replace every `nan` and every name in <>; then run"));
+    line(format!(
+        "# A rig of kind {kind}. Replace every `nan` and every name in <>; then run"
+    ));
     line("# shakebench diagnose THIS_FILE.toml --out results".into());
     line("name = \"<what it is called>\"".into());
     line(format!("kind = \"{kind}\""));
@@ -26,8 +28,14 @@ pub fn template(rig: &dyn Rig) -> String {
     line("# Time between samples, where the files have no column of times:".into());
     line("# time_step = { value = 1.0, unit = \"ms\" }".into());
     line(String::new());
-    line("# Columns by their text in the header, with the unit of their numbers; other columns are".into());
-    line("# left alone. Another file of the same rig may name them otherwise: --columns MAP.toml".into());
+    line(
+        "# Columns by their text in the header, with the unit of their numbers; other columns are"
+            .into(),
+    );
+    line(
+        "# left alone. Another file of the same rig may name them otherwise: --columns MAP.toml"
+            .into(),
+    );
     line("[columns]".into());
     let mut column = |channel: Channel, comment: &str, note: &str| {
         let (name, unit) = (channel.name(), channel.unit());
@@ -44,7 +52,10 @@ pub fn template(rig: &dyn Rig) -> String {
         column(*channel, "# ", "  # where there is one");
     }
     line(String::new());
-    line("# What is believed of the rig: value, one standard deviation (without it the value is".into());
+    line(
+        "# What is believed of the rig: value, one standard deviation (without it the value is"
+            .into(),
+    );
     line("# exact), unit of both.".into());
     line("[nominal]".into());
     let parameters = rig.parameters().iter().zip(rig.about_parameters());
@@ -90,7 +101,10 @@ mod tests {
         std::fs::create_dir_all(&folder).unwrap();
         for rig in KINDS {
             let text = template(rig);
-            assert!(text.lines().all(|line| line.chars().count() <= WIDTH + 20), "{text}");
+            assert!(
+                text.lines().all(|line| line.chars().count() <= WIDTH + 20),
+                "{text}"
+            );
             let path = folder.join(format!("{}.toml", rig.kind()));
             std::fs::write(&path, &text).unwrap();
             let description = Description::read(&path).unwrap();
