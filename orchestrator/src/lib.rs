@@ -2,6 +2,7 @@
 
 pub mod benchmark;
 pub mod cli;
+pub mod commission;
 pub mod comparison;
 pub mod component_library;
 pub mod design;

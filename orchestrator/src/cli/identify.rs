@@ -59,6 +59,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         model: arguments.out.clone(),
         fit_part: arguments.fit_part,
         specimen: arguments.specimen.clone(),
+        hydraulic_first: false,
     })?;
     identified.write()?;
     if arguments.json {

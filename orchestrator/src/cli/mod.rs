@@ -2,6 +2,7 @@
 
 pub mod benchmark;
 pub mod build;
+pub mod commission;
 pub mod compare;
 pub mod design;
 pub mod diagnose;
@@ -39,6 +40,8 @@ enum Command {
     Benchmark(benchmark::Arguments),
     /// Build the components and pack them as FMUs
     Build(build::Arguments),
+    /// Record, identify and validate a rig, and design all controllers on the result
+    Commission(commission::Arguments),
     /// Run controllers on records and print the thesis's tables beside the results
     Compare(compare::Arguments),
     /// Print margins of the loops and draw their frequency responses
@@ -67,6 +70,7 @@ pub fn main() -> ExitCode {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
         Some(Command::Build(arguments)) => build::execute(&arguments),
+        Some(Command::Commission(arguments)) => commission::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),

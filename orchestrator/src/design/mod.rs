@@ -2,6 +2,7 @@
 
 mod figures;
 mod loops;
+pub mod model;
 mod page;
 mod table;
 

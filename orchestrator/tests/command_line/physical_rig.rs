@@ -311,7 +311,10 @@ fn a_broken_rig_is_brought_to_null_in_the_time_that_the_docs_state() {
             0.024,
         ));
     }
-    let lost: &[&str] = &["interlock.tripped", "too far from the reference"];
+    let lost: &[&str] = &[
+        "interlock.tripped",
+        "the supply's pressure is below its limit",
+    ];
     cases.push((
         "supply lost".into(),
         vec![format!("table.supply_loss_time{at}")],
