@@ -18,6 +18,7 @@ pub mod motion;
 pub mod pack;
 pub mod report;
 pub mod results;
+pub mod rigs;
 pub mod run;
 pub mod system;
 pub use units;

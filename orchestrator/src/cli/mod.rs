@@ -10,6 +10,7 @@ pub mod identify;
 pub mod info;
 pub mod report;
 mod rig;
+pub mod rigs;
 pub mod run;
 
 use std::path::PathBuf;
@@ -60,6 +61,8 @@ enum Command {
         /// File that the calls come through
         file: PathBuf,
     },
+    /// Draw rigs about the physical one and compare designs on them
+    Rigs(rigs::Arguments),
     /// Run a system on a motion
     Run(Box<run::Arguments>),
 }
@@ -78,6 +81,7 @@ pub fn main() -> ExitCode {
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
+        Some(Command::Rigs(arguments)) => rigs::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
     };
     done.unwrap_or_else(|error| {

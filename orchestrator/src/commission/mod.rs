@@ -16,6 +16,7 @@ use identification::data::{Channel, Recording};
 use serde::Serialize;
 
 use self::experiment::{Bench, Played};
+
 use self::motions::{Sines, motion, triangle};
 use crate::design::model::{self, ModelDesign};
 use crate::error::Error;
@@ -25,6 +26,8 @@ use crate::report::number::significant;
 use crate::results::Results;
 use crate::system::control_model::ControlModel;
 use crate::units::STANDARD_GRAVITY;
+
+pub use self::experiment::CONTROLLER;
 
 /// What is commissioned how.
 #[derive(Debug, Clone)]
@@ -228,6 +231,29 @@ pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned
         identified,
         model_text,
     })
+}
+
+/// The recording that is identified, alone.
+///
+/// # Errors
+/// A rig at fault, or one that trips at the least motion.
+pub fn record_excitation(request: &Request) -> Result<Recording, Error> {
+    let mut bench = Bench::new(request)?;
+    let dt = bench.dt();
+    let shape = Sines {
+        band: BAND,
+        lines: None,
+        duration: request.duration,
+        dt,
+        seed: request.seed,
+    }
+    .shape();
+    let (scale, _) = grow(&mut bench, request, &shape)?;
+    let played = bench.play(motion(EXCITATION, &shape, scale, dt, Some(request.seed)))?;
+    match played.ended {
+        None => Ok(played.recording),
+        Some(reason) => Err(does_not_run(&reason)),
+    }
 }
 
 fn does_not_run(reason: &str) -> Error {

@@ -12,8 +12,8 @@ use crate::system::{Setting, SystemFile};
 /// The system of `controller`, designed on the file `model`, as TOML.
 pub(super) fn system(request: &Request, controller: &str, model: &Path) -> Result<String, Error> {
     let wanted = Wanted {
-        tuning: None,
         model: Some(model),
+        ..Wanted::default()
     };
     let mut file = built_in::system(controller, &request.plant, &request.specimen, wanted)?;
     for setting in &request.set {

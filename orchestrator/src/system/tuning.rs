@@ -41,6 +41,8 @@ pub struct Wanted<'a> {
     pub tuning: Option<Tuning>,
     /// Model file to tune on; none: the physical rig's commissioning.
     pub model: Option<&'a Path>,
+    /// Rules on a model that has been read; they go before everything else.
+    pub rules: Option<&'a Rules>,
 }
 
 /// Gives the controllers in `file` the parameters for `plant` with a specimen of that mass (kg).
@@ -53,6 +55,10 @@ pub(super) fn apply(
     specimen_mass: Option<f64>,
     wanted: Wanted<'_>,
 ) -> Result<(), String> {
+    if let Some(rules) = wanted.rules {
+        rules.apply(file, specimen_mass);
+        return Ok(());
+    }
     let own;
     let rules = match (wanted.tuning, wanted.model, plant.commissioned) {
         (Some(Tuning::Printed), Some(_), _) => {
@@ -81,24 +87,7 @@ pub(super) fn apply(
             rules.as_ref().map_err(Clone::clone)?
         }
     };
-    let specimen_mass = rules.model.specimen_mass.or(specimen_mass);
-    for (name, component) in &mut file.components {
-        match component.tuning {
-            None => {}
-            Some(Rule::DisplacementPid) => rules.named(component, Member::DisplacementPid),
-            Some(Rule::ForcePid) => rules.force_pid(component),
-            Some(Rule::LoopShaping) => rules.named(component, Member::LoopShaping),
-            Some(Rule::ModelPredictive) => {
-                rules.model_predictive(component);
-                delay_references(&mut file.connections, name, rules.model.delay);
-            }
-            Some(Rule::SlidingMode) => {
-                rules.sliding_mode(component, specimen_mass);
-            }
-            Some(Rule::ThreeVariable) => rules.named(component, Member::ThreeVariable),
-            Some(Rule::UnderPrediction) => rules.under_prediction(component),
-        }
-    }
+    rules.apply(file, specimen_mass);
     Ok(())
 }
 
@@ -113,8 +102,9 @@ fn delay_references(connections: &mut [Link], name: &str, delay: usize) {
     }
 }
 
-/// What all rules use.
-struct Rules {
+/// All rules on a model.
+#[derive(Debug, Clone)]
+pub struct Rules {
     model: ControlModel,
     suite: Suite,
 }
@@ -126,9 +116,34 @@ fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
 }
 
 impl Rules {
-    fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
+    /// Finds all controllers on a model.
+    ///
+    /// # Errors
+    /// A model for which a rule finds none.
+    pub fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
         let suite = model.suite()?;
         Ok(Self { model, suite })
+    }
+
+    /// Gives the controllers in `file` their parameters, under a specimen of that mass (kg) where the
+    /// model knows of none.
+    fn apply(&self, file: &mut SystemFile, specimen_mass: Option<f64>) {
+        let specimen_mass = self.model.specimen_mass.or(specimen_mass);
+        for (name, component) in &mut file.components {
+            match component.tuning {
+                None => {}
+                Some(Rule::DisplacementPid) => self.named(component, Member::DisplacementPid),
+                Some(Rule::ForcePid) => self.force_pid(component),
+                Some(Rule::LoopShaping) => self.named(component, Member::LoopShaping),
+                Some(Rule::ModelPredictive) => {
+                    self.model_predictive(component);
+                    delay_references(&mut file.connections, name, self.model.delay);
+                }
+                Some(Rule::SlidingMode) => self.sliding_mode(component, specimen_mass),
+                Some(Rule::ThreeVariable) => self.named(component, Member::ThreeVariable),
+                Some(Rule::UnderPrediction) => self.under_prediction(component),
+            }
+        }
     }
 
     /// What the suite sets a controller to.
