@@ -441,6 +441,8 @@ fn quadratics(roots: &[Complex<f64>]) -> Vec<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::loops::{LinearLaw, Loop, Time};
+    use plant::identified::coupled::Rig;
     use units::constants::SAMPLING_PERIOD;
 
     #[test]
@@ -468,6 +470,18 @@ mod tests {
                 let run = Pushed::new(&rig, &mut command, 20.0);
                 assert!(run.is_stable(), "{late} {target}");
                 let reached = run.open_loop(2.0).first_crossover().unwrap();
+                if late == 0.0 {
+                    let law = LinearLaw::shaped(&design.law, SAMPLING_PERIOD).unwrap();
+                    let rig_loop = Loop::new(&Rig::default(), law);
+                    for omega in [3.0, 40.0, 300.0] {
+                        let (a, b) = (
+                            rig_loop.open(Time::Sampled, omega),
+                            run.open_loop(2.0).at(omega),
+                        );
+                        assert!((a / b - 1.0).norm() < 0.01, "{omega}: {a} {b}");
+                    }
+                    assert!(rig_loop.is_stable(Time::Sampled));
+                }
                 assert!((reached / target - 1.0).abs() < 0.03, "{target} {reached}");
             }
         }

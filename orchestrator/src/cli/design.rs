@@ -22,8 +22,8 @@ pub struct Arguments {
     /// three-variable or sliding-mode [default: all]
     #[arg(long = "loop", value_name = "NAME")]
     only: Option<String>,
-    /// Target crossover of the loop-shaping synthesis, rad/s [default: 65, which comes nearest to
-    /// Eq 3-10]
+    /// Crossover that loop shaping is to reach, rad/s [default: the synthesis that comes nearest to
+    /// Eq 3-10; with --model the fastest with 6 dB and 45 degrees]
     #[arg(long, value_name = "RAD_PER_S")]
     crossover: Option<f64>,
     /// Design every controller on this model, as `shakebench identify` writes it: displacement-pid,
@@ -135,9 +135,28 @@ fn on_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
 }
 
 fn words(synthesis: &Synthesis) -> String {
+    let reached = synthesis
+        .reached_crossover_rad_s
+        .map_or(String::new(), |reached| {
+            format!(", reached {}", significant(reached, 4))
+        });
+    let sections: String = synthesis
+        .sections
+        .iter()
+        .map(|[b2, b1, a2, a1]| {
+            let cell = |value: &f64| significant(*value, 4);
+            format!(
+                " ({} s^2 + {} s + 1)/({} s^2 + {} s + 1)",
+                cell(b2),
+                cell(b1),
+                cell(a2),
+                cell(a1)
+            )
+        })
+        .collect();
     format!(
-        "loop-shaping-synthesis: target {} rad/s, gamma_min {:.4}; C = {:.4} (s^2 + {:.4} s + {:.4}) / \
-             (s (s + {:.5})) V/in (Eq 3-10: 6.986, 0.2975, 0.5892, 0.01046)\n",
+        "loop-shaping-synthesis: target {} rad/s{reached}, gamma_min {:.4}; C = {:.4} (s^2 + {:.4} s + {:.4}) / \
+             (s (s + {:.5})){sections} V/in (Eq 3-10: 6.986, 0.2975, 0.5892, 0.01046)\n",
         significant(synthesis.crossover_rad_s, 3),
         synthesis.gamma_min,
         synthesis.gain_v_m * INCH,

@@ -125,6 +125,19 @@ fn pole(pole: &[f64; 2]) -> String {
 /// What is printed without `--json`.
 fn text(found: &RigIdentification, summary: &Summary) -> String {
     let mut text = String::new();
+    let colours: Vec<String> = found
+        .residuals
+        .iter()
+        .filter(|(_, _, test)| !test.is_white())
+        .map(|(recording, channel, _)| format!("{channel} of {recording}"))
+        .collect();
+    if !colours.is_empty() {
+        text += &format!(
+            "not white: the one-step errors of {}: this model lacks something that the rig does, and \
+             the standard errors are too small\n\n",
+            colours.join(", ")
+        );
+    }
     if summary.identifiable {
         text += "actuator poles\n";
         for own in &summary.actuator_poles_rad_s {

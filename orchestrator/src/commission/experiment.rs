@@ -96,7 +96,7 @@ impl Bench {
         self.prepared.motion = motion;
         let outcome = self.prepared.run(Algorithm::default())?;
         let motion = &self.prepared.motion;
-        let rows = outcome.record.len();
+        let rows = outcome.record.len().min(motion.len());
         let mut channels = vec![
             (Channel::Reference, motion.displacement[..rows].to_vec()),
             (
@@ -129,6 +129,9 @@ impl Bench {
             if channel != Channel::SpecimenAcceleration || self.specimen {
                 channels.push((channel, shown(&outcome.record, &names)?));
             }
+        }
+        for (_, values) in &mut channels {
+            values.truncate(rows);
         }
         Ok(Played {
             recording: Recording::new(&motion.name, motion.dt, channels)?,

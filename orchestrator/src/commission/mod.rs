@@ -75,6 +75,8 @@ pub struct Prediction {
     pub largest_percent: f64,
     /// Root mean square of the error over that peak, percent.
     pub rms_percent: f64,
+    /// Root mean square of the error of the displacement over its own, percent.
+    pub displacement_percent: f64,
     /// Root mean square of the error of the command over its own, percent.
     pub command_percent: f64,
 }
@@ -324,10 +326,14 @@ fn predict(
     let mut law = bench.law();
     let (mut largest, mut square, mut peak) = (0.0_f64, 0.0, 0.0_f64);
     let (mut command_square, mut command_size) = (0.0, 0.0);
+    let (mut way_square, mut way_size) = (0.0, 0.0);
+    let ways = other.samples(Channel::Displacement);
     let wanted = other.samples(Channel::Reference);
     let measured = other.samples(Channel::Acceleration);
     let commands = other.samples(Channel::ValveCommand);
-    for ((reference, measured), recorded) in wanted.iter().zip(measured).zip(commands) {
+    for (((reference, measured), recorded), way) in
+        wanted.iter().zip(measured).zip(commands).zip(ways)
+    {
         let shown = model.shown();
         let input = PidInput {
             reference: *reference,
@@ -341,6 +347,8 @@ fn predict(
         peak = peak.max(measured.abs());
         command_square += (command - recorded).powi(2);
         command_size += recorded * recorded;
+        way_square += (shown.displacement - way).powi(2);
+        way_size += way * way;
     }
     let count = wanted.len().max(1) as f64;
     Prediction {
@@ -348,6 +356,7 @@ fn predict(
         peak_m_s2: peak,
         largest_percent: 100.0 * largest / peak,
         rms_percent: 100.0 * (square / count).sqrt() / peak,
+        displacement_percent: 100.0 * (way_square / way_size).sqrt(),
         command_percent: 100.0 * (command_square / command_size).sqrt(),
     }
 }

@@ -4,6 +4,7 @@
 
 mod archives;
 mod benchmark;
+mod commissioning;
 mod contract;
 mod diagnosis;
 mod failures;
