@@ -62,6 +62,7 @@ fn report(own: &Commissioned) -> Report {
             env!("CARGO_PKG_VERSION"),
             own.seed
         ),
+        ..Report::default()
     }
 }
 
