@@ -161,6 +161,18 @@ impl LoopShaping {
         value
     }
 
+    /// Root mean square of the command that white noise of unit size makes of the error, V/m.
+    pub fn noise_gain(&self, period: f64) -> f64 {
+        const LINES: usize = 200;
+        let nyquist = std::f64::consts::PI / period;
+        // Midpoints: the integral's pole at zero and the Nyquist frequency stay out.
+        let square: f64 = (0..LINES)
+            .map(|line| (line as f64 + 0.5) / LINES as f64 * nyquist)
+            .map(|omega| self.response(omega, period).norm_sqr())
+            .sum();
+        (square / LINES as f64).sqrt()
+    }
+
     /// The parameters with the names that the component gives them.
     pub fn named(&self) -> Vec<(String, f64)> {
         let c = &self.coefficients;

@@ -48,6 +48,8 @@ pub struct Shaped<'a> {
     pub rig: &'a ShakeTable,
     /// Lateness of what is measured, s.
     pub late: f64,
+    /// One standard deviation of the measured displacement's white noise, m.
+    pub noise: f64,
     /// Sampling period, s.
     pub period: f64,
 }
@@ -139,14 +141,15 @@ impl Shaped<'_> {
     }
 
     /// The fastest controller whose sampled loop keeps a gain margin of 6 dB and a phase margin of
-    /// 45 degrees, and is stable with twice and half its gain: crossovers are tried from the inverse
-    /// of the lateness downwards.
+    /// 45 degrees, and which makes no more than a hundredth of the valve's range (root mean square)
+    /// of the measurement's noise: crossovers are tried from the inverse of the lateness downwards.
     ///
     /// # Errors
     /// No such controller down to a fiftieth of that.
     pub fn fastest(&self) -> Result<WholePlantDesign, ModelError> {
         const GAIN_MARGIN_DB: f64 = 6.0;
         const PHASE_MARGIN_DEG: f64 = 45.0;
+        const NOISE_PART: f64 = 0.01;
         let most = 1.0 / (self.late + 1.5 * self.period).max(4.0 * self.period);
         let mut crossover = most;
         let mut last = None;
@@ -157,7 +160,9 @@ impl Shaped<'_> {
                     let holds = margins.gain_margin_db.is_none_or(|m| m >= GAIN_MARGIN_DB)
                         && margins
                             .phase_margin_deg
-                            .is_none_or(|m| m >= PHASE_MARGIN_DEG);
+                            .is_none_or(|m| m >= PHASE_MARGIN_DEG)
+                        && design.law.noise_gain(self.period) * self.noise
+                            <= NOISE_PART * design.law.limit;
                     if holds {
                         return Ok(design);
                     }
@@ -168,7 +173,8 @@ impl Shaped<'_> {
         }
         let reason = last.map_or(String::new(), |error| format!(" ({error})"));
         Err(no_solution(format!(
-            "no crossover from {most:.3} to {:.3} rad/s leaves 6 dB and 45 degrees{reason}",
+            "no crossover from {most:.3} to {:.3} rad/s leaves 6 dB, 45 degrees and a quiet \
+             valve{reason}",
             most / 50.0
         )))
     }
@@ -452,6 +458,7 @@ mod tests {
             let shaped = Shaped {
                 rig: &thesis,
                 late,
+                noise: 0.0,
                 period: SAMPLING_PERIOD,
             };
             for target in targets {
@@ -493,9 +500,12 @@ mod tests {
         let shaped = Shaped {
             rig: &rig,
             late: 0.002,
+            noise: 1.27e-5,
             period: SAMPLING_PERIOD,
         };
         let design = shaped.fastest().unwrap();
+        // Half a thousandth of an inch of noise, and a tenth of a volt.
+        assert!(design.law.noise_gain(SAMPLING_PERIOD) * 1.27e-5 <= 0.1);
         println!("{design:?}");
         assert!(design.margins.gain_margin_db.unwrap() >= 6.0);
         assert!(design.margins.phase_margin_deg.unwrap() >= 45.0);

@@ -157,7 +157,12 @@ impl Suite {
             ..Parameters::default()
         };
         mpc.validate()?;
-        let shaped = Shaped { rig, late, period };
+        let shaped = Shaped {
+            rig,
+            late,
+            noise: noise[0],
+            period,
+        };
         Ok(Self {
             rig: *rig,
             measurements: *measurements,
@@ -175,9 +180,18 @@ impl Suite {
     /// # Errors
     /// A crossover that is not reached.
     pub fn with_crossover(mut self, crossover: f64) -> Result<Self, ModelError> {
-        let Measurements { late, period, .. } = self.measurements;
-        let rig = &self.rig;
-        self.loop_shaping = Shaped { rig, late, period }.design(crossover)?;
+        let Measurements {
+            late,
+            noise,
+            period,
+        } = self.measurements;
+        self.loop_shaping = Shaped {
+            rig: &self.rig,
+            late,
+            noise: noise[0],
+            period,
+        }
+        .design(crossover)?;
         Ok(self)
     }
 

@@ -140,6 +140,7 @@ pub fn design(options: &Options) -> Result<Design, ModelError> {
             Shaped {
                 rig: &rig.shake_table,
                 late: 0.0,
+                noise: 0.0,
                 period: SAMPLING_PERIOD,
             }
             .design(crossover)
