@@ -31,8 +31,6 @@ nominal_parameters! {
 }
 
 session_parameters! {
-    /// Of the load cell.
-    zero: "N" within 0.02 as Setup,
     /// Part of a gap that was travelled before the test, less one half.
     gap_travelled: "1" within 0.2 as Start,
 }
@@ -165,9 +163,9 @@ impl Equations for HystereticDevice {
         );
         // The device begins as it was left: under the first measured force, or somewhere in the gap.
         let first = recording.output().first().copied().unwrap_or(f64::NAN);
-        let is_held = (first - session.zero).abs() > HELD * coulomb;
+        let is_held = first.abs() > HELD * coulomb;
         let mut force = if is_held {
-            (first - session.zero).max(-coulomb).min(coulomb)
+            first.max(-coulomb).min(coulomb)
         } else {
             0.0
         };
@@ -262,9 +260,9 @@ impl Equations for HystereticDevice {
                     shown_rate += h * resonance * pull;
                     shown += h * shown_rate;
                 }
-                *y = shown + session.zero;
+                *y = shown;
             } else {
-                *y = total + session.zero;
+                *y = total;
             }
         }
     }
