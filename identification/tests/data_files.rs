@@ -1,5 +1,7 @@
 //! Files of measured data as laboratories keep them: what is read, and how faults are named.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use std::path::Path;
 
 use identification::data::{Channel, DataError, Pick, Recording, Sheet, TimeBase, Wanted, decode};

@@ -19,6 +19,7 @@ from fmpy.fmi2 import (
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.model_description import ModelDescription
 
+# What a component that names no step of its own is stepped by, s.
 STEP = 0.002
 
 
@@ -44,6 +45,9 @@ class Archive:
         self.name = self.description.modelName
         self.is2 = self.description.fmiVersion == "2.0"
         self.label = f"{self.name} (FMI {self.description.fmiVersion})"
+        experiment = self.description.defaultExperiment
+        # Of a law that is sampled at a period of its own, no other step is taken.
+        self.step = float(getattr(experiment, "stepSize", None) or STEP)
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
 
     def variables(self, causality, type_=None):
@@ -157,7 +161,8 @@ class Instance:
     def deserialize(self, data):
         return (self.fmu.deSerializeFMUstate if self.is2 else self.fmu.deserializeFMUState)(data)
 
-    def step(self, time, size=STEP):
+    def step(self, time, size=None):
+        size = self.archive.step if size is None else size
         self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=size)
 
     def run(self, rows, outputs, start=0.0):
@@ -167,7 +172,7 @@ class Instance:
         for k, row in enumerate(rows):
             if inputs:
                 self.set(inputs, list(row))
-            self.step(start + k * STEP)
+            self.step(start + k * self.archive.step)
             results.append(self.get(outputs))
         return np.array(results)
 
@@ -178,7 +183,7 @@ class Instance:
 def excitation(archive, steps, seed=1):
     """Smooth inputs of about a tenth of their nominal values, one row a step."""
     random = np.random.default_rng(seed)
-    time = STEP * np.arange(steps)
+    time = archive.step * np.arange(steps)
     columns = []
     for variable in archive.variables("input"):
         size = 0.1 * float(variable.nominal or 1.0)
@@ -223,7 +228,7 @@ def run_without_fmi(archive, rows, outputs, parameters=None):
         integers(list(named)), reals(list(named.values())), len(named),
         integers(inputs), rows.ctypes.data_as(POINTER(c_double)), len(inputs),
         integers(outputs), results.ctypes.data_as(POINTER(c_double)), len(outputs),
-        len(rows), 0.0, STEP,
+        len(rows), 0.0, archive.step,
     )
     problem = run(byref(job))
     if problem:

@@ -3,7 +3,7 @@
 import sys
 
 import numpy as np
-from common import STEP, check, main, run_without_fmi
+from common import check, main, run_without_fmi
 from ecospy import EcosSimulation, EcosSimulationStructure
 
 STEPS = 100
@@ -16,7 +16,7 @@ def steps_in_ecos(archive):
         archive, np.tile(row, (STEPS, 1)), [v.valueReference for v in outputs])[-1]
     with EcosSimulationStructure() as structure:
         structure.add_model("it", archive.path)
-        with EcosSimulation(structure=structure, step_size=STEP) as simulation:
+        with EcosSimulation(structure=structure, step_size=archive.step) as simulation:
             simulation.init()
             for variable, value in zip(inputs, row):
                 simulation.set_real(f"it::{variable.name}", value)

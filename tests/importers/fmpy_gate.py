@@ -4,7 +4,7 @@ import ctypes
 import sys
 
 import numpy as np
-from common import STEP, Failure, check, excitation, main, run_without_fmi
+from common import Failure, check, excitation, main, run_without_fmi
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
@@ -32,7 +32,7 @@ def simulation_equals_the_code_without_fmi(archive):
     inputs = [v.name for v in archive.variables("input")]
     # fmpy interpolates continuous inputs between samples; at the samples themselves it does not.
     signal = np.array(
-        [(k * STEP, *row) for k, row in enumerate(rows)],
+        [(k * archive.step, *row) for k, row in enumerate(rows)],
         dtype=[("time", float)] + [(name, float) for name in inputs],
     )
     worst = 0.0
@@ -40,8 +40,8 @@ def simulation_equals_the_code_without_fmi(archive):
         reference = run_without_fmi(archive, rows, outputs_of(archive), parameters)
         check(np.any(reference != 0.0), "the excitation does nothing")
         result = simulate_fmu(
-            archive.path, fmi_type="CoSimulation", stop_time=STEPS * STEP, step_size=STEP,
-            output_interval=STEP, input=signal, output=names, start_values=parameters,
+            archive.path, fmi_type="CoSimulation", stop_time=STEPS * archive.step, step_size=archive.step,
+            output_interval=archive.step, input=signal, output=names, start_values=parameters,
             record_events=False,
         )
         simulated = np.array([result[name] for name in names]).T[1:]
@@ -60,16 +60,16 @@ def saved_state_replays_to_the_bit(archive):
     first.run(rows[:100], outputs)
     state = first.get_state()
     data = first.serialize(state)
-    expected = first.run(rows[100:], outputs, 100 * STEP)
+    expected = first.run(rows[100:], outputs, 100 * archive.step)
 
     first.set_state(state)
-    check(np.array_equal(first.run(rows[100:], outputs, 100 * STEP), expected), "set back differs")
+    check(np.array_equal(first.run(rows[100:], outputs, 100 * archive.step), expected), "set back differs")
     first.free_state(state)
 
     second = archive.open(name="second")
     restored = second.deserialize(data)
     second.set_state(restored)
-    check(np.array_equal(second.run(rows[100:], outputs, 100 * STEP), expected), "restored differs")
+    check(np.array_equal(second.run(rows[100:], outputs, 100 * archive.step), expected), "restored differs")
     second.set_state(restored)
     again = second.get_state()
     check(second.serialize(again) == data, "serialized again, it differs")
@@ -105,7 +105,7 @@ def instances_do_not_disturb_each_other(archive):
     for k, row in enumerate(rows):
         for i, instance in enumerate(several):
             instance.set(inputs, list(row * (i + 1)))
-            instance.step(k * STEP)
+            instance.step(k * archive.step)
             results[i].append(instance.get(outputs))
     check(np.array_equal(np.array(results[0]), expected), "beside others it differs")
     check(not np.array_equal(results[1], results[0]), "two instances share their inputs")
@@ -143,9 +143,9 @@ def wrong_calls_are_refused_with_a_reason(archive):
             refuse("input not finite", lambda: instance.set([reference], [value]), "finite")
     if parameters:
         refuse("fixed parameter", lambda: instance.set(parameters[:1], [1.0]), "cannot be set")
-    refuse("wrong communication point", lambda: instance.step(1.0 + STEP / 2), "communication point")
+    refuse("wrong communication point", lambda: instance.step(1.0 + archive.step / 2), "communication point")
     refuse("communication point not a number", lambda: instance.step(float("nan")), "communication")
-    refuse("backwards", lambda: instance.step(1.0, -STEP), "step size")
+    refuse("backwards", lambda: instance.step(1.0, -archive.step), "step size")
     refuse("no step", lambda: instance.step(1.0, 0.0), "step size")
     refuse("endless step", lambda: instance.step(1.0, float("inf")), "step size")
     refuse("wrong type", lambda: get_wrong_type(instance, outputs[:1]), "is a Float64")
@@ -165,9 +165,9 @@ def wrong_calls_are_refused_with_a_reason(archive):
     fresh.free()
 
     limited = archive.open()
-    limited.initialize(stop=STEP)
+    limited.initialize(stop=archive.step)
     limited.step(0.0)
-    limited.refused("past the stop time", lambda: limited.step(STEP), "stop time")
+    limited.refused("past the stop time", lambda: limited.step(archive.step), "stop time")
     limited.free()
     for closed in (unlike, wrong):
         closed.fmu.freeLibrary()

@@ -3,7 +3,7 @@
 import sys
 
 import numpy as np
-from common import STEP, check, excitation, main
+from common import check, excitation, main
 from fmpy import simulate_fmu
 
 STEPS = 250
@@ -62,7 +62,7 @@ def effects_with_a_memory_are_refused_by_name(archive):
         said = []
         try:
             simulate_fmu(
-                archive.path, fmi_type="ModelExchange", stop_time=STEP, start_values={name: value},
+                archive.path, fmi_type="ModelExchange", stop_time=archive.step, start_values={name: value},
                 logger=lambda *arguments: said.append(str(arguments)), debug_logging=True,
             )
         except Exception as error:
@@ -86,23 +86,23 @@ def compare(archive, start_values):
         if variable.variability == "continuous":
             rows[:, i] = rows[7, i]
     signal = np.array(
-        [(k * STEP, *row) for k, row in enumerate(rows)],
+        [(k * archive.step, *row) for k, row in enumerate(rows)],
         dtype=[("time", float)] + [(v.name, float) for v in inputs],
     )
     names = [v.name for v in archive.variables("output")]
 
     def run(kind, interval):
         return simulate_fmu(
-            archive.path, fmi_type=kind, stop_time=STEPS * STEP, step_size=interval,
+            archive.path, fmi_type=kind, stop_time=STEPS * archive.step, step_size=interval,
             output_interval=interval, relative_tolerance=1e-9, input=signal, output=names,
             record_events=False, start_values=start_values,
         )
 
-    exchange = run("ModelExchange", STEP)
+    exchange = run("ModelExchange", archive.step)
 
     def difference(parts):
         """Largest difference when co-simulation takes its steps in so many parts."""
-        cosimulation = run("CoSimulation", STEP / parts)[::parts]
+        cosimulation = run("CoSimulation", archive.step / parts)[::parts]
         check(len(cosimulation) == len(exchange), f"{len(cosimulation)} rows")
         worst = 0.0
         for name in names:

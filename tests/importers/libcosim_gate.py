@@ -3,7 +3,7 @@
 import sys
 
 import numpy as np
-from common import STEP, check, main, run_without_fmi
+from common import check, main, run_without_fmi
 from libcosimpy.CosimEnums import CosimExecutionState
 from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
@@ -14,11 +14,14 @@ STEPS = 100
 
 
 def steps_in_libcosim(archive):
+    nanoseconds = archive.step * 1e9
+    if nanoseconds != round(nanoseconds):
+        return f"left out: libcosim counts whole nanoseconds, and a step is {nanoseconds} of them"
     inputs, outputs = archive.variables("input"), archive.variables("output")
     row = [0.02 * (i + 1) * float(v.nominal or 1.0) for i, v in enumerate(inputs)]
     references = [v.valueReference for v in outputs]
     expected = run_without_fmi(archive, np.tile(row, (STEPS, 1)), references)[-1]
-    execution = CosimExecution.from_step_size(round(STEP * 1e9))
+    execution = CosimExecution.from_step_size(round(nanoseconds))
     slave = execution.add_local_slave(CosimLocalSlave(fmu_path=archive.path, instance_name="it"))
     observer = CosimObserver.create_last_value()
     check(execution.add_observer(observer), "observer")

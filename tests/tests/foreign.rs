@@ -33,7 +33,7 @@ fn run(system: &str, settings: &[&str], step: f64, samples: usize) -> Outcome {
     let mut library = FmuLibrary::new(FmiVersion::V3, None);
     let system = assemble(&file, &settings, &mut |name| library.find(name)).unwrap();
     let motion = rest(step, samples);
-    let plan = (step, (samples - 1) as f64 * step);
+    let plan = (step, samples as f64 * step);
     let options = Options::default();
     Simulation::with(&system, &motion, Algorithm::GaussSeidel, plan, &options)
         .unwrap()
@@ -262,36 +262,59 @@ fn every_type_goes_through_parameters_and_connections() {
 }
 
 #[test]
-fn arrays_follow_structural_parameters() {
+fn arrays_are_set_as_a_whole_and_connected_by_their_names() {
     let Some(fmu) = foreign("fmi3", "StateSpace") else {
         return;
     };
-    // y = D u with two inputs, three outputs and no states.
+    // y = D u without states, once and once more.
+    let system = format!(
+        "connections = [\"a.y -> b.u\"]\n[components.a]\nfmu = \"{0}\"\n\
+         [components.b]\nfmu = \"{0}\"\nparameters = {{ D = [[0, 0, 1], [0, 1, 0], [1, 0, 0]] }}\n",
+        fmu.display()
+    );
     let settings = [
-        "it.m=2",
-        "it.n=1",
-        "it.r=3",
-        "it.A=0",
-        "it.B=0 0",
-        "it.C=0 0 0",
-        "it.D=1 2 3 4 5 6",
-        "it.x0=0",
-        "it.u=10 1",
+        "a.D=1 2 3 4 5 6 7 8 9",
+        "a.u=1 10 100",
+        "a.B=0",
+        "b.B=0",
+        "a.A[2,1]=3",
     ];
-    let outcome = run(&alone(&fmu), &settings, 1.0, 3);
+    let outcome = run(&system, &settings, 1.0, 3);
     assert!(
         matches!(outcome.ended, Ended::Complete),
         "{}",
         outcome.ended.message()
     );
-    for (name, expected) in [("it.y[1]", 12.0), ("it.y[2]", 34.0), ("it.y[3]", 56.0)] {
-        assert_eq!(
-            outcome.record.column(name).unwrap(),
-            [expected; 3],
-            "{name}"
-        );
+    for (name, expected) in [
+        ("a.y[1]", 321.0),
+        ("a.y[2]", 654.0),
+        ("a.y[3]", 987.0),
+        ("b.y[1]", 987.0),
+        ("b.y[3]", 321.0),
+    ] {
+        let values = outcome.record.column(name).unwrap();
+        assert_eq!(values, [expected; 3], "{name}");
     }
-    assert!(outcome.record.column("it.y[4]").is_none());
+}
+
+/// The published StateSpace refuses every setting of its structural parameters, from fmpy as well:
+/// the sizes are checked before the run.
+#[test]
+fn arrays_follow_structural_parameters() {
+    let Some(fmu) = foreign("fmi3", "StateSpace") else {
+        return;
+    };
+    let file = SystemFile::parse("test", &alone(&fmu)).unwrap();
+    let mut library = FmuLibrary::new(FmiVersion::V3, None);
+    let settings = ["it.m=2", "it.n=1", "it.r=3"].map(str::to_string);
+    let system = assemble(&file, &settings, &mut |name| library.find(name)).unwrap();
+    let description = &system.components[0].fmu.description;
+    let size = |name: &str| description.array(name).map(|elements| elements.len());
+    for (name, elements) in [("A", 1), ("B", 2), ("C", 3), ("D", 6), ("u", 2), ("y", 3)] {
+        assert_eq!(size(name), Some(elements), "{name}");
+    }
+    assert!(description.position("D[3,2]").is_some());
+    assert!(description.position("D[2,3]").is_none());
 }
 
 #[test]

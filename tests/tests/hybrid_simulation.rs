@@ -73,15 +73,20 @@ fn numbers_of_the_definition_are_those_of_the_users_files() {
     assert_eq!(rows.len(), 36);
     for (case, rows) in BenchmarkCase::ALL.iter().zip(rows.chunks(9)) {
         let frame = case.frame();
-        for (matrix, rows) in [&frame.mass, &frame.damping, &frame.stiffness]
-            .iter()
-            .zip(rows.chunks(3))
+        // The file's damping is rounded: its ratios are those of the case within 0.02 %.
+        for ((matrix, within), rows) in [
+            (&frame.mass, 1e-9),
+            (&frame.damping, 2e-5),
+            (&frame.stiffness, 1e-9),
+        ]
+        .iter()
+        .zip(rows.chunks(3))
         {
             for i in 0..3 {
                 for j in 0..3 {
                     let off = (matrix[(i, j)] - rows[i][j]).abs();
                     assert!(
-                        off <= 1e-9 * matrix.amax(),
+                        off <= within * matrix.amax(),
                         "case {} {i} {j}",
                         case.number()
                     );

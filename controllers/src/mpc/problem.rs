@@ -1,7 +1,7 @@
 //! The optimisation of a step (Eq 5-14 to 5-18), reduced to what the valve can do.
 //!
 //! The 3p commands act through one valve, so the outputs depend on p numbers only, the effective
-//! valve sequence `w` ([`HorizonResponse`]). Of all commands `z` that give the same `w`, and so the
+//! valve sequence `w` (`HorizonResponse`). Of all commands `z` that give the same `w`, and so the
 //! same outputs, the cost of Eq 5-17 prefers one. With the previous command `u`, `z = E u + z'`
 //! (`E` repeats it over the horizon), `D` the differences along the horizon and `R = D' W D`, it is
 //!

@@ -57,12 +57,12 @@ pub trait Component: Clone + Default + Serialize + DeserializeOwned + Send + 'st
         Ok(())
     }
 
-    /// Computes outputs (and derivatives of states) from states, inputs and `time` [s].
+    /// Computes outputs (and derivatives of states) from states, inputs and `time` (s).
     fn update_outputs(&mut self, time: f64) {
         let _ = time;
     }
 
-    /// Advances from `time` to `time + step_size` [s] with the inputs held.
+    /// Advances from `time` to `time + step_size` (s) with the inputs held.
     ///
     /// # Errors
     /// When the model cannot go on; the instance then answers errors until it is reset or an
@@ -96,6 +96,6 @@ pub trait Component: Clone + Default + Serialize + DeserializeOwned + Send + 'st
 pub struct Event {
     /// The continuous states jumped.
     pub states_changed: bool,
-    /// The time [s] of the next event, when it is known beforehand.
+    /// The time (s) of the next event, when it is known beforehand.
     pub next_event_time: Option<f64>,
 }

@@ -114,7 +114,9 @@ impl Component for NumericalSubstructure {
             &mut s.acceleration
         });
         variables.extend(accelerations.into_iter().map(|element| {
-            element.depends_on(&["ground_acceleration"], fmu_kit::Dependency::Dependent)
+            element
+                .depends_on(&["ground_acceleration"], fmu_kit::Dependency::Dependent)
+                .initially_depends_on(&["ground_acceleration", "specimen_mass"])
         }));
         variables
     }

@@ -7,8 +7,8 @@ use fmu_kit::{
     Event, Variable,
 };
 use plant::servo_hydraulic::{
-    ExtendedServoHydraulicState, ExtendedServoHydraulicTable as Rig, INNER_STEP,
-    ServoHydraulicInput, ServoHydraulicState,
+    ExtendedServoHydraulicState, ExtendedServoHydraulicTable as Rig, ServoHydraulicInput,
+    ServoHydraulicState,
 };
 use serde::{Deserialize, Serialize};
 
@@ -219,7 +219,7 @@ impl Component for ServoHydraulicTable {
         } else if self.estimate_error {
             let table = &self.rig.table;
             let (next, error) =
-                table.advance_with_error(&self.state.table, &input, step_size, INNER_STEP);
+                table.advance_with_error(&self.state.table, &input, step_size, table.inner_step());
             (self.state.table, self.displacement_error) = (next, error.displacement);
         } else {
             self.state.table = self.rig.table.advance(&self.state.table, &input, step_size);

@@ -225,7 +225,7 @@ pub fn explained(
         from += LINES;
     }
     kept[0].im = 0.0;
-    if count % 2 == 0
+    if count.is_multiple_of(2)
         && let Some(last) = kept.last_mut()
     {
         last.im = 0.0;

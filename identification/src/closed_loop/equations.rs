@@ -194,7 +194,7 @@ impl HydraulicRig {
     }
 }
 
-/// Number of [`coefficients`]' rows.
+/// Number of `coefficients`' rows.
 pub const EQUATIONS: usize = 3;
 
 /// Coefficients of the three equations at `s`, `[equation][channel]`.

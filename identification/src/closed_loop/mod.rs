@@ -249,10 +249,10 @@ pub fn identify(
     let mut best: Option<Optimum> = None;
     for rig in start::actuators(&equations.experiments, &table, 4)? {
         let coordinates = coordinates(&rig, &payloads, force, specimen, settings.friction);
-        if let Some(optimum) = approach(&equations, &coordinates) {
-            if best.as_ref().is_none_or(|b| optimum.cost < b.cost) {
-                best = Some(optimum);
-            }
+        if let Some(optimum) = approach(&equations, &coordinates)
+            && best.as_ref().is_none_or(|b| optimum.cost < b.cost)
+        {
+            best = Some(optimum);
         }
     }
     let Some(mut optimum) = best else {

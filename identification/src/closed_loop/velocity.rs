@@ -65,7 +65,7 @@ pub fn velocity(
         };
     }
     // The last line of an even count has no imaginary part.
-    if count % 2 == 0
+    if count.is_multiple_of(2)
         && let Some(last) = x.last_mut()
     {
         last.im = 0.0;

@@ -1,6 +1,6 @@
 //! Parameters of the built-in systems' controllers by rule from an identified model.
 //!
-//! Every rule works on what a [`ControlModel`] says: a model file of `shakebench identify`, by
+//! Every rule works on what a `ControlModel` says: a model file of `shakebench identify`, by
 //! default the one of the physical rig's commissioning. Nothing here knows the rig itself.
 //!
 //! - three-variable control: [`ThreeVariableGains::tuned`];

@@ -27,7 +27,9 @@ impl Results {
         let text = fs::read_to_string(folder.join("results.csv")).unwrap();
         let lines: Vec<String> = text.lines().map(String::from).collect();
         let cells = |line: &String| line.split(',').map(String::from).collect::<Vec<_>>();
-        let numbers = |line: &String| cells(line).iter().map(|c| c.parse().unwrap()).collect();
+        // Columns of text are no numbers.
+        let number = |cell: &String| cell.parse().unwrap_or(f64::NAN);
+        let numbers = |line: &String| cells(line).iter().map(number).collect();
         Self {
             names: cells(&lines[0]),
             rows: lines[1..].iter().map(numbers).collect(),

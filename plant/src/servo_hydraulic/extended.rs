@@ -1,9 +1,7 @@
 //! The physical rig with those effects of the catalogue that it has not by nature: a late command,
 //! play before the spool, and a foundation that gives way.
 
-use super::{
-    Driven, INNER_STEP, STATES, ServoHydraulicInput, ServoHydraulicState, ServoHydraulicTable,
-};
+use super::{Driven, STATES, ServoHydraulicInput, ServoHydraulicState, ServoHydraulicTable};
 use crate::ModelError;
 use crate::identified::effects::valve::{CommandPath, ValveEffects};
 use crate::identified::effects::{Family, FoundationEffects};
@@ -114,7 +112,7 @@ impl ExtendedServoHydraulicTable {
             let mut x = [0.0; ALL];
             x[..STATES].copy_from_slice(&<[f64; STATES]>::from(state.table));
             x[STATES..].copy_from_slice(&state.foundation);
-            let x = integration::advance(&driven, &x, length, INNER_STEP);
+            let x = integration::advance(&driven, &x, length, self.table.inner_step());
             state.table = table_states(&x).into();
             state.foundation.copy_from_slice(&x[STATES..]);
         }

@@ -113,9 +113,13 @@ pub struct ServoHydraulicInput {
     pub supply_lost: bool,
 }
 
-/// The longest inner step that keeps the result accurate, s: a fifth of the quickest time constant
-/// of valve and oil.
+/// The longest inner step, s. With the default parameters a tenth of it changes the displacement by
+/// less than 2e-4 of the way; [`ServoHydraulicTable::inner_step`] keeps to that bound for others.
 pub const INNER_STEP: f64 = 2e-4;
+/// An inner step times the quickest rate of the equations at most.
+const STEP_BY_RATE: f64 = 0.35;
+/// The shortest inner step, s: a rig that needs finer ones is refused.
+const SHORTEST_STEP: f64 = 2e-6;
 
 impl ServoHydraulicTable {
     /// Checks the parameters.
@@ -130,7 +134,67 @@ impl ServoHydraulicTable {
         self.friction.validate()?;
         self.table.validate()?;
         ModelError::require_non_negative("added_payload", self.added_payload)?;
-        ModelError::require_finite("cubic_stiffness", self.cubic_stiffness)
+        ModelError::require_finite("cubic_stiffness", self.cubic_stiffness)?;
+        let (name, value, rate) = self.quickest();
+        if rate * SHORTEST_STEP <= STEP_BY_RATE {
+            return Ok(());
+        }
+        Err(ModelError::Parameter {
+            name,
+            value,
+            expected: "a value whose equation is slower than 175,000 1/s (inner steps of 2 µs)",
+        })
+    }
+
+    /// The quickest rate of the equations (1/s) over the stroke, with the parameter that makes it
+    /// and its value: cushions, stops, oil column and edge of the valve at the smallest chamber,
+    /// spool.
+    fn quickest(&self) -> (&'static str, f64, f64) {
+        let (mass, stops, cylinder) = (self.mass(), &self.stops, &self.cylinder);
+        let [large, small] = cylinder.volumes(stops.stroke);
+        let column = cylinder.bulk_modulus * cylinder.area.powi(2) * (1.0 / large + 1.0 / small);
+        let spool = std::f64::consts::TAU * self.valve.frequency;
+        let candidates = [
+            (
+                "cushion_damping",
+                stops.cushion_damping,
+                stops.cushion_damping / mass,
+            ),
+            (
+                "stop_stiffness",
+                stops.stiffness,
+                (stops.stiffness / mass).sqrt(),
+            ),
+            ("oil_volume", cylinder.volume, (column / mass).sqrt()),
+            (
+                "bulk_modulus",
+                cylinder.bulk_modulus,
+                cylinder.bulk_modulus / small * self.valve.steepest_edge(),
+            ),
+            (
+                "make_up_flow",
+                cylinder.make_up,
+                cylinder.bulk_modulus / small * cylinder.make_up,
+            ),
+            (
+                "valve_frequency",
+                self.valve.frequency,
+                spool * self.valve.damping_ratio.max(0.5) * 2.0,
+            ),
+        ];
+        let mut quickest = candidates[0];
+        for candidate in candidates {
+            if candidate.2 > quickest.2 {
+                quickest = candidate;
+            }
+        }
+        quickest
+    }
+
+    /// The inner step that keeps to the bound of [`INNER_STEP`], s: finer where cushions, stops,
+    /// oil, valve or a light table are quicker than by default.
+    pub fn inner_step(&self) -> f64 {
+        (STEP_BY_RATE / self.quickest().2).min(INNER_STEP)
     }
 
     /// The rig at rest in the middle, under pressure, with zero command.
@@ -223,7 +287,7 @@ impl ServoHydraulicTable {
         duration: f64,
     ) -> ServoHydraulicState {
         let driven = Driven { table: self, input };
-        integration::advance(&driven, &(*state).into(), duration, INNER_STEP).into()
+        integration::advance(&driven, &(*state).into(), duration, self.inner_step()).into()
     }
 
     /// As [`advance`](Self::advance), with inner steps no longer than `inner_step` seconds and an

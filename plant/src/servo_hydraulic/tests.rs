@@ -103,6 +103,49 @@ fn the_inner_step_is_fine_enough_and_the_estimate_says_so() {
 }
 
 #[test]
+fn quicker_rigs_take_finer_steps_to_the_same_bound_and_the_quickest_are_refused() {
+    use units::constants::{LBF_S_PER_INCH, PSI};
+    let default = ServoHydraulicTable::default();
+    assert_eq!(default.inner_step(), INNER_STEP);
+    let mut braked = default;
+    braked.stops.cushion_damping = 5000.0 * LBF_S_PER_INCH;
+    let mut stiff = default;
+    stiff.cylinder.volume = 2.5 * INCH.powi(3);
+    stiff.cylinder.bulk_modulus = 1.5e5 * PSI;
+    for table in [braked, stiff] {
+        table.validate().unwrap();
+        let (mut own, mut fine) = (table.rest(), table.rest());
+        let (mut worst, mut peak, mut worst_pressure): (f64, f64, f64) = (0.0, 0.0, 0.0);
+        for k in 0..500 {
+            // Into the cushion and back.
+            let input = ServoHydraulicInput {
+                valve_command: if k < 250 { 4.0 } else { -4.0 },
+                ..ServoHydraulicInput::default()
+            };
+            own = table.advance(&own, &input, 0.002);
+            fine = table
+                .advance_with_error(&fine, &input, 0.002, table.inner_step() / 8.0)
+                .0;
+            let [a, b] = [&own, &fine].map(|state| table.acceleration(state, 0.0));
+            worst = worst.max((a - b).abs());
+            peak = peak.max(b.abs());
+            worst_pressure = worst_pressure.max((own.pressures[0] - fine.pressures[0]).abs());
+        }
+        println!(
+            "{:.1} µs: acceleration off by {:.1e} of its peak, pressure by {:.1} psi",
+            1e6 * table.inner_step(),
+            worst / peak,
+            worst_pressure / PSI
+        );
+        assert!(worst < 0.01 * peak);
+    }
+    let mut wild = default;
+    wild.stops.cushion_damping = 1e8 * LBF_S_PER_INCH;
+    let error = wild.validate().unwrap_err().to_string();
+    assert!(error.contains("cushion_damping"), "{error}");
+}
+
+#[test]
 fn stiction_holds_the_table_where_it_was_left() {
     let table = ServoHydraulicTable::default();
     let mut s = ServoHydraulicState {

@@ -95,6 +95,13 @@ impl ServoValve {
         omega * (omega * (wanted - spool) - 2.0 * self.damping_ratio * spool_velocity)
     }
 
+    /// The steepest slope of an edge's flow by its pressure drop, m³/(s Pa): fully open, without a
+    /// drop.
+    pub(super) fn steepest_edge(&self) -> f64 {
+        let open = (self.travel_limit - self.overlap).max(0.0) * (1.0 + self.asymmetry.abs());
+        self.flow_coefficient * open / TRANSITION.sqrt() + self.null_leakage
+    }
+
     /// Opening of the edges, V: the spool's position within its travel, less the overlap.
     pub fn opening(&self, spool: f64) -> f64 {
         let spool = spool.clamp(-self.travel_limit, self.travel_limit);

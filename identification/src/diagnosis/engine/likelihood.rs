@@ -79,10 +79,17 @@ fn price(candidates: &[Candidate], point: &Point) -> f64 {
 pub fn matters(candidates: &[Candidate], point: &Point) -> bool {
     point.effects.iter().all(|(i, internal)| {
         let candidate = &candidates[*i];
+        // Of an effect that holds another, only what it adds tells it from that one.
+        let held = candidate.contains;
+        let held = held.and_then(|name| candidates.iter().find(|c| c.effect == name));
+        let adds = |name: &str| {
+            held.is_none_or(|held| held.parameters.iter().all(|other| other.name != name))
+        };
         let mut sizes = candidate
             .parameters
             .iter()
             .zip(internal)
+            .filter(|(p, _)| adds(p.name))
             .filter_map(|(p, &q)| {
                 let Role::Size { weak } = p.role else {
                     return None;

@@ -108,7 +108,7 @@ pub fn write(
     Ok(())
 }
 
-/// Reads what [`write`] wrote.
+/// Reads what [`write()`] wrote.
 ///
 /// # Errors
 /// Anything else, by line.

@@ -13,7 +13,7 @@ pub struct Effect {
     pub off: Vec<f64>,
 }
 
-/// A struct of nominal parameters, made by [`nominal_parameters!`].
+/// A struct of nominal parameters, made by `nominal_parameters!`.
 pub trait NominalTable: Sized {
     /// Names and SI units.
     const TABLE: &'static [Named];
@@ -22,7 +22,7 @@ pub trait NominalTable: Sized {
     fn from_values(values: &[f64]) -> Option<Self>;
 }
 
-/// A struct of effects, made by [`effects!`].
+/// A struct of effects, made by `effects!`.
 pub trait EffectTable: Sized {
     /// The effects in the order in which [`Self::from_values`] takes their parameters.
     fn table() -> Vec<Effect>;

@@ -1,8 +1,8 @@
 //! FMUs in another process, so that whatever they do ends as an error of this one.
 //!
 //! The program starts itself again as a guest that loads the libraries. Calls travel through a file
-//! mapped into both processes ([`frame`]); whose turn it is stands in one number there, on which
-//! both sides wait ([`turn`]): spinning for a few microseconds, then asleep. Settings of variables
+//! mapped into both processes (`frame`); whose turn it is stands in one number there, on which
+//! both sides wait (`turn`): spinning for a few microseconds, then asleep. Settings of variables
 //! are kept until the next call that gives something, and travel with it.
 #![allow(unsafe_code, reason = "memory is shared with another process")]
 

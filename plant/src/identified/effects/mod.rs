@@ -3,7 +3,7 @@
 //!
 //! Valve and oil act between the command and G1, friction, masses and springs on the table's
 //! equation, sensors on the channels. A family of effects is one file here and one line in
-//! [`families`]; the diagnosis's candidates, the FMUs' variables, the extended model and the
+//! `families`; the diagnosis's candidates, the FMUs' variables, the extended model and the
 //! sentences of a report follow from its [`Effect`]s.
 
 mod definition;
