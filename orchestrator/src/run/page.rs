@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::experiment::Prepared;
 use super::manifest::Manifest;
 use super::signals::{read_csv, write_csv};
-use super::summary::{Summary, Table};
+use super::summary::{Summary, Table, asked};
 use crate::error::Error;
 use crate::master::{Outcome, Record};
 use crate::motion::Motion;
@@ -51,6 +51,11 @@ fn page(
     record: &Record,
 ) -> Option<String> {
     let table = Table::find(manifest, record)?;
+    let asked = asked(record, motion);
+    let (motion, whole) = match &asked {
+        Some(asked) => (asked, asked.into()),
+        None => (motion, whole),
+    };
     let column = |output| record.column(&table.name(output)).unwrap_or_default();
     let valve = table.valve.as_ref().and_then(|name| record.column(name));
     let row = |name: &str, value: String| (name.to_string(), Cell::from(value));

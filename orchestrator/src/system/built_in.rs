@@ -47,7 +47,9 @@ const SPECIMENS: [(Part, fn() -> f64); 2] = [
         YieldingSpecimen::default().mass
     }),
 ];
-/// No specimen.
+/// Computed structures between the ground and the specimen.
+const STRUCTURES: [Part; 1] = [part!("structure/", "two-storeys")];
+/// No specimen, no structure.
 const NONE: &str = "none";
 
 /// The system run when none is named.
@@ -70,6 +72,38 @@ pub fn plants() -> impl Iterator<Item = &'static str> {
 /// Names of the specimens, `none` among them.
 pub fn specimens() -> impl Iterator<Item = &'static str> {
     std::iter::once(NONE).chain(SPECIMENS.iter().map(|(part, _)| part.name))
+}
+
+/// Names of the computed structures, `none` among them.
+pub fn structures() -> impl Iterator<Item = &'static str> {
+    std::iter::once(NONE).chain(STRUCTURES.iter().map(|part| part.name))
+}
+
+/// Puts the computed structure `name` between the reference, which then is the ground's motion, and
+/// whatever follows it in the built-in system `file`, whose sensors stand where `plant` has them.
+///
+/// # Errors
+/// A name that is unknown.
+pub fn add_structure(file: &mut SystemFile, name: &str, plant: &str) -> Result<(), SystemError> {
+    if name == NONE {
+        return Ok(());
+    }
+    let part = STRUCTURES.iter().find(|part| part.name == name);
+    let mut structure = read("structure", part, name, structures())?;
+    if !file.components.contains_key("specimen") {
+        structure.disconnect("specimen");
+    }
+    let rig = PLANTS.iter().find(|part| part.name == plant);
+    structure.redirect(&read("plant", rig, plant, plants())?.instead);
+    file.follow("structure");
+    let adjust = std::mem::take(&mut file.adjust);
+    file.extend(structure);
+    file.extend(SystemFile {
+        adjust,
+        ..SystemFile::default()
+    });
+    file.name = format!("{}-on-{name}", file.name);
+    Ok(())
 }
 
 /// A built-in system: the controller `name` on a rig of `plant` and `specimen` (or `none`), with the
@@ -109,7 +143,10 @@ pub fn system(
     file.extend(rig);
     match on_table {
         None => file.disconnect("specimen"),
-        Some((specimen, _)) => file.extend(specimen),
+        Some((specimen, _)) => {
+            file.adjust.extend(specimen.adjust.clone());
+            file.extend(specimen);
+        }
     }
     file.name = name.to_string();
     Ok(file)

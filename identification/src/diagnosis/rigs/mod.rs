@@ -10,6 +10,7 @@ mod cyclic_material;
 mod description;
 mod diagnosis;
 mod extended;
+mod hybrid_actuator;
 mod hysteretic_device;
 mod measured;
 mod positioning_drive;
@@ -22,6 +23,7 @@ pub use description::{Column, Description, DescriptionError, LeftOut, Quantity};
 pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, diagnose};
 pub use extended::ExtendedRig;
 
+pub use hybrid_actuator::TransferSystemRig;
 pub use reading::Measurement;
 pub use recording::RigRecording;
 pub use table::{Effect, EffectTable, NominalTable};
@@ -128,11 +130,12 @@ impl<E: Equations> Rig for E {
 }
 
 /// Every kind of rig.
-pub static KINDS: [&dyn Rig; 4] = [
+pub static KINDS: [&dyn Rig; 5] = [
     &closed_loop_actuator::ClosedLoopActuator,
     &positioning_drive::PositioningDrive,
     &hysteretic_device::HystereticDevice,
     &cyclic_material::CyclicMaterial,
+    &hybrid_actuator::HybridActuator,
 ];
 
 /// The rig of a kind.
