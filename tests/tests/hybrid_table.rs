@@ -65,7 +65,10 @@ fn errors(controller: &str, plant: &str, fmi: FmiVersion, set: &[&str]) -> Error
     );
     let record = &outcome.record;
     let column = |name: &str| record.column(name).unwrap();
-    let (upper, drift) = (column("structure.displacement[2]"), column("specimen.drift"));
+    let (upper, drift) = (
+        column("structure.displacement[2]"),
+        column("specimen.drift"),
+    );
     let wanted = asked(record, &prepared.motion).unwrap();
     let ground = column("reference.displacement");
     for (k, displacement) in wanted.displacement.iter().enumerate() {
@@ -84,7 +87,10 @@ fn errors(controller: &str, plant: &str, fmi: FmiVersion, set: &[&str]) -> Error
     let acceleration = column("reference.acceleration");
     let (mut sums, mut sizes) = ([0.0; 3], [0.0; 2]);
     for k in 0..record.len() {
-        let (storey, top) = (whole.displacement(1), whole.displacement(2) - whole.displacement(1));
+        let (storey, top) = (
+            whole.displacement(1),
+            whole.displacement(2) - whole.displacement(1),
+        );
         sums[0] += (upper[k] - storey).powi(2);
         sums[1] += (drift[k] - top).powi(2);
         sums[2] += (alone.displacement(1) - storey).powi(2);

@@ -10,7 +10,7 @@ pub use crate::structure::{State, TableError};
 use crate::{
     component::Component,
     fault::{Fault, Outcome},
-    structure::Structure,
+    structure::{Structure, check_terminals},
     variable::{Dependency, Row, Variable},
 };
 
@@ -46,6 +46,7 @@ impl<C: Component> Model<C> {
             initial_dependencies,
             states,
         } = Structure::of(C::NAME, &rows)?;
+        check_terminals(C::NAME, &rows, C::TERMINALS)?;
         Ok(Self {
             variables,
             dependencies,

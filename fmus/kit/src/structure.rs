@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use thiserror::Error;
 use units::Unit;
 
+use crate::terminal::Terminal;
 use crate::variable::{Causality, Declaration, Dependency, Row, Type, Value, Variability};
 
 /// A mistake in a component's table.
@@ -127,6 +128,39 @@ impl Structure {
             .find(is_wrong)
             .map(|i| (i, problem.into()))
     }
+}
+
+/// Checks a component's terminals against the rows of its table.
+pub(crate) fn check_terminals(
+    component: &'static str,
+    rows: &[Row],
+    terminals: &[Terminal],
+) -> Result<(), TableError> {
+    for (index, terminal) in terminals.iter().enumerate() {
+        let wrong = |variable: &str, problem: String| TableError {
+            component,
+            variable: variable.to_string(),
+            problem: format!("terminal `{}`: {problem}", terminal.name),
+        };
+        let before = &terminals[..index];
+        if before.iter().any(|other| other.name == terminal.name) {
+            return Err(wrong("", "the name is used twice".into()));
+        }
+        for (at, (member, variable)) in terminal.members.iter().enumerate() {
+            let mut rows = rows.iter().map(|row| row.declaration);
+            let found = rows.find(|declaration| declaration.name == *variable);
+            let is_port = found.is_some_and(|found| {
+                matches!(found.causality, Causality::Input | Causality::Output)
+            });
+            if !is_port {
+                return Err(wrong(variable, "is neither input nor output".into()));
+            }
+            if terminal.members[..at].iter().any(|(m, _)| m == member) {
+                return Err(wrong(variable, format!("member `{member}` is there twice")));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn check_units(row: &Row) -> Result<(), String> {

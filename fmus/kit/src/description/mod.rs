@@ -3,6 +3,7 @@
 mod fmi2;
 mod fmi3;
 mod html;
+mod terminals;
 mod xml;
 
 use std::collections::BTreeMap;
@@ -32,6 +33,11 @@ pub fn fmi3<C: Component>(model: &Model<C>) -> String {
 /// A page that says what the component is and lists its variables.
 pub fn html<C: Component>(model: &Model<C>) -> String {
     html::text(&Interface::of(model, &mut C::default()))
+}
+
+/// `terminalsAndIcons.xml` of FMI 3.0.
+pub fn terminals<C: Component>(_model: &Model<C>) -> String {
+    terminals::text(C::TERMINALS)
 }
 
 /// The instantiation token (FMI 3.0) and GUID (FMI 2.0): a fingerprint of the interface.

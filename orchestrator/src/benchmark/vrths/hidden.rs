@@ -343,7 +343,9 @@ pub fn read_hidden(text: &str) -> Result<(String, f64), String> {
     let name = name.trim();
     let Some(unit) = rig.unit(name) else {
         let hint = units::hint(name, names.iter().copied());
-        return Err(format!("`{name}` is no effect of the transfer system{hint}"));
+        return Err(format!(
+            "`{name}` is no effect of the transfer system{hint}"
+        ));
     };
     let value = units::value_in(value.trim(), unit).map_err(|why| format!("`{text}`: {why}"))?;
     Ok((name.to_string(), value))
