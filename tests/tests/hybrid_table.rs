@@ -6,7 +6,7 @@ use plant::hybrid::{Frame, ReferenceFrame};
 use plant::specimens::linear::LinearSpecimen;
 use shakebench::fmu::FmiVersion;
 use shakebench::master::Ended;
-use shakebench::run::experiment::{Request, prepare};
+use shakebench::run::experiment::{Request, Scale, prepare};
 use shakebench::run::summary::asked;
 
 const PERIOD: f64 = 0.002;
@@ -47,12 +47,13 @@ struct Errors {
     storey_alone: f64,
 }
 
-fn errors(controller: &str, plant: &str, fmi: FmiVersion, set: &[&str]) -> Errors {
+fn errors(controller: &str, plant: &str, fmi: FmiVersion, set: &[String]) -> Errors {
     let request = Request {
         structure: Some("two-storeys".to_string()),
         plant: plant.to_string(),
         duration_s: Some(20.0),
-        set: set.iter().map(|text| (*text).to_string()).collect(),
+        set: set.to_vec(),
+        scaling: Some(Scale::PeakAcceleration(1.0)),
         fmi,
         ..Request::built_in(controller)
     };
@@ -71,8 +72,10 @@ fn errors(controller: &str, plant: &str, fmi: FmiVersion, set: &[&str]) -> Error
     );
     let wanted = asked(record, &prepared.motion).unwrap();
     let ground = column("reference.displacement");
-    for (k, displacement) in wanted.displacement.iter().enumerate() {
-        assert!((displacement - ground[k] - upper[k]).abs() < 1e-12);
+    if set.is_empty() {
+        for (k, displacement) in wanted.displacement.iter().enumerate() {
+            assert!((displacement - ground[k] - upper[k]).abs() < 1e-12);
+        }
     }
 
     let frame = whole();
@@ -111,13 +114,10 @@ fn errors(controller: &str, plant: &str, fmi: FmiVersion, set: &[&str]) -> Error
 #[test]
 fn the_storeys_on_and_under_the_table_move_as_the_whole_structure() {
     let mpc = errors("mpc", "identified", FmiVersion::V3, &[]);
-    println!(
-        "mpc: {} {} (alone {})",
-        mpc.storey, mpc.drift, mpc.storey_alone
-    );
-    // The specimen matters: without its force the storeys move quite otherwise.
-    assert!(mpc.storey_alone > 0.1);
-    assert!(mpc.storey < 0.005 && mpc.drift < 0.005);
+    println!("mpc: {} {}", mpc.storey, mpc.drift);
+    println!("without the specimen's force: {}", mpc.storey_alone);
+    assert!(mpc.storey_alone > 0.5);
+    assert!(mpc.storey < 0.03 && mpc.drift < 0.06);
     let again = errors("mpc", "identified", FmiVersion::V2, &[]);
     assert_eq!(mpc.storey, again.storey);
     // What the table misses is missing in the structure, too.
@@ -127,9 +127,17 @@ fn the_storeys_on_and_under_the_table_move_as_the_whole_structure() {
 }
 
 #[test]
-fn on_the_physical_rig_the_sensors_give_the_force() {
-    let sliding = errors("sliding-mode", "servohydraulic", FmiVersion::V3, &[]);
-    println!("servohydraulic: {} {}", sliding.storey, sliding.drift);
-    assert!(sliding.storey < 0.5 * sliding.storey_alone);
-    assert!(sliding.drift < 0.2);
+fn on_the_physical_rig_the_sensors_give_the_force_and_a_lead_makes_up_for_their_lag() {
+    let [at_once, led] = ["0 ms", "10 ms"].map(|lead| {
+        let set = [format!("structure.lead={lead}")];
+        let sliding = errors("sliding-mode", "servohydraulic", FmiVersion::V3, &set);
+        println!(
+            "sliding-mode, servohydraulic, lead {lead}: {} {}",
+            sliding.storey, sliding.drift
+        );
+        sliding
+    });
+    assert!(at_once.storey < 0.5 * at_once.storey_alone);
+    assert!(led.storey < 0.1 && led.drift < 0.06);
+    assert!(led.storey < 0.6 * at_once.storey);
 }

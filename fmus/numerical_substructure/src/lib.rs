@@ -34,6 +34,7 @@ pub struct NumericalSubstructure {
     ground_next: f64,
     ground_displacement: f64,
     ground_velocity: f64,
+    lead: f64,
     table: Motion,
     displacement: [f64; MOST],
     velocity: [f64; MOST],
@@ -71,6 +72,7 @@ impl Default for NumericalSubstructure {
             ground_next: 0.0,
             ground_displacement: 0.0,
             ground_velocity: 0.0,
+            lead: 0.0,
             table: Motion::default(),
             displacement: [0.0; MOST],
             velocity: [0.0; MOST],
@@ -183,10 +185,15 @@ impl Component for NumericalSubstructure {
             input("ground_displacement", s.ground_displacement, "Displacement of the ground", "m" => "in").nominal(0.02);
             input("ground_velocity", s.ground_velocity, "Velocity of the ground", "m/s" => "in/s").nominal(0.2);
             parameter("payload_mass", s.payload_mass, "Mass of that storey: times its acceleration it is a force taken from the structure", "kg").min(0.0);
+            parameter("lead", s.lead, "Time by which the table's motion is asked for ahead: how late the table is", "s" => "ms").min(0.0).max(0.05);
             output("table_displacement", s.table.displacement, "Absolute displacement of the degree of freedom `interface`: what a table under the specimen is asked for", "m" => "in")
-                .nominal(0.02).depends_on(&["ground_displacement"], Dependent).initially_depends_on(&["ground_displacement"]);
+                .nominal(0.02).depends_on(&["ground_displacement", "ground_velocity"], Dependent).depends_on(&ACCELERATING, Dependent)
+                .initially_depends_on(&["ground_displacement", "ground_velocity", "lead"]).initially_depends_on(&ACCELERATING)
+                .initially_depends_on(&["specimen_mass", "payload_mass"]);
             output("table_velocity", s.table.velocity, "Absolute velocity of the same", "m/s" => "in/s")
-                .nominal(0.2).depends_on(&["ground_velocity"], Dependent).initially_depends_on(&["ground_velocity"]);
+                .nominal(0.2).depends_on(&["ground_velocity"], Dependent).depends_on(&ACCELERATING, Dependent)
+                .initially_depends_on(&["ground_velocity", "lead"]).initially_depends_on(&ACCELERATING)
+                .initially_depends_on(&["specimen_mass", "payload_mass"]);
             output("table_acceleration", s.table.acceleration, "Absolute acceleration of the same", "m/s2" => "g")
                 .nominal(3.0).depends_on(&ACCELERATING, Dependent).initially_depends_on(&ACCELERATING)
                 .initially_depends_on(&["specimen_mass", "payload_mass"]);
@@ -209,10 +216,15 @@ impl Component for NumericalSubstructure {
             *acceleration = part.total_acceleration(i, force, self.ground);
         }
         if interface < n {
+            let (displacement, velocity) = (
+                self.ground_displacement + self.displacement[interface],
+                self.ground_velocity + self.velocity[interface],
+            );
+            let (acceleration, lead) = (self.acceleration[interface], self.lead);
             self.table = Motion {
-                displacement: self.ground_displacement + self.displacement[interface],
-                velocity: self.ground_velocity + self.velocity[interface],
-                acceleration: self.acceleration[interface],
+                displacement: displacement + lead * (velocity + 0.5 * lead * acceleration),
+                velocity: velocity + lead * acceleration,
+                acceleration,
             };
         }
     }
