@@ -22,7 +22,7 @@ struct Hidden {
 /// Forces (N) with noise of 2.2 N, one a sample, under `command` (m).
 fn forces(command: &[f64], hidden: Hidden, seed: u64) -> Vec<f64> {
     let (a1b0, beta1, beta2, a2, a3) = (2.1283e13, 425.0, 9.9976e4, 4.2297e6, 3.3);
-    let (gain, m, k) = (1.0261, 29.13, 1.19e6);
+    let (gain, m, k): (f64, f64, f64) = (1.0261, 29.13, 1.19e6);
     let c = 2.0 * 0.0097 * (m * k).sqrt();
     let h = PERIOD / INNER as f64;
     let mut random = ChaCha8Rng::seed_from_u64(seed);

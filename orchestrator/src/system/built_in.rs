@@ -1,6 +1,8 @@
 //! The systems that come with the program. A rig (plant and specimen) and a controller are files
 //! of their own; a system is a controller on a rig.
 
+use std::path::Path;
+
 use crate::units::hint;
 use plant::specimens::YieldingSpecimen;
 use plant::specimens::linear::LinearSpecimen;
@@ -93,8 +95,7 @@ pub fn add_structure(file: &mut SystemFile, name: &str, plant: &str) -> Result<(
     if !file.components.contains_key("specimen") {
         structure.disconnect("specimen");
     }
-    let rig = PLANTS.iter().find(|part| part.name == plant);
-    structure.redirect(&read("plant", rig, plant, plants())?.instead);
+    structure.redirect(&plant_of(plant)?.instead);
     file.follow("structure");
     let adjust = std::mem::take(&mut file.adjust);
     file.extend(structure);
@@ -104,6 +105,28 @@ pub fn add_structure(file: &mut SystemFile, name: &str, plant: &str) -> Result<(
     });
     file.name = format!("{}-on-{name}", file.name);
     Ok(())
+}
+
+/// Whether a plant is a file, written as the built-in ones are: components `table` and what belongs to
+/// it, `instead` for what controllers are connected to.
+fn is_plant_file(plant: &str) -> bool {
+    plant.ends_with(".toml")
+}
+
+/// The plant of a name or a file.
+fn plant_of(plant: &str) -> Result<SystemFile, SystemError> {
+    if is_plant_file(plant) {
+        return SystemFile::read(Path::new(plant));
+    }
+    let rig = PLANTS.iter().find(|part| part.name == plant);
+    read("plant", rig, plant, plants())
+}
+
+/// A plant's name as it is; a file's path absolute, so that it stays true elsewhere.
+pub fn plant_path(plant: &str) -> String {
+    let absolute = is_plant_file(plant).then(|| std::path::absolute(plant).ok());
+    let absolute = absolute.flatten();
+    absolute.map_or(plant.to_string(), |path| path.display().to_string())
 }
 
 /// A built-in system: the controller `name` on a rig of `plant` and `specimen` (or `none`), with the
@@ -121,8 +144,10 @@ pub fn system(
     let controller = CONTROLLERS.iter().find(|part| part.name == name);
     let mut file = read("system", controller, name, names())?;
     file.origin = format!("{name} (built-in)");
-    let rig = PLANTS.iter().find(|part| part.name == plant);
-    let rig = read("plant", rig, plant, plants())?;
+    let rig = plant_of(plant)?;
+    if is_plant_file(plant) {
+        file.directory.clone_from(&rig.directory);
+    }
     let mut on_table = None;
     if specimen != NONE {
         let found = SPECIMENS.iter().find(|(part, _)| part.name == specimen);

@@ -22,8 +22,8 @@ use crate::identify::identified::RigIdentification;
 use crate::identify::parameters::Physical;
 
 pub use sections::{
-    ActuatorSection, BodySection, EffectSections, HydraulicSection, INCH_POUND, SI, StandardErrors,
-    UncertaintySection, Units,
+    ActuatorSection, BodySection, CovarianceSection, EffectSections, HydraulicSection, INCH_POUND,
+    SI, StandardErrors, UncertaintySection, Units,
 };
 
 /// A rig's parameters with their standard errors.
@@ -59,6 +59,9 @@ pub struct ModelFile {
     /// How far a diagnosis may take the parameters from their values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<UncertaintySection>,
+    /// How the errors of the hydraulic rig's parameters go together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<CovarianceSection>,
     /// Standard errors of everything above, in the same layout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_errors: Option<StandardErrors>,
@@ -274,6 +277,7 @@ impl ModelFile {
             noise: Some(noise),
             hydraulics: None,
             uncertainty: None,
+            covariance: None,
             standard_errors: Some(StandardErrors {
                 effects: EffectSections::new(),
                 actuator: found.identifiable.then_some(actuator_errors),

@@ -135,3 +135,13 @@ pub struct UncertaintySection {
     /// Relative standard deviation of every parameter.
     pub relative: f64,
 }
+
+/// `[covariance]`: how the errors of the identified parameters go together, SI whatever the file's
+/// units.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CovarianceSection {
+    /// The parameters, in the order of rows and columns.
+    pub parameters: Vec<String>,
+    /// The covariance, row after row.
+    pub matrix: Vec<Vec<f64>>,
+}
