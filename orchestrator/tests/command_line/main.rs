@@ -15,6 +15,7 @@ mod installation;
 mod motions;
 mod physical_rig;
 mod reports;
+mod rigs;
 mod systems;
 
 use std::path::Path;

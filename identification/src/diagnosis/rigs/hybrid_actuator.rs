@@ -23,15 +23,25 @@ const COMMAND: Channel = Channel::Other {
 };
 
 nominal_parameters! {
+    /// a1b0: rate of the flow over the drive.
     valve_gain: "N/(m s3)",
+    /// beta1: damping of the spool.
     valve_beta1: "1/s",
+    /// beta2: stiffness of the spool.
     valve_beta2: "1/s2",
+    /// a2: force that the velocity takes.
     actuator_a2: "N/m",
+    /// a3: leakage past the piston.
     actuator_a3: "1/s",
+    /// Gain on the command.
     command_gain: "1",
+    /// m_e: mass of the specimen.
     specimen_mass: "kg",
+    /// k_e: stiffness of the specimen.
     specimen_stiffness: "N/m",
+    /// Damping ratio of the specimen.
     specimen_damping_ratio: "1",
+    /// Zero of the load cell.
     force_offset: "N",
 }
 
@@ -50,7 +60,7 @@ effects! {
     } from [[0.05], [-0.05]];
     /// a3 + l: leakage past the piston.
     piston_leakage: PistonLeakage {
-        added_rate: size("1/s", 0.5, (-20.0, 50.0)),
+        added_rate: size("1/s", 0.5, (-4.0, 50.0)),
     } from [[2.0], [-1.0]];
     /// u(t - T): conversion, computation, transport.
     delay: Delay {
@@ -112,6 +122,7 @@ impl Equations for HybridActuator {
     const KIND: &'static str = "hybrid_actuator";
     type Nominal = Nominal;
     type Effects = Effects;
+    type Session = ();
     const INPUTS: &'static [Channel] = &[COMMAND];
     const OUTPUT: Channel = Channel::ActuatorForce;
 
@@ -120,6 +131,7 @@ impl Equations for HybridActuator {
         recording: &RigRecording,
         nominal: &Nominal,
         effects: &Effects,
+        (): &(),
         out: &mut [f64],
     ) {
         let (parameters, beyond) = plant_of(nominal, effects);

@@ -100,6 +100,8 @@ pub struct HiddenOutcome {
     pub wall_s: f64,
     #[serde(skip)]
     record: Histories,
+    #[serde(skip)]
+    model: ExtendedRig,
 }
 
 type Plant = (TransferSystemParameters, TransferSystemEffects);
@@ -120,6 +122,7 @@ impl HiddenStudy {
             recordings: vec![recording],
         };
         let diagnosis = diagnose(&rig.description, &measurement, observer)?;
+        let model = ExtendedRig::new(&rig.description, &measurement, &diagnosis)?;
         let (found, nominal) = (rig.found(&diagnosis), rig.plant(&[]));
         let designed = self.controllers.iter().filter(|entry| entry.is_designed());
         let controllers: Result<_, ModelError> = designed
@@ -142,6 +145,7 @@ impl HiddenStudy {
             seed: self.seed,
             wall_s: start.elapsed().as_secs_f64(),
             record,
+            model,
         })
     }
 
@@ -302,7 +306,7 @@ impl HiddenOutcome {
     /// # Errors
     /// Numbers that TOML cannot hold.
     pub fn extended_model(&self) -> Result<String, toml::ser::Error> {
-        ExtendedRig::from(&self.diagnosis).to_toml()
+        self.model.to_toml()
     }
 
     /// The record that was diagnosed, as CSV.
