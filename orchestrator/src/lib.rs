@@ -10,6 +10,7 @@ pub mod error;
 pub mod extended_model;
 pub mod fmu;
 pub mod identify;
+pub mod iteration;
 pub mod library;
 pub mod master;
 pub mod metrics;

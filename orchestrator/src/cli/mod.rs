@@ -7,6 +7,7 @@ pub mod design;
 pub mod diagnose;
 pub mod identify;
 pub mod info;
+pub mod iterate;
 pub mod report;
 mod rig;
 pub mod run;
@@ -49,6 +50,8 @@ enum Command {
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
     Info(info::Arguments),
+    /// Correct the drive from run to run until the table follows
+    Iterate(Box<iterate::Arguments>),
     /// Write the HTML report of a run, a comparison or a diagnosis again
     Report(report::Arguments),
     /// Carry out calls of FMUs for another process of this program
@@ -72,6 +75,7 @@ pub fn main() -> ExitCode {
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
+        Some(Command::Iterate(arguments)) => iterate::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
         Some(Command::Run(arguments)) => run::execute(&arguments),

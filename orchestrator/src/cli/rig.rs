@@ -8,7 +8,7 @@ use crate::system::built_in;
 use crate::system::tuning::Tuning;
 
 /// Options that choose a rig.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct RigArguments {
     /// Plant of a built-in system: identified, servohydraulic [default: identified]
     #[arg(long)]

@@ -1,6 +1,7 @@
 //! The report of a run: how the table followed its reference.
 
 use super::{Axis, Cell, Fact, Panel, Report, Section, Series, Table, Units};
+use crate::metrics::laboratory::Laboratory;
 use crate::metrics::{HIGHEST_FREQUENCY, Tracking, fourier_amplitudes};
 use crate::motion::Motion;
 
@@ -81,6 +82,15 @@ pub fn run(run: &Run) -> Report {
                     .map(|tracking| tracking_table(run.whole, tracking))
                     .into_iter()
                     .collect(),
+                ..Section::default()
+            },
+            Section {
+                heading: "As laboratories measure".to_string(),
+                tables: run
+                    .tracking
+                    .and_then(|tracking| tracking.laboratory.as_ref())
+                    .map(|own| vec![band_table(own), strong_table(own)])
+                    .unwrap_or_default(),
                 ..Section::default()
             },
             Section {
@@ -184,6 +194,65 @@ fn tracking_table(whole: Whole, tracking: &Tracking) -> Table {
                 none(),
                 none(),
             ],
+        ],
+    }
+}
+
+/// Response spectra and transfer function, a row for each band.
+fn band_table(own: &Laboratory) -> Table {
+    let percent = |value| Cell::Quantity(value, Units::PERCENT, 3);
+    let rows = own.response_spectrum_percent.iter().enumerate();
+    Table {
+        caption: "Response spectrum at 5 % damping: how far the table's is from the reference's. \
+                  Transfer function from the reference's to the table's acceleration, each frequency \
+                  weighted by the reference's power."
+            .to_string(),
+        columns: [
+            "band, Hz",
+            "spectrum, largest",
+            "spectrum, mean",
+            "gain",
+            "delay, ms",
+            "coherence",
+        ]
+        .map(str::to_string)
+        .to_vec(),
+        rows: rows
+            .map(|(n, spectrum)| {
+                let [from, to] = spectrum.band_hz;
+                let band = own.coherence.as_ref().map(|bands| &bands[n]);
+                let number = |value: Option<f64>, digits| {
+                    value.map_or("-".into(), |value| Cell::Number(value, digits))
+                };
+                vec![
+                    format!("{from} to {to}").into(),
+                    percent(spectrum.largest),
+                    percent(spectrum.mean),
+                    number(band.map(|band| band.gain), 4),
+                    number(band.map(|band| 1e3 * band.delay_s), 3),
+                    number(band.map(|band| band.coherence), 4),
+                ]
+            })
+            .collect(),
+    }
+}
+
+/// The strong part of the motion and its energy.
+fn strong_table(own: &Laboratory) -> Table {
+    Table {
+        caption: "Significant duration: from 5 to 95 % of the reference's Arias intensity.".into(),
+        columns: ["", "value"].map(str::to_string).to_vec(),
+        rows: vec![
+            vec![
+                "significant duration".into(),
+                Cell::Quantity(own.significant_duration_s, Units::TIME, 3),
+            ],
+            vec![
+                "error in time over it".into(),
+                Cell::Quantity(own.significant_duration_percent, Units::PERCENT, 3),
+            ],
+            vec!["peak ratio".into(), Cell::Number(own.peak_ratio, 4)],
+            vec!["Arias ratio".into(), Cell::Number(own.arias_ratio, 4)],
         ],
     }
 }

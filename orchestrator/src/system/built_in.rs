@@ -26,26 +26,26 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 5] = [
+const CONTROLLERS: [Part; 7] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
     part!("", "sliding-mode"),
     part!("", "mpc"),
+    part!("", "lqg"),
+    part!("", "preview"),
 ];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [
     part!("plant/", "identified"),
     part!("plant/", "servohydraulic"),
 ];
-/// What stands on the table, with its mass in kg.
-const SPECIMENS: [(Part, fn() -> f64); 2] = [
+/// What stands on the table, also as controllers may know it.
+const SPECIMENS: [(Part, fn() -> YieldingSpecimen); 2] = [
     (part!("specimen/", "linear"), || {
-        LinearSpecimen::appendix_a().mass
+        LinearSpecimen::appendix_a().into()
     }),
-    (part!("specimen/", "yielding"), || {
-        YieldingSpecimen::default().mass
-    }),
+    (part!("specimen/", "yielding"), YieldingSpecimen::default),
 ];
 /// No specimen.
 const NONE: &str = "none";
@@ -103,8 +103,8 @@ pub fn system(
     if on_table.is_none() {
         file.disconnect("specimen");
     }
-    let mass = on_table.as_ref().and_then(|(_, mass)| *mass);
-    tuning::apply(&mut file, &rig, mass, wanted).map_err(|reason| file.fault("tuning", reason))?;
+    let own = on_table.as_ref().and_then(|(_, own)| own.as_ref());
+    tuning::apply(&mut file, &rig, own, wanted).map_err(|reason| file.fault("tuning", reason))?;
     file.redirect(&rig.instead);
     file.extend(rig);
     match on_table {

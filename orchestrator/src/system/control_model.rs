@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use identification::closed_loop::model_section::HydraulicSection;
 use identification::identify::model_file::{ModelFile, Units};
 use plant::identified::shake_table::ShakeTable;
 use units::constants::{G, INCH, SAMPLING_PERIOD};
@@ -29,6 +30,8 @@ pub struct ControlModel {
     pub delay: usize,
     /// Noise of the measurements.
     pub noise: Noise,
+    /// Valve, oil and seals, where they were identified.
+    pub hydraulics: Option<HydraulicSection>,
     /// Mass of the specimen in the recordings, kg.
     pub specimen_mass: Option<f64>,
 }
@@ -78,6 +81,7 @@ impl ControlModel {
                 velocity,
                 acceleration,
             },
+            hydraulics: file.hydraulics,
             specimen_mass: file.specimen(name).map_err(said)?.map(|own| own.mass),
         })
     }

@@ -5,7 +5,7 @@ mod assemble;
 pub mod built_in;
 mod checked;
 mod connection;
-mod control_model;
+pub mod control_model;
 mod error;
 mod file;
 mod graph;

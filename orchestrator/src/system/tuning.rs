@@ -9,6 +9,9 @@
 //!   oscillates);
 //! - force loop, lambda and K of sliding mode: [`Hierarchy::tuned`], the largest gain that leaves the
 //!   whole hierarchy a margin of 6 dB on the model;
+//! - preview control: model, friction, delay and noise, with a feedback that
+//!   keeps a margin of 6 dB ([`preview::Parameters::tuned`]); of the specimen it knows mass and
+//!   damping, its stiffness a fifth too low and its yield force a fifth too high;
 //! - sliding mode and model predictive control have the model as theirs and know the delay; the
 //!   latter also knows the measurements' noise and weighs outputs in units of stroke, 20 in/s and
 //!   1 g.
@@ -18,6 +21,9 @@ use std::sync::OnceLock;
 
 use controllers::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
 use controllers::pid::Pid;
+use controllers::preview;
+use controllers::preview::feedback::Uncertainty;
+use controllers::preview::model::{Hydraulics, RigModel};
 use controllers::three_variable::ThreeVariableGains;
 use controllers::tuning::sliding_mode::{Hierarchy, SlidingModeTuning};
 use serde::{Deserialize, Serialize};
@@ -28,6 +34,7 @@ use super::file::{ComponentFile, SystemFile};
 use super::link::{Link, Origin};
 use super::rule::Rule;
 use plant::identified::nominal::shake_table_values;
+use plant::specimens::YieldingSpecimen;
 
 /// Which parameters the controllers of a built-in system have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -48,14 +55,14 @@ pub struct Wanted<'a> {
     pub model: Option<&'a Path>,
 }
 
-/// Gives the controllers in `file` the parameters for `plant` with a specimen of that mass (kg).
+/// Gives the controllers in `file` the parameters for `plant` with a specimen.
 ///
 /// # Errors
 /// A plant for which there is no tuning; a model that cannot be read or that a rule refuses.
 pub(super) fn apply(
     file: &mut SystemFile,
     plant: &SystemFile,
-    specimen_mass: Option<f64>,
+    specimen: Option<&YieldingSpecimen>,
     wanted: Wanted<'_>,
 ) -> Result<(), String> {
     let own;
@@ -86,7 +93,8 @@ pub(super) fn apply(
             rules.as_ref().map_err(Clone::clone)?
         }
     };
-    let specimen_mass = rules.model.specimen_mass.or(specimen_mass);
+    let mass = rules.model.specimen_mass;
+    let specimen_mass = mass.or(specimen.map(|specimen| specimen.mass));
     for (name, component) in &mut file.components {
         match component.tuning {
             None => {}
@@ -97,6 +105,8 @@ pub(super) fn apply(
                 rules.model_predictive(component);
                 delay_references(&mut file.connections, name, rules.model.delay);
             }
+            Some(Rule::Preview) => rules.preview(component, specimen)?,
+            Some(Rule::LinearQuadraticGaussian) => rules.linear_quadratic_gaussian(component)?,
             Some(Rule::SlidingMode) => {
                 rules.sliding_mode(component, specimen_mass);
             }
@@ -117,6 +127,12 @@ fn delay_references(connections: &mut [Link], name: &str, delay: usize) {
     }
 }
 
+/// Stiffness of the specimen as a controller knows it, over the true one: before a test it is known
+/// within a fifth.
+const KNOWN_STIFFNESS: f64 = 0.8;
+/// As [`KNOWN_STIFFNESS`], for the yield force.
+const KNOWN_YIELD_FORCE: f64 = 1.2;
+
 /// What all rules use.
 struct Rules {
     model: ControlModel,
@@ -124,6 +140,8 @@ struct Rules {
     /// Displacement gain over the printed one.
     displacement: f64,
     sliding: SlidingModeTuning,
+    /// A model that preview control cannot hold is no fault of the others.
+    preview: Result<preview::Parameters, plant::ModelError>,
 }
 
 fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
@@ -151,9 +169,34 @@ impl Rules {
             period: SAMPLING_PERIOD,
         }
         .tuned()?;
+        let preview = preview::Parameters {
+            rig: RigModel {
+                shake_table: rig,
+                hydraulics: model.hydraulics.map(|own| Hydraulics {
+                    spool_lag: own.spool_lag,
+                    spool_inertia: own.spool_inertia,
+                    force_rate: own.force_rate,
+                    oil_stiffness: own.oil_stiffness,
+                    leakage_rate: own.leakage_rate,
+                    seal_damping: own.seal_damping,
+                }),
+            },
+            delay,
+            uncertainty: Uncertainty {
+                measurement: [
+                    model.noise.displacement,
+                    model.noise.velocity,
+                    model.noise.acceleration,
+                ],
+                ..preview::Parameters::default().uncertainty
+            },
+            ..preview::Parameters::default()
+        }
+        .tuned();
         Ok(Self {
             model,
             gains,
+            preview,
             displacement,
             sliding,
         })
@@ -238,6 +281,79 @@ impl Rules {
             ],
         );
         component.set("loop_delay_samples", self.model.delay as i64);
+    }
+
+    fn preview(
+        &self,
+        component: &mut ComponentFile,
+        specimen: Option<&YieldingSpecimen>,
+    ) -> Result<(), String> {
+        self.linear_quadratic_gaussian(component)?;
+        if let Some(own) = &self.model.hydraulics {
+            set(
+                component,
+                &[
+                    ("seal_friction", own.seal_friction),
+                    ("seal_presliding", own.seal_presliding),
+                    ("seal_excess", own.seal_excess),
+                    ("seal_stribeck_velocity", own.seal_stribeck_velocity),
+                    ("seal_sharpness", own.seal_sharpness),
+                    ("seal_relaxation", own.seal_relaxation),
+                ],
+            );
+        }
+        component.set("specimen_known", specimen.is_some());
+        if let Some(specimen) = specimen {
+            let columns = &specimen.columns;
+            let drift = columns.yield_displacement * KNOWN_YIELD_FORCE / KNOWN_STIFFNESS;
+            set(
+                component,
+                &[
+                    ("specimen_mass", specimen.mass),
+                    ("specimen_damping", specimen.damping),
+                    (
+                        "specimen_yield_force",
+                        columns.yield_force * KNOWN_YIELD_FORCE,
+                    ),
+                    ("specimen_yield_displacement", drift),
+                    ("specimen_post_yield_ratio", columns.post_yield_ratio),
+                ],
+            );
+        }
+        Ok(())
+    }
+
+    /// Preview control's model, margins and noise, without friction and specimen.
+    fn linear_quadratic_gaussian(&self, component: &mut ComponentFile) -> Result<(), String> {
+        let tuned = self.preview.as_ref().map_err(ToString::to_string)?;
+        let noise = &self.model.noise;
+        self.model(component);
+        if let Some(own) = &self.model.hydraulics {
+            component.set("hydraulics_known", true);
+            set(
+                component,
+                &[
+                    ("spool_lag", own.spool_lag),
+                    ("spool_inertia", own.spool_inertia),
+                    ("force_rate", own.force_rate),
+                    ("oil_stiffness", own.oil_stiffness),
+                    ("leakage_rate", own.leakage_rate),
+                    ("seal_damping", own.seal_damping),
+                ],
+            );
+        }
+        set(
+            component,
+            &[
+                ("command_weight", tuned.command_weight),
+                ("force_step", tuned.uncertainty.force_step),
+                ("displacement_measurement_noise", noise.displacement),
+                ("velocity_measurement_noise", noise.velocity),
+                ("acceleration_measurement_noise", noise.acceleration),
+            ],
+        );
+        component.set("loop_delay_samples", self.model.delay as i64);
+        Ok(())
     }
 
     fn model(&self, component: &mut ComponentFile) {
