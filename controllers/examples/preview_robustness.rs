@@ -89,6 +89,7 @@ fn play(
                 velocity: measured.velocity,
                 acceleration: measured.acceleration,
             },
+            ..PreviewInput::default()
         };
         let valve_command = control.step(&input, H);
         sum += (acceleration - wanted.acceleration).powi(2);

@@ -11,6 +11,9 @@
 //!    the valve.
 //! 3. The rig is brought to the model's state; what the forces were not, and the valve's offset, is
 //!    estimated and taken off ([`feedback`]). Measurements may be late.
+//!
+//! The first two with a table that stands still make a compensation of friction and specimen that
+//! any other controller can have ([`Role::Compensation`]).
 
 pub mod feedback;
 pub mod feedforward;
@@ -28,9 +31,23 @@ use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};
 use plant::identified::seal_shape::SealShape;
 
+/// What the law does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Drives the valve.
+    #[default]
+    Control,
+    /// Adds to another controller's command what keeps a table that stands still unmoved under the
+    /// forces along the wanted motion: to that controller the rig has neither friction nor specimen.
+    Compensation,
+}
+
 /// What preview control is built from.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameters {
+    /// What it does.
+    pub role: Role,
     /// The rig.
     pub rig: RigModel,
     /// Forces on its table.
@@ -58,6 +75,7 @@ pub struct Parameters {
 impl Default for Parameters {
     fn default() -> Self {
         Self {
+            role: Role::Control,
             rig: RigModel::default(),
             load: KnownLoad {
                 friction: 0.0,
@@ -143,6 +161,8 @@ pub struct PreviewInput {
     pub reference: [Motion; PREVIEW + 1],
     /// Measured motion.
     pub measured: Motion,
+    /// Another controller's command, V; for [`Role::Compensation`] alone.
+    pub command: f64,
 }
 
 /// What preview control remembers: plain data.
@@ -245,7 +265,11 @@ impl Controller for PreviewControl {
     fn step(&mut self, input: &PreviewInput, _period: f64) -> f64 {
         self.look_ahead(&input.reference);
         let limit = self.parameters.limit;
+        let compensates = self.parameters.role == Role::Compensation;
         let wanted: [_; PREVIEW + 1] = std::array::from_fn(|j| {
+            if compensates {
+                return SVector::zeros();
+            }
             vector(&input.reference[if self.parameters.preview { j } else { 0 }])
         });
         let memory = &mut self.memory;
@@ -255,19 +279,18 @@ impl Controller for PreviewControl {
             .command(&x, memory.command, &wanted, &memory.forces)
             .clamp(-limit, limit);
         let forces = [memory.forces[0], memory.forces[1]];
-        let command = self
-            .feedback
-            .command(
-                &mut memory.feedback,
-                &self.rig,
-                &x,
-                own,
-                &vector(&input.measured),
-                forces[0],
-            )
-            .clamp(-limit, limit);
-        self.feedback
-            .sent(&mut memory.feedback, &self.rig, command, forces[1]);
+        let command = if compensates {
+            (input.command + own).clamp(-limit, limit)
+        } else {
+            let measured = vector(&input.measured);
+            let state = &mut memory.feedback;
+            let command = self
+                .feedback
+                .command(state, &self.rig, &x, own, &measured, forces[0])
+                .clamp(-limit, limit);
+            self.feedback.sent(state, &self.rig, command, forces[1]);
+            command
+        };
         memory.model = self.rig.advance(&x, own, forces).into();
         memory.command = own;
         command

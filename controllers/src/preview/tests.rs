@@ -71,6 +71,7 @@ fn error(parameters: Parameters, force: f64, offset: f64) -> f64 {
         let input = PreviewInput {
             reference: std::array::from_fn(at),
             measured: late[parameters.delay],
+            ..PreviewInput::default()
         };
         let u = control.step(&input, h) + offset;
         load = parameters.load.advance(&load, [&wanted, &at(1)], h);
@@ -142,6 +143,7 @@ fn error_on_dry_seals(parameters: Parameters, seals: KnownLoad) -> f64 {
             &PreviewInput {
                 reference,
                 measured: late,
+                ..PreviewInput::default()
             },
             h,
         );
@@ -193,10 +195,48 @@ fn the_valve_limit_holds_and_the_model_knows_it() {
         let input = PreviewInput {
             reference: std::array::from_fn(at),
             measured: at(0),
+            ..PreviewInput::default()
         };
         let u = control.step(&input, parameters.period);
         assert!(u.abs() <= 1.0);
         largest = largest.max(control.memory.command.abs());
     }
     assert_eq!(largest, 1.0);
+}
+
+#[test]
+fn compensation_holds_a_table_still_under_the_loads_of_a_motion() {
+    let loaded = hydraulic();
+    let mut compensation = PreviewControl::new(Parameters {
+        role: Role::Compensation,
+        ..loaded
+    })
+    .unwrap();
+    let rig = *compensation.rig();
+    let h = loaded.period;
+    // The rig under the loads, once left alone and once held; another's command passes through.
+    let mut both = [SVector::<f64, STATES>::zeros(); 2];
+    let (mut load, mut force) = (LoadState::default(), 0.0);
+    let mut largest = [0.0f64; 2];
+    for k in 0..1500 {
+        let at = |j: usize| motion((k + j) as f64 * h);
+        let u = compensation.step(
+            &PreviewInput {
+                reference: std::array::from_fn(at),
+                command: 0.25,
+                ..PreviewInput::default()
+            },
+            h,
+        ) - 0.25;
+        load = loaded.load.advance(&load, [&at(0), &at(1)], h);
+        let next = loaded.load.force(&load, &at(1));
+        for (i, command) in [0.0, u].into_iter().enumerate() {
+            both[i] = rig.advance(&both[i], command, [force, next]);
+            let a = (rig.c * both[i] + rig.d * next)[2];
+            largest[i] = largest[i].max(a.abs());
+        }
+        force = next;
+    }
+    println!("left alone {:.3}, held {:.4} m/s2", largest[0], largest[1]);
+    assert!(largest[1] < 0.2 * largest[0], "{largest:?}");
 }

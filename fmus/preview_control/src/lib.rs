@@ -9,7 +9,7 @@ use controllers::{Controller, Motion};
 use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Variable};
 use serde::{Deserialize, Serialize};
 
-use settings::Settings;
+use settings::{ROLES, Settings};
 
 /// Preview control from reference and measured motion to valve command.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -20,6 +20,7 @@ pub struct PreviewControl {
     velocity_ahead: [f64; PREVIEW],
     acceleration_ahead: [f64; PREVIEW],
     measured: Motion,
+    command: f64,
     memory: Memory,
     valve_command: f64,
     #[serde(skip)]
@@ -61,13 +62,14 @@ impl Built {
     }
 }
 
-const NOW: [&str; 6] = [
+const NOW: [&str; 7] = [
     "reference_displacement",
     "reference_velocity",
     "reference_acceleration",
     "measured_displacement",
     "measured_velocity",
     "measured_acceleration",
+    "controller_command",
 ];
 
 fn ahead() -> Vec<Variable<PreviewControl>> {
@@ -126,6 +128,7 @@ impl Component for PreviewControl {
             input("reference_acceleration", s.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
             input("measured_displacement", s.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
             input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+            input("controller_command", s.command, "Another controller's command, where this compensates", "V").nominal(10.0);
             input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
         };
         let ahead = ahead();
@@ -142,6 +145,10 @@ impl Component for PreviewControl {
         };
         variables.extend(outputs);
         variables.extend(settings::variables());
+        variables.push(
+            Variable::choice("role", ROLES, |s: &mut Self| &mut s.settings.role)
+                .about("What the law does"),
+        );
         variables
     }
 
@@ -165,6 +172,7 @@ impl Component for PreviewControl {
                 },
             }),
             measured: self.measured,
+            command: self.command,
         };
         self.valve_command = control.step(&input, step_size);
         self.memory = control.memory;

@@ -1,15 +1,32 @@
 //! The parameters of the FMU and what the controller is built from.
 
-use controllers::preview::Parameters;
 use controllers::preview::load::KnownLoad;
 use controllers::preview::model::{Hydraulics, RigModel};
-use fmu_kit::Variable;
+use controllers::preview::{Parameters, Role};
+use fmu_kit::{Enumeration, Item, Variable};
 use plant::ModelError;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::YieldingSpecimen;
 use serde::{Deserialize, Serialize};
 
 use crate::PreviewControl;
+
+/// The choices of `role`.
+pub const ROLES: Enumeration = Enumeration {
+    name: "Role",
+    items: &[
+        Item {
+            name: "control",
+            value: 1,
+            description: "Drives the valve",
+        },
+        Item {
+            name: "compensation",
+            value: 2,
+            description: "Adds to controller_command what friction and specimen take",
+        },
+    ],
+};
 
 /// All parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -20,6 +37,7 @@ pub struct Settings {
     hydraulics_known: bool,
     specimen: YieldingSpecimen,
     specimen_known: bool,
+    pub(crate) role: i32,
     loop_delay_samples: i32,
 }
 
@@ -40,6 +58,7 @@ impl Default for Settings {
             hydraulics_known: false,
             specimen: YieldingSpecimen::default(),
             specimen_known: false,
+            role: 1,
             loop_delay_samples: 0,
         }
     }
@@ -55,6 +74,11 @@ impl Settings {
                 expected: "zero or a positive number",
             })?;
         Ok(Parameters {
+            role: if self.role == 2 {
+                Role::Compensation
+            } else {
+                Role::Control
+            },
             rig: RigModel {
                 shake_table: self.shake_table,
                 hydraulics: self.hydraulics_known.then_some(self.hydraulics),

@@ -13,7 +13,7 @@ pub struct RigArguments {
     /// Plant of a built-in system: identified, servohydraulic [default: identified]
     #[arg(long)]
     pub plant: Option<String>,
-    /// Specimen of a built-in system: none, linear, yielding [default: linear]
+    /// Specimen of a built-in system: none, linear, yielding, storeys [default: linear]
     #[arg(long)]
     pub specimen: Option<String>,
     /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]

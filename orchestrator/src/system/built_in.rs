@@ -26,12 +26,14 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 7] = [
+const CONTROLLERS: [Part; 9] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
     part!("", "sliding-mode"),
     part!("", "mpc"),
+    part!("", "three-variable-compensated"),
+    part!("", "mpc-compensated"),
     part!("", "lqg"),
     part!("", "preview"),
 ];
@@ -40,12 +42,15 @@ const PLANTS: [Part; 2] = [
     part!("plant/", "identified"),
     part!("plant/", "servohydraulic"),
 ];
-/// What stands on the table, also as controllers may know it.
-const SPECIMENS: [(Part, fn() -> YieldingSpecimen); 2] = [
+/// What stands on the table, with what controllers may know of it: one storey or nothing.
+const SPECIMENS: [(Part, fn() -> Option<YieldingSpecimen>); 3] = [
     (part!("specimen/", "linear"), || {
-        LinearSpecimen::appendix_a().into()
+        Some(LinearSpecimen::appendix_a().into())
     }),
-    (part!("specimen/", "yielding"), YieldingSpecimen::default),
+    (part!("specimen/", "yielding"), || {
+        Some(YieldingSpecimen::default())
+    }),
+    (part!("specimen/", "storeys"), || None),
 ];
 /// No specimen.
 const NONE: &str = "none";
@@ -98,7 +103,7 @@ pub fn system(
             specimen,
             specimens(),
         )?;
-        on_table = Some((part, found.map(|found| found.1())));
+        on_table = Some((part, found.and_then(|found| found.1())));
     }
     if on_table.is_none() {
         file.disconnect("specimen");

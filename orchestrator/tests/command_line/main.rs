@@ -8,6 +8,7 @@ mod contract;
 mod diagnosis;
 mod failures;
 mod hostile;
+mod iteration;
 mod motions;
 mod physical_rig;
 mod reports;

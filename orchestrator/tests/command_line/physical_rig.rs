@@ -69,12 +69,15 @@ fn median(json: &Value, controller: &str) -> f64 {
         .unwrap()
 }
 
-/// No run ends early or leaves the stroke, and the order of the controllers holds.
+/// The controllers of the thesis.
+const THESIS: &str = "displacement-pid,three-variable,loop-shaping,sliding-mode,mpc";
+
+/// No run of `controllers` ends early or leaves the stroke, and their order holds.
 #[track_caller]
-fn holds_its_order(json: &Value, status: i32, said: &str) {
+fn holds_its_order(json: &Value, status: i32, said: &str, controllers: usize) {
     assert_eq!(status, 0, "{said}");
     let rows = json["rows"].as_array().unwrap();
-    assert_eq!(rows.len(), 40);
+    assert_eq!(rows.len(), 8 * controllers);
     for row in rows {
         assert_eq!(row["ended"], "complete", "{row}");
         assert!(
@@ -82,19 +85,29 @@ fn holds_its_order(json: &Value, status: i32, said: &str) {
             "{row}"
         );
     }
-    let order = ["mpc", "sliding-mode", "three-variable", "loop-shaping"];
+    let order = [
+        "preview",
+        "mpc",
+        "sliding-mode",
+        "three-variable",
+        "loop-shaping",
+    ];
     let medians = order.map(|controller| median(json, controller));
     println!("{}: {order:?} {medians:.2?} %", json["specimen"]);
     assert!(medians.is_sorted(), "{medians:?}");
-    // The distances are of some size: MPC at least a quarter below three-variable control.
-    assert!(medians[0] < 0.75 * medians[2], "{medians:?}");
+    // The distances are of some size: MPC at least a quarter below three-variable control, preview
+    // control at less than half of MPC.
+    assert!(medians[1] < 0.75 * medians[3], "{medians:?}");
+    assert!(medians[0] < 0.5 * medians[1], "{medians:?}");
 }
 
 #[test]
 fn with_every_specimen_no_run_ends_early_and_the_order_of_controllers_holds() {
+    let controllers = format!("{THESIS},preview");
     for specimen in ["none", "linear", "yielding"] {
-        let (status, json, said) = compare(&["--specimen", specimen]);
-        holds_its_order(&json, status, &said);
+        let (status, json, said) =
+            compare(&["--specimen", specimen, "--controllers", &controllers]);
+        holds_its_order(&json, status, &said, 6);
         assert_eq!(json["specimen"], specimen);
     }
 }
@@ -119,16 +132,23 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
     let Some(folder) = records() else { return };
     let records = folder.display().to_string();
     let (status, json, said) = compare(&["--specimen", "yielding", "--records", &records]);
-    holds_its_order(&json, status, &said);
-    // Stated in docs/physical-rig.md.
-    for (controller, largest) in [("mpc", 5.5), ("sliding-mode", 7.5), ("three-variable", 8.5)] {
+    holds_its_order(&json, status, &said, 9);
+    // Stated in docs/physical-rig.md and docs/preview-control.md.
+    for (controller, largest) in [
+        ("preview", 1.5),
+        ("mpc", 5.5),
+        ("sliding-mode", 7.5),
+        ("three-variable", 8.5),
+    ] {
         assert!(median(&json, controller) < largest, "{controller}");
     }
 }
 
 #[test]
 fn printed_tunings_that_are_unstable_on_this_rig_are_stopped_and_shown_as_stopped() {
-    let (status, json, said) = compare(&["--specimen", "yielding", "--tuning", "printed"]);
+    let arguments = ["--specimen", "yielding", "--tuning", "printed"];
+    let controllers = ["--controllers", THESIS];
+    let (status, json, said) = compare(&[&arguments[..], &controllers].concat());
     assert_eq!(status, 1);
     for controller in ["mpc", "sliding-mode"] {
         assert!(json["medians"][controller]["time_domain_percent"].is_null());
