@@ -9,6 +9,7 @@ mod diagnosis;
 mod failures;
 mod hostile;
 mod iteration;
+mod installation;
 mod motions;
 mod physical_rig;
 mod reports;
