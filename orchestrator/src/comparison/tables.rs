@@ -43,11 +43,14 @@ pub fn tables(comparison: &Comparison) -> [ErrorTable; 4] {
     ]
 }
 
+/// The printed values of a motion, and their medians and deviations.
+type PrintedColumn = (fn(&Printed) -> [f64; 3], [[f64; 3]; 2]);
+
 fn table(
     caption: &str,
     comparison: &Comparison,
     measure: Measure,
-    printed: Option<(fn(&Printed) -> [f64; 3], [[f64; 3]; 2])>,
+    printed: Option<PrintedColumn>,
 ) -> ErrorTable {
     let (rows, controllers) = (&comparison.rows, comparison.controllers());
     let place = |controller: &str| CONTROLLERS.iter().position(|known| *known == controller);

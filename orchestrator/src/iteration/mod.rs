@@ -136,6 +136,18 @@ pub struct Iteration {
     pub errors: Option<(f64, Vec<f64>, Vec<f64>)>,
 }
 
+/// The best run so far.
+struct Best {
+    /// Measured error, %.
+    measured: f64,
+    iteration: usize,
+    drive: Motion,
+    /// Acceleration error within the band, m/s².
+    error: Vec<f64>,
+    /// True acceleration error, m/s².
+    off: Vec<f64>,
+}
+
 /// What a run gave.
 struct Played {
     measured: Measured,
@@ -173,8 +185,7 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
     let energy = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>();
     let whole = energy(&wanted.acceleration);
     let (mut runs, mut exposure, mut gain, mut halved) = (Vec::<Run>::new(), 0.0, plan.gain, false);
-    // Measured error, run, drive, its error in band, its true error.
-    let mut best: Option<(f64, usize, Motion, Vec<f64>, Vec<f64>)> = None;
+    let mut best: Option<Best> = None;
     let mut first_error = Vec::new();
     let stop = loop {
         let iteration = runs.len();
@@ -209,11 +220,17 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
         if iteration == 0 {
             first_error.clone_from(&off);
         }
-        let before = best.as_ref().map(|best| best.0);
+        let before = best.as_ref().map(|best| best.measured);
         if before.is_none_or(|before| measured < before) {
-            best = Some((measured, iteration, drive.clone(), error, off));
+            best = Some(Best {
+                measured,
+                iteration,
+                drive: drive.clone(),
+                error,
+                off,
+            });
         }
-        let Some((_, _, best_drive, best_error, _)) = &best else {
+        let Some(nearest) = &best else {
             break Stop::EndedEarly;
         };
         if measured <= plan.target_percent {
@@ -239,12 +256,12 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
         {
             break Stop::Exposure;
         }
-        drive = best_drive.clone();
-        inverse.correct(&mut drive, best_error, gain);
+        drive = nearest.drive.clone();
+        inverse.correct(&mut drive, &nearest.error, gain);
     };
     let first = runs[0].measured_percent;
     let (at, best_drive, off) = match best {
-        Some((_, at, drive, _, off)) => (at, Some(drive), off),
+        Some(best) => (best.iteration, Some(best.drive), best.off),
         None => (0, None, Vec::new()),
     };
     let converges = runs[at].measured_percent < first || stop == Stop::Target;

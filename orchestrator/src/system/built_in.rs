@@ -42,8 +42,10 @@ const PLANTS: [Part; 2] = [
     part!("plant/", "identified"),
     part!("plant/", "servohydraulic"),
 ];
-/// What stands on the table, with what controllers may know of it: one storey or nothing.
-const SPECIMENS: [(Part, fn() -> Option<YieldingSpecimen>); 3] = [
+/// What controllers may know of a specimen: one storey or nothing.
+type Known = fn() -> Option<YieldingSpecimen>;
+/// What stands on the table.
+const SPECIMENS: [(Part, Known); 3] = [
     (part!("specimen/", "linear"), || {
         Some(LinearSpecimen::appendix_a().into())
     }),

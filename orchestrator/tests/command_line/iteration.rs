@@ -19,7 +19,11 @@ const RIG: [&str; 6] = [
 #[test]
 fn three_corrections_make_a_fifth_of_the_error_and_the_drive_is_written_and_read() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = [&RIG[..], &["--dummy-mass", "100 lbm", "--out", "out", "--json"]].concat();
+    let arguments = [
+        &RIG[..],
+        &["--dummy-mass", "100 lbm", "--out", "out", "--json"],
+    ]
+    .concat();
     let output = shakebench(folder.path(), &arguments);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let found: Value = serde_json::from_str(&stdout(&output)).unwrap();
