@@ -1,7 +1,9 @@
 //! How well a table followed its reference.
 
 pub mod laboratory;
-pub mod response_spectrum;
+mod response_spectrum;
+
+pub use response_spectrum::{USUAL_DAMPING, pseudo_acceleration};
 
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;

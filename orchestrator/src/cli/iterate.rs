@@ -11,7 +11,7 @@ use super::run;
 use crate::error::Error;
 use crate::iteration::{self, Iteration, Plan};
 use crate::report::columns::aligned;
-use crate::results::Results;
+use crate::results::{Results, unused};
 
 /// Options of `shakebench iterate`.
 #[derive(Debug, Args)]
@@ -95,7 +95,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let found = found?;
     let folder = arguments.out.clone().unwrap_or_else(|| {
         let name = format!("iteration-{}-{}", found.system, found.motion);
-        Path::new("shakebench-results").join(name.replace(['/', '\\', ' '], "-"))
+        let name = name.replace(['/', '\\', ' '], "-");
+        unused(&Path::new("shakebench-results").join(name), |_| false)
     });
     let files = iteration::write(&found, &folder)?;
     if arguments.json {
@@ -175,8 +176,8 @@ fn text(found: &Iteration) -> String {
     let head = [
         "corrections",
         "measured",
-        "in time",
-        "in frequency",
+        "RMS error",
+        "Fourier error",
         "spectrum",
         "exposure",
         "",

@@ -12,18 +12,20 @@ use super::OneVersion;
 use super::rig::RigArguments;
 use crate::error::Error;
 use crate::fmu::{Isolation, Options, Trace};
-use crate::master::{Algorithm, Ended, Pace};
+use crate::live::{Scene, Server, Tap};
+use crate::master::{Algorithm, Ended, Pace, Simulation};
 use crate::metrics::laboratory::Laboratory;
 use crate::motion::{self, Motion};
 use crate::report::columns::aligned;
 use crate::report::number::significant;
-use crate::results::Results;
+use crate::report::{Cell, UnitSystem, Units};
+use crate::results::{Results, unused};
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
 use crate::run::summary::Summary;
 use crate::system::built_in;
-use crate::units::{self, INCH, STANDARD_GRAVITY};
+use crate::units::{self, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
 #[derive(Debug, Default, Args)]
@@ -71,9 +73,13 @@ pub struct Arguments {
     /// Seed of the built-in motion [default: 1]
     #[arg(long, conflicts_with_all = ["record", "reference"])]
     seed: Option<u64>,
-    /// Keep pace with the clock on the wall
+    /// Keep pace with real time
     #[arg(long)]
     real_time: bool,
+    /// Show the run while it goes on, on a page of this machine at this port (any free one where none
+    /// is given); it keeps pace with real time
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
+    watch: Option<u16>,
     /// Folder for the results [default: shakebench-results/SYSTEM-MOTION]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -147,14 +153,23 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         samples,
         ..
     } = &prepared;
+    let is_same = |place: &Path| {
+        let before = Manifest::read(&place.join("manifest.json"));
+        before.is_ok_and(|before| before.request == request)
+    };
     let folder = arguments.out.clone().unwrap_or_else(|| {
         let name = format!("{}-{}", system.name, motion.name);
-        Path::new("shakebench-results").join(name.replace(['/', '\\', ' '], "-"))
+        let name = name.replace(['/', '\\', ' '], "-");
+        unused(&Path::new("shakebench-results").join(name), is_same)
     });
     Results::check(&folder)?;
-    let simulation = prepared.simulation(request.algorithm)?;
+    let mut simulation = prepared.simulation(request.algorithm)?;
+    let live = match arguments.watch {
+        Some(port) => Some(watch(&prepared, &mut simulation, port)?),
+        None => None,
+    };
     let bar = progress_bar(*samples);
-    let pace = if arguments.real_time {
+    let pace = if arguments.real_time || arguments.watch.is_some() {
         Pace::RealTime
     } else {
         Pace::Fastest
@@ -180,6 +195,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             println!("  {}", file.display());
         }
     }
+    if let Some((server, tap)) = live {
+        tap.finish(&outcome.ended.message());
+        server.farewell();
+    }
     if let Some(written) = written {
         let differences = written.differences(&manifest);
         if !differences.is_empty() {
@@ -198,6 +217,26 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     eprintln!("error: the run ended early: {}", outcome.ended.message());
     eprintln!("what was computed until then is saved");
     Ok(ExitCode::from(1))
+}
+
+/// Serves the page of the run and says where.
+///
+/// # Errors
+/// A port that is taken.
+fn watch(
+    prepared: &Prepared,
+    simulation: &mut Simulation,
+    port: u16,
+) -> Result<(Server, Arc<Tap>), Error> {
+    let (scene, places) = Scene::new(prepared, simulation.names());
+    let tap = Arc::new(Tap::new(places, prepared.samples));
+    let server = Server::start(&scene, Arc::clone(&tap), port).map_err(|error| Error::Option {
+        option: "--watch",
+        reason: format!("port {port} of 127.0.0.1 cannot be listened at: {error}"),
+    })?;
+    simulation.watch(Arc::clone(&tap));
+    eprintln!("watch it at {}", server.url());
+    Ok((server, tap))
 }
 
 /// How FMUs are run.
@@ -256,8 +295,9 @@ fn table(summary: &Summary, motion: &Motion) -> String {
         row.extend(cells);
         row
     };
-    let inches = |value: f64| format!("{:.4} in", value / INCH);
-    let gravity = |value: f64| format!("{:.4} g", value / STANDARD_GRAVITY);
+    let system = UnitSystem::of_text();
+    let length = |value| Cell::Quantity(value, Units::DISPLACEMENT, 4).text(system);
+    let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4).text(system);
     let percent = |value: f64| format!("{value:.4} %");
     text += &aligned(&[
         row(
@@ -267,17 +307,17 @@ fn table(summary: &Summary, motion: &Motion) -> String {
         row(
             "displacement, peak",
             [
-                inches(motion.peak_displacement()),
-                inches(tracking.peak_displacement),
-                inches(tracking.peak_displacement_error),
+                length(motion.peak_displacement()),
+                length(tracking.peak_displacement),
+                length(tracking.peak_displacement_error),
             ],
         ),
         row(
             "acceleration, peak",
             [
-                gravity(motion.peak_acceleration()),
-                gravity(tracking.peak_acceleration),
-                gravity(tracking.peak_acceleration_error),
+                acceleration(motion.peak_acceleration()),
+                acceleration(tracking.peak_acceleration),
+                acceleration(tracking.peak_acceleration_error),
             ],
         ),
     ]);
@@ -285,15 +325,15 @@ fn table(summary: &Summary, motion: &Motion) -> String {
     let pair = |name: &str, value: String| vec![name.to_string(), value];
     text += &aligned(&[
         pair(
-            "error in time, acceleration",
+            "normalised RMS acceleration error",
             percent(tracking.time_domain_percent),
         ),
         pair(
-            "error in frequency, acceleration",
+            "Fourier amplitude error, acceleration",
             percent(tracking.frequency_domain_percent),
         ),
         pair(
-            "error in time, displacement",
+            "normalised RMS displacement error",
             percent(tracking.displacement_percent),
         ),
         pair(
@@ -307,7 +347,7 @@ fn table(summary: &Summary, motion: &Motion) -> String {
         text += "\n";
         text += &aligned(&[
             pair(
-                "error over the significant duration",
+                "error over the significant duration, acceleration",
                 format!(
                     "{} of {:.2} s",
                     percent(own.significant_duration_percent),

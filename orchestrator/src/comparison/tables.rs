@@ -16,13 +16,13 @@ pub struct ErrorTable {
 pub fn tables(comparison: &Comparison) -> [ErrorTable; 4] {
     [
         table(
-            "Error in time, % (printed values of Table 4-1 and 5-2 in brackets)",
+            "Normalised RMS acceleration error, % (printed values of Table 4-1 and 5-2 in brackets)",
             comparison,
             |row| row.time_domain_percent,
             Some((|printed| printed.time, PRINTED_TIME)),
         ),
         table(
-            "Error in frequency, % (printed values in brackets; their scaling is not given, and the \
+            "Fourier amplitude error, % (printed values in brackets; their scaling is not given, and the \
              printed median 0.65 should be 0.63)",
             comparison,
             |row| row.frequency_domain_percent,
@@ -35,7 +35,7 @@ pub fn tables(comparison: &Comparison) -> [ErrorTable; 4] {
             None,
         ),
         table(
-            "Error in time over the significant duration (5 to 95 % of the Arias intensity), %",
+            "Normalised RMS acceleration error over the significant duration (5 to 95 % of the Arias intensity), %",
             comparison,
             |row| row.significant_duration_percent,
             None,

@@ -88,8 +88,8 @@ fn page(iteration: &Iteration) -> Report {
                 columns: [
                     "corrections",
                     "measured error",
-                    "error in time",
-                    "error in frequency",
+                    "RMS acceleration error",
+                    "Fourier amplitude error",
                     "response spectrum",
                     "exposure",
                     "ended",

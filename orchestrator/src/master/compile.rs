@@ -1,6 +1,7 @@
 //! From a checked system to a simulation: loads the FMUs and prepares every exchange of values.
 
 use std::collections::{HashMap, HashSet};
+use std::time::Duration;
 
 use super::action::Action;
 use super::reference::Reference;
@@ -80,6 +81,8 @@ impl Simulation {
                 may_fail,
                 failure: None,
                 ended: None,
+                steps: 0,
+                spent: Duration::ZERO,
             });
         }
         let actions = schedule
@@ -124,6 +127,7 @@ impl Simulation {
             next_signals: signals.clone(),
             last_signals: signals.clone(),
             signals,
+            tap: None,
             names: plan.names,
             exact_names,
             reference,

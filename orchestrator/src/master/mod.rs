@@ -20,12 +20,15 @@ mod start;
 mod transfer;
 
 use std::fmt;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 pub use error::MasterError;
 pub use record::Record;
 pub use run::{Ended, Ending, LogLine, Outcome, Pace};
 
 use crate::fmu::{Diverted, Instance, Item, Progress, State};
+use crate::live::Tap;
 use action::{Action, Moment};
 use reference::Reference;
 use signals::Signals;
@@ -95,6 +98,8 @@ pub struct Simulation {
     last_signals: Signals,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
     next_signals: Signals,
+    /// Who watches.
+    tap: Option<Arc<Tap>>,
 }
 
 /// What ends a run early.
@@ -124,7 +129,14 @@ struct Part {
     failure: Option<MasterError>,
     /// When it asked to end the run, s.
     ended: Option<f64>,
+    /// Its steps so far.
+    steps: u32,
+    /// Time that its timed steps took.
+    spent: Duration,
 }
+
+/// One in so many steps of a component is timed: looking at the clock costs as much as a short step.
+const TIMED: u32 = 16;
 
 impl Part {
     /// Steps it; a failure that may be is kept instead of given.
@@ -132,7 +144,13 @@ impl Part {
         if self.failure.is_some() || self.ended.is_some() {
             return Ok(());
         }
-        match self.instance.do_step(time, length) {
+        let begun = self.steps.is_multiple_of(TIMED).then(Instant::now);
+        let stepped = self.instance.do_step(time, length);
+        if let Some(begun) = begun {
+            self.spent += begun.elapsed();
+        }
+        self.steps = self.steps.wrapping_add(1);
+        match stepped {
             Err(error) if self.may_fail => self.failure = Some(error.into()),
             done => {
                 if let Progress::Ended(at) = done? {
@@ -152,12 +170,23 @@ impl Part {
         Ok(())
     }
 
+    /// Time that its steps took, s, from those that were timed.
+    fn wall(&self) -> f64 {
+        let timed = self.steps.div_ceil(TIMED).max(1);
+        self.spent.as_secs_f64() * f64::from(self.steps) / f64::from(timed)
+    }
+
     fn is_due(&self, tick: usize) -> bool {
         self.every.is_none_or(|every| tick.is_multiple_of(every))
     }
 }
 
 impl Simulation {
+    /// Shows every row of its record to `tap` from now on.
+    pub fn watch(&mut self, tap: Arc<Tap>) {
+        self.tap = Some(tap);
+    }
+
     /// Time of the present tick, s.
     pub fn time(&self) -> f64 {
         self.tick as f64 * self.step

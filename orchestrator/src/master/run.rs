@@ -137,6 +137,8 @@ pub struct Outcome {
     pub step: f64,
     /// Time that the stepping took, s.
     pub wall: f64,
+    /// Time that the steps of each component took, s.
+    pub spent: Vec<(String, f64)>,
     /// What the FMUs logged.
     pub messages: Vec<LogLine>,
     /// What the user should know of the order of calls.
@@ -183,8 +185,13 @@ impl Simulation {
                     message,
                 })
         });
+        let spent = self.parts.iter().map(|part| {
+            let name = part.instance.name.clone();
+            (name, part.wall())
+        });
         Outcome {
             record,
+            spent: spent.collect(),
             steps: self.tick,
             step: self.step,
             wall,
@@ -215,6 +222,9 @@ impl Simulation {
             self.observe()?;
             if self.tick.is_multiple_of(self.ticks_per_row) {
                 record.push(self.time(), &self.signals.numbers, &self.signals.exact);
+                if let Some(tap) = &self.tap {
+                    tap.push(self.time(), &self.signals.numbers);
+                }
                 self.check_bounds()?;
                 let sample = self.tick / self.ticks_per_row;
                 if sample.is_multiple_of(1024) {

@@ -5,14 +5,11 @@ use std::f64::consts::{PI, TAU};
 
 use realfft::num_complex::Complex64;
 
-use super::response_spectrum::pseudo_acceleration;
-use super::{rms, spectrum};
+use super::{USUAL_DAMPING, pseudo_acceleration, rms, spectrum};
 use crate::motion::peak;
 
 /// Bands in which figures are given, Hz.
 pub const BANDS: [[f64; 2]; 5] = [[0.5, 1.0], [1.0, 2.0], [2.0, 4.0], [4.0, 8.0], [8.0, 15.0]];
-/// Damping ratio of the response spectra.
-pub const DAMPING: f64 = 0.05;
 /// Oscillators an octave.
 const PER_OCTAVE: f64 = 12.0;
 /// Segments of the transfer function, s: Hann windows that overlap by half.
@@ -110,11 +107,13 @@ fn significant(acceleration: &[f64]) -> [usize; 2] {
 fn deviation(wanted: &[f64], found: &[f64], dt: f64, band: [f64; 2]) -> SpectrumDeviation {
     let octaves = (band[1] / band[0]).log2();
     let count = (octaves * PER_OCTAVE).ceil().max(1.0);
+    let frequencies: Vec<f64> = (0..=count as usize)
+        .map(|n| band[0] * (octaves * n as f64 / count).exp2())
+        .collect();
+    let [reference, table] =
+        [wanted, found].map(|a| pseudo_acceleration(a, dt, &frequencies, USUAL_DAMPING));
     let (mut largest, mut sum) = (0.0f64, 0.0);
-    for n in 0..=count as usize {
-        let frequency = band[0] * (octaves * n as f64 / count).exp2();
-        let [reference, table] =
-            [wanted, found].map(|a| pseudo_acceleration(a, dt, frequency, DAMPING));
+    for (table, reference) in table.iter().zip(&reference) {
         let off = 100.0 * (table / reference - 1.0).abs();
         largest = largest.max(off);
         sum += off;

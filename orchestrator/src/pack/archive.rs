@@ -145,6 +145,7 @@ pub(super) fn write_archive(path: &Path, entries: &Entries) -> Result<(), PackEr
 fn write_entries(path: &Path, entries: &Entries, stamp: String) -> io::Result<()> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
+        .compression_level(Some(9))
         .last_modified_time(DateTime::default());
     let mut archive = ZipWriter::new(File::create(path)?);
     archive.set_comment(stamp).map_err(io::Error::from)?;
