@@ -13,6 +13,7 @@ pub mod mpc;
 pub mod pid;
 pub mod prediction_over_delay;
 pub mod preview;
+pub mod robustness;
 pub mod sliding_mode;
 pub mod synthesis;
 pub mod three_variable;

@@ -15,6 +15,7 @@ pub mod model;
 mod rule;
 pub mod tuning;
 mod value;
+mod written;
 
 pub use assemble::{Library, assemble};
 pub use checked::{Component, Connection, DEFAULT_PERIOD, Source, System};

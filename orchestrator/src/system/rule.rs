@@ -12,7 +12,7 @@ pub enum Rule {
     ForcePid,
     /// Model and weights of linear quadratic Gaussian control.
     LinearQuadraticGaussian,
-    /// The gain of loop shaping.
+    /// All coefficients of loop shaping.
     LoopShaping,
     /// Model and weights of model predictive control.
     ModelPredictive,
@@ -22,4 +22,6 @@ pub enum Rule {
     SlidingMode,
     /// All gains of three-variable control.
     ThreeVariable,
+    /// The gains of three-variable control under model predictive control.
+    UnderPrediction,
 }

@@ -3,12 +3,11 @@
 //! Every rule works on what a `ControlModel` says: a model file of `shakebench identify`, by
 //! default the one of the physical rig's commissioning. Nothing here knows the rig itself.
 //!
-//! - three-variable control: [`ThreeVariableGains::tuned`];
-//! - displacement PID and loop shaping: the printed controller, its gain changed so that the
-//!   displacement gain is that of three-variable control (half the gain at which the loop
-//!   oscillates);
-//! - force loop, lambda and K of sliding mode: [`Hierarchy::tuned`], the largest gain that leaves the
-//!   whole hierarchy a margin of 6 dB on the model;
+//! - displacement PID: the printed controller with half the gain at which the loop oscillates;
+//! - three-variable control: [`ThreeVariableGains::damped`](controllers::three_variable::ThreeVariableGains::damped);
+//! - loop shaping: [`Shaped::fastest`](controllers::synthesis::whole_plant::Shaped::fastest);
+//! - force loop, lambda and K of sliding mode: [`Hierarchy::tuned`](controllers::tuning::sliding_mode::Hierarchy::tuned),
+//!   the largest gain that leaves the whole hierarchy a margin of 6 dB on the model;
 //! - preview control: model, friction, delay and noise, with a feedback that
 //!   keeps a margin of 6 dB ([`preview::Parameters::tuned`]); of the specimen it knows mass and
 //!   damping, its stiffness a fifth too low and its yield force a fifth too high;
@@ -19,15 +18,11 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use controllers::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
-use controllers::pid::Pid;
 use controllers::preview;
 use controllers::preview::feedback::Uncertainty;
 use controllers::preview::model::{Hydraulics, RigModel};
-use controllers::three_variable::ThreeVariableGains;
-use controllers::tuning::sliding_mode::{Hierarchy, SlidingModeTuning};
+use controllers::tuning::suite::{Member, Suite};
 use serde::{Deserialize, Serialize};
-use units::constants::SAMPLING_PERIOD;
 
 use super::control_model::ControlModel;
 use super::file::{ComponentFile, SystemFile};
@@ -53,6 +48,8 @@ pub struct Wanted<'a> {
     pub tuning: Option<Tuning>,
     /// Model file to tune on; none: the physical rig's commissioning.
     pub model: Option<&'a Path>,
+    /// Rules on a model that has been read; they go before everything else.
+    pub rules: Option<&'a Rules>,
 }
 
 /// Gives the controllers in `file` the parameters for `plant` with a specimen.
@@ -65,6 +62,9 @@ pub(super) fn apply(
     specimen: Option<&YieldingSpecimen>,
     wanted: Wanted<'_>,
 ) -> Result<(), String> {
+    if let Some(rules) = wanted.rules {
+        return rules.apply(file, specimen);
+    }
     let own;
     let rules = match (wanted.tuning, wanted.model, plant.commissioned) {
         (Some(Tuning::Printed), Some(_), _) => {
@@ -93,27 +93,7 @@ pub(super) fn apply(
             rules.as_ref().map_err(Clone::clone)?
         }
     };
-    let mass = rules.model.specimen_mass;
-    let specimen_mass = mass.or(specimen.map(|specimen| specimen.mass));
-    for (name, component) in &mut file.components {
-        match component.tuning {
-            None => {}
-            Some(Rule::DisplacementPid) => rules.displacement_pid(component),
-            Some(Rule::ForcePid) => rules.force_pid(component),
-            Some(Rule::LoopShaping) => rules.loop_shaping(component),
-            Some(Rule::ModelPredictive) => {
-                rules.model_predictive(component);
-                delay_references(&mut file.connections, name, rules.model.delay);
-            }
-            Some(Rule::Preview) => rules.preview(component, specimen)?,
-            Some(Rule::LinearQuadraticGaussian) => rules.linear_quadratic_gaussian(component)?,
-            Some(Rule::SlidingMode) => {
-                rules.sliding_mode(component, specimen_mass);
-            }
-            Some(Rule::ThreeVariable) => rules.three_variable(component),
-        }
-    }
-    Ok(())
+    rules.apply(file, specimen)
 }
 
 /// The component `name` compares late measurements with the reference of the same time.
@@ -133,15 +113,13 @@ const KNOWN_STIFFNESS: f64 = 0.8;
 /// As [`KNOWN_STIFFNESS`], for the yield force.
 const KNOWN_YIELD_FORCE: f64 = 1.2;
 
-/// What all rules use.
-struct Rules {
+/// All rules on a model.
+#[derive(Debug, Clone)]
+pub struct Rules {
     model: ControlModel,
-    gains: ThreeVariableGains,
-    /// Displacement gain over the printed one.
-    displacement: f64,
-    sliding: SlidingModeTuning,
-    /// A model that preview control cannot hold is no fault of the others.
-    preview: Result<preview::Parameters, plant::ModelError>,
+    suite: Suite,
+    /// What keeps others from being tuned is no fault of theirs: a sentence then.
+    preview: Result<preview::Parameters, String>,
 }
 
 fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
@@ -151,81 +129,67 @@ fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
 }
 
 impl Rules {
-    fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
-        let ControlModel { rig, delay, .. } = model;
-        let gains = ThreeVariableGains::tuned(&rig, delay, SAMPLING_PERIOD)?;
-        let printed = Pid::equation_3_6();
-        let displacement = gains.proportional / printed.proportional;
-        let sliding = Hierarchy {
-            rig: &rig.state_space(),
-            model: &rig,
-            displacement: Pid {
-                proportional: gains.proportional,
-                integral: printed.integral * displacement,
-                integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
-                ..printed
-            },
-            delay,
-            period: SAMPLING_PERIOD,
-        }
-        .tuned()?;
-        let preview = preview::Parameters {
-            rig: RigModel {
-                shake_table: rig,
-                hydraulics: model.hydraulics.map(|own| Hydraulics {
-                    spool_lag: own.spool_lag,
-                    spool_inertia: own.spool_inertia,
-                    force_rate: own.force_rate,
-                    oil_stiffness: own.oil_stiffness,
-                    leakage_rate: own.leakage_rate,
-                    seal_damping: own.seal_damping,
-                }),
-            },
-            delay,
-            uncertainty: Uncertainty {
-                measurement: [
-                    model.noise.displacement,
-                    model.noise.velocity,
-                    model.noise.acceleration,
-                ],
-                ..preview::Parameters::default().uncertainty
-            },
-            ..preview::Parameters::default()
-        }
-        .tuned();
+    /// Finds all controllers on a model.
+    ///
+    /// # Errors
+    /// A model for which a rule finds none.
+    pub fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
+        let suite = model.suite()?;
+        let preview = preview_control(&model)
+            .tuned()
+            .map_err(|error| error.to_string());
         Ok(Self {
             model,
-            gains,
+            suite,
             preview,
-            displacement,
-            sliding,
         })
     }
 
-    fn displacement_pid(&self, component: &mut ComponentFile) {
-        let printed = Pid::equation_3_6();
-        set(
-            component,
-            &[
-                (
-                    "proportional_gain",
-                    printed.proportional * self.displacement,
-                ),
-                ("integral_gain", printed.integral * self.displacement),
-            ],
-        );
+    /// Gives the controllers in `file` their parameters, under a specimen; its mass counts where the
+    /// model knows of none.
+    fn apply(
+        &self,
+        file: &mut SystemFile,
+        specimen: Option<&YieldingSpecimen>,
+    ) -> Result<(), String> {
+        let mass = specimen.map(|specimen| specimen.mass);
+        let specimen_mass = self.model.specimen_mass.or(mass);
+        for (name, component) in &mut file.components {
+            match component.tuning {
+                None => {}
+                Some(Rule::DisplacementPid) => self.named(component, Member::DisplacementPid),
+                Some(Rule::ForcePid) => self.force_pid(component),
+                Some(Rule::LoopShaping) => self.named(component, Member::LoopShaping),
+                Some(Rule::ModelPredictive) => {
+                    self.model_predictive(component);
+                    delay_references(&mut file.connections, name, self.model.delay);
+                }
+                Some(Rule::Preview) => self.preview(component, specimen)?,
+                Some(Rule::LinearQuadraticGaussian) => {
+                    self.linear_quadratic_gaussian(component)?;
+                }
+                Some(Rule::SlidingMode) => self.sliding_mode(component, specimen_mass),
+                Some(Rule::ThreeVariable) => self.named(component, Member::ThreeVariable),
+                Some(Rule::UnderPrediction) => self.under_prediction(component),
+            }
+        }
+        Ok(())
     }
 
-    fn loop_shaping(&self, component: &mut ComponentFile) {
-        set(component, &[("gain", self.gains.proportional)]);
+    /// What the suite sets a controller to.
+    fn named(&self, component: &mut ComponentFile, member: Member) {
+        for (name, value) in self.suite.named(member) {
+            component.set(&name, value);
+        }
     }
 
-    fn three_variable(&self, component: &mut ComponentFile) {
-        set(component, &self.gains.named());
+    /// Three-variable control as the prediction above it knows it.
+    fn under_prediction(&self, component: &mut ComponentFile) {
+        set(component, &self.suite.mpc.low_level.gains.named());
     }
 
     fn force_pid(&self, component: &mut ComponentFile) {
-        let force = &self.sliding.force;
+        let force = &self.suite.sliding_mode.force;
         set(
             component,
             &[
@@ -237,24 +201,7 @@ impl Rules {
 
     fn sliding_mode(&self, component: &mut ComponentFile, specimen_mass: Option<f64>) {
         self.model(component);
-        let (displacement, force) = (Pid::equation_3_6(), &self.sliding.force);
-        set(
-            component,
-            &[
-                ("surface_rate", self.sliding.rate),
-                ("reaching_rate", self.sliding.rate),
-                (
-                    "displacement_loop_proportional_gain",
-                    displacement.proportional * self.displacement,
-                ),
-                (
-                    "displacement_loop_integral_gain",
-                    displacement.integral * self.displacement,
-                ),
-                ("force_loop_proportional_gain", force.proportional),
-                ("force_loop_integral_gain", force.integral),
-            ],
-        );
+        self.named(component, Member::SlidingMode);
         if let Some(mass) = specimen_mass {
             component.set("specimen_mass", mass);
         }
@@ -264,41 +211,28 @@ impl Rules {
     }
 
     fn model_predictive(&self, component: &mut ComponentFile) {
-        let noise = &self.model.noise;
         self.model(component);
-        self.three_variable(component);
-        // The sensors' noise, and outputs in units of the stroke, 20 in/s and 1 g: with the printed
-        // weights on unscaled outputs displacement counts for nothing and drifts.
-        set(
-            component,
-            &[
-                ("displacement_measurement_noise", noise.displacement),
-                ("velocity_measurement_noise", noise.velocity),
-                ("acceleration_measurement_noise", noise.acceleration),
-                ("displacement_scale", 0.0381),
-                ("velocity_scale", 0.508),
-                ("acceleration_scale", 9.80665),
-            ],
-        );
+        self.named(component, Member::ModelPredictive);
         component.set("loop_delay_samples", self.model.delay as i64);
     }
 
+    /// Preview control's model, margins, noise, friction and specimen.
     fn preview(
         &self,
         component: &mut ComponentFile,
         specimen: Option<&YieldingSpecimen>,
     ) -> Result<(), String> {
         self.linear_quadratic_gaussian(component)?;
-        if let Some(own) = &self.model.hydraulics {
+        if let Some((own, shape)) = &self.model.hydraulics {
             set(
                 component,
                 &[
                     ("seal_friction", own.seal_friction),
-                    ("seal_presliding", own.seal_presliding),
-                    ("seal_excess", own.seal_excess),
-                    ("seal_stribeck_velocity", own.seal_stribeck_velocity),
-                    ("seal_sharpness", own.seal_sharpness),
-                    ("seal_relaxation", own.seal_relaxation),
+                    ("seal_presliding", shape.presliding),
+                    ("seal_excess", shape.excess),
+                    ("seal_stribeck_velocity", shape.stribeck_velocity),
+                    ("seal_sharpness", shape.sharpness),
+                    ("seal_relaxation", shape.relaxation),
                 ],
             );
         }
@@ -325,10 +259,10 @@ impl Rules {
 
     /// Preview control's model, margins and noise, without friction and specimen.
     fn linear_quadratic_gaussian(&self, component: &mut ComponentFile) -> Result<(), String> {
-        let tuned = self.preview.as_ref().map_err(ToString::to_string)?;
+        let tuned = self.preview.as_ref().map_err(Clone::clone)?;
         let noise = &self.model.noise;
         self.model(component);
-        if let Some(own) = &self.model.hydraulics {
+        if let Some((own, _)) = &self.model.hydraulics {
             component.set("hydraulics_known", true);
             set(
                 component,
@@ -358,5 +292,30 @@ impl Rules {
 
     fn model(&self, component: &mut ComponentFile) {
         set(component, &shake_table_values(&self.model.rig));
+    }
+}
+
+/// Preview control of a model's rig, not yet tuned.
+fn preview_control(model: &ControlModel) -> preview::Parameters {
+    let usual = preview::Parameters::default();
+    let noise = &model.noise;
+    preview::Parameters {
+        rig: RigModel {
+            shake_table: model.rig,
+            hydraulics: model.hydraulics.map(|(own, _)| Hydraulics {
+                spool_lag: own.spool_lag,
+                spool_inertia: own.spool_inertia,
+                force_rate: own.force_rate,
+                oil_stiffness: own.oil_stiffness,
+                leakage_rate: own.leakage_rate,
+                seal_damping: own.seal_damping,
+            }),
+        },
+        delay: model.delay,
+        uncertainty: Uncertainty {
+            measurement: [noise.displacement, noise.velocity, noise.acceleration],
+            ..usual.uncertainty
+        },
+        ..usual
     }
 }

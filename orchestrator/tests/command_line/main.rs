@@ -6,6 +6,7 @@ mod archives;
 mod benchmark;
 mod book;
 mod browser;
+mod commissioning;
 mod contract;
 mod diagnosis;
 mod failures;
@@ -15,6 +16,7 @@ mod iteration;
 mod motions;
 mod physical_rig;
 mod reports;
+mod rigs;
 mod systems;
 
 use std::path::Path;

@@ -72,7 +72,8 @@ fn median(json: &Value, controller: &str) -> f64 {
 /// The controllers of the thesis.
 const THESIS: &str = "displacement-pid,three-variable,loop-shaping,sliding-mode,mpc";
 
-/// No run of `controllers` ends early or leaves the stroke, and their order holds.
+/// No run of `controllers` ends early or leaves the stroke; displacement PID is the worst, model
+/// predictive control far from it and preview control far from that.
 #[track_caller]
 fn holds_its_order(json: &Value, status: i32, said: &str, controllers: usize) {
     assert_eq!(status, 0, "{said}");
@@ -85,20 +86,17 @@ fn holds_its_order(json: &Value, status: i32, said: &str, controllers: usize) {
             "{row}"
         );
     }
-    let order = [
-        "preview",
-        "mpc",
-        "sliding-mode",
-        "three-variable",
-        "loop-shaping",
-    ];
-    let medians = order.map(|controller| median(json, controller));
-    println!("{}: {order:?} {medians:.2?} %", json["specimen"]);
-    assert!(medians.is_sorted(), "{medians:?}");
-    // The distances are of some size: MPC at least a quarter below three-variable control, preview
-    // control at less than half of MPC.
-    assert!(medians[1] < 0.75 * medians[3], "{medians:?}");
-    assert!(medians[0] < 0.5 * medians[1], "{medians:?}");
+    let all = ["mpc", "sliding-mode", "three-variable", "loop-shaping"];
+    let medians = all.map(|controller| median(json, controller));
+    let worst = median(json, "displacement-pid");
+    let best = median(json, "preview");
+    println!(
+        "{}: {all:?} {medians:.2?} %, PID {worst:.2} %, preview {best:.2} %",
+        json["specimen"]
+    );
+    assert!(medians.iter().all(|own| *own < worst), "{medians:?}");
+    assert!(medians[0] < 0.6 * worst, "{medians:?}");
+    assert!(best < 0.5 * medians[0], "{best}, {medians:?}");
 }
 
 #[test]
@@ -137,8 +135,9 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
     for (controller, largest) in [
         ("preview", 1.5),
         ("mpc", 5.5),
+        ("three-variable", 6.5),
         ("sliding-mode", 7.5),
-        ("three-variable", 8.5),
+        ("loop-shaping", 9.0),
     ] {
         assert!(median(&json, controller) < largest, "{controller}");
     }
@@ -331,7 +330,10 @@ fn a_broken_rig_is_brought_to_null_in_the_time_that_the_docs_state() {
             0.024,
         ));
     }
-    let lost: &[&str] = &["interlock.tripped", "too far from the reference"];
+    let lost: &[&str] = &[
+        "interlock.tripped",
+        "the supply's pressure is below its limit",
+    ];
     cases.push((
         "supply lost".into(),
         vec![format!("table.supply_loss_time{at}")],
