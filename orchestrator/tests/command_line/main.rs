@@ -12,6 +12,7 @@ mod diagnosis;
 mod failures;
 mod hostile;
 mod installation;
+mod iteration;
 mod motions;
 mod physical_rig;
 mod reports;
