@@ -14,6 +14,7 @@ use crate::error::Error;
 use crate::fmu::{Isolation, Options, Trace};
 use crate::live::{Scene, Server, Tap};
 use crate::master::{Algorithm, Ended, Pace, Simulation};
+use crate::metrics::laboratory::Laboratory;
 use crate::motion::{self, Motion};
 use crate::report::columns::aligned;
 use crate::report::number::significant;
@@ -103,6 +104,30 @@ pub struct Arguments {
         "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// A run of `system` on the `[record, reference]` or the built-in motion, scaled by `[pga, peak]`.
+    pub(super) fn of(
+        system: Option<String>,
+        [record, reference]: [Option<PathBuf>; 2],
+        rig: RigArguments,
+        set: Vec<String>,
+        [pga, peak]: [Option<String>; 2],
+        seed: Option<u64>,
+    ) -> Self {
+        Self {
+            system,
+            record,
+            reference,
+            rig,
+            set,
+            pga,
+            peak,
+            seed,
+            ..Self::default()
+        }
+    }
 }
 
 /// Runs a system on a motion and writes the results.
@@ -316,13 +341,62 @@ fn table(summary: &Summary, motion: &Motion) -> String {
             format!("{:.1} ms", 1e3 * tracking.delay),
         ),
     ]);
+    if let Some(own) = &tracking.laboratory {
+        text += "\n";
+        text += &aligned(&bands(own));
+        text += "\n";
+        text += &aligned(&[
+            pair(
+                "error over the significant duration, acceleration",
+                format!(
+                    "{} of {:.2} s",
+                    percent(own.significant_duration_percent),
+                    own.significant_duration_s
+                ),
+            ),
+            pair("peak ratio", format!("{:.4}", own.peak_ratio)),
+            pair("Arias ratio", format!("{:.4}", own.arias_ratio)),
+        ]);
+    }
     text
 }
+
+/// Response spectra and transfer function, a row for each band.
+fn bands(own: &Laboratory) -> Vec<Vec<String>> {
+    let head = [
+        "band",
+        "response spectrum, largest",
+        "mean",
+        "gain",
+        "delay",
+        "coherence",
+    ];
+    let mut rows = vec![head.map(str::to_string).to_vec()];
+    for (n, spectrum) in own.response_spectrum_percent.iter().enumerate() {
+        let [from, to] = spectrum.band_hz;
+        let mut row = vec![
+            format!("{from} to {to} Hz"),
+            format!("{:.2} %", spectrum.largest),
+            format!("{:.2} %", spectrum.mean),
+        ];
+        row.extend(match own.coherence.as_ref().map(|bands| &bands[n]) {
+            Some(band) => [
+                format!("{:.4}", band.gain),
+                format!("{:.2} ms", 1e3 * band.delay_s),
+                format!("{:.4}", band.coherence),
+            ],
+            None => ["-", "-", "-"].map(str::to_string),
+        });
+        rows.push(row);
+    }
+    rows
+}
+
 /// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.
 ///
 /// # Errors
 /// Values that cannot be read.
-fn request(arguments: &Arguments) -> Result<Request, Error> {
+pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
     let system = arguments
         .system
         .clone()
@@ -378,7 +452,7 @@ fn absolute(path: &Path) -> PathBuf {
 }
 
 /// A positive quantity; a number alone is in `unit`.
-fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
+pub(super) fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
     let fault = |reason: String| Error::Option { option, reason };
     let value = units::value_in(text, unit).map_err(|error| fault(error.to_string()))?;
     if value > 0.0 {

@@ -28,26 +28,33 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 5] = [
+const CONTROLLERS: [Part; 9] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
     part!("", "sliding-mode"),
     part!("", "mpc"),
+    part!("", "three-variable-compensated"),
+    part!("", "mpc-compensated"),
+    part!("", "lqg"),
+    part!("", "preview"),
 ];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [
     part!("plant/", "identified"),
     part!("plant/", "servohydraulic"),
 ];
-/// What stands on the table, with its mass in kg.
-const SPECIMENS: [(Part, fn() -> f64); 2] = [
+/// What controllers may know of a specimen: one storey or nothing.
+type Known = fn() -> Option<YieldingSpecimen>;
+/// What stands on the table.
+const SPECIMENS: [(Part, Known); 3] = [
     (part!("specimen/", "linear"), || {
-        LinearSpecimen::appendix_a().mass
+        Some(LinearSpecimen::appendix_a().into())
     }),
     (part!("specimen/", "yielding"), || {
-        YieldingSpecimen::default().mass
+        Some(YieldingSpecimen::default())
     }),
+    (part!("specimen/", "storeys"), || None),
 ];
 /// No specimen.
 const NONE: &str = "none";
@@ -119,13 +126,13 @@ pub fn system(
             specimen,
             specimens(),
         )?;
-        on_table = Some((part, found.map(|found| found.1())));
+        on_table = Some((part, found.and_then(|found| found.1())));
     }
     if on_table.is_none() {
         file.disconnect("specimen");
     }
-    let mass = on_table.as_ref().and_then(|(_, mass)| *mass);
-    tuning::apply(&mut file, &rig, mass, wanted).map_err(|reason| file.fault("tuning", reason))?;
+    let own = on_table.as_ref().and_then(|(_, own)| own.as_ref());
+    tuning::apply(&mut file, &rig, own, wanted).map_err(|reason| file.fault("tuning", reason))?;
     file.redirect(&rig.instead);
     file.extend(rig);
     match on_table {
