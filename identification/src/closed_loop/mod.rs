@@ -9,7 +9,7 @@ pub mod bands;
 pub mod equations;
 pub mod friction;
 pub mod least_squares;
-pub mod model_section;
+mod model_section;
 pub mod simulation;
 pub mod specimen;
 pub mod start;

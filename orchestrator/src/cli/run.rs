@@ -13,7 +13,7 @@ use super::rig::RigArguments;
 use crate::error::Error;
 use crate::fmu::{Isolation, Options, Trace};
 use crate::live::{Scene, Server, Tap};
-use crate::master::{Algorithm, Ended, Pace, Simulation};
+use crate::master::{Algorithm, Ended, Pace, Record, Simulation};
 use crate::metrics::laboratory::Laboratory;
 use crate::motion::{self, Motion};
 use crate::report::columns::aligned;
@@ -23,7 +23,7 @@ use crate::results::{Results, unused};
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
-use crate::run::summary::Summary;
+use crate::run::summary::{Summary, asked};
 use crate::system::built_in;
 use crate::units::{self, STANDARD_GRAVITY};
 
@@ -46,6 +46,10 @@ pub struct Arguments {
     reference: Option<PathBuf>,
     #[command(flatten)]
     rig: RigArguments,
+    /// Hybrid simulation: a computed structure between the ground, which the motion then is, and the
+    /// specimen of a built-in system: none, two-storeys [default: none]
+    #[arg(long, value_name = "NAME")]
+    structure: Option<String>,
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
@@ -100,7 +104,7 @@ pub struct Arguments {
     log: Option<Vec<String>>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
-        "system", "record", "reference", "plant", "specimen", "tuning", "control_model", "set", "fmi", "algorithm", "step",
+        "system", "record", "reference", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
         "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
@@ -189,7 +193,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.json {
         println!("{}", serde_json::json!(summary));
     } else {
-        print!("{}", table(&summary, motion));
+        print!("{}", table(&summary, &outcome.record, motion));
         println!("\nwritten:");
         for file in files {
             println!("  {}", file.display());
@@ -268,7 +272,7 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
 }
 
 /// The figures as a table for people.
-fn table(summary: &Summary, motion: &Motion) -> String {
+fn table(summary: &Summary, record: &Record, motion: &Motion) -> String {
     let mut text = format!("{} on {}\n", summary.system, summary.motion.name);
     for note in &motion.notes {
         text += &format!("  {note}\n");
@@ -290,6 +294,11 @@ fn table(summary: &Summary, motion: &Motion) -> String {
     let Some(tracking) = &summary.tracking else {
         return text;
     };
+    let asked = asked(record, motion);
+    let (motion, heading) = match &asked {
+        Some(asked) => (asked, "structure"),
+        None => (motion, "reference"),
+    };
     let row = |name: &str, cells: [String; 3]| {
         let mut row = vec![name.to_string()];
         row.extend(cells);
@@ -300,10 +309,7 @@ fn table(summary: &Summary, motion: &Motion) -> String {
     let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4).text(system);
     let percent = |value: f64| format!("{value:.4} %");
     text += &aligned(&[
-        row(
-            "",
-            ["reference".into(), "table".into(), "largest error".into()],
-        ),
+        row("", [heading.into(), "table".into(), "largest error".into()]),
         row(
             "displacement, peak",
             [
@@ -405,6 +411,7 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
     for (option, given) in [
         ("--plant", &arguments.rig.plant),
         ("--specimen", &arguments.rig.specimen),
+        ("--structure", &arguments.structure),
     ] {
         if let (true, Some(_)) = (is_file, given) {
             let reason = format!("{system} is a file and has its own; edit it instead");
@@ -433,6 +440,7 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
         },
         plant: arguments.rig.plant(),
         specimen: arguments.rig.specimen(),
+        structure: arguments.structure.clone(),
         tuning: arguments.rig.tuning,
         control_model: arguments.rig.control_model.as_deref().map(absolute),
         record: arguments.record.as_deref().map(absolute),

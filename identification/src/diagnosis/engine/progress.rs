@@ -27,7 +27,7 @@ pub enum Step {
     Screened,
     /// It has one more effect.
     Extended,
-    /// It lacks an effect that no longer pays.
+    /// It lacks an effect, or what one has beyond its special case, that no longer pays.
     Reduced,
 }
 

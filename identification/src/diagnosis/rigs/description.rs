@@ -166,12 +166,20 @@ impl Description {
             path: path.to_owned(),
             source,
         })?;
+        Self::parse(path, &text)
+    }
+
+    /// Reads the text of a description; `path` is where it stands.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, DescriptionError> {
         let wrong = |what: String| DescriptionError::Description {
             path: path.to_owned(),
             what,
         };
         let mut description: Self =
-            toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+            toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
         description.path = path.to_owned();
         description.rig()?;
         Ok(description)

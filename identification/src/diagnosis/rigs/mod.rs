@@ -12,6 +12,7 @@ mod cyclic_material;
 mod description;
 mod diagnosis;
 mod extended;
+mod hybrid_actuator;
 mod hysteretic_device;
 mod measured;
 mod natural;
@@ -28,6 +29,7 @@ pub use description::{Column, Description, DescriptionError, LeftOut, Quantity, 
 pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
 pub use extended::{ExtendedRig, FileErrors, Prediction};
 
+pub use hybrid_actuator::TransferSystemRig;
 pub use natural::Natural;
 pub use reading::Measurement;
 pub use recording::RigRecording;
@@ -249,11 +251,12 @@ impl<E: Equations> Rig for E {
 }
 
 /// Every kind of rig.
-pub static KINDS: [&dyn Rig; 6] = [
+pub static KINDS: [&dyn Rig; 7] = [
     &closed_loop_actuator::ClosedLoopActuator,
     &positioning_drive::PositioningDrive,
     &hysteretic_device::HystereticDevice,
     &cyclic_material::CyclicMaterial,
+    &hybrid_actuator::HybridActuator,
     &oscillator::Oscillator,
     &controlled_damper::ControlledDamper,
 ];
