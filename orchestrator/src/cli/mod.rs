@@ -2,6 +2,7 @@
 
 pub mod benchmark;
 pub mod build;
+pub mod commission;
 pub mod compare;
 pub mod compare_runs;
 pub mod design;
@@ -13,6 +14,7 @@ pub mod info;
 mod progress;
 pub mod report;
 mod rig;
+pub mod rigs;
 pub mod run;
 
 use std::path::PathBuf;
@@ -62,6 +64,8 @@ enum Command {
     Benchmark(benchmark::Arguments),
     /// Build the components and pack them as FMUs
     Build(build::Arguments),
+    /// Record, identify and validate a rig, and design all controllers on the result
+    Commission(commission::Arguments),
     /// Run controllers on records and print the thesis's tables beside the results
     Compare(compare::Arguments),
     /// Lay any runs over each other and say what differs between them
@@ -94,6 +98,8 @@ enum Command {
         /// File that the calls come through
         file: PathBuf,
     },
+    /// Draw rigs about the physical one and compare designs on them
+    Rigs(rigs::Arguments),
     /// Run a system on a motion
     Run(Box<run::Arguments>),
 }
@@ -114,6 +120,7 @@ pub fn main() -> ExitCode {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
         Some(Command::Build(arguments)) => build::execute(&arguments),
+        Some(Command::Commission(arguments)) => commission::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::CompareRuns(arguments)) => compare_runs::execute(&arguments),
         Some(Command::Completions { shell }) => {
@@ -129,6 +136,7 @@ pub fn main() -> ExitCode {
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
+        Some(Command::Rigs(arguments)) => rigs::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
     };
     done.unwrap_or_else(|error| {

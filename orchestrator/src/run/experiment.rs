@@ -132,12 +132,21 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
             Wanted {
                 tuning: request.tuning,
                 model: request.control_model.as_deref(),
+                rules: None,
             },
         )?
     };
-    let motion = motion(request, &file)?;
+    prepare_file(request, &file)
+}
+
+/// As [`prepare`], of a system that has been read or put together.
+///
+/// # Errors
+/// Whatever is at fault.
+pub fn prepare_file(request: &Request, file: &SystemFile) -> Result<Prepared, Error> {
+    let motion = motion(request, file)?;
     let mut library = FmuLibrary::new(request.fmi, file.directory.as_deref());
-    let system = system::assemble(&file, &request.set, &mut |name| library.find(name))?;
+    let system = system::assemble(file, &request.set, &mut |name| library.find(name))?;
     let step = request.step_s.or(file.step()?).unwrap_or(motion.dt);
     let mut samples = motion.len();
     if let Some(duration) = request.duration_s.or(file.duration()?) {

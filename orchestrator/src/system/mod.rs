@@ -5,7 +5,7 @@ mod assemble;
 pub mod built_in;
 mod checked;
 mod connection;
-mod control_model;
+pub mod control_model;
 mod error;
 mod file;
 mod graph;
@@ -15,6 +15,7 @@ pub mod model;
 mod rule;
 pub mod tuning;
 mod value;
+mod written;
 
 pub use assemble::{Library, assemble};
 pub use checked::{Component, Connection, DEFAULT_PERIOD, Source, System};
