@@ -11,6 +11,7 @@ pub mod doctor;
 pub mod figures;
 pub mod identify;
 pub mod info;
+pub mod iterate;
 mod progress;
 pub mod report;
 mod rig;
@@ -90,6 +91,8 @@ enum Command {
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
     Info(info::Arguments),
+    /// Correct the drive from run to run until the table follows
+    Iterate(Box<iterate::Arguments>),
     /// Write the HTML report of a run, a comparison or a diagnosis again
     Report(report::Arguments),
     /// Carry out calls of FMUs for another process of this program
@@ -134,6 +137,7 @@ pub fn main() -> ExitCode {
         Some(Command::Doctor(arguments)) => doctor::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
+        Some(Command::Iterate(arguments)) => iterate::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
         Some(Command::Rigs(arguments)) => rigs::execute(&arguments),

@@ -21,6 +21,9 @@ pub struct Request {
     pub plant: String,
     /// Specimen of a built-in system.
     pub specimen: String,
+    /// Computed structure under the specimen of a built-in system.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub structure: Option<String>,
     /// Parameters of a built-in system's controllers; absent: by its plant.
     #[serde(default)]
     pub tuning: Option<Tuning>,
@@ -80,6 +83,7 @@ impl Request {
             system: system.to_string(),
             plant: built_in::DEFAULT_PLANT.to_string(),
             specimen: built_in::DEFAULT_SPECIMEN.to_string(),
+            structure: None,
             tuning: None,
             control_model: None,
             record: None,
@@ -122,7 +126,7 @@ impl Prepared {
 /// # Errors
 /// Whatever is at fault.
 pub fn prepare(request: &Request) -> Result<Prepared, Error> {
-    let file = if is_file(&request.system) {
+    let mut file = if is_file(&request.system) {
         SystemFile::read(Path::new(&request.system))?
     } else {
         built_in::system(
@@ -136,6 +140,9 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
             },
         )?
     };
+    if let Some(structure) = &request.structure {
+        built_in::add_structure(&mut file, structure, &request.plant)?;
+    }
     prepare_file(request, &file)
 }
 
