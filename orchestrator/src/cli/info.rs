@@ -12,9 +12,9 @@ use crate::motion;
 use crate::pack;
 use crate::report::columns::last_left;
 use crate::report::number::significant;
+use crate::report::{Cell, UnitSystem, Units};
 use crate::system::tuning::Wanted;
 use crate::system::{self, Operation, SystemFile, built_in};
-use crate::units::STANDARD_GRAVITY;
 
 /// Options of `shakebench info`.
 #[derive(Debug, Args)]
@@ -186,14 +186,15 @@ fn motion(path: &Path) -> Result<String, Error> {
     for note in &playable.notes {
         text += &format!("  {note}\n");
     }
+    let shown = |value, units| Cell::Quantity(value, units, 4).text(UnitSystem::of_text());
     text += &format!(
-        "  as played: {} s, {} samples of {} ms, {} g, {} m/s, {} in\n",
+        "  as played: {} s, {} samples of {} ms, {}, {}, {}\n",
         significant(playable.duration(), 4),
         playable.len(),
         1e3 * playable.dt,
-        significant(playable.peak_acceleration() / STANDARD_GRAVITY, 4),
-        significant(playable.peak_velocity(), 4),
-        significant(playable.peak_displacement() / crate::units::INCH, 4),
+        shown(playable.peak_acceleration(), Units::ACCELERATION),
+        shown(playable.peak_velocity(), Units::VELOCITY),
+        shown(playable.peak_displacement(), Units::DISPLACEMENT),
     );
     Ok(text)
 }
