@@ -18,5 +18,7 @@ pub mod pack;
 pub mod report;
 pub mod results;
 pub mod run;
+pub mod ssp;
 pub mod system;
+pub mod validate;
 pub use units;

@@ -18,7 +18,9 @@ pub use crate::fmu::FmiVersion;
 pub use archive::PackedFmu;
 pub use error::PackError;
 pub(crate) use error::file_error;
+pub(crate) use archive::write_archive;
 pub use variant::{StartValue, write_variant};
+pub(crate) use variant::with_resource;
 use workspace::{Component, Workspace};
 
 /// Builds every component and packs it as `out/fmi2/NAME.fmu` and `out/fmi3/NAME.fmu`, as far as

@@ -30,6 +30,8 @@ pub struct Results {
     folder: PathBuf,
     staging: tempfile::TempDir,
     names: Vec<String>,
+    /// Files of an earlier run that do not stay.
+    replaced: Vec<String>,
 }
 
 impl Results {
@@ -57,6 +59,7 @@ impl Results {
             folder: folder.to_path_buf(),
             staging,
             names: Vec::new(),
+            replaced: Vec::new(),
         })
     }
 
@@ -112,7 +115,14 @@ impl Results {
         self.names.push(name.to_string());
     }
 
-    /// Moves the files into their folder; files of the same name are replaced, others stay.
+    /// Files of these names are taken away where this result has none of them, so that they are not
+    /// taken for its own.
+    pub fn replaces(&mut self, names: &[&str]) {
+        self.replaced.extend(names.iter().map(|name| name.to_string()));
+    }
+
+    /// Moves the files into their folder; files of the same name are replaced, others stay. Of two
+    /// that do so at once, one waits for the other.
     ///
     /// # Errors
     /// A folder that cannot be made.
@@ -121,6 +131,13 @@ impl Results {
             folder: self.folder.clone(),
             source,
         })?;
+        // Where folders cannot be locked, nothing waits.
+        let lock = File::open(&self.folder);
+        let _held = lock.as_ref().map(File::lock);
+        for name in self.replaced.iter().filter(|name| !self.names.contains(name)) {
+            // Mostly there is none.
+            let _ = fs::remove_file(self.folder.join(name));
+        }
         let mut files = Vec::new();
         for name in &self.names {
             let file = self.folder.join(name);

@@ -11,6 +11,7 @@ use crate::library::FmuLibrary;
 use crate::motion;
 use crate::report::columns::aligned;
 use crate::report::number::significant;
+use crate::ssp;
 use crate::system::tuning::Wanted;
 use crate::system::{self, Operation, SystemFile, built_in};
 use crate::units::STANDARD_GRAVITY;
@@ -22,7 +23,7 @@ use crate::units::STANDARD_GRAVITY;
     shakebench info three-variable\n  \
     shakebench info records/RSN1633_MANJIL_ABBAR--L.AT2")]
 pub struct Arguments {
-    /// An .fmu, a system (.toml or built-in), or a motion (.AT2, .csv)
+    /// An .fmu, a system (.toml, .ssp or built-in), or a motion (.AT2, .csv)
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }
@@ -38,6 +39,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let text = match extension.as_deref() {
         Some("fmu") => fmu(&*Fmu::open(path)?),
         Some("toml") => system(&SystemFile::read(path)?)?,
+        _ if ssp::is_ssp(&name) => system(&ssp::read(&name)?)?,
         Some("at2" | "csv") => motion(path)?,
         _ if built_in::names().any(|known| known == name) => system(&built_in::system(
             &name,
@@ -47,7 +49,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         )?)?,
         _ => {
             let reason = format!(
-                "expected an .fmu, .toml, .AT2 or .csv file, or a built-in system ({})",
+                "expected an .fmu, .ssp, .toml, .AT2 or .csv file, or a built-in system ({})",
                 built_in::names().collect::<Vec<_>>().join(", ")
             );
             return Err(Error::File {
@@ -139,7 +141,7 @@ fn last_left(mut rows: Vec<Vec<String>>) -> String {
 }
 
 fn system(file: &SystemFile) -> Result<String, Error> {
-    let mut library = FmuLibrary::new(FmiVersion::V3, file.directory.as_deref());
+    let mut library = FmuLibrary::of(FmiVersion::V3, file);
     let system = system::assemble(file, &[], &mut |name| library.find(name))?;
     let mut text = format!("{}: {}\n\ncomponents\n", system.name, system.description);
     let rows = system.components.iter().map(|component| {

@@ -1,15 +1,32 @@
 //! The command line: one file a command, which parses, calls and prints.
 
+/// As those of the standard library, but through [`terminal`].
+macro_rules! println {
+    () => { $crate::cli::terminal::out(format_args!(""), "\n") };
+    ($($text:tt)*) => { $crate::cli::terminal::out(format_args!($($text)*), "\n") };
+}
+macro_rules! print {
+    ($($text:tt)*) => { $crate::cli::terminal::out(format_args!($($text)*), "") };
+}
+macro_rules! eprintln {
+    () => { $crate::cli::terminal::err(format_args!("")) };
+    ($($text:tt)*) => { $crate::cli::terminal::err(format_args!($($text)*)) };
+}
+
 pub mod benchmark;
 pub mod build;
 pub mod compare;
 pub mod design;
 pub mod diagnose;
+pub mod export;
 pub mod identify;
 pub mod info;
+mod interrupt;
 pub mod report;
 mod rig;
 pub mod run;
+mod terminal;
+pub mod validate;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -45,6 +62,8 @@ enum Command {
     Design(design::Arguments),
     /// Name what a model gets wrong, from records of the rig
     Diagnose(diagnose::Arguments),
+    /// Write a system with its components as an SSP archive
+    Export(export::Arguments),
     /// Find a rig's parameters from measured data
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
@@ -59,6 +78,8 @@ enum Command {
     },
     /// Run a system on a motion
     Run(Box<run::Arguments>),
+    /// Say what is wrong with an FMU or an SSP archive
+    Validate(validate::Arguments),
 }
 
 /// Reads the command line, does what it says and gives the exit status.
@@ -70,16 +91,23 @@ pub fn main() -> ExitCode {
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
+        Some(Command::Export(arguments)) => export::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
         Some(Command::Run(arguments)) => run::execute(&arguments),
+        Some(Command::Validate(arguments)) => validate::execute(&arguments),
     };
-    done.unwrap_or_else(|error| {
+    let status = done.unwrap_or_else(|error| {
         eprintln!("error: {error}");
         ExitCode::from(2)
-    })
+    });
+    terminal::flush();
+    match terminal::has_failed() {
+        true => ExitCode::from(1),
+        false => status,
+    }
 }
 
 /// `--fmi` where one version is meant.

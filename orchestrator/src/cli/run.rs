@@ -7,11 +7,13 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use sha2::{Digest, Sha256};
 
 use super::OneVersion;
+use super::interrupt;
 use super::rig::RigArguments;
 use crate::error::Error;
-use crate::fmu::{Isolation, Options, Trace};
+use crate::fmu::{Isolation, Options, Trace, hexadecimal};
 use crate::master::{Algorithm, Ended, Pace};
 use crate::motion::{self, Motion};
 use crate::report::columns::aligned;
@@ -21,7 +23,7 @@ use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
 use crate::run::summary::Summary;
-use crate::system::built_in;
+use crate::system::{System, built_in};
 use crate::units::{self, INCH, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
@@ -30,9 +32,11 @@ use crate::units::{self, INCH, STANDARD_GRAVITY};
     shakebench run three-variable --record NGA/RSN1633_MANJIL_ABBAR--L.AT2\n  \
     shakebench run displacement-pid --specimen none --pga 0.2 --set control.integral_gain=\"0.5 V/(in s)\"\n  \
     shakebench run my-rig.toml --algorithm jacobi --step 1ms --json\n  \
+    shakebench run system.ssp --duration \"10 s\"\n  \
+    shakebench run Theirs.fmu --input forces.csv\n  \
     shakebench run --manifest shakebench-results/three-variable-synthetic-1/manifest.json")]
 pub struct Arguments {
-    /// Built-in system or .toml file [default: three-variable]
+    /// Built-in system, .toml file, .ssp archive or single .fmu [default: three-variable]
     #[arg(value_name = "SYSTEM")]
     system: Option<String>,
     /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
@@ -49,9 +53,13 @@ pub struct Arguments {
     /// Version of FMI of the components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
-    /// Order of calls
-    #[arg(long, value_enum, default_value_t)]
-    algorithm: Algorithm,
+    /// Order of calls [default: what the system says, otherwise gauss-seidel]
+    #[arg(long, value_enum)]
+    algorithm: Option<Algorithm>,
+    /// Input table: .csv with a column `time`, then columns named as inputs (component.input), with
+    /// units; may be given several times
+    #[arg(long, value_name = "FILE")]
+    input: Vec<PathBuf>,
     /// Coupling step, such as "0.5 ms"; controllers keep their own period [default: 2 ms]
     #[arg(long, value_name = "T")]
     step: Option<String>,
@@ -70,9 +78,12 @@ pub struct Arguments {
     /// Seed of the built-in motion [default: 1]
     #[arg(long, conflicts_with_all = ["record", "reference"])]
     seed: Option<u64>,
-    /// Keep pace with the clock on the wall
+    /// Keep pace with the clock on the wall, and say how well that went
     #[arg(long)]
     real_time: bool,
+    /// Keep one sample of so many in the results
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(usize).range(1..))]
+    record_every: usize,
     /// Folder for the results [default: shakebench-results/SYSTEM-MOTION]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -93,7 +104,7 @@ pub struct Arguments {
     log: Option<Vec<String>>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
-        "system", "record", "reference", "plant", "specimen", "tuning", "control_model", "set", "fmi", "algorithm", "step",
+        "system", "record", "reference", "input", "plant", "specimen", "tuning", "control_model", "set", "fmi", "algorithm", "step",
         "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
@@ -122,27 +133,30 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         samples,
         ..
     } = &prepared;
-    let folder = arguments.out.clone().unwrap_or_else(|| {
-        let name = format!("{}-{}", system.name, motion.name);
-        Path::new("shakebench-results").join(name.replace(['/', '\\', ' '], "-"))
-    });
+    let folder = arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| default_folder(&request, system, motion));
     Results::check(&folder)?;
-    let simulation = prepared.simulation(request.algorithm)?;
+    let mut simulation = prepared.simulation(prepared.algorithm)?;
+    simulation.heed(interrupt::heed());
+    simulation.keep_every(arguments.record_every);
     let bar = progress_bar(*samples);
     let pace = if arguments.real_time {
         Pace::RealTime
     } else {
         Pace::Fastest
     };
-    let outcome = simulation.run(*samples, pace, &mut |sample| {
+    let mut outcome = simulation.run(*samples, pace, &mut |sample| {
         bar.set_position(sample as u64)
     });
     bar.finish_and_clear();
+    prepared.judge(&mut outcome);
 
-    let plan = (request.algorithm, *step, *samples);
-    let manifest = Manifest::new(&request, system, motion, plan, &outcome.record);
-    let summary = Summary::new(&request, &prepared, &outcome, &manifest);
-    let files = page::write(&folder, &prepared, &outcome, &summary, &manifest)?;
+    let plan = (prepared.algorithm, *step, *samples);
+    let mut manifest = Manifest::new(&request, system, motion, plan);
+    let summary = Summary::new(&prepared, &outcome, &manifest);
+    let files = page::write(&folder, &prepared, &outcome, &summary, &mut manifest)?;
     for line in &summary.warnings {
         eprintln!("warning: {line}");
     }
@@ -173,6 +187,26 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     eprintln!("error: the run ended early: {}", outcome.ended.message());
     eprintln!("what was computed until then is saved");
     Ok(ExitCode::from(1))
+}
+
+/// The folder of a run for which none is named: one for each system, motion and set of options.
+fn default_folder(request: &Request, system: &System, motion: &Motion) -> PathBuf {
+    let mut name = match motion.is_empty() {
+        true => system.name.clone(),
+        false => format!("{}-{}", system.name, motion.name),
+    };
+    let plain = Request {
+        record: request.record.clone(),
+        reference: request.reference.clone(),
+        seed: request.seed,
+        ..Request::built_in(&request.system)
+    };
+    if *request != plain {
+        let text = serde_json::to_string(request).unwrap_or_default();
+        let sum = Sha256::digest(text.as_bytes());
+        name += &format!("-{}", &hexadecimal(&sum)[..8]);
+    }
+    Path::new("shakebench-results").join(name.replace(['/', '\\', ' '], "-"))
 }
 
 /// How FMUs are run.
@@ -223,6 +257,24 @@ fn table(summary: &Summary, motion: &Motion) -> String {
         significant(summary.real_time_factor, 2),
         summary.ended.word(),
     );
+    if let Some(kept) = &summary.real_time {
+        text += &format!(
+            "in real time: {} of {} steps were not done in time, the latest by {:.2} ms; steps began \
+             {:.0} us late (median), 99 of 100 less than {:.0} us\n\n",
+            kept.missed,
+            kept.deadlines,
+            1e3 * kept.worst_s,
+            1e6 * kept.jitter_median_s,
+            1e6 * kept.jitter_p99_s,
+        );
+    }
+    let mut times: Vec<_> = summary.step_time_s.iter().collect();
+    times.sort_by(|a, b| b.1.total_cmp(a.1));
+    let share = |(name, time): &(&String, &f64)| {
+        format!("`{name}` {:.0} %", 100.0 * **time / summary.wall_s.max(1e-12))
+    };
+    let shares: Vec<String> = times.iter().take(6).map(share).collect();
+    text += &format!("of the time, in steps: {}\n\n", shares.join(", "));
     let Some(tracking) = &summary.tracking else {
         return text;
     };
@@ -330,6 +382,7 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         algorithm: arguments.algorithm,
         step_s: text("--step", &arguments.step, "s")?,
         duration_s: text("--duration", &arguments.duration, "s")?,
+        inputs: arguments.input.iter().map(|path| absolute(path)).collect(),
     })
 }
 

@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::{self, Write},
+    io::{self, Cursor, Seek, Write},
     path::{Path, PathBuf},
 };
 
@@ -64,7 +64,7 @@ pub(super) fn entries(
 
 /// Writes an archive unless it is there with the same contents. The same contents give the same
 /// bytes; a reader never sees half an archive.
-pub(super) fn write_archive(path: &Path, entries: &[(String, Vec<u8>)]) -> Result<(), PackError> {
+pub(crate) fn write_archive(path: &Path, entries: &[(String, Vec<u8>)]) -> Result<(), PackError> {
     let mut sum = Sha256::new();
     for (name, content) in entries {
         sum.update((name.len() as u64).to_le_bytes());
@@ -83,7 +83,7 @@ pub(super) fn write_archive(path: &Path, entries: &[(String, Vec<u8>)]) -> Resul
     if old.is_some_and(|archive| archive.comment() == stamp.as_bytes()) {
         return Ok(());
     }
-    let draft = path.with_extension(format!("fmu.{}", std::process::id()));
+    let draft = path.with_extension(format!("draft.{}", std::process::id()));
     let written = write_entries(&draft, entries, stamp);
     let moved = written.and_then(|()| fs::rename(&draft, path));
     if moved.is_err() {
@@ -93,10 +93,23 @@ pub(super) fn write_archive(path: &Path, entries: &[(String, Vec<u8>)]) -> Resul
 }
 
 fn write_entries(path: &Path, entries: &[(String, Vec<u8>)], stamp: String) -> io::Result<()> {
+    write_to(File::create(path)?, entries, stamp)?.sync_all()
+}
+
+/// An archive in memory.
+pub(super) fn archive_bytes(entries: &[(String, Vec<u8>)]) -> io::Result<Vec<u8>> {
+    Ok(write_to(Cursor::new(Vec::new()), entries, String::new())?.into_inner())
+}
+
+fn write_to<W: Write + Seek>(
+    writer: W,
+    entries: &[(String, Vec<u8>)],
+    stamp: String,
+) -> io::Result<W> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default());
-    let mut archive = ZipWriter::new(File::create(path)?);
+    let mut archive = ZipWriter::new(writer);
     archive.set_comment(stamp).map_err(io::Error::from)?;
     for (name, content) in entries {
         if let Some(folder) = name.strip_suffix('/') {
@@ -111,5 +124,5 @@ fn write_entries(path: &Path, entries: &[(String, Vec<u8>)], stamp: String) -> i
         archive.start_file(name, options.unix_permissions(mode))?;
         archive.write_all(content)?;
     }
-    archive.finish()?.sync_all()
+    Ok(archive.finish()?)
 }

@@ -12,7 +12,7 @@ use fmu_kit::resources::{START_VALUES, variant_token};
 use roxmltree::{Document, Node};
 use zip::ZipArchive;
 
-use super::archive::write_archive;
+use super::archive::{archive_bytes, write_archive};
 use super::error::{PackError, file_error};
 
 /// A parameter that starts differently.
@@ -60,6 +60,21 @@ pub fn write_variant(
     entries.insert("modelDescription.xml".into(), changed.into_bytes());
     entries.insert(resource, table.into_bytes());
     write_archive(out, &entries.into_iter().collect::<Vec<_>>())
+}
+
+/// The bytes of the FMU `original` with a further file in its resources.
+///
+/// # Errors
+/// When the original cannot be read.
+pub(crate) fn with_resource(
+    original: &Path,
+    name: &str,
+    content: Vec<u8>,
+) -> Result<Vec<u8>, PackError> {
+    let mut entries = read_archive(original)?;
+    entries.insert(format!("resources/{name}"), content);
+    let entries: Vec<(String, Vec<u8>)> = entries.into_iter().collect();
+    archive_bytes(&entries).map_err(file_error(original))
 }
 
 fn read_archive(path: &Path) -> Result<BTreeMap<String, Vec<u8>>, PackError> {

@@ -1,14 +1,17 @@
 //! The files of a run.
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use super::experiment::Prepared;
 use super::manifest::Manifest;
 use super::signals::{read_csv, write_csv};
 use super::summary::{Summary, Table};
 use crate::error::Error;
+use crate::fmu::hexadecimal;
 use crate::master::{Outcome, Record};
 use crate::motion::Motion;
 use crate::report::number::significant;
@@ -25,10 +28,20 @@ pub fn write(
     prepared: &Prepared,
     outcome: &Outcome,
     summary: &Summary,
-    manifest: &Manifest,
+    manifest: &mut Manifest,
 ) -> Result<Vec<PathBuf>, Error> {
     let mut results = Results::begin(folder)?;
-    results.write("results.csv", |file| write_csv(&outcome.record, file))?;
+    let mut sum = Sha256::new();
+    results.write("results.csv", |file| {
+        let mut both = Hashed {
+            file,
+            sum: &mut sum,
+        };
+        write_csv(&outcome.record, &mut both)
+    })?;
+    manifest.results_sha256 = hexadecimal(&sum.finalize());
+    // A page of an earlier run here would be another run's.
+    results.replaces(&["report.html"]);
     results.write_text("summary.json", &json(summary))?;
     results.write_text("manifest.json", &json(manifest))?;
     let motion = &prepared.motion;
@@ -36,6 +49,24 @@ pub fn write(
         results.write_text("report.html", &page)?;
     }
     Ok(results.finish()?)
+}
+
+/// A file whose checksum is taken on the way.
+struct Hashed<'a, W> {
+    file: W,
+    sum: &'a mut Sha256,
+}
+
+impl<W: Write> Write for Hashed<'_, W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.sum.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 fn json(value: &impl Serialize) -> String {

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::experiment::{Prepared, Request};
+use super::experiment::Prepared;
 use super::manifest::Manifest;
-use crate::master::{Ending, Outcome, Record};
+use crate::master::{Ending, Outcome, RealTime, Record};
 use crate::metrics::{self, Tracking};
 use crate::system::Origin;
 use crate::units::{self, INCH, STANDARD_GRAVITY};
@@ -40,6 +40,12 @@ pub struct Summary {
     pub tracking: Option<Tracking>,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Time that each component took in its steps, s, estimated from one step in 32.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub step_time_s: BTreeMap<String, f64>,
+    /// How the clock on the wall was kept; of a run in real time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub real_time: Option<RealTime>,
 }
 
 /// The motion of a run, whole.
@@ -58,7 +64,6 @@ pub struct MotionSummary {
 impl Summary {
     /// Measures a run.
     pub fn new(
-        request: &Request,
         prepared: &Prepared,
         outcome: &Outcome,
         manifest: &Manifest,
@@ -77,7 +82,16 @@ impl Summary {
             .collect();
         let notes = system.notes.iter().chain(&outcome.notes);
         warnings.splice(0..0, notes.cloned());
-        let tracking = Table::find(manifest, &outcome.record).and_then(|table| {
+        let is_whole = outcome.record.len() < 2 || {
+            let times = outcome.record.column("time").unwrap_or_default();
+            times[1] - times[0] < 1.5 * motion.dt
+        };
+        let table = Table::find(manifest, &outcome.record).filter(|_| !motion.is_empty());
+        let tracking = table.and_then(|table| {
+            if !is_whole {
+                warnings.push("tracking is not measured on a thinned record".to_string());
+                return None;
+            }
             let displacement = outcome.record.column(&table.name("displacement"))?;
             let acceleration = outcome.record.column(&table.name("acceleration"))?;
             match metrics::tracking(motion, &displacement, &acceleration) {
@@ -117,7 +131,7 @@ impl Summary {
             steps: outcome.steps,
             step_s: outcome.step,
             fmi: versions.join(" and "),
-            algorithm: request.algorithm.to_string(),
+            algorithm: prepared.algorithm.to_string(),
             wall_s: outcome.wall,
             real_time_factor: simulated / outcome.wall,
             ended: outcome.ended.kind(),
@@ -132,6 +146,8 @@ impl Summary {
                 .collect(),
             tracking,
             warnings,
+            step_time_s: outcome.step_time.iter().cloned().collect(),
+            real_time: outcome.real_time.clone(),
         }
     }
 }

@@ -12,7 +12,9 @@ mod graph;
 mod link;
 mod lookup;
 pub mod model;
+mod passage;
 mod rule;
+mod table;
 pub mod tuning;
 mod value;
 
@@ -22,5 +24,7 @@ pub use error::SystemError;
 pub use file::{ComponentFile, ExperimentFile, SystemFile};
 pub use graph::{Operation, Schedule};
 pub use link::{Link, Origin, Quantity, VariableName};
+pub use passage::{DeclaredUnit, Hop, Passage, Transformation, Way};
 pub use rule::Rule;
-pub use value::{Setting, Value};
+pub use table::{Between, InputTable, TableFile};
+pub use value::{Declared, Setting, Value};
