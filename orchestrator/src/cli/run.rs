@@ -82,7 +82,7 @@ pub struct Arguments {
     #[arg(long)]
     real_time: bool,
     /// Keep one sample of so many in the results
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(usize).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     record_every: usize,
     /// Folder for the results [default: shakebench-results/SYSTEM-MOTION]
     #[arg(long, value_name = "DIR")]
@@ -398,6 +398,12 @@ fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64,
         return Ok(value);
     }
     Err(fault(format!("`{text}` is not positive")))
+}
+
+/// A whole number above 0.
+fn at_least_one(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|number| *number > 0);
+    number.ok_or_else(|| "expected a whole number from 1".to_string())
 }
 
 fn progress_bar(samples: usize) -> ProgressBar {
