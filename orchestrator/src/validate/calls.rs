@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::Findings;
 use crate::fmu::{
-    Datum, Fmu, Instance, Isolation, Kind, Options, Processes, Progress, State,
+    Datum, Fmu, Instance, Interface, Isolation, Kind, Options, Processes, Progress, State,
 };
 
 /// Steps that are made.
@@ -67,6 +67,16 @@ fn in_order(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) -> Optio
                 rows.len().saturating_sub(1)
             ));
             Some(rows)
+        }
+        Err(reason)
+            if fmu.description.interface == Interface::ModelExchange
+                && reason.contains("did not return") =>
+        {
+            findings.warning(
+                "library",
+                format!("stiff, or slow, for the solver of this program: {reason}"),
+            );
+            None
         }
         Err(reason) => {
             findings.error("library", reason);

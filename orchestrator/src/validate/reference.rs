@@ -45,6 +45,8 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path) {
     let times: Vec<f64> = rows.iter().filter_map(time).collect();
     let spans = times.windows(2).map(|pair| pair[1] - pair[0]);
     let usual = spans.filter(|span| *span > 0.0).fold(f64::INFINITY, f64::min);
+    // Without the rounding of differences.
+    let usual = (usual * 1e12).round() / 1e12;
     let step = fmu.description.preferred_step.unwrap_or(usual);
     if !(last > first && step.is_finite()) {
         findings.warning(&name, "holds no run");
@@ -78,6 +80,9 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path) {
     let ours = record.column("time").unwrap_or_default();
     let mut compared = 0;
     for (place, column) in columns.iter().enumerate().skip(1) {
+        if fmu.description.array(column).is_some() {
+            continue;
+        }
         let Some(variable) = fmu.description.variable(column) else {
             findings.warning(&name, format!("`{column}` is no variable"));
             continue;

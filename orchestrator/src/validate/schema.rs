@@ -197,7 +197,7 @@ fn element(findings: &mut Findings, node: Node, parent: Option<&str>, shapes: &S
             (!["true", "false", "0", "1"].contains(&value.trim())).then_some("true or false")
         } else if REALS.contains(&known) {
             value.trim().parse::<f64>().is_err().then_some("a number")
-        } else if WHOLE.contains(&known) {
+        } else if WHOLE.contains(&known) && (known != "value" || name == "Item") {
             value.trim().parse::<i64>().is_err().then_some("a whole number")
         } else {
             None

@@ -3,3 +3,4 @@
 mod importers;
 mod model_descriptions;
 mod packing;
+mod ssp;
