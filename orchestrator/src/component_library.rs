@@ -21,6 +21,8 @@ pub struct Descriptions {
     pub fmi3: String,
     /// `documentation/index.html`.
     pub documentation: String,
+    /// `terminalsAndIcons.xml` of FMI 3.0.
+    pub terminals: String,
 }
 
 /// A library built from a crate that exports a component with `fmu_kit::export!`.
@@ -59,6 +61,7 @@ impl ComponentLibrary {
             name: self.text(1)?,
             fmi2: self.text(2)?,
             fmi3: self.text(3)?,
+            terminals: self.text(4)?,
         })
     }
 

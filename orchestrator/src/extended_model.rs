@@ -13,6 +13,7 @@ use plant::identified::nominal::{NominalRig, PARAMETERS};
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
 
+use crate::pack::supply;
 use crate::pack::{PackError, PackedFmu, StartValue, file_error, write_variant};
 
 /// A parameter of the extended model.
@@ -115,6 +116,7 @@ impl ExtendedModel {
             let Some(values) = self.parameters.get(original.name.as_str()) else {
                 continue;
             };
+            supply::check(original)?;
             let starts: Vec<StartValue> = values
                 .iter()
                 .map(|(name, estimate)| StartValue {

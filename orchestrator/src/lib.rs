@@ -6,6 +6,7 @@ pub mod comparison;
 pub mod component_library;
 pub mod design;
 pub mod diagnosis;
+pub mod doctor;
 pub mod error;
 pub mod extended_model;
 pub mod fmu;

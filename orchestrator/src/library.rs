@@ -1,5 +1,4 @@
-//! Where the FMUs of a system come from: files, or the components of this project, which are built
-//! and packed when they are missing or stale.
+//! Where the FMUs of a system come from: files, or the components of this project.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -7,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::fmu::{FmiVersion, Fmu};
-use crate::pack;
+use crate::pack::{self, PackedFmu};
 use crate::ssp::Package;
 use crate::system::SystemFile;
 use crate::units::hint;
@@ -54,7 +53,7 @@ impl FmuLibrary {
                 .unwrap_or(Path::new(""))
                 .join(name)
         } else {
-            self.component(name)?
+            component(name, self.version)?.path.clone()
         };
         if let Some(fmu) = self.open.get(&path) {
             return Ok(fmu.clone());
@@ -69,20 +68,30 @@ impl FmuLibrary {
         self.open.insert(path, fmu.clone());
         Ok(fmu)
     }
+}
 
-    fn component(&self, name: &str) -> Result<PathBuf, Box<dyn Error>> {
-        let packed: Vec<_> = pack::all_fmus()?
-            .iter()
-            .filter(|fmu| fmu.version == self.version)
-            .collect();
-        let found = packed.iter().find(|fmu| fmu.name == name);
-        let found = found.ok_or_else(|| {
-            let known = packed.iter().map(|fmu| fmu.name.as_str());
-            format!(
-                "`{name}` is no component and no path to an .fmu file{}",
-                hint(name, known)
-            )
-        })?;
-        Ok(found.path.clone())
-    }
+/// The packed FMU of a component of this project, checked.
+///
+/// # Errors
+/// An unknown name (with the nearest one), components that cannot be found or built, an FMU that is
+/// damaged or of another version.
+pub fn component(name: &str, version: FmiVersion) -> Result<&'static PackedFmu, Box<dyn Error>> {
+    let packed: Vec<&PackedFmu> = pack::all_fmus()?
+        .iter()
+        .filter(|fmu| fmu.version == version)
+        .collect();
+    let Some(&found) = packed.iter().find(|fmu| fmu.name == name) else {
+        let known = packed.iter().map(|fmu| fmu.name.as_str());
+        let hint = hint(name, known);
+        return Err(format!(
+            "`{name}` is no path to an .fmu file and no component in {}{hint}",
+            pack::supply::folder()?
+                .path
+                .join(version.folder())
+                .display()
+        )
+        .into());
+    };
+    pack::supply::check(found)?;
+    Ok(found)
 }

@@ -1,24 +1,33 @@
-//! Building the components and packing them as FMUs.
+//! Building the components and packing them as FMUs, and finding those that were packed.
 //!
 //! A component is a library crate of type `cdylib` under `fmus/`; nothing else lists it. Cargo
 //! builds it, and the built library tells its own name, model descriptions and documentation.
 
+mod annotation;
 mod archive;
 pub(crate) mod error;
+mod merge;
+mod notices;
+mod packing;
+mod platform;
+pub mod supply;
 mod variant;
 mod workspace;
 
-use std::{
-    path::{Path, PathBuf},
-    sync::OnceLock,
-};
+use std::path::{Path, PathBuf};
 
 use crate::component_library::{ComponentLibrary, Descriptions};
 pub use crate::fmu::FmiVersion;
+pub use annotation::build_of;
 pub use archive::PackedFmu;
 pub use error::PackError;
 pub(crate) use error::file_error;
 pub(crate) use archive::write_archive;
+pub use merge::merge;
+use notices::Notices;
+use packing::Form;
+pub use platform::Platform;
+pub use supply::all_fmus;
 pub use variant::{StartValue, write_variant};
 pub(crate) use variant::with_resource;
 use workspace::{Component, Workspace};
@@ -29,7 +38,36 @@ use workspace::{Component, Workspace};
 /// # Errors
 /// When the workspace, cargo or the folder is not usable, or a component does not compile.
 pub fn build_fmus(out: &Path, versions: &[FmiVersion]) -> Result<Vec<PackedFmu>, PackError> {
-    Workspace::find()?.pack(Workspace::published, out, versions)
+    let form = Form {
+        versions,
+        revision: None,
+    };
+    packing::pack(&Workspace::find()?, Workspace::published, out, form)
+}
+
+/// Packs every component from libraries that were compiled before: a folder a platform, this one's
+/// among them. `revision` says which build of the sources they are.
+///
+/// # Errors
+/// Libraries that are missing, and as [`build_fmus`].
+pub fn pack_libraries(
+    libraries: &[(Platform, PathBuf)],
+    out: &Path,
+    versions: &[FmiVersion],
+    revision: Option<&str>,
+) -> Result<Vec<PackedFmu>, PackError> {
+    let form = Form { versions, revision };
+    let components = |workspace: &Workspace| workspace.published_from(libraries);
+    packing::pack(&Workspace::find()?, components, out, form)
+}
+
+/// The licences of everything that this program is linked with.
+///
+/// # Errors
+/// When the workspace or cargo is not usable.
+pub fn notices_of_the_program() -> Result<String, PackError> {
+    let workspace = Workspace::find()?;
+    Notices::read(&workspace.metadata()?)?.of(&workspace.root.join("orchestrator"))
 }
 
 /// Builds and packs the component whose crate lies in a folder of the workspace, also one that
@@ -43,20 +81,11 @@ pub fn build_component(
     versions: &[FmiVersion],
 ) -> Result<Vec<PackedFmu>, PackError> {
     let component = |workspace: &Workspace| Ok(vec![workspace.component_in(folder)?]);
-    Workspace::find()?.pack(component, out, versions)
-}
-
-/// All FMUs of both versions in `target/fmus`, built at most once in a process.
-///
-/// # Errors
-/// As [`build_fmus`].
-pub fn all_fmus() -> Result<&'static [PackedFmu], PackError> {
-    static FMUS: OnceLock<Result<Vec<PackedFmu>, String>> = OnceLock::new();
-    let fmus = FMUS.get_or_init(|| {
-        let out = default_folder().map_err(|e| e.to_string())?;
-        build_fmus(&out, &FmiVersion::ALL).map_err(|e| e.to_string())
-    });
-    fmus.as_deref().map_err(|e| PackError::Earlier(e.clone()))
+    let form = Form {
+        versions,
+        revision: None,
+    };
+    packing::pack(&Workspace::find()?, component, out, form)
 }
 
 /// The folder of packed FMUs, `target/fmus` of the workspace.
@@ -64,7 +93,7 @@ pub fn all_fmus() -> Result<&'static [PackedFmu], PackError> {
 /// # Errors
 /// When the program does not run inside its workspace.
 pub fn default_folder() -> Result<PathBuf, PackError> {
-    Ok(Workspace::find()?.root.join("target/fmus"))
+    Ok(Workspace::find()?.fmus())
 }
 
 /// Model descriptions of all components with their places below `modelDescription/`, such as

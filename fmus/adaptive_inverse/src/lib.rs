@@ -5,7 +5,7 @@ use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::adaptive_inverse::AdaptiveInverse as Law;
 use controllers::hybrid::extrapolation::Extrapolation;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::hybrid::{Deviation, PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +46,19 @@ impl Component for AdaptiveInverse {
     const DESCRIPTION: &'static str =
         "Tracking control by an inverse that is estimated during the test";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[("displacement", "desired_displacement")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[("displacement", "measured_displacement")],
+        ),
+        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+    ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 

@@ -5,7 +5,7 @@ use controllers::{
     Controller,
     allocation::{ControlAllocation as Law, LoopCommands},
 };
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// The shares of displacement and force loop in the valve command.
@@ -21,6 +21,15 @@ impl Component for ControlAllocation {
     const NAME: &'static str = "ControlAllocation";
     const DESCRIPTION: &'static str = "Shares the servo valve between two low-level loops";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::plug(
+            "displacement_loop",
+            "valve",
+            &[("command", "displacement_loop_command")],
+        ),
+        Terminal::plug("force_loop", "valve", &[("command", "force_loop_command")]),
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:

@@ -5,7 +5,7 @@ use controllers::{
     Controller,
     pid::{Pid, PidInput},
 };
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// PID control from displacement to valve command.
@@ -32,6 +32,19 @@ impl Component for DisplacementPid {
     const NAME: &'static str = "DisplacementPid";
     const DESCRIPTION: &'static str = "PID control of the displacement of a shake table";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[("displacement", "reference_displacement")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[("displacement", "measured_displacement")],
+        ),
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:

@@ -5,7 +5,7 @@ use controllers::{
     Controller,
     pid::{Pid, PidInput},
 };
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// PID control from actuator force to valve command.
@@ -32,6 +32,11 @@ impl Component for ForcePid {
     const NAME: &'static str = "ForcePid";
     const DESCRIPTION: &'static str = "PID control of the force of a hydraulic actuator";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus("reference", "reference", &[("force", "reference_force")]),
+        Terminal::bus("measured", "motion", &[("force", "measured_force")]),
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:

@@ -1,7 +1,9 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! Sensors of the rig as an FMU.
 
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Variable};
+use fmu_kit::{
+    Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Terminal, Variable,
+};
 use plant::identified::effects::{self, Component as Part, Field};
 use plant::sensors::channel::Channel;
 use plant::sensors::instrumentation::{
@@ -293,6 +295,39 @@ impl Component for Instrumentation {
     const NAME: &'static str = "Instrumentation";
     const DESCRIPTION: &'static str = "Sensors of a shake table and an estimate of its velocity";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "rig",
+            "motion",
+            &[
+                ("displacement", "displacement"),
+                ("velocity", "velocity"),
+                ("acceleration", "acceleration"),
+                ("force", "actuator_force"),
+            ],
+        ),
+        Terminal::plug(
+            "specimen",
+            "specimen-motion",
+            &[("acceleration", "specimen_acceleration")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[
+                ("displacement", "measured_displacement"),
+                ("velocity", "measured_velocity"),
+                ("acceleration", "measured_acceleration"),
+                ("force", "measured_force"),
+                ("valid", "measurement_valid"),
+            ],
+        ),
+        Terminal::plug(
+            "measured_specimen",
+            "specimen-motion",
+            &[("acceleration", "measured_specimen_acceleration")],
+        ),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::table! { Self, s:

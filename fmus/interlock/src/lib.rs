@@ -3,7 +3,9 @@
 
 use controllers::Controller;
 use controllers::interlock::{Interlock as Law, InterlockInput, Trip};
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Variable};
+use fmu_kit::{
+    Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Terminal, Variable,
+};
 use serde::{Deserialize, Serialize};
 
 /// Why it tripped, by the numbers of [`Trip`].
@@ -75,6 +77,31 @@ impl Component for Interlock {
     const DESCRIPTION: &'static str =
         "Interlock between controller and valve; it protects no people";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[("displacement", "reference_displacement")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[
+                ("displacement", "measured_displacement"),
+                ("velocity", "measured_velocity"),
+                ("acceleration", "measured_acceleration"),
+                ("force", "measured_force"),
+                ("valid", "measurement_valid"),
+            ],
+        ),
+        Terminal::plug(
+            "specimen",
+            "specimen-motion",
+            &[("acceleration", "specimen_acceleration")],
+        ),
+        Terminal::plug("controller", "valve", &[("command", "controller_command")]),
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         const INPUTS: [&str; 7] = [

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::variable::Variable;
+use crate::{terminal::Terminal, variable::Variable};
 
 /// Why a component refuses its parameters or cannot go on; the text goes to the importer's log.
 pub type ComponentResult = Result<(), Box<dyn std::error::Error>>;
@@ -35,6 +35,8 @@ pub trait Component: Clone + Default + Serialize + DeserializeOwned + Send + 'st
     const PARTIAL_DERIVATIVES: bool = false;
     /// Number of values that [`event_indicators`](Self::event_indicators) fills.
     const EVENT_INDICATORS: usize = 0;
+    /// Ports that are connected as a whole.
+    const TERMINALS: &'static [Terminal] = &[];
 
     /// The table of variables. Their order is that of the model description.
     ///

@@ -62,6 +62,7 @@ pub mod fmi3;
 pub mod model;
 pub mod native;
 pub mod resources;
+pub mod terminal;
 pub mod variable;
 
 pub use component::{Component, ComponentResult, Event};
@@ -70,6 +71,7 @@ pub use guard::collect_panics;
 pub use phase::{Kind, Phase};
 #[doc(hidden)]
 pub use shared::{exchanges, states};
+pub use terminal::Terminal;
 pub use variable::{Causality, Dependency, Enumeration, Item, Variable};
 
 /// Short names for the types of the C interfaces, used by [`export!`].

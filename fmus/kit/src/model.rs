@@ -117,6 +117,7 @@ impl<C: Component> Model<C> {
             token: OnceLock::new(),
         };
         model.check_structure()?;
+        model.check_terminals()?;
         Ok(model)
     }
 
@@ -155,6 +156,35 @@ impl<C: Component> Model<C> {
                         variable: variable.name.clone(),
                         problem: "states and derivatives are continuous outputs or locals".into(),
                     });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_terminals(&self) -> Result<(), TableError> {
+        for (index, terminal) in C::TERMINALS.iter().enumerate() {
+            let wrong = |variable: &str, problem: String| TableError {
+                component: C::NAME,
+                variable: variable.to_string(),
+                problem: format!("terminal `{}`: {problem}", terminal.name),
+            };
+            if C::TERMINALS[..index]
+                .iter()
+                .any(|t| t.name == terminal.name)
+            {
+                return Err(wrong("", "the name is used twice".into()));
+            }
+            for (at, (member, variable)) in terminal.members.iter().enumerate() {
+                let found = self.find(variable);
+                let is_port = found.is_some_and(|(_, found)| {
+                    matches!(found.causality, Causality::Input | Causality::Output)
+                });
+                if !is_port {
+                    return Err(wrong(variable, "is neither input nor output".into()));
+                }
+                if terminal.members[..at].iter().any(|(m, _)| m == member) {
+                    return Err(wrong(variable, format!("member `{member}` is there twice")));
                 }
             }
         }

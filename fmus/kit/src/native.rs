@@ -22,6 +22,9 @@ pub const DOCUMENTATION: i32 = 0;
 /// Argument of `shakebench_describe`: the name of the model.
 pub const NAME: i32 = 1;
 
+/// Argument of `shakebench_describe`: `terminalsAndIcons.xml` of FMI 3.0.
+pub const TERMINALS: i32 = 4;
+
 /// A description as text to be freed with [`free_text`]; text beginning with `error: ` if the
 /// component's table is wrong.
 pub fn describe<C: Component>(what: i32) -> *mut c_char {
@@ -30,6 +33,7 @@ pub fn describe<C: Component>(what: i32) -> *mut c_char {
         (Ok(model), FMI2) => description::fmi2(model),
         (Ok(model), FMI3) => description::fmi3(model),
         (Ok(model), DOCUMENTATION) => description::html(model),
+        (Ok(model), TERMINALS) => description::terminals(model),
         (Ok(_), NAME) => C::NAME.into(),
         (Ok(_), other) => format!("error: no description {other}"),
     });

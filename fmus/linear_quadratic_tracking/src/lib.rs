@@ -6,7 +6,7 @@ use controllers::hybrid::TrackingInput;
 use controllers::hybrid::linear_quadratic::{
     LinearQuadraticDesign, LinearQuadraticTracking as Law,
 };
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::hybrid::{PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,19 @@ impl Component for LinearQuadraticTracking {
     const NAME: &'static str = "LinearQuadraticTracking";
     const DESCRIPTION: &'static str = "Linear quadratic Gaussian tracking control";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[("displacement", "desired_displacement")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[("displacement", "measured_displacement")],
+        ),
+        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+    ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 

@@ -2,7 +2,7 @@
 //! Loop-shaping control as an FMU.
 
 use controllers::{Controller, loop_shaping::LoopShaping as Law, pid::PidInput};
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// The second-order controller of Eq 3-10 from displacement to valve command.
@@ -18,6 +18,19 @@ impl Component for LoopShaping {
     const NAME: &'static str = "LoopShaping";
     const DESCRIPTION: &'static str = "Loop-shaping control of the displacement of a shake table";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[("displacement", "reference_displacement")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[("displacement", "measured_displacement")],
+        ),
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:

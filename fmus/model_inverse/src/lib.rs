@@ -5,7 +5,7 @@ use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::extrapolation::Extrapolation;
 use controllers::hybrid::model_inverse::ModelInverse as Law;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::hybrid::TransferSystemParameters;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,19 @@ impl Component for ModelInverse {
     const NAME: &'static str = "ModelInverse";
     const DESCRIPTION: &'static str = "Tracking control by the inverse of a model, with PI";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[("displacement", "desired_displacement")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[("displacement", "measured_displacement")],
+        ),
+        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+    ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 

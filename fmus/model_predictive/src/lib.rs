@@ -5,7 +5,7 @@ mod settings;
 
 use controllers::mpc::{MAXIMUM_HORIZON, Memory, ModelPredictiveControl, ModelPredictiveInput};
 use controllers::{Controller, Motion};
-use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 use settings::{SOLVERS, Settings};
@@ -132,6 +132,35 @@ impl Component for ModelPredictive {
     const DESCRIPTION: &'static str =
         "Model predictive control of a shake table over three-variable control";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[
+                ("displacement", "reference_displacement"),
+                ("velocity", "reference_velocity"),
+                ("acceleration", "reference_acceleration"),
+            ],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[
+                ("displacement", "measured_displacement"),
+                ("velocity", "measured_velocity"),
+                ("acceleration", "measured_acceleration"),
+            ],
+        ),
+        Terminal::bus(
+            "command",
+            "reference",
+            &[
+                ("displacement", "command_displacement"),
+                ("velocity", "command_velocity"),
+                ("acceleration", "command_acceleration"),
+            ],
+        ),
+    ];
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {

@@ -3,7 +3,7 @@
 
 mod matrix;
 
-use fmu_kit::{Causality, Component, ComponentResult, Variable};
+use fmu_kit::{Causality, Component, ComponentResult, Terminal, Variable};
 use plant::hybrid::{BenchmarkCase, Frame, NumericalSubstructure as Part, PERIOD};
 use serde::{Deserialize, Serialize};
 
@@ -73,6 +73,11 @@ impl Component for NumericalSubstructure {
     const NAME: &'static str = "NumericalSubstructure";
     const DESCRIPTION: &'static str = "The computed part of a structure in hybrid simulation";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[Terminal::bus(
+        "measured",
+        "motion",
+        &[("force", "measured_force")],
+    )];
     const STEP_SIZE: f64 = PERIOD;
     const ANY_STEP_SIZE: bool = false;
 

@@ -4,7 +4,7 @@
 use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::phase_lead_pi::PhaseLeadPi as Law;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Tracking control by PI with phase lead.
@@ -31,6 +31,19 @@ impl Component for PhaseLeadPi {
     const NAME: &'static str = "PhaseLeadPi";
     const DESCRIPTION: &'static str = "Tracking control by PI with phase lead";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[("displacement", "desired_displacement")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[("displacement", "measured_displacement")],
+        ),
+        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+    ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 

@@ -4,7 +4,7 @@
 use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::robust_tracking::RobustTracking as Law;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::hybrid::{PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +36,19 @@ impl Component for RobustTracking {
     const NAME: &'static str = "RobustTracking";
     const DESCRIPTION: &'static str = "Tracking control by synthesised loop shaping";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[("displacement", "desired_displacement")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[("displacement", "measured_displacement")],
+        ),
+        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+    ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 

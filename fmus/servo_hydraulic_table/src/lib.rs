@@ -4,7 +4,7 @@
 use fmu_kit::{
     Component, ComponentResult,
     Dependency::{Dependent, Fixed},
-    Event, Variable,
+    Event, Terminal, Variable,
 };
 use plant::servo_hydraulic::{
     ExtendedServoHydraulicState, ExtendedServoHydraulicTable as Rig, ServoHydraulicInput,
@@ -65,6 +65,27 @@ impl Component for ServoHydraulicTable {
     const NAME: &'static str = "ServoHydraulicTable";
     const DESCRIPTION: &'static str = "Uniaxial servo-hydraulic shake table from first principles";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::bus(
+            "motion",
+            "motion",
+            &[
+                ("displacement", "displacement"),
+                ("velocity", "velocity"),
+                ("acceleration", "acceleration"),
+                ("force", "actuator_force"),
+            ],
+        ),
+        Terminal::plug(
+            "mount",
+            "mount",
+            &[
+                ("acceleration", "acceleration"),
+                ("force", "specimen_force"),
+            ],
+        ),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         const MOTION: [&str; 2] = ["displacement", "velocity"];

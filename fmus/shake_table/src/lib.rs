@@ -1,7 +1,7 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! Shake table with its hydraulic actuator as an FMU.
 
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::identified::effects::{self, AtStart, Component as Part, Effects, Field};
 use plant::identified::extended_table::{ExtendedTable, ExtendedTableState};
 use plant::identified::shake_table::{SampledShakeTable, ShakeTable as Rig, ShakeTableState};
@@ -87,6 +87,27 @@ impl Component for ShakeTable {
     const NAME: &'static str = "ShakeTable";
     const DESCRIPTION: &'static str = "Uniaxial shake table with its identified hydraulic actuator";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::bus(
+            "motion",
+            "motion",
+            &[
+                ("displacement", "displacement"),
+                ("velocity", "velocity"),
+                ("acceleration", "acceleration"),
+                ("force", "actuator_force"),
+            ],
+        ),
+        Terminal::plug(
+            "mount",
+            "mount",
+            &[
+                ("acceleration", "acceleration"),
+                ("force", "specimen_force"),
+            ],
+        ),
+    ];
     const PARTIAL_DERIVATIVES: bool = true;
 
     fn variables() -> Vec<Variable<Self>> {

@@ -9,7 +9,7 @@ use controllers::{
     prediction_over_delay::PredictionOverDelay,
     sliding_mode::SlidingMode as Law,
 };
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::ModelError;
 use plant::identified::{actuator::IdentifiedActuator, shake_table::ShakeTable};
 use serde::{Deserialize, Serialize};
@@ -73,6 +73,39 @@ impl Component for SlidingMode {
     const NAME: &'static str = "SlidingMode";
     const DESCRIPTION: &'static str = "Sliding mode over a displacement and a force loop";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[
+                ("displacement", "reference_displacement"),
+                ("velocity", "reference_velocity"),
+                ("acceleration", "reference_acceleration"),
+            ],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[
+                ("displacement", "measured_displacement"),
+                ("velocity", "measured_velocity"),
+                ("force", "measured_force"),
+            ],
+        ),
+        Terminal::plug(
+            "specimen",
+            "specimen-motion",
+            &[("acceleration", "specimen_acceleration")],
+        ),
+        Terminal::bus(
+            "command",
+            "reference",
+            &[
+                ("displacement", "displacement_command"),
+                ("force", "force_command"),
+            ],
+        ),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:

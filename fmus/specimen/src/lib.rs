@@ -1,7 +1,7 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! Linear specimen on the table as an FMU.
 
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::identified::effects::{
     self, AtStart, Component as Part, Effects, Family, Field, SpecimenEffects,
 };
@@ -80,6 +80,18 @@ impl Component for Specimen {
     const NAME: &'static str = "Specimen";
     const DESCRIPTION: &'static str = "Linear one-storey specimen on a shake table";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::plug(
+            "mount",
+            "mount",
+            &[("acceleration", "table_acceleration"), ("force", "force")],
+        ),
+        Terminal::plug(
+            "motion",
+            "specimen-motion",
+            &[("acceleration", "acceleration")],
+        ),
+    ];
     const PARTIAL_DERIVATIVES: bool = true;
 
     fn variables() -> Vec<Variable<Self>> {

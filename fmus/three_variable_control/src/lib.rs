@@ -5,7 +5,7 @@ use controllers::{
     Controller, Motion,
     three_variable::{ThreeVariableControl as Law, ThreeVariableInput},
 };
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Three-variable control from motion to valve command.
@@ -30,6 +30,27 @@ impl Component for ThreeVariableControl {
     const NAME: &'static str = "ThreeVariableControl";
     const DESCRIPTION: &'static str = "Three-variable control of a shake table";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[
+                ("displacement", "reference_displacement"),
+                ("velocity", "reference_velocity"),
+                ("acceleration", "reference_acceleration"),
+            ],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[
+                ("displacement", "measured_displacement"),
+                ("velocity", "measured_velocity"),
+                ("acceleration", "measured_acceleration"),
+            ],
+        ),
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:

@@ -1,7 +1,7 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! Sensors of hybrid simulation as an FMU.
 
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::hybrid::{Converter, PERIOD, SensorNoise};
 use plant::sensors::channel::Noise;
 use serde::{Deserialize, Serialize};
@@ -25,6 +25,21 @@ impl Component for TrackingSensors {
     const NAME: &'static str = "TrackingSensors";
     const DESCRIPTION: &'static str = "Displacement sensor and load cell of hybrid simulation";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "rig",
+            "motion",
+            &[("displacement", "displacement"), ("force", "force")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[
+                ("displacement", "measured_displacement"),
+                ("force", "measured_force"),
+            ],
+        ),
+    ];
     const STEP_SIZE: f64 = PERIOD;
 
     fn variables() -> Vec<Variable<Self>> {

@@ -4,7 +4,7 @@
 use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::sliding_mode::TrackingSlidingMode as Law;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Tracking control by sliding mode.
@@ -39,6 +39,19 @@ impl Component for TrackingSlidingMode {
     const NAME: &'static str = "TrackingSlidingMode";
     const DESCRIPTION: &'static str = "Tracking control by sliding mode";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[("displacement", "desired_displacement")],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[("displacement", "measured_displacement")],
+        ),
+        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+    ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 

@@ -1,7 +1,7 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! The transfer system of hybrid simulation as an FMU.
 
-use fmu_kit::{Component, ComponentResult, Enumeration, Item, Variable};
+use fmu_kit::{Component, ComponentResult, Enumeration, Item, Terminal, Variable};
 use plant::hybrid::{
     Converter, InteractionForm, PERIOD, TransferSystem as Plant, TransferSystemParameters,
 };
@@ -41,6 +41,18 @@ impl Component for TransferSystem {
     const DESCRIPTION: &'static str =
         "Servo-hydraulic actuator with a specimen, for hybrid simulation";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+        Terminal::bus(
+            "motion",
+            "motion",
+            &[
+                ("displacement", "displacement"),
+                ("velocity", "velocity"),
+                ("force", "force"),
+            ],
+        ),
+    ];
     const STEP_SIZE: f64 = PERIOD;
     const ANY_STEP_SIZE: bool = false;
 

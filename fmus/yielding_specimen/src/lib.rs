@@ -4,7 +4,7 @@
 use fmu_kit::{
     Component, ComponentResult,
     Dependency::{Constant, Dependent},
-    Event, Variable,
+    Event, Terminal, Variable,
 };
 use plant::specimens::{YieldingSpecimen as Storey, YieldingState};
 use serde::{Deserialize, Serialize};
@@ -48,6 +48,18 @@ impl Component for YieldingSpecimen {
     const NAME: &'static str = "YieldingSpecimen";
     const DESCRIPTION: &'static str = "Yielding one-storey specimen on a shake table";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::plug(
+            "mount",
+            "mount",
+            &[("acceleration", "table_acceleration"), ("force", "force")],
+        ),
+        Terminal::plug(
+            "motion",
+            "specimen-motion",
+            &[("acceleration", "acceleration")],
+        ),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         const STATES: [&str; 3] = ["drift", "drift_velocity", "hysteretic_force_ratio"];

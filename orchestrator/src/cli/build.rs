@@ -6,11 +6,14 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 
 use crate::error::Error;
-use crate::pack;
+use crate::pack::{self, FmiVersion, Platform};
 
 /// Options of `shakebench build`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  shakebench build --fmi 2 --out fmus")]
+#[command(after_help = "Examples:\n  \
+    shakebench build --fmi 2 --out fmus\n  \
+    shakebench build --merge fmus-linux fmus-mac --out fmus\n  \
+    shakebench build --libraries x86_64-linux=LIB --libraries x86_64-windows=DLL --out fmus")]
 pub struct Arguments {
     /// Version of FMI
     #[arg(long, value_enum, default_value = "all")]
@@ -18,6 +21,36 @@ pub struct Arguments {
     /// Folder for fmi2/NAME.fmu and fmi3/NAME.fmu [default: target/fmus]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Join the FMUs of these folders instead of building: one archive with all their platforms
+    #[arg(
+        long,
+        value_name = "DIR",
+        num_args = 1..,
+        requires = "out",
+        conflicts_with_all = ["fmi", "libraries", "revision", "notices"]
+    )]
+    merge: Vec<PathBuf>,
+    /// Pack libraries that were compiled before instead of building; one folder a platform, which is
+    /// written as in x86_64-windows; this platform's is needed
+    #[arg(long, value_name = "PLATFORM=DIR", value_parser = libraries)]
+    libraries: Vec<(Platform, PathBuf)>,
+    /// Which build of the sources the libraries are; goes into the descriptions
+    #[arg(long, value_name = "TEXT", requires = "libraries")]
+    revision: Option<String>,
+    /// Write the licences of everything that the program is linked with, and pack nothing
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["fmi", "out", "libraries", "revision"])]
+    notices: Option<PathBuf>,
+}
+
+fn libraries(text: &str) -> Result<(Platform, PathBuf), String> {
+    let (platform, folder) = text
+        .split_once('=')
+        .ok_or("expected PLATFORM=DIR, as in x86_64-windows=DIR")?;
+    let folder = PathBuf::from(folder);
+    if !folder.is_dir() {
+        return Err(format!("{}: no such folder", folder.display()));
+    }
+    Ok((platform.parse()?, folder))
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -34,17 +67,33 @@ enum Versions {
 /// # Errors
 /// Components that do not build, or a folder that cannot be written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if let Some(file) = &arguments.notices {
+        let text = pack::notices_of_the_program()?;
+        std::fs::write(file, text).map_err(|error| Error::File {
+            path: file.clone(),
+            reason: error.to_string(),
+        })?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let out = match &arguments.out {
         Some(out) => out.clone(),
         None => pack::default_folder()?,
     };
-    let versions: &[pack::FmiVersion] = match arguments.fmi {
-        Versions::Two => &[pack::FmiVersion::V2],
-        Versions::Three => &[pack::FmiVersion::V3],
-        Versions::All => &pack::FmiVersion::ALL,
+    let versions: &[FmiVersion] = match arguments.fmi {
+        Versions::Two => &[FmiVersion::V2],
+        Versions::Three => &[FmiVersion::V3],
+        Versions::All => &FmiVersion::ALL,
     };
-    eprintln!("building the components (the first time takes a minute)...");
-    for fmu in pack::build_fmus(&out, versions)? {
+    let packed = if !arguments.merge.is_empty() {
+        pack::merge(&arguments.merge, &out)?
+    } else if !arguments.libraries.is_empty() {
+        let revision = arguments.revision.as_deref();
+        pack::pack_libraries(&arguments.libraries, &out, versions, revision)?
+    } else {
+        eprintln!("building the components (the first time takes a minute)...");
+        pack::build_fmus(&out, versions)?
+    };
+    for fmu in packed {
         println!("{}", fmu.path.display());
     }
     Ok(ExitCode::SUCCESS)

@@ -7,9 +7,10 @@ use clap::Args;
 
 use crate::error::Error;
 use crate::fmu::{Causality, FmiVersion, Fmu};
-use crate::library::FmuLibrary;
+use crate::library::{FmuLibrary, component};
 use crate::motion;
-use crate::report::columns::aligned;
+use crate::pack;
+use crate::report::columns::last_left;
 use crate::report::number::significant;
 use crate::ssp;
 use crate::system::tuning::Wanted;
@@ -19,11 +20,12 @@ use crate::units::STANDARD_GRAVITY;
 /// Options of `shakebench info`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    shakebench info target/fmus/fmi3/ShakeTable.fmu\n  \
+    shakebench info ShakeTable\n  \
     shakebench info three-variable\n  \
+    shakebench info target/fmus/fmi3/ShakeTable.fmu\n  \
     shakebench info records/RSN1633_MANJIL_ABBAR--L.AT2")]
 pub struct Arguments {
-    /// An .fmu, a system (.toml, .ssp or built-in), or a motion (.AT2, .csv)
+    /// A component's name, an .fmu, a system (.toml, .ssp or built-in), or a motion (.AT2, .csv)
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }
@@ -47,10 +49,25 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             built_in::DEFAULT_SPECIMEN,
             Wanted::default(),
         )?)?,
+        None if pack::all_fmus()?.iter().any(|known| known.name == name) => {
+            let packed = component(&name, FmiVersion::V3).map_err(|error| Error::File {
+                path: path.clone(),
+                reason: error.to_string(),
+            })?;
+            fmu(&*Fmu::open_own(&packed.path)?)
+        }
         _ => {
+            let mut components: Vec<&str> = pack::all_fmus()
+                .unwrap_or_default()
+                .iter()
+                .map(|fmu| fmu.name.as_str())
+                .collect();
+            components.dedup();
             let reason = format!(
-                "expected an .fmu, .ssp, .toml, .AT2 or .csv file, or a built-in system ({})",
-                built_in::names().collect::<Vec<_>>().join(", ")
+                "expected an .fmu, .ssp, .toml, .AT2 or .csv file, a built-in system ({}), or a \
+                 component ({})",
+                built_in::names().collect::<Vec<_>>().join(", "),
+                components.join(", ")
             );
             return Err(Error::File {
                 path: path.clone(),
@@ -113,31 +130,6 @@ fn fmu(fmu: &Fmu) -> String {
         text += &format!("\nremark: {remark}\n");
     }
     text
-}
-
-/// As [`aligned`], with the last column aligned left.
-fn last_left(mut rows: Vec<Vec<String>>) -> String {
-    let last: Vec<String> = rows.iter_mut().filter_map(Vec::pop).collect();
-    let width = rows
-        .iter()
-        .flat_map(|row| row.last())
-        .map(|c| c.chars().count())
-        .max();
-    for row in &mut rows {
-        if let Some(cell) = row.last_mut() {
-            *cell = format!("{cell:<0$}", width.unwrap_or(0));
-        }
-    }
-    let table = aligned(&rows);
-    let full = table
-        .lines()
-        .map(|line| line.chars().count())
-        .max()
-        .unwrap_or(0);
-    let lines = table.lines().zip(last);
-    lines
-        .map(|(line, last)| format!("{line:<full$}  {last}").trim_end().to_string() + "\n")
-        .collect()
 }
 
 fn system(file: &SystemFile) -> Result<String, Error> {

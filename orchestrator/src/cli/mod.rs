@@ -18,6 +18,7 @@ pub mod build;
 pub mod compare;
 pub mod design;
 pub mod diagnose;
+pub mod doctor;
 pub mod export;
 pub mod identify;
 pub mod info;
@@ -34,6 +35,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use crate::fmu::{FmiVersion, isolation};
+use crate::pack::supply;
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -48,6 +50,9 @@ use crate::fmu::{FmiVersion, isolation};
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    /// Folder of the components' FMUs [default: beside the program, or built from the workspace]
+    #[arg(long, global = true, value_name = "DIR")]
+    fmus: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -62,6 +67,8 @@ enum Command {
     Design(design::Arguments),
     /// Name what a model gets wrong, from records of the rig
     Diagnose(diagnose::Arguments),
+    /// Say what is here, what is missing, and the cure
+    Doctor(doctor::Arguments),
     /// Write a system with its components as an SSP archive
     Export(export::Arguments),
     /// Find a rig's parameters from measured data
@@ -84,13 +91,18 @@ enum Command {
 
 /// Reads the command line, does what it says and gives the exit status.
 pub fn main() -> ExitCode {
-    let done = match Cli::parse().command {
+    let cli = Cli::parse();
+    if let Some(folder) = &cli.fmus {
+        supply::take_from(folder);
+    }
+    let done = match cli.command {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
         Some(Command::Build(arguments)) => build::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
+        Some(Command::Doctor(arguments)) => doctor::execute(&arguments),
         Some(Command::Export(arguments)) => export::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),

@@ -1,15 +1,18 @@
 //! What lies in an FMU, and writing it so that the same contents give the same bytes.
 
 use std::{
+    collections::BTreeMap,
     fs::{self, File},
-    io::{self, Cursor, Seek, Write},
+    io::{self, Cursor, Read, Seek, Write},
     path::{Path, PathBuf},
 };
 
 use sha2::{Digest, Sha256};
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
+use super::annotation;
 use super::error::{PackError, file_error};
+use super::platform::Platform;
 use crate::component_library::Descriptions;
 use crate::fmu::FmiVersion;
 
@@ -25,46 +28,93 @@ pub struct PackedFmu {
 }
 
 const LICENCE: &str = "This FMU is licensed under either of the Apache License, Version 2.0, or \
-                       the MIT license, at your option; both texts lie beside this file.\n";
+                       the MIT license, at your option; both texts lie beside this file, and the \
+                       notices of what is linked into it in third-party.txt.\n";
 
-/// Names and contents of an FMU's files, sorted; a name that ends in a slash is a folder.
-pub(super) fn entries(
-    version: FmiVersion,
-    descriptions: &Descriptions,
-    binary: &[u8],
-    licences: &[(String, Vec<u8>)],
-) -> Vec<(String, Vec<u8>)> {
-    let description = match version {
-        FmiVersion::V2 => &descriptions.fmi2,
-        FmiVersion::V3 => &descriptions.fmi3,
+/// The picture that tools show.
+const ICON: &[u8] = include_bytes!("assets/icon.png");
+
+/// Files of an FMU by name, sorted; a name that ends in a slash is a folder.
+pub(super) type Entries = BTreeMap<String, Vec<u8>>;
+
+/// What the FMUs of a component are made of.
+pub(super) struct Contents<'a> {
+    /// What it says of itself.
+    pub(super) descriptions: Descriptions,
+    /// Its libraries.
+    pub(super) libraries: Vec<(Platform, Vec<u8>)>,
+    /// The project's licences by file name.
+    pub(super) licences: Vec<(String, Vec<u8>)>,
+    /// Licences of what is linked into the libraries.
+    pub(super) notices: String,
+    /// Which build of the sources it is.
+    pub(super) revision: Option<&'a str>,
+}
+
+impl Contents<'_> {
+    /// The files of the FMU for one version.
+    pub(super) fn entries(&self, version: FmiVersion) -> Entries {
+        let descriptions = &self.descriptions;
+        let description = match version {
+            FmiVersion::V2 => &descriptions.fmi2,
+            FmiVersion::V3 => &descriptions.fmi3,
+        };
+        let mut entries = Entries::new();
+        let mut put = |name: &str, content: &[u8]| entries.insert(name.into(), content.into());
+        let described = annotation::annotated(description, version, self.revision);
+        put("modelDescription.xml", described.as_bytes());
+        put(
+            "documentation/index.html",
+            descriptions.documentation.as_bytes(),
+        );
+        put("documentation/licenses/license.txt", LICENCE.as_bytes());
+        put(
+            "documentation/licenses/third-party.txt",
+            self.notices.as_bytes(),
+        );
+        for (name, text) in &self.licences {
+            put(&format!("documentation/licenses/{name}"), text);
+        }
+        put("resources/", &[]);
+        match version {
+            FmiVersion::V2 => put("model.png", ICON),
+            FmiVersion::V3 => {
+                put("terminalsAndIcons/icon.png", ICON);
+                put(
+                    "terminalsAndIcons/terminalsAndIcons.xml",
+                    descriptions.terminals.as_bytes(),
+                )
+            }
+        };
+        for (platform, library) in &self.libraries {
+            put(
+                &platform.library_in_fmu(version, &descriptions.name),
+                library,
+            );
+        }
+        entries
+    }
+}
+
+/// The files of an FMU.
+pub(super) fn read_archive(path: &Path) -> Result<Entries, PackError> {
+    let read = || -> io::Result<Entries> {
+        let mut archive = ZipArchive::new(File::open(path)?)?;
+        let mut entries = Entries::new();
+        for index in 0..archive.len() {
+            let mut file = archive.by_index(index)?;
+            let mut content = Vec::new();
+            file.read_to_end(&mut content)?;
+            entries.insert(file.name()?.into_owned(), content);
+        }
+        Ok(entries)
     };
-    let library = format!(
-        "{}/{}{}",
-        version.binaries(),
-        descriptions.name,
-        std::env::consts::DLL_SUFFIX
-    );
-    let mut entries = vec![
-        (
-            "modelDescription.xml".to_string(),
-            description.clone().into_bytes(),
-        ),
-        (
-            "documentation/index.html".into(),
-            descriptions.documentation.clone().into_bytes(),
-        ),
-        ("documentation/licenses/license.txt".into(), LICENCE.into()),
-        ("resources/".into(), Vec::new()),
-        (library, binary.to_vec()),
-    ];
-    entries.extend_from_slice(licences);
-    entries.sort();
-    entries
+    read().map_err(file_error(path))
 }
 
 /// Writes an archive unless it is there with the same contents. The same contents give the same
 /// bytes; a reader never sees half an archive.
-pub(crate) fn write_archive(path: &Path, entries: &[(String, Vec<u8>)]) -> Result<(), PackError> {
+pub(crate) fn write_archive(path: &Path, entries: &Entries) -> Result<(), PackError> {
     let mut sum = Sha256::new();
     for (name, content) in entries {
         sum.update((name.len() as u64).to_le_bytes());
@@ -92,18 +142,18 @@ pub(crate) fn write_archive(path: &Path, entries: &[(String, Vec<u8>)]) -> Resul
     moved.map_err(file_error(path))
 }
 
-fn write_entries(path: &Path, entries: &[(String, Vec<u8>)], stamp: String) -> io::Result<()> {
+fn write_entries(path: &Path, entries: &Entries, stamp: String) -> io::Result<()> {
     write_to(File::create(path)?, entries, stamp)?.sync_all()
 }
 
 /// An archive in memory.
-pub(super) fn archive_bytes(entries: &[(String, Vec<u8>)]) -> io::Result<Vec<u8>> {
+pub(super) fn archive_bytes(entries: &Entries) -> io::Result<Vec<u8>> {
     Ok(write_to(Cursor::new(Vec::new()), entries, String::new())?.into_inner())
 }
 
 fn write_to<W: Write + Seek>(
     writer: W,
-    entries: &[(String, Vec<u8>)],
+    entries: &Entries,
     stamp: String,
 ) -> io::Result<W> {
     let options = SimpleFileOptions::default()

@@ -13,7 +13,7 @@ pub enum PackError {
     /// The program does not run inside its workspace.
     #[error(
         "no workspace with `fmus/kit` found above {0}: components are built from source, so run \
-         this inside the project's folder"
+         this inside the project's folder (a release holds them ready built)"
     )]
     NoWorkspace(PathBuf),
     /// Cargo could not be started.
@@ -64,9 +64,69 @@ pub enum PackError {
         /// What is wrong and what was expected.
         problem: String,
     },
+    /// There are no packed FMUs, and no sources to build them from.
+    #[error(
+        "no FMUs of the components: none beside the program{}, none named by --fmus or \
+         SHAKEBENCH_FMUS, no sources above the present folder to build them from; unpack the \
+         release's FMUs into a folder `fmus` beside the program, or name their folder in --fmus",
+        places(beside)
+    )]
+    NoFmus {
+        /// Where an installed program looks.
+        beside: Vec<PathBuf>,
+    },
+    /// A folder that was chosen holds none.
+    #[error(
+        "{}: no FMUs in this folder, {by}; expected fmi2/NAME.fmu or fmi3/NAME.fmu, as the \
+         release's archive or `shakebench build --out` has them", folder.display()
+    )]
+    EmptyFolder {
+        /// The folder.
+        folder: PathBuf,
+        /// Who chose it.
+        by: &'static str,
+    },
+    /// An FMU is damaged, of another version or another's.
+    #[error(
+        "{}: this FMU {problem}; install again, or name the folder of this version's FMUs in \
+         --fmus", path.display()
+    )]
+    Unfit {
+        /// The FMU.
+        path: PathBuf,
+        /// What is wrong, as a clause.
+        problem: String,
+    },
+    /// Libraries of this platform are not among those to pack.
+    #[error(
+        "no libraries for {0} among those of --libraries: the components of this platform are \
+         loaded to learn their descriptions"
+    )]
+    NoOwnLibraries(String),
+    /// Two FMUs of one name do not fit together.
+    #[error(
+        "{} and {} cannot be merged: {problem}; expected FMUs of one component, built from the \
+         same sources for different platforms", first.display(), second.display()
+    )]
+    Unlike {
+        /// One.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+        /// In what they differ, as a clause.
+        problem: String,
+    },
     /// FMUs could not be packed earlier in this process.
     #[error("{0}")]
     Earlier(String),
+}
+
+fn places(beside: &[PathBuf]) -> String {
+    let places: Vec<String> = beside.iter().map(|p| p.display().to_string()).collect();
+    if places.is_empty() {
+        return String::new();
+    }
+    format!(" ({})", places.join(", "))
 }
 
 pub(crate) fn file_error(path: &Path) -> impl FnOnce(io::Error) -> PackError {

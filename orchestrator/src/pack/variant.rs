@@ -1,18 +1,11 @@
 //! An FMU of this project with other start values: the same library, its own description.
 
-use std::{
-    collections::BTreeMap,
-    fs::File,
-    io::{self, Read},
-    ops::Range,
-    path::Path,
-};
+use std::{ops::Range, path::Path};
 
 use fmu_kit::resources::{START_VALUES, variant_token};
 use roxmltree::{Document, Node};
-use zip::ZipArchive;
 
-use super::archive::{archive_bytes, write_archive};
+use super::archive::{archive_bytes, read_archive, write_archive};
 use super::error::{PackError, file_error};
 
 /// A parameter that starts differently.
@@ -59,7 +52,7 @@ pub fn write_variant(
     let changed = change(&description, model_name, start_values, &table).map_err(fail)?;
     entries.insert("modelDescription.xml".into(), changed.into_bytes());
     entries.insert(resource, table.into_bytes());
-    write_archive(out, &entries.into_iter().collect::<Vec<_>>())
+    write_archive(out, &entries)
 }
 
 /// The bytes of the FMU `original` with a further file in its resources.
@@ -73,23 +66,7 @@ pub(crate) fn with_resource(
 ) -> Result<Vec<u8>, PackError> {
     let mut entries = read_archive(original)?;
     entries.insert(format!("resources/{name}"), content);
-    let entries: Vec<(String, Vec<u8>)> = entries.into_iter().collect();
     archive_bytes(&entries).map_err(file_error(original))
-}
-
-fn read_archive(path: &Path) -> Result<BTreeMap<String, Vec<u8>>, PackError> {
-    let read = || -> io::Result<BTreeMap<String, Vec<u8>>> {
-        let mut archive = ZipArchive::new(File::open(path)?)?;
-        let mut entries = BTreeMap::new();
-        for index in 0..archive.len() {
-            let mut file = archive.by_index(index)?;
-            let mut content = Vec::new();
-            file.read_to_end(&mut content)?;
-            entries.insert(file.name()?.into_owned(), content);
-        }
-        Ok(entries)
-    };
-    read().map_err(file_error(path))
 }
 
 /// The description with the values of some attributes replaced.
@@ -141,7 +118,7 @@ fn change(
     Ok(text)
 }
 
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

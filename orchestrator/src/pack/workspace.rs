@@ -1,17 +1,14 @@
 //! Finding the project's workspace and letting cargo build its components.
 
 use std::{
-    fs::{self, File},
+    fs,
     io::{self, IsTerminal},
     path::{Path, PathBuf},
     process::{Command, Stdio},
-    sync::{Mutex, PoisonError},
 };
 
-use super::archive::{PackedFmu, entries, write_archive};
 use super::error::{PackError, file_error};
-use crate::component_library::ComponentLibrary;
-use crate::fmu::FmiVersion;
+use super::platform::Platform;
 
 /// The project's folder.
 pub(super) struct Workspace {
@@ -21,9 +18,11 @@ pub(super) struct Workspace {
 /// A component as cargo has built it.
 pub(super) struct Component {
     /// The folder of its crate.
-    folder: PathBuf,
-    /// Its dynamic library.
+    pub(super) folder: PathBuf,
+    /// Its dynamic library for this platform.
     pub(super) library: PathBuf,
+    /// All its dynamic libraries.
+    pub(super) libraries: Vec<(Platform, PathBuf)>,
 }
 
 impl Workspace {
@@ -40,6 +39,11 @@ impl Workspace {
             .find(|folder| folder.join("fmus/kit/Cargo.toml").is_file())
             .map(|root| Self { root: root.into() })
             .ok_or(PackError::NoWorkspace(here))
+    }
+
+    /// The folder that FMUs are packed into unless another is asked for.
+    pub(super) fn fmus(&self) -> PathBuf {
+        self.root.join("target/fmus")
     }
 
     fn cargo(&self, arguments: &[&str]) -> Result<String, PackError> {
@@ -85,6 +89,7 @@ impl Workspace {
             command: "build",
             problem,
         };
+        let here = Platform::here();
         let mut components = Vec::new();
         for line in answer.lines() {
             let message: serde_json::Value =
@@ -106,6 +111,10 @@ impl Workspace {
                 .ok_or_else(|| fail(format!("no dynamic library of {}", folder.display())))?;
             components.push(Component {
                 folder: folder.into(),
+                libraries: here
+                    .iter()
+                    .map(|here| (here.clone(), library.clone()))
+                    .collect(),
                 library,
             });
         }
@@ -130,48 +139,60 @@ impl Workspace {
             })
     }
 
-    pub(super) fn pack(
+    /// The components under `fmus/` from libraries that were compiled before, a folder a platform.
+    pub(super) fn published_from(
         &self,
-        components: impl FnOnce(&Self) -> Result<Vec<Component>, PackError>,
-        out: &Path,
-        versions: &[FmiVersion],
-    ) -> Result<Vec<PackedFmu>, PackError> {
-        // One process at a time builds and packs: the first does the work, the others find it
-        // done. Threads of one process share the lock of the file, so they need one of their own.
-        static THREADS: Mutex<()> = Mutex::new(());
-        let _turn = THREADS.lock().unwrap_or_else(PoisonError::into_inner);
-        fs::create_dir_all(out).map_err(file_error(out))?;
-        let lock_path = out.join(".lock");
-        let lock = File::create(&lock_path).map_err(file_error(&lock_path))?;
-        lock.lock().map_err(file_error(&lock_path))?;
-        let licences = self.licences()?;
-        let mut packed = Vec::new();
-        for Component { library, .. } in components(self)? {
-            let binary = fs::read(&library).map_err(file_error(&library))?;
-            let descriptions = ComponentLibrary::open(&library)?.describe()?;
-            for version in versions {
-                let folder = out.join(version.folder());
-                fs::create_dir_all(&folder).map_err(file_error(&folder))?;
-                let path = folder.join(format!("{}.fmu", descriptions.name));
-                let entries = entries(*version, &descriptions, &binary, &licences);
-                write_archive(&path, &entries)?;
-                packed.push(PackedFmu {
-                    name: descriptions.name.clone(),
-                    version: *version,
-                    path,
-                });
-            }
+        folders: &[(Platform, PathBuf)],
+    ) -> Result<Vec<Component>, PackError> {
+        let here = Platform::here();
+        let own = folders
+            .iter()
+            .find(|(platform, _)| Some(platform) == here.as_ref());
+        let Some((own_platform, own)) = own else {
+            let here = here.map_or("this platform".to_string(), |here| here.to_string());
+            return Err(PackError::NoOwnLibraries(here));
+        };
+        let metadata: serde_json::Value =
+            serde_json::from_str(&self.metadata()?).map_err(|error| PackError::Answer {
+                command: "metadata",
+                problem: error.to_string(),
+            })?;
+        let mut components = Vec::new();
+        for package in metadata["packages"].as_array().into_iter().flatten() {
+            let manifest = package["manifest_path"].as_str().map(Path::new);
+            let folder = manifest
+                .and_then(Path::parent)
+                .filter(|folder| folder.parent() == Some(&self.root.join("fmus")));
+            let mut targets = package["targets"].as_array().into_iter().flatten();
+            let library = targets.find(|target| kinds(target, "cdylib"));
+            let (Some(folder), Some(name)) = (folder, library.and_then(|l| l["name"].as_str()))
+            else {
+                continue;
+            };
+            let file = |(platform, from): &(Platform, PathBuf)| {
+                (platform.clone(), from.join(platform.library_file(name)))
+            };
+            components.push(Component {
+                folder: folder.into(),
+                library: own.join(own_platform.library_file(name)),
+                libraries: folders.iter().map(file).collect(),
+            });
         }
-        packed.sort_by(|a, b| (&a.name, a.version).cmp(&(&b.name, b.version)));
-        Ok(packed)
+        Ok(components)
     }
 
-    fn licences(&self) -> Result<Vec<(String, Vec<u8>)>, PackError> {
+    /// What cargo tells of the packages and what they are built on.
+    pub(super) fn metadata(&self) -> Result<String, PackError> {
+        self.cargo(&["metadata", "--format-version", "1"])
+    }
+
+    /// The project's own licences, by file name.
+    pub(super) fn licences(&self) -> Result<Vec<(String, Vec<u8>)>, PackError> {
         let mut licences = Vec::new();
         for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
             let path = self.root.join(name);
             let text = fs::read(&path).map_err(file_error(&path))?;
-            licences.push((format!("documentation/licenses/{name}.txt"), text));
+            licences.push((format!("{name}.txt"), text));
         }
         Ok(licences)
     }

@@ -27,3 +27,28 @@ pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     }
     text
 }
+
+/// As [`aligned`], with the last column aligned left.
+pub(crate) fn last_left(mut rows: Vec<Vec<String>>) -> String {
+    let last: Vec<String> = rows.iter_mut().filter_map(Vec::pop).collect();
+    let width = rows
+        .iter()
+        .flat_map(|row| row.last())
+        .map(|c| c.chars().count())
+        .max();
+    for row in &mut rows {
+        if let Some(cell) = row.last_mut() {
+            *cell = format!("{cell:<0$}", width.unwrap_or(0));
+        }
+    }
+    let table = aligned(&rows);
+    let full = table
+        .lines()
+        .map(|line| line.chars().count())
+        .max()
+        .unwrap_or(0);
+    let lines = table.lines().zip(last);
+    lines
+        .map(|(line, last)| format!("{line:<full$}  {last}").trim_end().to_string() + "\n")
+        .collect()
+}

@@ -53,9 +53,9 @@ pub fn write(
         path,
     };
     let text = writer.structure(experiment)?;
-    let mut entries = vec![(STRUCTURE.to_string(), text.into_bytes())];
+    let mut entries = BTreeMap::from([(STRUCTURE.to_string(), text.into_bytes())]);
     for (name, content) in std::mem::take(&mut writer.fmus) {
-        entries.push((format!("resources/{name}"), content.bytes));
+        entries.insert(format!("resources/{name}"), content.bytes);
     }
     pack::write_archive(path, &entries)?;
     Ok(writer.notes)

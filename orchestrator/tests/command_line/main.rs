@@ -8,6 +8,7 @@ mod contract;
 mod diagnosis;
 mod failures;
 mod hostile;
+mod installation;
 mod motions;
 mod physical_rig;
 mod reports;

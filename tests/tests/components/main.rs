@@ -4,3 +4,4 @@ mod importers;
 mod model_descriptions;
 mod packing;
 mod ssp;
+mod terminals;

@@ -3,11 +3,13 @@
 mod fmi2;
 mod fmi3;
 mod html;
+mod terminals;
 mod xml;
 
 pub use fmi2::fmi2;
 pub use fmi3::fmi3;
 pub use html::html;
+pub use terminals::terminals;
 
 use std::collections::BTreeMap;
 

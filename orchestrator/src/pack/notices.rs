@@ -1,0 +1,224 @@
+//! Licences of what is linked into a library: each crate with the notices in its own files.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::error::PackError;
+
+/// What cargo tells of the workspace and everything it is built on.
+#[derive(Deserialize)]
+struct Metadata {
+    packages: Vec<Package>,
+    resolve: Resolve,
+}
+
+#[derive(Deserialize)]
+struct Package {
+    id: String,
+    name: String,
+    version: String,
+    license: Option<String>,
+    repository: Option<String>,
+    source: Option<String>,
+    manifest_path: PathBuf,
+}
+
+#[derive(Deserialize)]
+struct Resolve {
+    nodes: Vec<Node>,
+}
+
+#[derive(Deserialize)]
+struct Node {
+    id: String,
+    deps: Vec<Link>,
+}
+
+#[derive(Deserialize)]
+struct Link {
+    pkg: String,
+    dep_kinds: Vec<Kind>,
+}
+
+#[derive(Deserialize)]
+struct Kind {
+    kind: Option<String>,
+}
+
+/// The crates that a workspace's packages are linked with.
+pub(super) struct Notices {
+    packages: HashMap<String, Package>,
+    links: HashMap<String, Vec<String>>,
+}
+
+/// How the standard library, which every program of Rust holds, is licensed.
+const STANDARD_LIBRARY: &str = "Rust's standard library\n    licence: MIT OR Apache-2.0; \
+    https://github.com/rust-lang/rust\n    Copyright (c) The Rust Project Contributors\n";
+
+impl Notices {
+    /// Reads the answer of `cargo metadata --format-version 1`.
+    ///
+    /// # Errors
+    /// Another form than expected.
+    pub(super) fn read(metadata: &str) -> Result<Self, PackError> {
+        let metadata: Metadata =
+            serde_json::from_str(metadata).map_err(|error| PackError::Answer {
+                command: "metadata",
+                problem: error.to_string(),
+            })?;
+        let linked = |node: Node| {
+            let normal = node.deps.into_iter().filter(|link| {
+                let mut kinds = link.dep_kinds.iter();
+                kinds.any(|kind| kind.kind.is_none())
+            });
+            (node.id, normal.map(|link| link.pkg).collect())
+        };
+        Ok(Self {
+            links: metadata.resolve.nodes.into_iter().map(linked).collect(),
+            packages: metadata
+                .packages
+                .into_iter()
+                .map(|package| (package.id.clone(), package))
+                .collect(),
+        })
+    }
+
+    /// The notices of everything that the package in `folder` is linked with, as one text.
+    ///
+    /// # Errors
+    /// There is no such package.
+    pub(super) fn of(&self, folder: &Path) -> Result<String, PackError> {
+        let root = self
+            .packages
+            .values()
+            .find(|package| package.manifest_path.parent() == Some(folder))
+            .ok_or_else(|| PackError::Answer {
+                command: "metadata",
+                problem: format!("no package in {}", folder.display()),
+            })?;
+        let mut reached = BTreeSet::new();
+        let mut open = vec![&root.id];
+        while let Some(id) = open.pop() {
+            if reached.insert(id) {
+                open.extend(self.links.get(id).into_iter().flatten());
+            }
+        }
+        let mut foreign: Vec<&Package> = reached
+            .into_iter()
+            .filter_map(|id| self.packages.get(id))
+            .filter(|package| package.source.is_some())
+            .collect();
+        foreign.sort_by(|a, b| (&a.name, &a.version).cmp(&(&b.name, &b.version)));
+        Ok(text(&foreign))
+    }
+}
+
+fn text(packages: &[&Package]) -> String {
+    let mut text = format!("Linked into this library or program:\n\n{STANDARD_LIBRARY}");
+    // Many crates carry the same text: it stands once, under a number.
+    let mut texts: BTreeMap<String, usize> = BTreeMap::new();
+    let mut ordered: Vec<String> = Vec::new();
+    for package in packages {
+        let numbers: Vec<String> = licence_files(package)
+            .into_iter()
+            .map(|content| {
+                let next = texts.len() + 1;
+                let number = *texts.entry(content.clone()).or_insert(next);
+                if number == next {
+                    ordered.push(content);
+                }
+                format!("[{number}]")
+            })
+            .collect();
+        text += &format!(
+            "\n{} {}\n    licence: {}; {}\n",
+            package.name,
+            package.version,
+            package.license.as_deref().unwrap_or("see its files"),
+            package.repository.as_deref().unwrap_or("crates.io"),
+        );
+        text += &match numbers.is_empty() {
+            true => "    no file of its own with a notice\n".to_string(),
+            false => format!("    notices: {}\n", numbers.join(" ")),
+        };
+    }
+    for (index, content) in ordered.iter().enumerate() {
+        text += &format!("\n{:=<78}\n[{}]\n\n{content}", "", index + 1);
+    }
+    text
+}
+
+/// The texts of a crate's licence files, tidied so that equal ones are equal.
+fn licence_files(package: &Package) -> Vec<String> {
+    let folder = package.manifest_path.parent().unwrap_or(Path::new(""));
+    let is_notice = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let name = name.to_uppercase();
+        let begins = ["LICEN", "COPYING", "NOTICE", "COPYRIGHT", "UNLICENSE"];
+        begins.iter().any(|begin| name.starts_with(begin)) && path.is_file()
+    };
+    let mut files: Vec<PathBuf> = fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(is_notice)
+        .collect();
+    files.sort();
+    files
+        .iter()
+        .filter_map(|file| fs::read(file).ok())
+        .map(|bytes| {
+            let text = String::from_utf8_lossy(&bytes);
+            let lines: Vec<&str> = text.lines().map(str::trim_end).collect();
+            format!("{}\n", lines.join("\n").trim_matches('\n'))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_texts_stand_once_and_build_dependencies_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let package = |name: &str, licence: Option<&str>| {
+            let place = folder.path().join(name);
+            fs::create_dir(&place).unwrap();
+            if let Some(text) = licence {
+                fs::write(place.join("LICENSE-MIT"), text).unwrap();
+            }
+            serde_json::json!({
+                "id": name, "name": name, "version": "1.0.0", "license": "MIT",
+                "repository": null, "manifest_path": place.join("Cargo.toml"),
+                "source": if name == "own" { None } else { Some("registry") },
+            })
+        };
+        let dependency = |name: &str, kind: Option<&str>| serde_json::json!({"pkg": name, "dep_kinds": [{"kind": kind}]});
+        let metadata = serde_json::json!({
+            "packages": [
+                package("own", Some("ours")), package("a", Some("free\r\n")),
+                package("b", Some("free\n\n")), package("builder", Some("no")),
+                package("bare", None),
+            ],
+            "resolve": {"nodes": [
+                {"id": "own", "deps": [dependency("a", None), dependency("builder", Some("build"))]},
+                {"id": "a", "deps": [dependency("b", None), dependency("bare", None)]},
+            ]},
+        });
+        let notices = Notices::read(&metadata.to_string()).unwrap();
+        let text = notices.of(&folder.path().join("own")).unwrap();
+        assert_eq!(text.matches("free").count(), 1, "{text}");
+        assert_eq!(text.matches("notices: [1]").count(), 2, "{text}");
+        assert!(
+            text.contains("bare 1.0.0") && !text.contains("builder"),
+            "{text}"
+        );
+        assert!(!text.contains("ours"), "{text}");
+        assert!(notices.of(folder.path()).is_err());
+    }
+}

@@ -1,0 +1,184 @@
+"""The program's commands as functions."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Union
+
+from ._program import PathLike, call, optional_path, options, text
+from ._results import Result
+
+Quantity = Union[str, float]
+
+
+def _finished(
+    arguments: Sequence[str], out: Optional[PathLike], traces: Optional[str] = None
+) -> Result:
+    """Runs a command that writes into a folder: ``out``, or one that goes with the result."""
+    folder = Path(tempfile.mkdtemp(prefix="shakebench-") if out is None else out)
+    try:
+        # The program makes a folder of results whole, so it is given one that is not there yet.
+        results = folder / "results" if out is None else folder
+        values = call([*arguments, "--out", str(results), "--json"])
+    except BaseException:
+        if out is None:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return Result(values, results, traces, folder if out is None else None)
+
+
+def _paths(files: Union[PathLike, Sequence[PathLike]]) -> List[str]:
+    if isinstance(files, (list, tuple)):
+        return [text(file) for file in files]
+    return [text(files)]
+
+
+def run(
+    system: Optional[PathLike] = None,
+    *,
+    record: Optional[PathLike] = None,
+    reference: Optional[PathLike] = None,
+    plant: Optional[str] = None,
+    specimen: Optional[str] = None,
+    set: Optional[Mapping[str, Any]] = None,
+    fmi: Optional[int] = None,
+    algorithm: Optional[str] = None,
+    step: Optional[str] = None,
+    duration: Optional[str] = None,
+    scale: Optional[float] = None,
+    pga: Optional[Quantity] = None,
+    peak: Optional[Quantity] = None,
+    seed: Optional[int] = None,
+    control_model: Optional[PathLike] = None,
+    out: Optional[PathLike] = None,
+    **more: Any,
+) -> Result:
+    """Runs a system on a motion.
+
+    ``system`` is a built-in name (``"three-variable"``, ``"mpc"``, ...) or a system file; ``record``
+    an acceleration (PEER ``.AT2`` or CSV), ``reference`` a CSV used to the letter; without either the
+    built-in motion is played. ``set`` gives parameters, ``{"control.valve_limit": "5 V"}``. Quantities
+    are text with a unit (``duration="10 s"``). ``more`` are further options of ``shakebench run``.
+
+    The result's ``traces`` hold every signal of every component over time, SI.
+
+    Raises :class:`shakebench.InputError` for input at fault. A run that ended early is returned:
+    ``result["ended"]`` is then not ``"complete"`` and ``result["ended_because"]`` tells why.
+    """
+    arguments = ["run", *([] if system is None else [text(system)])]
+    for name, value in (set or {}).items():
+        arguments += ["--set", f"{name}={text(value)}"]
+    arguments += options(
+        {
+            "record": optional_path(record),
+            "reference": optional_path(reference),
+            "plant": plant,
+            "specimen": specimen,
+            "fmi": fmi,
+            "algorithm": algorithm,
+            "step": step,
+            "duration": duration,
+            "scale": scale,
+            "pga": pga,
+            "peak": peak,
+            "seed": seed,
+            "control_model": optional_path(control_model),
+            **more,
+        }
+    )
+    return _finished(arguments, out, "results.csv")
+
+
+def compare(
+    controllers: Optional[Sequence[str]] = None,
+    *,
+    records: Optional[Union[PathLike, Sequence[PathLike]]] = None,
+    reference: Optional[PathLike] = None,
+    plant: Optional[str] = None,
+    specimen: Optional[str] = None,
+    out: Optional[PathLike] = None,
+    **more: Any,
+) -> Result:
+    """Runs controllers (default: all) on records (files or folders; default: built-in motions).
+
+    ``result["rows"]`` has a row a run, ``result["medians"]`` one a controller; ``frame()`` gives the
+    rows as a table.
+
+    Raises :class:`shakebench.InputError` for unknown names or records at fault.
+    """
+    arguments = options(
+        {
+            "controllers": None if controllers is None else ",".join(controllers),
+            "records": None if records is None else _paths(records),
+            "reference": optional_path(reference),
+            "plant": plant,
+            "specimen": specimen,
+            **more,
+        }
+    )
+    return _finished(["compare", *arguments], out)
+
+
+def design(loop: Optional[str] = None, **more: Any) -> Dict[str, Any]:
+    """Margins, crossover and bandwidth of the loops: ``design()["loops"]``.
+
+    Raises :class:`shakebench.InputError` for an unknown loop.
+    """
+    with tempfile.TemporaryDirectory(prefix="shakebench-") as folder:
+        named = options({"loop": loop, "out": str(Path(folder) / "design"), **more})
+        return call(["design", *named, "--json"])
+
+
+def identify(
+    data: Union[PathLike, Sequence[PathLike]],
+    out: Optional[PathLike] = None,
+    *,
+    fit_part: Optional[float] = None,
+    specimen: Optional[PathLike] = None,
+    **more: Any,
+) -> Result:
+    """Finds a rig's parameters from recordings (CSV with unit headers) and writes them to ``out``.
+
+    ``result["model"]`` is the model file, ``result["fit_percent"]`` how well it predicts the part of
+    the data that was left out.
+
+    Raises :class:`shakebench.InputError` for data at fault, with file, row and what was expected.
+    """
+    named = options({"fit_part": fit_part, "specimen": optional_path(specimen), **more})
+    arguments = ["identify", *_paths(data), *named, "--json"]
+    if out is not None:
+        return Result(call([*arguments, "--out", text(out)]), Path(out).resolve().parent)
+    folder = Path(tempfile.mkdtemp(prefix="shakebench-"))
+    try:
+        values = call([*arguments, "--out", str(folder / "model.toml")])
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return Result(values, folder, None, folder)
+
+
+def diagnose(
+    case: PathLike,
+    *,
+    data: Optional[Union[PathLike, Sequence[PathLike]]] = None,
+    out: Optional[PathLike] = None,
+    **more: Any,
+) -> Result:
+    """Names what a model gets wrong, from the records of a case (a folder or a rig description).
+
+    ``result["verdict"]``, ``result["effects"]``, ``result["gain"]``; the extended model and its FMUs lie
+    in ``result.folder``.
+
+    Raises :class:`shakebench.InputError` for a case at fault.
+    """
+    named: List[str] = []
+    for file in [] if data is None else _paths(data):
+        named += ["--data", file]
+    return _finished(["diagnose", text(case), *named, *options(more)], out)
+
+
+def doctor() -> Dict[str, Any]:
+    """What is here, what is missing, and the cure: ``doctor()["ready"]`` and ``["findings"]``."""
+    return call(["doctor", "--json"])
