@@ -11,6 +11,7 @@
 )]
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Instant;
 
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
@@ -18,6 +19,7 @@ use controllers::{Controller, Motion as Sample};
 use plant::identified::shake_table::{ShakeTable, ShakeTableState};
 use plant::specimens::linear::{LinearSpecimen, SpecimenState};
 use shakebench::fmu::FmiVersion;
+use shakebench::live::{Scene, Tap};
 use shakebench::master::{Algorithm, Pace};
 use shakebench::motion::Motion;
 use shakebench::run::experiment::{Prepared, Request, prepare};
@@ -108,6 +110,18 @@ fn main() {
             &prepared,
         );
     }
+    let watched = prepared(FmiVersion::V3);
+    report(
+        "the same, watched (FMI 3.0)",
+        21,
+        || {
+            let mut simulation = watched.simulation(Algorithm::GaussSeidel).unwrap();
+            let (_, places) = Scene::new(&watched, simulation.names());
+            simulation.watch(Arc::new(Tap::new(places, watched.samples)));
+            simulation
+        },
+        |simulation| simulation.run(watched.samples, Pace::Fastest, &mut |_| {}),
+    );
     let Prepared {
         motion, samples, ..
     } = prepared(FmiVersion::V3);

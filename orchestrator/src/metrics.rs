@@ -1,5 +1,9 @@
 //! How well a table followed its reference.
 
+mod response_spectrum;
+
+pub use response_spectrum::{USUAL_DAMPING, pseudo_acceleration};
+
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 use thiserror::Error;

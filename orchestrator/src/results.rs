@@ -3,6 +3,36 @@
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static MAY_OVERWRITE: AtomicBool = AtomicBool::new(false);
+
+/// Lets this process replace files that differ (`--force`).
+pub fn allow_overwriting() {
+    MAY_OVERWRITE.store(true, Ordering::Relaxed);
+}
+
+fn may_overwrite() -> bool {
+    MAY_OVERWRITE.load(Ordering::Relaxed)
+}
+
+/// A folder for results where none was named: `folder` itself where it is not there yet or
+/// `is_same` says that it holds the results of the same command, otherwise the first such of
+/// `folder-2`, `folder-3` and so on.
+pub fn unused(folder: &Path, is_same: impl Fn(&Path) -> bool) -> PathBuf {
+    let is_free = |place: &Path| may_overwrite() || !place.exists() || is_same(place);
+    if is_free(folder) {
+        return folder.to_path_buf();
+    }
+    let numbered = (2..).map(|number| {
+        let mut name = folder.as_os_str().to_os_string();
+        name.push(format!("-{number}"));
+        PathBuf::from(name)
+    });
+    let mut free = numbered.filter(|place| is_free(place));
+    // The numbers do not end.
+    free.next().unwrap_or_else(|| folder.to_path_buf())
+}
 
 /// Why results cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -23,7 +53,20 @@ pub enum ResultsError {
         /// The operating system's word.
         source: io::Error,
     },
+    /// There is a file of that name with other content.
+    #[error(
+        "{}: is there already and would change; expected a new name or folder for --out, or --force",
+        file.display()
+    )]
+    Exists {
+        /// The file.
+        file: PathBuf,
+    },
 }
+
+/// Files that tell how long something took, draw what others hold or pack it: they may differ from one
+/// time to the next without saying anything else.
+const VOLATILE: [&str; 4] = ["html", "json", "svg", "fmu"];
 
 /// Files on their way into a folder: they appear there together, when all of them are complete.
 pub struct Results {
@@ -121,12 +164,38 @@ impl Results {
         self.replaced.extend(names.iter().map(|name| name.to_string()));
     }
 
-    /// Moves the files into their folder; files of the same name are replaced, others stay. Of two
-    /// that do so at once, one waits for the other.
+    /// Whether a file of data would change; pages, pictures and summaries follow the data.
+    fn check_existing(&self) -> Result<(), ResultsError> {
+        let is_volatile = |name: &&String| {
+            let extension = Path::new(name.as_str()).extension();
+            VOLATILE
+                .iter()
+                .any(|own| extension.is_some_and(|e| e == *own))
+        };
+        let data = self.names.iter().filter(|name| !is_volatile(name));
+        for name in data {
+            let file = self.folder.join(name);
+            let Ok(before) = fs::read(&file) else {
+                continue;
+            };
+            let now = fs::read(self.staging.path().join(name));
+            if now.is_ok_and(|now| now != before) {
+                return Err(ResultsError::Exists { file });
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves the files into their folder; others stay. Of two that do so at once, one waits for the
+    /// other.
     ///
     /// # Errors
-    /// A folder that cannot be made.
+    /// A folder that cannot be made; a file of data that is there and would change, unless
+    /// [`allow_overwriting`] was called.
     pub fn finish(self) -> Result<Vec<PathBuf>, ResultsError> {
+        if !may_overwrite() {
+            self.check_existing()?;
+        }
         fs::create_dir_all(&self.folder).map_err(|source| ResultsError::Folder {
             folder: self.folder.clone(),
             source,

@@ -1,6 +1,6 @@
 //! `shakebench compare`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -9,7 +9,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::rig::RigArguments;
 use crate::comparison::{self, Plan, Played, Progress};
 use crate::error::Error;
+use crate::results::unused;
 use crate::system::built_in;
+use crate::units::nearest;
 
 /// Options of `shakebench compare`.
 #[derive(Debug, Args)]
@@ -68,7 +70,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let found = found?;
 
     let folder = arguments.out.clone();
-    let folder = folder.unwrap_or_else(|| "shakebench-results/comparison".into());
+    let folder =
+        folder.unwrap_or_else(|| unused(Path::new("shakebench-results/comparison"), |_| false));
     let files = comparison::write(&found, &folder)?;
     if arguments.json {
         println!("{}", serde_json::json!(found));
@@ -101,19 +104,25 @@ fn controllers(asked: &[String]) -> Result<Vec<String>, Error> {
     if asked.is_empty() {
         return Ok(built_in::names().map(String::from).collect());
     }
-    for name in asked {
-        if !built_in::names().any(|known| known == name) {
+    let asked = asked.iter().map(|name| name.trim());
+    let asked = asked.filter(|name| !name.is_empty());
+    asked
+        .map(|name| {
+            if built_in::names().any(|known| known == name) {
+                return Ok(name.to_string());
+            }
             let known: Vec<&str> = built_in::names().collect();
-            return Err(Error::Option {
+            let suggestion = nearest(name, built_in::names())
+                .map_or(String::new(), |near| format!(" did you mean `{near}`?"));
+            Err(Error::Option {
                 option: "--controllers",
                 reason: format!(
-                    "`{name}` is no built-in system; expected {}",
+                    "`{name}` is no built-in system;{suggestion} expected some of {}",
                     known.join(", ")
                 ),
-            });
-        }
-    }
-    Ok(asked.to_vec())
+            })
+        })
+        .collect()
 }
 
 fn played(arguments: &Arguments) -> Result<Vec<Played>, Error> {

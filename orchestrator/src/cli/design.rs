@@ -1,6 +1,6 @@
 //! `shakebench design`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -9,6 +9,7 @@ use crate::design::{self, LoopName, Options, Synthesis};
 use crate::error::Error;
 use crate::report::columns::aligned;
 use crate::report::number::significant;
+use crate::results::unused;
 use crate::units::INCH;
 
 /// Options of `shakebench design`.
@@ -53,7 +54,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let design =
         design::design(&options).map_err(|error| fault("--crossover")(error.to_string()))?;
     let folder = arguments.out.clone();
-    let folder = folder.unwrap_or_else(|| "shakebench-results/design".into());
+    let folder =
+        folder.unwrap_or_else(|| unused(Path::new("shakebench-results/design"), |_| false));
     let report = design::write(&design, &folder)?;
     if arguments.json {
         let mut json = serde_json::json!(design);

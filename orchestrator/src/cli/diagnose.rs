@@ -6,8 +6,10 @@ use std::process::ExitCode;
 use clap::Args;
 use identification::diagnosis::engine::{Observer, Progress};
 
+use super::progress;
 use crate::diagnosis::{diagnose, files, text};
 use crate::error::Error;
+use crate::results::unused;
 
 /// What `diagnose` takes.
 #[derive(Debug, Args)]
@@ -48,15 +50,29 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             place.file_stem()
         };
         let name = name.unwrap_or_default().to_string_lossy();
-        Path::new("shakebench-results").join(format!("diagnosis-{name}"))
+        let folder = Path::new("shakebench-results").join(format!("diagnosis-{name}"));
+        unused(&folder, |_| false)
     });
-    let tell = |event: &Progress| eprintln!("{event}");
-    let observer = if arguments.verbose {
-        Observer::new(&tell)
-    } else {
-        Observer::none()
+    let bar = progress::spinner("reading");
+    let tell = |event: &Progress| {
+        if arguments.verbose {
+            eprintln!("{event}");
+        } else {
+            let words = event.to_string();
+            bar.set_message(words.lines().next().unwrap_or_default().to_string());
+        }
     };
-    let report = diagnose(&arguments.case, &arguments.data, &folder, observer)?;
+    if arguments.verbose {
+        bar.finish_and_clear();
+    }
+    let report = diagnose(
+        &arguments.case,
+        &arguments.data,
+        &folder,
+        Observer::new(&tell),
+    );
+    bar.finish_and_clear();
+    let report = report?;
     if arguments.json {
         println!("{}", serde_json::json!(report));
     } else {

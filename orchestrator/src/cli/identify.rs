@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 use identification::identify::identified::RigIdentification;
 
+use super::progress;
 use crate::error::Error;
 use crate::identify::{
     EQUATION_COLUMNS, Form, HydraulicIdentification, PARAMETER_COLUMNS, Request, Summary, identify,
@@ -54,12 +55,15 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         });
     }
     check_place(arguments)?;
+    let bar = progress::spinner("identifying");
     let identified = identify(&Request {
         data: arguments.data.clone(),
         model: arguments.out.clone(),
         fit_part: arguments.fit_part,
         specimen: arguments.specimen.clone(),
-    })?;
+    });
+    bar.finish_and_clear();
+    let identified = identified?;
     identified.write()?;
     if arguments.json {
         println!(

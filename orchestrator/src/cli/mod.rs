@@ -16,13 +16,16 @@ macro_rules! eprintln {
 pub mod benchmark;
 pub mod build;
 pub mod compare;
+pub mod compare_runs;
 pub mod design;
 pub mod diagnose;
 pub mod doctor;
 pub mod export;
+pub mod figures;
 pub mod identify;
 pub mod info;
 mod interrupt;
+mod progress;
 pub mod report;
 mod rig;
 pub mod run;
@@ -32,10 +35,12 @@ pub mod validate;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::fmu::{FmiVersion, isolation};
 use crate::pack::supply;
+use crate::report::UnitSystem;
+use crate::results;
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -50,6 +55,19 @@ use crate::pack::supply;
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    /// Units of what is printed and drawn: us (in, lbf) or si (mm, kN); accelerations in g. Files of
+    /// numbers are SI always [default: us, and the reader of a page chooses]
+    #[arg(
+        long,
+        value_enum,
+        global = true,
+        value_name = "SYSTEM",
+        hide_possible_values = true
+    )]
+    units: Option<UnitSystem>,
+    /// Replace files of results that are there already and differ
+    #[arg(long, global = true)]
+    force: bool,
     /// Folder of the components' FMUs [default: beside the program, or built from the workspace]
     #[arg(long, global = true, value_name = "DIR")]
     fmus: Option<PathBuf>,
@@ -63,10 +81,22 @@ enum Command {
     Build(build::Arguments),
     /// Run controllers on records and print the thesis's tables beside the results
     Compare(compare::Arguments),
+    /// Lay any runs over each other and say what differs between them
+    CompareRuns(compare_runs::Arguments),
+    /// Print what makes a shell complete commands and options
+    #[command(
+        after_help = "Example:\n  shakebench completions bash > ~/.local/share/bash-completion/completions/shakebench"
+    )]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
     /// Print margins of the loops and draw their frequency responses
     Design(design::Arguments),
     /// Name what a model gets wrong, from records of the rig
     Diagnose(diagnose::Arguments),
+    /// Draw the thesis's figures with what this program computes
+    Figures(figures::Arguments),
     /// Say what is here, what is missing, and the cure
     Doctor(doctor::Arguments),
     /// Write a system with its components as an SSP archive
@@ -92,6 +122,12 @@ enum Command {
 /// Reads the command line, does what it says and gives the exit status.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    if let Some(units) = cli.units {
+        units.choose();
+    }
+    if cli.force {
+        results::allow_overwriting();
+    }
     if let Some(folder) = &cli.fmus {
         supply::take_from(folder);
     }
@@ -100,8 +136,15 @@ pub fn main() -> ExitCode {
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
         Some(Command::Build(arguments)) => build::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
+        Some(Command::CompareRuns(arguments)) => compare_runs::execute(&arguments),
+        Some(Command::Completions { shell }) => {
+            let mut words = Cli::command();
+            clap_complete::generate(shell, &mut words, "shakebench", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
         Some(Command::Design(arguments)) => design::execute(&arguments),
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
+        Some(Command::Figures(arguments)) => figures::execute(&arguments),
         Some(Command::Doctor(arguments)) => doctor::execute(&arguments),
         Some(Command::Export(arguments)) => export::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),

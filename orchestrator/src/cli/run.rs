@@ -7,24 +7,25 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use sha2::{Digest, Sha256};
 
 use super::OneVersion;
 use super::interrupt;
 use super::rig::RigArguments;
 use crate::error::Error;
-use crate::fmu::{Isolation, Options, Trace, hexadecimal};
-use crate::master::{Algorithm, Ended, Pace};
+use crate::fmu::{Isolation, Options, Trace};
+use crate::live::{Scene, Server, Tap};
+use crate::master::{Algorithm, Ended, Pace, Simulation};
 use crate::motion::{self, Motion};
 use crate::report::columns::aligned;
 use crate::report::number::significant;
-use crate::results::Results;
+use crate::report::{Cell, UnitSystem, Units};
+use crate::results::{Results, unused};
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
 use crate::run::summary::Summary;
-use crate::system::{System, built_in};
-use crate::units::{self, INCH, STANDARD_GRAVITY};
+use crate::system::built_in;
+use crate::units::{self, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
 #[derive(Debug, Default, Args)]
@@ -78,12 +79,16 @@ pub struct Arguments {
     /// Seed of the built-in motion [default: 1]
     #[arg(long, conflicts_with_all = ["record", "reference"])]
     seed: Option<u64>,
-    /// Keep pace with the clock on the wall, and say how well that went
+    /// Keep pace with real time, and say how well that went
     #[arg(long)]
     real_time: bool,
     /// Keep one sample of so many in the results
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     record_every: usize,
+    /// Show the run while it goes on, on a page of this machine at this port (any free one where none
+    /// is given); it keeps pace with real time
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
+    watch: Option<u16>,
     /// Folder for the results [default: shakebench-results/SYSTEM-MOTION]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -133,16 +138,28 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         samples,
         ..
     } = &prepared;
-    let folder = arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| default_folder(&request, system, motion));
+    let is_same = |place: &Path| {
+        let before = Manifest::read(&place.join("manifest.json"));
+        before.is_ok_and(|before| before.request == request)
+    };
+    let folder = arguments.out.clone().unwrap_or_else(|| {
+        let name = match motion.is_empty() {
+            true => system.name.clone(),
+            false => format!("{}-{}", system.name, motion.name),
+        };
+        let name = name.replace(['/', '\\', ' '], "-");
+        unused(&Path::new("shakebench-results").join(name), is_same)
+    });
     Results::check(&folder)?;
     let mut simulation = prepared.simulation(prepared.algorithm)?;
     simulation.heed(interrupt::heed());
     simulation.keep_every(arguments.record_every);
+    let live = match arguments.watch {
+        Some(port) => Some(watch(&prepared, &mut simulation, port)?),
+        None => None,
+    };
     let bar = progress_bar(*samples);
-    let pace = if arguments.real_time {
+    let pace = if arguments.real_time || arguments.watch.is_some() {
         Pace::RealTime
     } else {
         Pace::Fastest
@@ -169,6 +186,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             println!("  {}", file.display());
         }
     }
+    if let Some((server, tap)) = live {
+        tap.finish(&outcome.ended.message());
+        server.farewell();
+    }
     if let Some(written) = written {
         let differences = written.differences(&manifest);
         if !differences.is_empty() {
@@ -189,24 +210,24 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::from(1))
 }
 
-/// The folder of a run for which none is named: one for each system, motion and set of options.
-fn default_folder(request: &Request, system: &System, motion: &Motion) -> PathBuf {
-    let mut name = match motion.is_empty() {
-        true => system.name.clone(),
-        false => format!("{}-{}", system.name, motion.name),
-    };
-    let plain = Request {
-        record: request.record.clone(),
-        reference: request.reference.clone(),
-        seed: request.seed,
-        ..Request::built_in(&request.system)
-    };
-    if *request != plain {
-        let text = serde_json::to_string(request).unwrap_or_default();
-        let sum = Sha256::digest(text.as_bytes());
-        name += &format!("-{}", &hexadecimal(&sum)[..8]);
-    }
-    Path::new("shakebench-results").join(name.replace(['/', '\\', ' '], "-"))
+/// Serves the page of the run and says where.
+///
+/// # Errors
+/// A port that is taken.
+fn watch(
+    prepared: &Prepared,
+    simulation: &mut Simulation,
+    port: u16,
+) -> Result<(Server, Arc<Tap>), Error> {
+    let (scene, places) = Scene::new(prepared, simulation.names());
+    let tap = Arc::new(Tap::new(places, prepared.samples));
+    let server = Server::start(&scene, Arc::clone(&tap), port).map_err(|error| Error::Option {
+        option: "--watch",
+        reason: format!("port {port} of 127.0.0.1 cannot be listened at: {error}"),
+    })?;
+    simulation.watch(Arc::clone(&tap));
+    eprintln!("watch it at {}", server.url());
+    Ok((server, tap))
 }
 
 /// How FMUs are run.
@@ -268,13 +289,6 @@ fn table(summary: &Summary, motion: &Motion) -> String {
             1e6 * kept.jitter_p99_s,
         );
     }
-    let mut times: Vec<_> = summary.step_time_s.iter().collect();
-    times.sort_by(|a, b| b.1.total_cmp(a.1));
-    let share = |(name, time): &(&String, &f64)| {
-        format!("`{name}` {:.0} %", 100.0 * **time / summary.wall_s.max(1e-12))
-    };
-    let shares: Vec<String> = times.iter().take(6).map(share).collect();
-    text += &format!("of the time, in steps: {}\n\n", shares.join(", "));
     let Some(tracking) = &summary.tracking else {
         return text;
     };
@@ -283,8 +297,9 @@ fn table(summary: &Summary, motion: &Motion) -> String {
         row.extend(cells);
         row
     };
-    let inches = |value: f64| format!("{:.4} in", value / INCH);
-    let gravity = |value: f64| format!("{:.4} g", value / STANDARD_GRAVITY);
+    let system = UnitSystem::of_text();
+    let length = |value| Cell::Quantity(value, Units::DISPLACEMENT, 4).text(system);
+    let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4).text(system);
     let percent = |value: f64| format!("{value:.4} %");
     text += &aligned(&[
         row(
@@ -294,17 +309,17 @@ fn table(summary: &Summary, motion: &Motion) -> String {
         row(
             "displacement, peak",
             [
-                inches(motion.peak_displacement()),
-                inches(tracking.peak_displacement),
-                inches(tracking.peak_displacement_error),
+                length(motion.peak_displacement()),
+                length(tracking.peak_displacement),
+                length(tracking.peak_displacement_error),
             ],
         ),
         row(
             "acceleration, peak",
             [
-                gravity(motion.peak_acceleration()),
-                gravity(tracking.peak_acceleration),
-                gravity(tracking.peak_acceleration_error),
+                acceleration(motion.peak_acceleration()),
+                acceleration(tracking.peak_acceleration),
+                acceleration(tracking.peak_acceleration_error),
             ],
         ),
     ]);
@@ -312,15 +327,15 @@ fn table(summary: &Summary, motion: &Motion) -> String {
     let pair = |name: &str, value: String| vec![name.to_string(), value];
     text += &aligned(&[
         pair(
-            "error in time, acceleration",
+            "normalised RMS acceleration error",
             percent(tracking.time_domain_percent),
         ),
         pair(
-            "error in frequency, acceleration",
+            "Fourier amplitude error, acceleration",
             percent(tracking.frequency_domain_percent),
         ),
         pair(
-            "error in time, displacement",
+            "normalised RMS displacement error",
             percent(tracking.displacement_percent),
         ),
         pair(

@@ -6,7 +6,9 @@ use super::errors;
 use super::result::{Comparison, History, Row};
 use super::tables::{ErrorTable, tables};
 use crate::error::Error;
-use crate::report::{self, Axis, Panel, Report, Section, Series, Units};
+use crate::report::{
+    self, Axis, Bar, BarGroup, Bars, Panel, Report, Section, Series, Units, identity,
+};
 use crate::results::Results;
 
 /// File with the errors by run.
@@ -29,18 +31,22 @@ fn page(comparison: &Comparison, folder: &Path) -> Result<String, Error> {
     let rows = &comparison.rows;
     let report = Report {
         title: "Comparison of controllers".into(),
-        summary: format!(
-            "{} runs of {}.",
-            rows.len(),
-            comparison.controllers().join(", ")
-        ),
+        summary: summary(comparison),
+        identity: vec![
+            identity::entry("Plant", comparison.plant.as_str()),
+            identity::entry("Specimen", comparison.specimen.as_str()),
+            identity::entry("Controllers", comparison.controllers().join(", ")),
+            identity::entry("Motions", motions(rows).join(", ")),
+            identity::version(),
+        ],
         sections: vec![Section {
             heading: "Tracking errors".into(),
             text: vec![
-                "100 rms of the acceleration error over the largest reference acceleration; in \
-                 frequency, of the difference of the Fourier amplitudes up to 25 Hz."
+                "Root mean square of the acceleration error over the largest acceleration of the \
+                 reference; and of the difference of the Fourier amplitudes up to 25 Hz over the same."
                     .into(),
             ],
+            bars: bars(comparison),
             tables: tables(comparison)
                 .iter()
                 .map(ErrorTable::report_table)
@@ -85,6 +91,69 @@ pub fn page_again(folder: &Path) -> Result<String, Error> {
     page(&comparison, folder)
 }
 
+fn motions(rows: &[Row]) -> Vec<&str> {
+    let mut names: Vec<&str> = Vec::new();
+    for row in rows {
+        if !names.contains(&row.record.as_str()) {
+            names.push(&row.record);
+        }
+    }
+    names
+}
+
+/// Which controller follows best, and how many runs ended early.
+fn summary(comparison: &Comparison) -> String {
+    let medians = comparison.medians.iter();
+    let medians = medians.filter_map(|(name, own)| Some((own.time_domain_percent?, name)));
+    let least = medians.min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = least.map_or(String::new(), |(error, name)| {
+        format!(" The smallest median of the acceleration error is {error:.2} %, of {name}.")
+    });
+    let early = comparison.ended_early().count();
+    let early = match early {
+        0 => String::new(),
+        1 => " One run ended early.".to_string(),
+        many => format!(" {many} runs ended early."),
+    };
+    format!(
+        "{} runs of {}.{best}{early}",
+        comparison.rows.len(),
+        comparison.controllers().join(", ")
+    )
+}
+
+/// The acceleration error by motion and controller; runs that ended early have no bar.
+fn bars(comparison: &Comparison) -> Vec<Bars> {
+    let controllers = comparison.controllers();
+    let colour = |name: &str| {
+        let place = controllers.iter().position(|own| *own == name);
+        1 + place.unwrap_or(0) % 8
+    };
+    let groups = motions(&comparison.rows)
+        .into_iter()
+        .map(|motion| BarGroup {
+            label: motion.to_string(),
+            bars: comparison
+                .rows
+                .iter()
+                .filter(|row| row.record == motion && row.is_complete())
+                .filter_map(|row| {
+                    Some(Bar {
+                        name: row.controller.clone(),
+                        value: row.time_domain_percent?,
+                        interval: None,
+                        colour: colour(&row.controller),
+                    })
+                })
+                .collect(),
+        });
+    vec![Bars {
+        title: "Normalised RMS acceleration error, %".into(),
+        groups: groups.collect(),
+        mark: None,
+    }]
+}
+
 /// A line for each run that ended early.
 fn early(comparison: &Comparison) -> Vec<String> {
     comparison
@@ -112,7 +181,7 @@ fn panels(rows: &[Row]) -> Vec<Panel> {
     let panel = |what: &str, units: Units, values: fn(&History) -> &[f64]| Panel {
         title: format!("{what} error on {}", first.record),
         x: Axis::linear("time", Units::TIME),
-        y: Axis::linear("table less reference", units),
+        y: Axis::linear("table minus reference", units),
         series: kept
             .iter()
             .map(|(row, history)| Series::history(&row.controller, history.dt, values(history)))

@@ -15,14 +15,14 @@ pub struct ErrorTable {
 pub fn tables(comparison: &Comparison) -> [ErrorTable; 2] {
     [
         table(
-            "Error in time, % (printed values of Table 4-1 and 5-2 in brackets)",
+            "Normalised RMS acceleration error, % (printed values of Table 4-1 and 5-2 in brackets)",
             comparison,
             |row| row.time_domain_percent,
             |printed| printed.time,
             PRINTED_TIME,
         ),
         table(
-            "Error in frequency, % (printed values in brackets; their scaling is not given, and the \
+            "Fourier amplitude error, % (printed values in brackets; their scaling is not given, and the \
              printed median 0.65 should be 0.63)",
             comparison,
             |row| row.frequency_domain_percent,

@@ -1,5 +1,6 @@
 //! Margins and frequency responses of the loops, and the loop-shaping synthesis.
 
+mod bode;
 mod figures;
 mod loops;
 mod page;
@@ -18,7 +19,7 @@ use serde::Serialize;
 pub use figures::{Figures, LoopFigures};
 pub use loops::LoopName;
 use loops::NamedLoop;
-pub use page::write;
+pub use page::{thesis_figures, write};
 pub use table::table;
 
 /// What is designed.
@@ -41,6 +42,16 @@ pub enum Specimen {
     None,
     /// The linear specimen of Appendix A.
     Linear,
+}
+
+impl Specimen {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Linear => "linear",
+        }
+    }
 }
 
 impl FromStr for Specimen {

@@ -13,12 +13,13 @@ use plant::identified::shake_table::ShakeTable;
 use plant::linear::{FrequencyResponse, log_space};
 use units::constants::SAMPLING_PERIOD;
 
-use super::Design;
 use super::loops::{LoopName, NamedLoop};
 use super::table::table;
+use super::{Design, bode};
 use crate::error::Error;
+use crate::figures::Figure;
 use crate::report::{
-    self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units,
+    self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units, identity,
 };
 use crate::results::Results;
 
@@ -73,58 +74,51 @@ fn report(design: &Design) -> Report {
         tables: vec![figures],
         ..Section::default()
     }];
-    sections.extend(loops.iter().map(loop_section));
+    let pairs = loops.iter().zip(&design.loops);
+    sections.extend(pairs.map(|(one, figures)| bode::section(one, figures)));
     if loops.len() == LoopName::ALL.len() {
         sections.push(comparison(loops));
         sections.push(shaping(&design.shaping));
     }
     Report {
         title: "Loops of the shake table".into(),
-        summary: "Margins and frequency responses on the identified plant.".into(),
+        summary: summary(design),
+        identity: vec![
+            identity::entry("Plant", "identified (Eq 2-13, 2-28)"),
+            identity::entry("Specimen", design.specimen.name()),
+            identity::entry(
+                "Loops",
+                loops
+                    .iter()
+                    .map(|one| one.name.name())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            ),
+            identity::entry("Sampled at", "500 Hz"),
+            identity::version(),
+        ],
         sections,
         footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
         ..Report::default()
     }
 }
 
-fn loop_section(one: &NamedLoop) -> Section {
-    let open = |time| response(|omega| one.rig_loop.open(time, omega));
-    let closed = |time| response(|omega| one.rig_loop.closed(time, omega));
-    let (continuous, sampled) = (open(Time::Continuous), open(Time::Sampled));
-    let pair = |values: fn(&FrequencyResponse) -> Vec<f64>,
-                a: &FrequencyResponse,
-                b: &FrequencyResponse| {
-        vec![
-            line("continuous", a, values(a)),
-            line("500 Hz", b, values(b)).styled(Style::Dashed),
-        ]
-    };
-    let (closed_continuous, closed_sampled) = (closed(Time::Continuous), closed(Time::Sampled));
-    let figure = one.name.figure();
-    let figure = figure.map_or(String::new(), |figure| format!(" ({figure})"));
-    Section {
-        heading: one.name.to_string(),
-        text: vec![format!("{}{figure}.", one.name.about())],
-        panels: vec![
-            gain_panel(
-                "Open loop, gain",
-                pair(FrequencyResponse::gain_db, &continuous, &sampled),
-            ),
-            phase_panel(
-                "Open loop, phase",
-                pair(FrequencyResponse::phase_deg, &continuous, &sampled),
-            ),
-            gain_panel(
-                "Closed loop, gain",
-                pair(
-                    FrequencyResponse::gain_db,
-                    &closed_continuous,
-                    &closed_sampled,
-                ),
-            ),
-        ],
-        ..Section::default()
-    }
+/// How many loops are stable, and which comes nearest to not being.
+fn summary(design: &Design) -> String {
+    let stable = design.loops.iter().filter(|row| row.sampled.stable);
+    let least = stable.clone().filter_map(|row| {
+        let margin = row.sampled.phase_margin_deg?;
+        Some((margin, row.name.name()))
+    });
+    let least = least.min_by(|a, b| a.0.total_cmp(&b.0));
+    let least = least.map_or(String::new(), |(margin, name)| {
+        format!(" The smallest phase margin of these is {margin:.1}°, of {name}.")
+    });
+    format!(
+        "{} of {} loops are stable as sampled at 500 Hz.{least}",
+        stable.count(),
+        design.loops.len()
+    )
 }
 
 /// Fig 3-7 and 3-10: what the loops make of their reference.
@@ -165,11 +159,53 @@ fn comparison(all: &[NamedLoop]) -> Section {
             gain_panel("All, gain", series(&tracking, FrequencyResponse::gain_db)),
             phase_panel(
                 "All, phase",
-                series(&tracking, FrequencyResponse::phase_deg),
+                series(&tracking, |response| bode::closed_phase(response)),
             ),
         ],
         ..Section::default()
     }
+}
+
+/// Figures 3-3, 3-4, 3-7, 3-9 and 3-10, of a design with all loops.
+pub fn thesis_figures(design: &Design) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    let pairs = design.drawn.iter().zip(&design.loops);
+    for (number, name, text) in [
+        (
+            "3-3",
+            LoopName::DisplacementPid,
+            "The displacement PID, Eq 3-6.",
+        ),
+        (
+            "3-4",
+            LoopName::ForcePid,
+            "The force PID, Eq 3-7, which as sampled at 500 Hz is unstable.",
+        ),
+    ] {
+        let found = pairs.clone().find(|(one, _)| one.name == name);
+        figures.extend(found.map(|(one, own)| Figure {
+            number,
+            text: text.into(),
+            panels: bode::section(one, own).panels,
+        }));
+    }
+    let mut closed = comparison(&design.drawn).panels.into_iter();
+    for (number, text) in [
+        ("3-7", "Closed loops of PID and three-variable control."),
+        ("3-10", "Closed loops of PID and loop shaping."),
+    ] {
+        figures.extend(closed.next().map(|panel| Figure {
+            number,
+            text: text.into(),
+            panels: vec![panel],
+        }));
+    }
+    figures.push(Figure {
+        number: "3-9",
+        text: "The synthesis of the loop-shaping controller, Eq 3-10.".into(),
+        panels: shaping(&design.shaping).panels,
+    });
+    figures
 }
 
 /// Fig 3-9: plant, controller, loop and target.
@@ -223,23 +259,23 @@ fn shaping(design: &LoopShapingDesign) -> Section {
     }
 }
 
-fn response(value: impl Fn(f64) -> Complex<f64>) -> FrequencyResponse {
+pub(super) fn response(value: impl Fn(f64) -> Complex<f64>) -> FrequencyResponse {
     let last = 0.499 / SAMPLING_PERIOD;
     FrequencyResponse::continuous(&log_space(TAU * FIRST_HZ, TAU * last, POINTS), |s| {
         value(s.im)
     })
 }
 
-fn line(name: &str, response: &FrequencyResponse, values: Vec<f64>) -> Series {
+pub(super) fn line(name: &str, response: &FrequencyResponse, values: Vec<f64>) -> Series {
     let places: Arc<[f64]> = response.omega.iter().map(|omega| omega / TAU).collect();
     Series::line(name, Abscissa::At(places), values)
 }
 
-fn gain_panel(title: &str, series: Vec<Series>) -> Panel {
+pub(super) fn gain_panel(title: &str, series: Vec<Series>) -> Panel {
     panel(title, Axis::linear("gain", Units::DECIBEL), series)
 }
 
-fn phase_panel(title: &str, series: Vec<Series>) -> Panel {
+pub(super) fn phase_panel(title: &str, series: Vec<Series>) -> Panel {
     panel(title, Axis::linear("phase", Units::DEGREE), series)
 }
 

@@ -1,5 +1,7 @@
 //! Margins as a table.
 
+use std::f64::consts::TAU;
+
 use super::figures::LoopFigures;
 use crate::report::number::significant;
 
@@ -10,11 +12,13 @@ pub fn table(rows: &[LoopFigures]) -> Vec<Vec<String>> {
         "time",
         "stable",
         "crossover",
+        "crossover",
         "phase margin",
         "gain margin",
         "bandwidth",
+        "bandwidth",
     ];
-    let units = ["", "", "", "rad/s", "deg", "dB", "Hz"];
+    let units = ["", "", "", "Hz", "rad/s", "deg", "dB", "Hz", "rad/s"];
     let mut table = vec![
         heads.map(String::from).to_vec(),
         units.map(String::from).to_vec(),
@@ -30,10 +34,12 @@ pub fn table(rows: &[LoopFigures]) -> Vec<Vec<String>> {
                 },
                 time.to_string(),
                 if figures.stable { "yes" } else { "NO" }.to_string(),
+                cell(figures.crossover_rad_s.map(|omega| omega / TAU)),
                 cell(figures.crossover_rad_s),
                 cell(figures.phase_margin_deg),
                 cell(figures.gain_margin_db),
                 cell(figures.bandwidth_hz),
+                cell(figures.bandwidth_hz.map(|hertz| TAU * hertz)),
             ]);
         }
     }

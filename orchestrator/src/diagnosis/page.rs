@@ -13,7 +13,7 @@ use super::case::Extended;
 use super::{DIAGNOSIS, pictures, rig, text};
 use crate::extended_model::ExtendedModel;
 use crate::report::number::significant;
-use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Report, Section, Table};
+use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Report, Section, Table, identity};
 use plant::identified::nominal::{shake_table_values, specimen_values};
 
 /// A table of `rows`, of which the first are the headings.
@@ -34,6 +34,11 @@ fn page(name: &str, source: &str, report: &DiagnosisReport, sections: Vec<Sectio
         summary: report.sentence.clone(),
         facts: facts(report),
         sections,
+        identity: vec![
+            identity::entry("Diagnosed", source),
+            identity::entry("Elapsed time", format!("{:.1} s", report.wall_s)),
+            identity::version(),
+        ],
         footer: format!("shakebench {} on {source}", env!("CARGO_PKG_VERSION")),
     }
 }
@@ -49,7 +54,10 @@ pub(super) fn of_case(
     let mut sections = vec![findings(report), gain(report, Some(found))];
     if let Some(played) = &extended.comparison {
         sections.push(Section {
-            panels: pictures::closed_loop(case, played),
+            panels: pictures::overlays(case, played)
+                .into_iter()
+                .chain(pictures::closed_loop(case, played))
+                .collect(),
             ..closed_loop(&played.gain)
         });
     }
@@ -125,9 +133,12 @@ fn rig_sections(report: &DiagnosisReport, curves: Option<&[Curves]>) -> Vec<Sect
     ];
     if let Some(curves) = curves {
         sections.push(Section {
-            heading: "Errors".into(),
+            heading: "Measured and simulated".into(),
             text: vec!["The first record that holds data left out.".into()],
-            panels: rig::pictures(rig, curves),
+            panels: rig::overlay(rig, curves)
+                .into_iter()
+                .chain(rig::pictures(rig, curves))
+                .collect(),
             ..Section::default()
         });
     }
@@ -172,12 +183,12 @@ fn facts(report: &DiagnosisReport) -> Vec<Fact> {
         Cell::Text(format!("{before} → {after}"))
     };
     let verdict = match report.effects.as_slice() {
-        [one] => format!("confidence {:.3}", one.confidence),
+        [one] => format!("confidence {}", text::confidence(one.confidence)),
         [] => String::new(),
         [first, ..] => format!(
-            "{} effects, confidence {:.3}",
+            "{} effects, confidence {}",
             report.effects.len(),
-            first.confidence
+            text::confidence(first.confidence)
         ),
     };
     let mut facts = vec![fact("Verdict", report.verdict.to_string().into(), &verdict)];
@@ -216,7 +227,7 @@ fn findings(report: &DiagnosisReport) -> Section {
     let mut tables = Vec::new();
     if !report.effects.is_empty() {
         tables.push(table(
-            "Estimates with one standard error",
+            "Estimates ± one standard error, and what they are with a confidence of 95 %",
             text::parameters(report),
         ));
     }

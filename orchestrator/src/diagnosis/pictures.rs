@@ -34,6 +34,34 @@ fn channels(validation: &Validation) -> impl Iterator<Item = (usize, [Vec<f64>; 
     })
 }
 
+/// Values of a series that a page shows.
+const SHOWN: usize = 12_000;
+
+/// The sensors' readings with those of both rigs in closed loop over them.
+pub(super) fn overlays(case: &Case, found: &Comparison) -> Vec<Panel> {
+    let period = 1.0 / case.nominal.sample_rate;
+    let outputs = Channel::OUTPUTS.map(|channel| case.validation.channel(channel));
+    let live = (0..).zip(outputs);
+    let live = live.filter_map(|(i, measured)| Some((i, measured?)));
+    live.map(|(i, measured)| {
+        let line = |name: &str, values: &[f64], colour| {
+            let line = Series::history(name, period, values).coloured(colour);
+            line.thinned(SHOWN)
+        };
+        Panel {
+            title: format!("{}, measured and co-simulated", words(i)),
+            x: Axis::linear("time", Units::TIME),
+            y: Axis::linear(&words(i), units(i)),
+            series: vec![
+                line("measured", measured, 0),
+                line("nominal model", &found.before[i], BEFORE),
+                line("extended model", &found.after[i], AFTER),
+            ],
+        }
+    })
+    .collect()
+}
+
 /// The sensors' readings less those of both rigs in closed loop, over time.
 pub(super) fn closed_loop(case: &Case, found: &Comparison) -> Vec<Panel> {
     let period = 1.0 / case.nominal.sample_rate;

@@ -129,6 +129,35 @@ fn over_time(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
     }
 }
 
+/// The output as measured and as both models have it, over time.
+pub(super) fn overlay(found: &RigDiagnosis, curves: &[Curves]) -> Option<Panel> {
+    const MOST: usize = 12_000;
+    let shown = curves.iter().find(|one| one.left_out.contains(&true));
+    let (rig, shown) = (of_kind(&found.kind)?, shown.or(curves.first())?);
+    let line = |name: &str, values: &[f64], colour| {
+        let line = Series::history(name, step(shown), values).coloured(colour);
+        line.thinned(MOST)
+    };
+    Some(Panel {
+        title: format!(
+            "{} of {}, measured and simulated",
+            rig.output().name(),
+            shown.record
+        ),
+        x: if shown.is_timed {
+            Axis::linear("time", Units::TIME)
+        } else {
+            Axis::linear("sample", Units::NONE)
+        },
+        y: Axis::linear(rig.output().name(), units(rig.output().unit())),
+        series: vec![
+            line("measured", &shown.measured, 0),
+            line("nominal", &shown.nominal, 2),
+            line("extended", &shown.extended, 1),
+        ],
+    })
+}
+
 fn loops(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
     let (input, output) = (rig.inputs()[0], rig.output());
     let places: Arc<[f64]> = thin(&curves.input).into();

@@ -6,6 +6,7 @@ use identification::diagnosis::{
     DiagnosisReport, Evidence, GainReport, ParameterReport, ShakeTableEvidence,
 };
 
+use crate::report::UnitSystem;
 use crate::report::columns::aligned;
 use crate::report::number::significant;
 
@@ -14,13 +15,39 @@ fn in_unit(parameter: &ParameterReport, unit: &str) -> String {
     with_error(value, error, &parameter.unit, unit)
 }
 
+/// A confidence in words: nothing is certain.
+pub(super) fn confidence(share: f64) -> String {
+    if share > 0.999 {
+        "above 99.9 %".into()
+    } else {
+        format!("{:.1} %", 100.0 * share)
+    }
+}
+
+/// What a parameter is with a confidence of 95 %; a dash where its error is not known.
+fn interval(parameter: &ParameterReport, unit: &str) -> String {
+    let Ok(factor) = crate::units::convert(1.0, &parameter.unit, unit) else {
+        return "-".into();
+    };
+    let half = 1.96 * parameter.standard_error;
+    if !half.is_finite() {
+        return "-".into();
+    }
+    let ends = [parameter.value - half, parameter.value + half];
+    // As many digits as tell the ends apart.
+    let size = ends[0].abs().max(ends[1].abs());
+    let digits = (size / half.max(1e-300)).log10().ceil().clamp(0.0, 6.0) as usize + 2;
+    let [low, high] = ends.map(|end| significant(factor * end, digits));
+    format!("{low} to {high} {unit}").trim_end().to_string()
+}
+
 /// Estimates with a line of headings. The units of the laboratory stand beside SI for the shake
 /// table, whose laboratory it is.
 pub(super) fn parameters(report: &DiagnosisReport) -> Vec<Vec<String>> {
     let is_case = matches!(report.evidence, Evidence::ShakeTable(_));
     let mut heading = vec!["effect", "parameter"];
     heading.extend(is_case.then_some("laboratory"));
-    heading.extend(["SI", "confidence"]);
+    heading.extend(["SI", "95 % interval", "confidence"]);
     heading.extend((!is_case).then_some("on every part"));
     let mut rows = vec![heading.into_iter().map(String::from).collect()];
     for effect in &report.effects {
@@ -31,7 +58,12 @@ pub(super) fn parameters(report: &DiagnosisReport) -> Vec<Vec<String>> {
             let mut row = vec![effect.effect.clone(), name.to_string()];
             row.extend(is_case.then(|| cell(&|si| laboratory_unit(si).to_string())));
             row.push(cell(&str::to_string));
-            row.push(format!("{:.3}", effect.confidence));
+            let laboratory = |si: &str| match is_case && UnitSystem::of_text() == UnitSystem::Us {
+                true => laboratory_unit(si).to_string(),
+                false => si.to_string(),
+            };
+            row.push(of.map_or("-".into(), |p| interval(p, &laboratory(&p.unit))));
+            row.push(confidence(effect.confidence));
             let word = |all| if all { "yes" } else { "no" }.to_string();
             row.extend(effect.on_every_part.map(word));
             row

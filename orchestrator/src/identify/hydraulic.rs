@@ -10,9 +10,10 @@ use identification::closed_loop::{self, Check, Found, Settings};
 use identification::data::{Channel, Recording};
 use identification::identify::model_file::ModelFile;
 
+use super::poles;
 use super::summary::Summary;
 use crate::report::number::significant;
-use crate::report::{Cell, Report, Section, Table};
+use crate::report::{Cell, Report, Section, Table, identity};
 
 /// What was found from the first part of the recordings, and how the rest obeys it.
 pub struct HydraulicIdentification {
@@ -191,9 +192,15 @@ impl HydraulicIdentification {
                 .first()
                 .cloned()
                 .unwrap_or_else(|| explained.into()),
+            identity: vec![
+                identity::entry("Form", "hydraulic, with friction and late sensors"),
+                identity::entry("Model file", summary.model.display().to_string()),
+                identity::version(),
+            ],
             sections: vec![Section {
                 heading: "Model".into(),
                 notes: summary.warnings.clone(),
+                panels: vec![poles::panel(summary)],
                 tables: vec![
                     table("Parameters", PARAMETER_COLUMNS, self.parameters()),
                     table(

@@ -3,6 +3,8 @@
 mod hydraulic;
 mod page;
 mod parameters;
+mod poles;
+mod residuals;
 mod responses;
 mod summary;
 

@@ -4,9 +4,34 @@ use identification::data::Recording;
 use identification::identify::identified::RigIdentification;
 
 use super::parameters::parameters;
-use super::responses;
 use super::summary::Summary;
+use super::{poles, residuals, responses};
+use crate::report::identity::{entry, version};
 use crate::report::{Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units};
+
+fn identity(
+    found: &RigIdentification,
+    recordings: &[Recording],
+    summary: &Summary,
+) -> Vec<(String, Cell)> {
+    let names: Vec<&str> = recordings.iter().map(|own| own.name.as_str()).collect();
+    let seconds: f64 = recordings.iter().map(Recording::duration).sum();
+    let rate = recordings
+        .first()
+        .map_or(f64::NAN, |own| 1.0 / own.period());
+    vec![
+        entry("Recordings", names.join(", ")),
+        entry("Length", Cell::Quantity(seconds, Units::TIME, 4)),
+        entry("Sampled at", Cell::Quantity(rate, Units::FREQUENCY, 4)),
+        entry("Specimen", if found.specimen { "yes" } else { "none" }),
+        entry("Model file", summary.model.display().to_string()),
+        entry(
+            "Elapsed time",
+            Cell::Quantity(summary.wall_s, Units::TIME, 2),
+        ),
+        version(),
+    ]
+}
 
 /// The report with plots like Fig 2-7 and 2-10.
 pub(super) fn report(
@@ -27,7 +52,8 @@ pub(super) fn report(
     let mut sections = vec![Section {
         heading: "Model".into(),
         notes: summary.warnings.clone(),
-        tables: vec![table],
+        panels: vec![poles::panel(summary)],
+        tables: vec![table, poles::table(summary)],
         ..Section::default()
     }];
     let period = found.model.experiments.first().map_or(1.0, |e| e.period);
@@ -75,6 +101,7 @@ pub(super) fn report(
     let orders = (1..=found.singular_values.len().min(20))
         .map(|n| n as f64)
         .collect();
+    sections.push(residuals::section(found));
     sections.push(Section {
         heading: "Order".into(),
         panels: vec![Panel {
@@ -111,6 +138,7 @@ pub(super) fn report(
                 several => format!("{several} warnings"),
             }
         ),
+        identity: identity(found, recordings, summary),
         sections,
         footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
         ..Report::default()

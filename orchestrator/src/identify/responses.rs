@@ -93,19 +93,51 @@ fn measured(found: &RigIdentification, recording: &Recording, index: usize) -> V
                 f64::NAN
             }
         });
+        let at = || Abscissa::At(places.clone().into());
+        let gains: Vec<f64> = gains.collect();
+        // Two standard errors of the averaged spectra.
+        let [low, high] = [-2.0, 2.0].map(|sign| -> Vec<f64> {
+            let pairs = gains.iter().zip(&lines);
+            pairs
+                .map(|(gain, &line)| {
+                    let factor = 1.0 + sign * estimate.relative_error[line];
+                    gain + 20.0 * factor.max(0.05).log10()
+                })
+                .collect()
+        });
         panels.push(gain_panel(
-            &format!("valve_command to {}", channel.name()),
+            &format!("valve_command to {}, gain", channel.name()),
             vec![
-                Series::line(
-                    "measured",
-                    Abscissa::At(places.clone().into()),
-                    gains.collect(),
-                )
-                .styled(Style::Points)
-                .coloured(0),
+                Series::line("measured, 95 %", at(), low)
+                    .styled(Style::Band(high))
+                    .coloured(0),
+                Series::line("measured", at(), gains)
+                    .styled(Style::Points)
+                    .coloured(0),
                 Series::line("model", hertz(&omega), model.gain_db()).coloured(2),
             ],
         ));
+        let phases = lines.iter().map(|&line| {
+            if estimate.coherence[line] >= LEAST_COHERENCE {
+                estimate.response[line].arg().to_degrees()
+            } else {
+                f64::NAN
+            }
+        });
+        let of_model = model.value.iter().map(|value| value.arg().to_degrees());
+        panels.push(Panel {
+            title: format!("valve_command to {}, phase", channel.name()),
+            x: Axis::logarithmic("frequency", Units::FREQUENCY),
+            y: Axis::linear("phase", Units::DEGREE).between(-185.0, 185.0),
+            series: vec![
+                Series::line("measured", at(), phases.collect())
+                    .styled(Style::Points)
+                    .coloured(0),
+                Series::line("model", hertz(&omega), of_model.collect())
+                    .styled(Style::Points)
+                    .coloured(2),
+            ],
+        });
         coherences.push(Series::line(
             channel.name(),
             Abscissa::At(places.into()),

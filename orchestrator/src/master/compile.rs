@@ -87,9 +87,7 @@ impl Simulation {
                 may_fail,
                 failure: None,
                 ended: None,
-                is_measured: false,
                 steps: 0,
-                measured: 0,
                 spent: Duration::ZERO,
             });
         }
@@ -149,6 +147,7 @@ impl Simulation {
             next_signals: signals.clone(),
             last_signals: signals.clone(),
             signals,
+            tap: None,
             names: plan.names,
             exact_names,
             reference,

@@ -21,6 +21,7 @@ mod start;
 mod transfer;
 
 use std::fmt;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -30,6 +31,7 @@ pub use record::Record;
 pub use run::{Ended, Ending, LogLine, Outcome, Pace};
 
 use crate::fmu::{Diverted, Instance, Item, Progress, State};
+use crate::live::Tap;
 use action::{Action, Moment};
 use reference::Reference;
 use signals::Signals;
@@ -110,6 +112,8 @@ pub struct Simulation {
     last_signals: Signals,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
     next_signals: Signals,
+    /// Who watches.
+    tap: Option<Arc<Tap>>,
 }
 
 /// What ends a run early.
@@ -139,13 +143,14 @@ struct Part {
     failure: Option<MasterError>,
     /// When it asked to end the run, s.
     ended: Option<f64>,
-    /// Whether the time of this step is measured.
-    is_measured: bool,
-    /// Steps made, steps measured, and the time that those took.
-    steps: usize,
-    measured: usize,
+    /// Its steps so far.
+    steps: u32,
+    /// Time that its timed steps took.
     spent: Duration,
 }
+
+/// One in so many steps of a component is timed: looking at the clock costs as much as a short step.
+const TIMED: u32 = 16;
 
 impl Part {
     /// Steps it; a failure that may be is kept instead of given.
@@ -153,14 +158,13 @@ impl Part {
         if self.failure.is_some() || self.ended.is_some() {
             return Ok(());
         }
-        self.steps += 1;
-        let begin = self.is_measured.then(Instant::now);
-        let done = self.instance.do_step(time, length);
-        if let Some(begin) = begin {
-            self.measured += 1;
-            self.spent += begin.elapsed();
+        let begun = self.steps.is_multiple_of(TIMED).then(Instant::now);
+        let stepped = self.instance.do_step(time, length);
+        if let Some(begun) = begun {
+            self.spent += begun.elapsed();
         }
-        match done {
+        self.steps = self.steps.wrapping_add(1);
+        match stepped {
             Err(error) if self.may_fail => self.failure = Some(error.into()),
             done => {
                 if let Progress::Ended(at) = done? {
@@ -180,12 +184,23 @@ impl Part {
         Ok(())
     }
 
+    /// Time that its steps took, s, from those that were timed.
+    fn wall(&self) -> f64 {
+        let timed = self.steps.div_ceil(TIMED).max(1);
+        self.spent.as_secs_f64() * f64::from(self.steps) / f64::from(timed)
+    }
+
     fn is_due(&self, tick: usize) -> bool {
         self.every.is_none_or(|every| tick.is_multiple_of(every))
     }
 }
 
 impl Simulation {
+    /// Shows every row of its record to `tap` from now on.
+    pub fn watch(&mut self, tap: Arc<Tap>) {
+        self.tap = Some(tap);
+    }
+
     /// Time of the present tick, s.
     pub fn time(&self) -> f64 {
         let since = self.tick as f64 * self.step;

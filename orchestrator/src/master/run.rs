@@ -150,14 +150,14 @@ pub struct Outcome {
     pub step: f64,
     /// Time that the stepping took, s.
     pub wall: f64,
+    /// Time that the steps of each component took, s.
+    pub spent: Vec<(String, f64)>,
     /// What the FMUs logged.
     pub messages: Vec<LogLine>,
     /// What the user should know of the order of calls.
     pub notes: Vec<String>,
     /// How the clock on the wall was kept; of a run in real time.
     pub real_time: Option<RealTime>,
-    /// Time that each component took in its steps, s, estimated from some of them.
-    pub step_time: Vec<(String, f64)>,
 }
 
 /// A line logged by a component's FMU.
@@ -179,9 +179,6 @@ pub enum Pace {
     RealTime,
 }
 
-/// Of so many steps, the time in one is measured.
-pub(super) const MEASURED: usize = 32;
-
 impl Simulation {
     /// Plays `samples` samples; `progress` is told the number of samples reached now and then.
     /// What was computed is returned however the run ends.
@@ -196,11 +193,6 @@ impl Simulation {
         progress(record.len());
         self.close();
         let notes = std::mem::take(&mut self.notes);
-        let step_time = self.parts.iter().map(|part| {
-            let share = part.steps as f64 / (part.measured.max(1)) as f64;
-            (part.instance.name.clone(), part.spent.as_secs_f64() * share)
-        });
-        let step_time = step_time.collect();
         let messages = self.parts.iter().flat_map(|part| {
             let component = &part.instance.name;
             part.instance
@@ -211,14 +203,18 @@ impl Simulation {
                     message,
                 })
         });
+        let spent = self.parts.iter().map(|part| {
+            let name = part.instance.name.clone();
+            (name, part.wall())
+        });
         Outcome {
             record,
+            spent: spent.collect(),
             steps: self.tick,
             step: self.step,
             wall,
             messages: messages.collect(),
             notes,
-            step_time,
             real_time: self.clock.take().map(Clock::statistics),
             ended: match ended {
                 Ok(ended) => ended,
@@ -242,8 +238,6 @@ impl Simulation {
             if self.interrupt.is_some_and(|asked| asked.load(Ordering::Relaxed)) {
                 return Ok(Ended::Interrupted { time: self.time() });
             }
-            let is_measured = self.tick.is_multiple_of(MEASURED);
-            self.parts.iter_mut().for_each(|part| part.is_measured = is_measured);
             self.observe()?;
             if self.tick.is_multiple_of(self.ticks_per_row) {
                 let sample = self.tick / self.ticks_per_row;
@@ -334,6 +328,9 @@ impl Simulation {
     fn keep(&self, time: f64, record: &mut Record) {
         let (numbers, exact) = (&self.signals.numbers, &self.signals.exact);
         record.push_with(time, numbers, &self.alias_signals, exact);
+        if let Some(tap) = &self.tap {
+            tap.push(time, numbers);
+        }
     }
 
     /// Values that no physical quantity has are a run that diverges.

@@ -5,7 +5,7 @@ use minijinja::{AutoEscape, Environment, Value, context};
 
 use super::chart_data::json_for_script;
 use super::number::typeset;
-use super::{Cell, Report, Section, Table, bars};
+use super::{Cell, Report, Section, Table, UnitSystem, bars};
 
 const TEMPLATE: &str = include_str!("assets/report.html");
 const STYLE: &str = include_str!("assets/report.css");
@@ -35,13 +35,21 @@ pub fn html(report: &Report) -> Result<String, minijinja::Error> {
         .iter()
         .map(|fact| context! { label => fact.label.as_str(), note => fact.note.as_str(), value => cell(&fact.value) })
         .collect();
+    let identity: Vec<_> = report
+        .identity
+        .iter()
+        .map(|(name, value)| context! { name => name.as_str(), value => cell(value) })
+        .collect();
     let panels = report.sections.iter().flat_map(|section| &section.panels);
     environment.get_template("report")?.render(context! {
         title => report.title.as_str(),
         summary => report.summary.as_str(),
         footer => report.footer.as_str(),
         facts,
+        identity,
         sections,
+        units => UnitSystem::of_text().key(),
+        units_asked => UnitSystem::chosen().is_some(),
         has_panels => next_panel > 0,
         data => json_for_script(panels),
         style => STYLE,
@@ -65,7 +73,7 @@ fn section(section: &Section, next_panel: &mut usize) -> Value {
     let bars: Vec<_> = section
         .bars
         .iter()
-        .map(|one| context! { title => one.title.as_str(), svg => bars::svg(one) })
+        .map(|one| context! { title => one.title.as_str(), html => bars::html(one) })
         .collect();
     let tables: Vec<_> = section.tables.iter().map(table).collect();
     context! {
@@ -115,10 +123,11 @@ fn cell(cell: &Cell) -> Value {
                     format!("{number}\u{a0}{name}")
                 }
             };
-            (
-                text(units.laboratory_factor, &units.laboratory),
-                text(units.si_factor, &units.si),
-            )
+            let [us, si] = [UnitSystem::Us, UnitSystem::Si].map(|system| {
+                let (factor, name) = units.unit(system);
+                text(factor, name)
+            });
+            (us, si)
         }
     };
     context! { one => laboratory == si, laboratory, si }

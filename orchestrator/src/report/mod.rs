@@ -8,19 +8,19 @@ mod bars;
 mod chart_data;
 pub(crate) mod columns;
 mod html;
+pub mod identity;
 pub(crate) mod number;
 mod run;
 mod svg;
+pub(crate) mod units;
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 pub use bars::{Bar, BarGroup, Bars};
 pub use html::html;
-pub use run::{Run, Whole, run};
+pub use run::{Changed, Component, Run, SpecimenHistory, Whole, run};
 pub use svg::svg;
-
-use crate::units::{INCH, POUND_FORCE, STANDARD_GRAVITY};
+pub use units::{UnitSystem, Units};
 
 /// A report, top to bottom.
 #[derive(Debug, Clone, Default)]
@@ -29,6 +29,8 @@ pub struct Report {
     pub title: String,
     /// One sentence that says how it went.
     pub summary: String,
+    /// What was run, in few words: system, plant, specimen, motion, version.
+    pub identity: Vec<(String, Cell)>,
     /// The few figures that matter most, shown large.
     pub facts: Vec<Fact>,
     /// Everything else.
@@ -57,9 +59,9 @@ pub struct Section {
     pub text: Vec<String>,
     /// A list.
     pub notes: Vec<String>,
-    /// Bars, above the tables.
+    /// Bars, above everything else.
     pub bars: Vec<Bars>,
-    /// Tables.
+    /// Tables, below the plots.
     pub tables: Vec<Table>,
     /// Plots.
     pub panels: Vec<Panel>,
@@ -93,69 +95,26 @@ impl From<&str> for Cell {
     }
 }
 
+impl Cell {
+    /// As text in a system of units, for a terminal.
+    #[must_use]
+    pub fn text(&self, system: UnitSystem) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Number(value, digits) => number::significant(*value, *digits),
+            Self::Quantity(value, units, digits) => {
+                let (shown, unit) = units.shown(*value, system);
+                format!("{} {unit}", number::significant(shown, *digits))
+                    .trim_end()
+                    .to_string()
+            }
+        }
+    }
+}
+
 impl From<String> for Cell {
     fn from(text: String) -> Self {
         Cell::Text(text)
-    }
-}
-
-/// The two units a value can be read in, the laboratory's and SI; the reader of a report chooses.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Units {
-    /// Name of the laboratory's unit; empty for none.
-    pub laboratory: Cow<'static, str>,
-    /// What one of it is in the unit the data are given in.
-    pub laboratory_factor: f64,
-    /// Name of the SI unit; empty for none.
-    pub si: Cow<'static, str>,
-    /// What one of it is in the unit the data are given in.
-    pub si_factor: f64,
-}
-
-impl Units {
-    /// Length, data in m: in, mm.
-    pub const DISPLACEMENT: Units = Units::pair("in", INCH, "mm", 1e-3);
-    /// Data in m/s: in/s, mm/s.
-    pub const VELOCITY: Units = Units::pair("in/s", INCH, "mm/s", 1e-3);
-    /// Data in m/s^2: g, m/s².
-    pub const ACCELERATION: Units = Units::pair("g", STANDARD_GRAVITY, "m/s²", 1.0);
-    /// Data in N: lbf, N.
-    pub const FORCE: Units = Units::pair("lbf", POUND_FORCE, "N", 1.0);
-    /// Data in V.
-    pub const VOLTAGE: Units = Units::same("V");
-    /// Data in s.
-    pub const TIME: Units = Units::same("s");
-    /// Data in Hz.
-    pub const FREQUENCY: Units = Units::same("Hz");
-    /// Data in percent.
-    pub const PERCENT: Units = Units::same("%");
-    /// Data in dB.
-    pub const DECIBEL: Units = Units::same("dB");
-    /// Data in degrees.
-    pub const DEGREE: Units = Units::same("°");
-    /// Plain numbers.
-    pub const NONE: Units = Units::same("");
-
-    /// Two units and what one of each is in the unit of the data.
-    #[must_use]
-    pub const fn pair(
-        laboratory: &'static str,
-        laboratory_factor: f64,
-        si: &'static str,
-        si_factor: f64,
-    ) -> Self {
-        Self {
-            laboratory: Cow::Borrowed(laboratory),
-            laboratory_factor,
-            si: Cow::Borrowed(si),
-            si_factor,
-        }
-    }
-
-    /// One unit for both, that of the data.
-    #[must_use]
-    pub const fn same(unit: &'static str) -> Self {
-        Self::pair(unit, 1.0, unit, 1.0)
     }
 }
 
@@ -273,6 +232,25 @@ impl Series {
         }
     }
 
+    /// A level across the places from `from` to `to`, dashed and neutral: a limit, an aim.
+    #[must_use]
+    pub fn level(name: &str, value: f64, [from, to]: [f64; 2]) -> Self {
+        Self::line(name, Abscissa::At([from, to].into()), vec![value; 2])
+            .styled(Style::Dashed)
+            .coloured(0)
+    }
+
+    /// A stroke from one point to another: an event, a margin.
+    #[must_use]
+    pub fn stroke(name: &str, from: [f64; 2], to: [f64; 2]) -> Self {
+        Self::line(
+            name,
+            Abscissa::At([from[0], to[0]].into()),
+            vec![from[1], to[1]],
+        )
+        .styled(Style::Path)
+    }
+
     /// A time history that begins at 0.
     #[must_use]
     pub fn history(name: &str, dt: f64, values: &[f64]) -> Self {
@@ -284,6 +262,16 @@ impl Series {
             },
             values.to_vec(),
         )
+    }
+
+    /// The same with at most so many values, about: the least and the largest of each stretch, so
+    /// that no peak is lost.
+    #[must_use]
+    pub fn thinned(self, most: usize) -> Self {
+        if self.values.len() <= most {
+            return self;
+        }
+        chart_data::envelope(&self, (most / 2).max(1))
     }
 
     /// The same in another style.

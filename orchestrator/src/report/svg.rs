@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::chart_data::envelope;
 use super::number::typeset;
-use super::{Axis, Panel, Series, Style};
+use super::{Axis, Panel, Series, Style, UnitSystem};
 
 const WIDTH: f64 = 820.0;
 const HEIGHT: f64 = 320.0;
@@ -18,7 +18,8 @@ const COLOURS: [&str; 9] = [
     "#6f7f1e",
 ];
 
-/// Draws the panel in the laboratory's units, on white. All text is escaped.
+/// Draws the panel in the units that were chosen, else the laboratory's, on white. All text is
+/// escaped.
 #[must_use]
 pub fn svg(panel: &Panel) -> String {
     let x = Scale::new(
@@ -64,7 +65,7 @@ pub fn svg(panel: &Panel) -> String {
 struct Scale {
     unit: f64,
     logarithmic: bool,
-    /// Limits in the laboratory's unit (their logarithm to 10 on a logarithmic axis).
+    /// Limits in the unit shown (their logarithm to 10 on a logarithmic axis).
     low: f64,
     high: f64,
     from: f64,
@@ -73,7 +74,7 @@ struct Scale {
 
 impl Scale {
     fn new(axis: &Axis, data: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
-        let unit = axis.units.laboratory_factor;
+        let (unit, _) = axis.units.unit(UnitSystem::of_text());
         let shown = |value: f64| {
             let value = value / unit;
             if axis.logarithmic {
@@ -211,7 +212,7 @@ fn grid(out: &mut String, panel: &Panel, x: &Scale, y: &Scale) {
 }
 
 fn axis_title(axis: &Axis) -> String {
-    let unit = &axis.units.laboratory;
+    let (_, unit) = axis.units.unit(UnitSystem::of_text());
     let title = if unit.is_empty() {
         axis.label.clone()
     } else {

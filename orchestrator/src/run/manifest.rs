@@ -68,6 +68,9 @@ pub struct ComponentEntry {
     pub period_s: Option<f64>,
     /// All parameters: value and unit.
     pub parameters: BTreeMap<String, (serde_json::Value, Option<String>)>,
+    /// Defaults of the FMU for those that differ.
+    #[serde(default)]
+    pub defaults: BTreeMap<String, serde_json::Value>,
 }
 
 impl Manifest {
@@ -80,22 +83,29 @@ impl Manifest {
     ) -> Self {
         let components = system.components.iter().map(|component| {
             let description = &component.fmu.description;
+            let mut defaults = BTreeMap::new();
             let parameters = description.of(Causality::Parameter).map(|position| {
                 let variable = &description.variables[position];
                 let given = component.parameters.iter().find(|(p, _)| *p == position);
+                let default = start(variable.start.as_deref().unwrap_or_default());
                 let value = match given {
                     Some((_, value)) => serde_json::json!(value),
-                    None => start(variable.start.as_deref().unwrap_or_default()),
+                    None => default.clone(),
                 };
+                if differ(&value, &default) {
+                    defaults.insert(variable.name.clone(), default);
+                }
                 (variable.name.clone(), (value, variable.unit.clone()))
             });
+            let parameters = parameters.collect();
             let entry = ComponentEntry {
                 model: description.model_name.clone(),
                 fmu: component.fmu.path.clone(),
                 sha256: component.fmu.sha256.clone(),
                 fmi: description.version.to_string(),
                 period_s: component.period,
-                parameters: parameters.collect(),
+                parameters,
+                defaults,
             };
             (component.name.clone(), entry)
         });
@@ -167,6 +177,18 @@ impl Manifest {
         compare("connections", &then, &now);
         compare("results", &self.results_sha256, &again.results_sha256);
         lines
+    }
+}
+
+/// Whether two values of a parameter are not the same, whatever they are written as.
+fn differ(one: &serde_json::Value, other: &serde_json::Value) -> bool {
+    let number = |value: &serde_json::Value| {
+        let truth = value.as_bool().map(|truth| f64::from(u8::from(truth)));
+        value.as_f64().or(truth)
+    };
+    match (number(one), number(other)) {
+        (Some(one), Some(other)) => one != other,
+        _ => one != other,
     }
 }
 

@@ -1,6 +1,7 @@
 //! A run of a system on a motion: what is asked for, what is played, what is kept.
 
 pub mod experiment;
+pub mod identity;
 pub mod manifest;
 pub mod page;
 pub mod signals;

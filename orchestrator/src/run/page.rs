@@ -7,15 +7,16 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::experiment::Prepared;
+use super::identity;
 use super::manifest::Manifest;
-use super::signals::{read_csv, write_csv};
+use super::signals::{COLUMNS, RESULTS, columns, read_csv, write_columns, write_csv};
 use super::summary::{Summary, Table};
 use crate::error::Error;
 use crate::fmu::hexadecimal;
 use crate::master::{Outcome, Record};
 use crate::motion::Motion;
 use crate::report::number::significant;
-use crate::report::{self, Cell, Whole};
+use crate::report::{self, Cell, Component, SpecimenHistory, Whole};
 use crate::results::Results;
 use crate::units::STANDARD_GRAVITY;
 
@@ -32,7 +33,7 @@ pub fn write(
 ) -> Result<Vec<PathBuf>, Error> {
     let mut results = Results::begin(folder)?;
     let mut sum = Sha256::new();
-    results.write("results.csv", |file| {
+    results.write(RESULTS, |file| {
         let mut both = Hashed {
             file,
             sum: &mut sum,
@@ -42,6 +43,8 @@ pub fn write(
     manifest.results_sha256 = hexadecimal(&sum.finalize());
     // A page of an earlier run here would be another run's.
     results.replaces(&["report.html"]);
+    let columns = columns(&prepared.system, &outcome.record);
+    results.write(COLUMNS, |file| write_columns(&columns, file))?;
     results.write_text("summary.json", &json(summary))?;
     results.write_text("manifest.json", &json(manifest))?;
     let motion = &prepared.motion;
@@ -83,41 +86,46 @@ fn page(
 ) -> Option<String> {
     let table = Table::find(manifest, record)?;
     let column = |output| record.column(&table.name(output)).unwrap_or_default();
-    let valve = table.valve.as_ref().and_then(|name| record.column(name));
     let row = |name: &str, value: String| (name.to_string(), Cell::from(value));
-    let mut settings = vec![
+    let settings = vec![
         row("FMI", summary.fmi.clone()),
-        row("Algorithm", summary.algorithm.clone()),
-        row("Step", format!("{} ms", 1e3 * summary.step_s)),
+        row("algorithm", summary.algorithm.clone()),
+        row("coupling step", format!("{} ms", 1e3 * summary.step_s)),
         row(
-            "Speed",
+            "speed",
             format!(
-                "{} times real time",
-                significant(summary.real_time_factor, 2)
+                "{} times real time ({} s elapsed)",
+                significant(summary.real_time_factor, 2),
+                significant(summary.wall_s, 2)
             ),
         ),
     ];
-    for (name, component) in &manifest.components {
-        let file = component.fmu.file_name().unwrap_or_default();
-        let sum = component.sha256.get(..16).unwrap_or(&component.sha256);
-        settings.push(row(
-            name,
-            format!("{}, SHA-256 {sum}", file.to_string_lossy()),
-        ));
-    }
+    let commands = table.valve.iter().filter_map(|name| {
+        let values = record.column(name)?;
+        Some((name.clone(), values))
+    });
     let run = report::Run {
         system: &summary.system,
+        identity: identity::of_run(manifest, motion, whole),
         motion,
         whole,
         displacement: &column("displacement"),
         velocity: &column("velocity"),
         acceleration: &column("acceleration"),
-        valve_command: valve.as_deref(),
+        commands: commands.collect(),
+        valve_limit: valve_limit(manifest, &table.valve),
+        specimen: specimen(manifest, record),
+        trip: summary
+            .trip
+            .as_ref()
+            .map(|trip| (trip.time_s, trip.cause.clone())),
         tracking: summary.tracking.as_ref(),
         ended: summary
             .ended_because
             .as_deref()
             .unwrap_or(summary.ended.word()),
+        changed: identity::changed(manifest),
+        components: components(manifest, summary),
         settings,
         footer: format!(
             "shakebench {}; repeat with: shakebench run --manifest manifest.json",
@@ -127,6 +135,42 @@ fn page(
     report::html(&report::run(&run)).ok()
 }
 
+/// The limit of the component that gives the first command.
+fn valve_limit(manifest: &Manifest, commands: &[String]) -> Option<f64> {
+    let (controller, _) = commands.first()?.rsplit_once('.')?;
+    let component = manifest.components.get(controller)?;
+    component.parameters.get("valve_limit")?.0.as_f64()
+}
+
+/// Drift and force of the first component that has both.
+fn specimen(manifest: &Manifest, record: &Record) -> Option<SpecimenHistory> {
+    let mut names = manifest.components.keys();
+    names.find_map(|name| {
+        Some(SpecimenHistory {
+            drift: record.column(&format!("{name}.drift"))?,
+            force: record.column(&format!("{name}.force"))?,
+        })
+    })
+}
+
+fn components(manifest: &Manifest, summary: &Summary) -> Vec<Component> {
+    let all = manifest.components.iter();
+    all.map(|(name, component)| {
+        let sum = component.sha256.get(..16).unwrap_or(&component.sha256);
+        let file = component.fmu.file_name().unwrap_or_default();
+        Component {
+            name: name.clone(),
+            model: format!(
+                "{}, FMI {}, SHA-256 {sum}",
+                file.to_string_lossy(),
+                component.fmi
+            ),
+            time: summary.component_wall_s.get(name).copied(),
+        }
+    })
+    .collect()
+}
+
 /// The report of the run whose files lie in `folder`; of a motion that was not played to its end, it
 /// draws what was played.
 ///
@@ -134,15 +178,8 @@ fn page(
 /// A file that is missing or is none of a run.
 pub fn page_again(folder: &Path) -> Result<String, Error> {
     let manifest = Manifest::read(&folder.join("manifest.json"))?;
-    let place = folder.join("summary.json");
-    let fault = |reason: String| Error::File {
-        path: place.clone(),
-        reason,
-    };
-    let text = std::fs::read_to_string(&place).map_err(|error| fault(error.to_string()))?;
-    let summary: Summary = serde_json::from_str(&text)
-        .map_err(|error| fault(format!("not the summary of a run: {error}")))?;
-    let place = folder.join("results.csv");
+    let summary = Summary::read(&folder.join("summary.json"))?;
+    let place = folder.join(RESULTS);
     let record = read_csv(&place)?;
     let column = |quantity| {
         let name = format!("reference.{quantity}");

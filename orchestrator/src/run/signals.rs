@@ -1,4 +1,4 @@
-//! `results.csv`: the recorded signals of a run.
+//! `results.csv`: the recorded signals of a run, and `columns.csv`: what its columns are.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -7,6 +7,80 @@ use std::path::Path;
 use crate::error::Error;
 use crate::fmu::Datum;
 use crate::master::Record;
+use crate::system::System;
+
+/// File with the recorded signals.
+pub const RESULTS: &str = "results.csv";
+/// File that names the columns' units.
+pub const COLUMNS: &str = "columns.csv";
+
+/// A column of `results.csv`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Column {
+    /// Its name.
+    pub name: String,
+    /// Unit of its numbers; empty for none.
+    pub unit: String,
+    /// What it is.
+    pub description: String,
+}
+
+/// Whether a column is written: not what lies ahead of the reference, which is the same history
+/// some samples later.
+fn is_kept(name: &str) -> bool {
+    !(name.starts_with("reference.") && name.ends_with(']'))
+}
+
+/// The columns of `record` that are written.
+pub fn columns(system: &System, record: &Record) -> Vec<Column> {
+    let names = record.columns.iter().chain(&record.exact_columns);
+    names
+        .filter(|name| is_kept(name))
+        .map(|name| {
+            let (unit, description) = about(system, name);
+            Column {
+                name: name.clone(),
+                unit,
+                description,
+            }
+        })
+        .collect()
+}
+
+/// Unit and description of a signal.
+fn about(system: &System, name: &str) -> (String, String) {
+    let own = |unit: &str, text: &str| (unit.to_string(), text.to_string());
+    match name {
+        "time" => return own("s", "time"),
+        "reference.displacement" => return own("m", "displacement asked for"),
+        "reference.velocity" => return own("m/s", "velocity asked for"),
+        "reference.acceleration" => return own("m/s2", "acceleration asked for"),
+        _ => {}
+    }
+    let (component, variable) = name.split_once('.').unwrap_or(("", name));
+    let component = system.components.iter().find(|own| own.name == component);
+    let found = component.and_then(|component| {
+        let variables = &component.fmu.description.variables;
+        variables.iter().find(|own| own.name == variable)
+    });
+    found.map_or((String::new(), String::new()), |variable| {
+        let unit = variable.unit.clone().unwrap_or_default();
+        (unit, variable.description.clone())
+    })
+}
+
+/// Writes the columns' names, units and descriptions.
+///
+/// # Errors
+/// A disk that is full, and the like.
+pub fn write_columns(columns: &[Column], file: impl Write) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(file);
+    csv.write_record(["column", "unit", "description"])?;
+    for column in columns {
+        csv.write_record([&column.name, &column.unit, &column.description])?;
+    }
+    csv.flush()
+}
 
 /// Writes a record as CSV: a line of names, then a line a sample; every number reads back to the
 /// same bits.
@@ -15,15 +89,15 @@ use crate::master::Record;
 /// A disk that is full, and the like.
 pub fn write_csv(record: &Record, file: impl Write) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(file);
-    if record.exact_columns.is_empty() {
-        csv.write_record(&record.columns)?;
-        for row in record.rows() {
-            csv.serialize(row).map_err(io::Error::other)?;
-        }
-        return csv.flush();
+    let kept: Vec<bool> = record.columns.iter().map(|name| is_kept(name)).collect();
+    fn only<'a, T>(kept: &'a [bool], all: &'a [T]) -> impl Iterator<Item = &'a T> {
+        all.iter()
+            .zip(kept)
+            .filter_map(|(one, keep)| keep.then_some(one))
     }
-    csv.write_record(record.columns.iter().chain(&record.exact_columns))?;
+    csv.write_record(only(&kept, &record.columns).chain(&record.exact_columns))?;
     for (number, row) in record.rows().enumerate() {
+        let row: Vec<f64> = only(&kept, row).copied().collect();
         let exact: Vec<String> = record.exact(number).iter().map(Datum::to_string).collect();
         csv.serialize((row, exact)).map_err(io::Error::other)?;
     }

@@ -1,12 +1,14 @@
 //! The figures of a run.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::experiment::Prepared;
 use super::manifest::Manifest;
-use crate::master::{Ending, Outcome, RealTime, Record};
+use crate::error::Error;
+use crate::master::{Ended, Ending, Outcome, RealTime, Record};
 use crate::metrics::{self, Tracking};
 use crate::system::Origin;
 use crate::units::{self, INCH, STANDARD_GRAVITY};
@@ -34,18 +36,47 @@ pub struct Summary {
     pub ended: Ending,
     /// Why it ended early.
     pub ended_because: Option<String>,
+    /// What stopped it, where something did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trip: Option<Trip>,
+    /// Time that the steps of each component took.
+    #[serde(default)]
+    pub component_wall_s: BTreeMap<String, f64>,
     /// Seeds of random components (such as sensors' noise), by instance.
     pub seeds: BTreeMap<String, serde_json::Value>,
     /// How well the table followed; absent where there is no table.
     pub tracking: Option<Tracking>,
     /// What the user should know.
     pub warnings: Vec<String>,
-    /// Time that each component took in its steps, s, estimated from one step in 32.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub step_time_s: BTreeMap<String, f64>,
     /// How the clock on the wall was kept; of a run in real time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub real_time: Option<RealTime>,
+}
+
+/// What stopped a run.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Trip {
+    /// When.
+    pub time_s: f64,
+    /// Why, in words.
+    pub cause: String,
+}
+
+impl Trip {
+    fn of(ended: &Ended) -> Option<Self> {
+        let cause = match ended {
+            Ended::Interlock { cause, signal, .. } => cause.clone().unwrap_or(signal.clone()),
+            Ended::Stopped { error, .. } => error.to_string(),
+            Ended::Complete
+            | Ended::Terminated { .. }
+            | Ended::Interrupted { .. }
+            | Ended::Failed(_) => return None,
+        };
+        Some(Self {
+            time_s: ended.time()?,
+            cause,
+        })
+    }
 }
 
 /// The motion of a run, whole.
@@ -62,6 +93,20 @@ pub struct MotionSummary {
 }
 
 impl Summary {
+    /// Reads `summary.json`.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is none.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let fault = |reason: String| Error::File {
+            path: path.to_path_buf(),
+            reason,
+        };
+        let text = std::fs::read_to_string(path).map_err(|error| fault(error.to_string()))?;
+        serde_json::from_str(&text)
+            .map_err(|error| fault(format!("not the summary of a run: {error}")))
+    }
+
     /// Measures a run.
     pub fn new(
         prepared: &Prepared,
@@ -136,6 +181,8 @@ impl Summary {
             real_time_factor: simulated / outcome.wall,
             ended: outcome.ended.kind(),
             ended_because: outcome.ended.reason(),
+            trip: Trip::of(&outcome.ended),
+            component_wall_s: outcome.spent.iter().cloned().collect(),
             seeds: manifest
                 .components
                 .iter()
@@ -146,7 +193,6 @@ impl Summary {
                 .collect(),
             tracking,
             warnings,
-            step_time_s: outcome.step_time.iter().cloned().collect(),
             real_time: outcome.real_time.clone(),
         }
     }
@@ -154,14 +200,14 @@ impl Summary {
 
 /// The component that is the table: `table`, or the first with a displacement, velocity and
 /// acceleration that takes a valve command.
-pub(super) struct Table<'a> {
+pub(crate) struct Table<'a> {
     name: &'a str,
-    /// The output that drives the valve.
-    pub(super) valve: Option<String>,
+    /// The outputs that drive the valve, the controller's first, as `component.variable`.
+    pub(crate) valve: Vec<String>,
 }
 
 impl<'a> Table<'a> {
-    pub(super) fn find(manifest: &'a Manifest, record: &Record) -> Option<Self> {
+    pub(crate) fn find(manifest: &'a Manifest, record: &Record) -> Option<Self> {
         let valve = |name: &str| {
             let mut links = manifest.connections.iter();
             links
@@ -178,15 +224,33 @@ impl<'a> Table<'a> {
             Some((name, _)) => name,
             None => names.find(|name| moves(name))?,
         };
-        let valve = match valve(name) {
-            Some(Origin::Output(output)) => Some(output.to_string()),
-            _ => None,
-        };
-        Some(Self { name, valve })
+        // Back from the valve: an interlock takes the controller's command.
+        let mut commands = Vec::new();
+        let mut at = valve(name);
+        while let Some(Origin::Output(output)) = at {
+            let signal = output.to_string();
+            if commands.contains(&signal) || commands.len() > 3 {
+                break;
+            }
+            commands.push(signal);
+            at = manifest
+                .connections
+                .iter()
+                .find(|link| {
+                    link.to.component == output.component
+                        && link.to.variable == "controller_command"
+                })
+                .map(|link| &link.from);
+        }
+        commands.reverse();
+        Some(Self {
+            name,
+            valve: commands,
+        })
     }
 
     /// The signal that is an output of it.
-    pub(super) fn name(&self, output: &str) -> String {
+    pub(crate) fn name(&self, output: &str) -> String {
         format!("{}.{output}", self.name)
     }
 }

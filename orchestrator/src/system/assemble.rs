@@ -237,6 +237,29 @@ fn as_toml(variable: &Variable, text: &str) -> Setting {
     }
 }
 
+/// A number alone for a variable with a unit is refused: on a command line nobody sees which unit
+/// is meant, and the file's is rarely the laboratory's. Zero is zero in every unit.
+fn ask_for_unit(variable: &Variable, name: &str, text: &str) -> Result<(), String> {
+    let is_float = matches!(variable.kind, Kind::Float64 | Kind::Float32);
+    let unit = variable.unit.as_deref().unwrap_or_default();
+    let has_dimension = matches!(
+        units::convert(1.0, unit, ""),
+        Err(units::UnitError::Misfit { .. })
+    );
+    match text.parse::<f64>() {
+        Ok(number) if is_float && has_dimension && number != 0.0 => {
+            let shown = variable.display_unit.as_deref();
+            let shown = shown.filter(|own| *own != unit);
+            let or = shown.map_or(String::new(), |own| format!(" or \"{text} {own}\""));
+            Err(format!(
+                "`{text}` has no unit, and `{name}` is in {unit}; expected a number with its unit, \
+                 such as {name}=\"{text} {unit}\"{or}"
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Values for a variable, or for all elements of an array: a list, or a text with one value for
 /// each between spaces.
 fn values(
@@ -490,6 +513,7 @@ fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
     let Some(first) = first else {
         return Err(format!("`{variable}` has no elements"));
     };
+    ask_for_unit(first, variable, text.trim())?;
     let written = as_toml(first, text.trim());
     for (position, value) in values(&fmu, variable, elements, &written)? {
         put(list, position, value);

@@ -28,7 +28,7 @@ fn without_arguments_the_built_in_system_runs_and_says_where_everything_lies() {
         assert!(path.is_file(), "{}", path.display());
         assert!(said.contains(file), "{said}");
     }
-    assert!(said.contains("error in time, acceleration"), "{said}");
+    assert!(said.contains("normalised RMS acceleration error"), "{said}");
     let page = folder
         .path()
         .join("shakebench-results/three-variable-synthetic-1/report.html");
@@ -119,7 +119,8 @@ fn a_manifest_repeats_a_run_to_the_bit_and_notices_a_difference() {
     assert!(manifest.contains(given), "{manifest}");
     let other = manifest.replace(given, "control.integral_gain=0.6 V/(in s)");
     fs::write(folder.path().join("first/manifest.json"), other).unwrap();
-    let output = shakebench(folder.path(), &again);
+    let elsewhere = ["run", "--manifest", "first/manifest.json", "--out", "other"];
+    let output = shakebench(folder.path(), &elsewhere);
     assert_eq!(output.status.code(), Some(1));
     let said = stderr(&output);
     assert!(
@@ -142,13 +143,68 @@ fn every_command_has_help_with_an_example() {
 #[test]
 fn an_fmu_that_refuses_a_parameter_is_named_with_the_parameter() {
     let folder = tempfile::tempdir().unwrap();
-    let setting = ["run", "--set", "control.valve_limit=-3"];
+    let setting = ["run", "--set", "control.valve_limit=-3 V"];
     let words = [
         "`control`",
         "ThreeVariableControl.fmu",
         "`valve_limit` is -3",
     ];
     crate::refused(folder.path(), &setting, &words);
+}
+
+#[test]
+fn a_number_for_a_variable_with_a_unit_asks_for_the_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let setting = ["run", "--set", "control.proportional_gain=5"];
+    let words = [
+        "`5` has no unit",
+        "`proportional_gain` is in V/m",
+        "proportional_gain=\"5 V/m\"",
+        "\"5 V/in\"",
+    ];
+    crate::refused(folder.path(), &setting, &words);
+    // Whole numbers without a unit, truth values and zero need none.
+    let done = [
+        "run",
+        "--duration",
+        "1 s",
+        "--set",
+        "control.integral_gain=0",
+    ];
+    let output = shakebench(folder.path(), &done);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+}
+
+#[test]
+fn nothing_is_overwritten_that_differs() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let run = |pga: &str, rest: &[&str]| {
+        let all = ["run", "displacement-pid", "--duration", "1 s", "--pga", pga];
+        shakebench(folder, &[&all[..], rest].concat())
+    };
+    let code = |pga: &str, rest: &[&str]| run(pga, rest).status.code();
+    let place = |name: &str| folder.join("shakebench-results").join(name);
+    // Without a name: the same command into the same folder, another into a new one.
+    assert_eq!(code("0.1", &[]), Some(0));
+    assert_eq!(code("0.1", &[]), Some(0));
+    assert!(!place("displacement-pid-synthetic-1-2").exists());
+    assert_eq!(code("0.12", &[]), Some(0));
+    assert!(place("displacement-pid-synthetic-1-2/results.csv").is_file());
+    // With a name: the same again is done, another is refused unless it is forced.
+    assert_eq!(code("0.1", &["--out", "own"]), Some(0));
+    assert_eq!(code("0.1", &["--out", "own"]), Some(0));
+    let before = fs::read(folder.join("own/results.csv")).unwrap();
+    let refused = run("0.12", &["--out", "own"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = stderr(&refused);
+    assert!(
+        said.contains("results.csv") && said.contains("--force"),
+        "{said}"
+    );
+    assert_eq!(fs::read(folder.join("own/results.csv")).unwrap(), before);
+    assert_eq!(code("0.12", &["--out", "own", "--force"]), Some(0));
+    assert_ne!(fs::read(folder.join("own/results.csv")).unwrap(), before);
 }
 
 #[test]

@@ -4,6 +4,8 @@
 
 mod archives;
 mod benchmark;
+mod book;
+mod browser;
 mod contract;
 mod diagnosis;
 mod failures;

@@ -34,7 +34,7 @@ fn the_report_of_a_run_is_the_same_again() {
         serde_json::from_str(&fs::read_to_string(&summary).unwrap()).unwrap();
     json["tracking"]["time_domain_percent"] = 87.65.into();
     fs::write(&summary, json.to_string()).unwrap();
-    assert!(twice(folder)[1].contains("an error of 87.65 % in time"));
+    assert!(twice(folder)[1].contains("acceleration error of 87.65 %"));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use plant::hybrid::{PERIOD, TransferSystemParameters};
 
 use crate::report::{
     Abscissa, Axis, Bar, BarGroup, Bars, Cell, Fact, Panel, Report, Section, Series, Style, Table,
-    Units,
+    Units, identity,
 };
 
 use super::criteria::Histories;
@@ -82,6 +82,22 @@ pub fn report(outcome: &Outcome, pictures: &[Picture]) -> Report {
         ),
         facts: facts(outcome),
         sections,
+        identity: vec![
+            identity::entry("Benchmark", "virtual real-time hybrid simulation (2020)"),
+            identity::entry("Controllers", outcome.controllers.len().to_string()),
+            identity::entry(
+                "Cases",
+                outcome
+                    .cases
+                    .iter()
+                    .map(u8::to_string)
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            ),
+            identity::entry("Motions", outcome.motions.join(", ")),
+            identity::entry("Seed", outcome.seed.to_string()),
+            identity::version(),
+        ],
         footer: format!(
             "shakebench {}. Benchmark of Silva, Gomez, Maghareh, Dyke and Spencer (2020).",
             env!("CARGO_PKG_VERSION")

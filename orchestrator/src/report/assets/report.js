@@ -132,7 +132,7 @@
     const drawn = [];
     const series = [{ label: named(panel.x, xUnit), value: (_, v) => digits(v, span(data[0])) }];
     roles.forEach(({ series: one, role }, n) => {
-      const stroke = colour(`--series-${one.colour === 0 ? 0 : 1 + (one.colour - 1) % 8}`);
+      const stroke = strokeOf(one);
       const is = (style) => one.style === style;
       const wide = one.colour === 0 && is("line");
       series.push({
@@ -170,7 +170,7 @@
       return made;
     };
     const options = {
-      width: place.clientWidth, height: printing ? 175 : 250,
+      width: printing ? 680 : place.clientWidth, height: height(panel, place.clientWidth),
       scales: { x: scale(panel.x, xUnit), y: scale(panel.y, yUnit) },
       series, bands,
       axes: [axis(panel.x, xUnit, 34), axis(panel.y, yUnit, panel.y.log ? 64 : 58)],
@@ -182,6 +182,13 @@
       hooks: { draw: drawn },
     };
     return new uPlot(options, data, place);
+  };
+  // A part of a plane is drawn as a plane, as far as there is room.
+  const height = (panel, width) => {
+    const plane = panel.x.limits && panel.y.limits && !panel.x.log && !panel.y.log;
+    const span = ([low, high]) => high - low;
+    if (!plane || printing) return printing ? 175 : 250;
+    return Math.max(250, Math.min(520, 70 + (width - 70) * span(panel.y.limits) / span(panel.x.limits)));
   };
   // Fixed limits; along x a zoom stays within them.
   const limited = (which, unit) => {
@@ -205,6 +212,90 @@
     if (width > 0 && width !== chart.width) chart.setSize({ width, height: chart.height });
   });
 
+  // A file for the reader, made of what the page holds.
+  const save = (name, parts, type) => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob(parts, { type }));
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  };
+  const fileName = (panel, ending) =>
+    `${document.title} - ${panel.title}`.replace(/[^\p{L}\p{N}.]+/gu, "-").slice(0, 90) + ending;
+  const strokeOf = (one) => colour(`--series-${one.colour === 0 ? 0 : 1 + (one.colour - 1) % 8}`);
+
+  // The plot as it stands, with its title above and its legend below.
+  const picture = (chart, panel) => {
+    const ratio = devicePixelRatio;
+    const plot = chart.ctx.canvas;
+    const canvas = document.createElement("canvas");
+    const ctx = canvas.getContext("2d");
+    const font = (size, weight) => { ctx.font = `${weight} ${size * ratio}px system-ui, sans-serif`; };
+    font(12.5, 400);
+    const rows = [[]];
+    let at = 0;
+    for (const one of panel.series) {
+      const width = ctx.measureText(one.name).width + 44 * ratio;
+      if (at > 0 && at + width > plot.width - 24 * ratio) { rows.push([]); at = 0; }
+      rows.at(-1).push({ one, at });
+      at += width;
+    }
+    const head = 30 * ratio;
+    canvas.width = plot.width;
+    canvas.height = head + plot.height + (20 * rows.length + 10) * ratio;
+    ctx.fillStyle = colour("--card");
+    ctx.fillRect(0, 0, canvas.width, canvas.height);
+    ctx.fillStyle = colour("--ink");
+    font(14, 600);
+    ctx.fillText(panel.title, 12 * ratio, 21 * ratio, canvas.width - 24 * ratio);
+    ctx.drawImage(plot, 0, head);
+    font(12.5, 400);
+    rows.forEach((row, n) => row.forEach(({ one, at: left }) => {
+      const y = head + plot.height + (14 + 20 * n) * ratio;
+      ctx.fillStyle = strokeOf(one);
+      ctx.fillRect(12 * ratio + left, y - 5 * ratio, 20 * ratio, 3 * ratio);
+      ctx.fillStyle = colour("--ink");
+      ctx.fillText(one.name, 38 * ratio + left, y);
+    }));
+    return canvas;
+  };
+
+  // The data in the units shown; series that stand at other places get a column of places each.
+  const table = (panel) => {
+    const system = root.dataset.units;
+    const [xUnit, yUnit] = [panel.x[system], panel.y[system]];
+    const cell = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+    const head = (text, unit) => cell(text + (unit[0] ? ` [${unit[0]}]` : ""));
+    const list = [];
+    let last = null;
+    for (const one of panel.series) {
+      if (one.key !== last) list.push({ head: head(panel.x.label, xUnit), values: one.x, unit: xUnit[1] });
+      last = one.key;
+      list.push({ head: head(one.name, yUnit), values: one.y, unit: yUnit[1] });
+      if (one.upper) list.push({ head: head(`${one.name}, upper`, yUnit), values: one.upper, unit: yUnit[1] });
+    }
+    const lines = [list.map((column) => column.head).join(",")];
+    const longest = Math.max(...list.map((column) => column.values.length));
+    const number = (column, n) => {
+      const value = column.values[n];
+      return value == null ? "" : String(Number((value / column.unit).toPrecision(8)));
+    };
+    for (let n = 0; n < longest; n++) lines.push(list.map((column) => number(column, n)).join(","));
+    return `${lines.join("\n")}\n`;
+  };
+  for (const button of document.querySelectorAll("[data-export]")) {
+    button.addEventListener("click", () => {
+      const place = button.closest("figure").querySelector(".chart");
+      const panel = panels[Number(place.dataset.panel)];
+      if (button.dataset.export === "csv") {
+        save(fileName(panel, ".csv"), [table(panel)], "text/csv");
+        return;
+      }
+      const chart = charts.find((one) => one.root.parentElement === place);
+      if (chart) picture(chart, panel).toBlob((blob) => save(fileName(panel, ".png"), [blob], "image/png"));
+    });
+  }
+
   const remember = (key, value) => { try { localStorage.setItem(key, value); } catch { /* a private window */ } };
   const recall = (key) => { try { return localStorage.getItem(key); } catch { return null; } };
   const choose = (what, value, again) => {
@@ -221,7 +312,8 @@
   };
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
   choose("theme", recall("shakebench-theme") || (dark ? "dark" : "light"));
-  choose("units", recall("shakebench-units") || "laboratory");
+  // What the command was asked for holds until the reader chooses otherwise.
+  choose("units", (!root.dataset.unitsAsked && recall("shakebench-units")) || root.dataset.units);
   build();
   let waiting = 0;
   addEventListener("resize", () => { cancelAnimationFrame(waiting); waiting = requestAnimationFrame(resize); });

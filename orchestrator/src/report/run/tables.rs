@@ -1,0 +1,121 @@
+//! The tables of a run.
+
+use super::{Run, Whole};
+use crate::metrics::Tracking;
+use crate::report::{Cell, Table, Units};
+
+fn columns<const N: usize>(names: [&str; N]) -> Vec<String> {
+    names.map(str::to_string).to_vec()
+}
+
+/// Peaks and errors.
+pub(super) fn tracking(whole: Whole, tracking: &Tracking) -> Table {
+    let length = |value| Cell::Quantity(value, Units::DISPLACEMENT, 4);
+    let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4);
+    let percent = |value| Cell::Quantity(value, Units::PERCENT, 3);
+    let none = || Cell::Text(String::new());
+    Table {
+        caption: "Errors in percent are relative to the peak of the reference.".to_string(),
+        columns: columns(["", "reference", "table", "largest error", "RMS error"]),
+        rows: vec![
+            vec![
+                "displacement, peak".into(),
+                length(whole.peak_displacement),
+                length(tracking.peak_displacement),
+                length(tracking.peak_displacement_error),
+                percent(tracking.displacement_percent),
+            ],
+            vec![
+                "acceleration, peak".into(),
+                acceleration(whole.peak_acceleration),
+                acceleration(tracking.peak_acceleration),
+                acceleration(tracking.peak_acceleration_error),
+                percent(tracking.time_domain_percent),
+            ],
+            vec![
+                "acceleration, Fourier amplitudes to 25 Hz".into(),
+                none(),
+                none(),
+                none(),
+                percent(tracking.frequency_domain_percent),
+            ],
+            vec![
+                "acceleration, correlation".into(),
+                none(),
+                Cell::Number(tracking.correlation, 5),
+                none(),
+                none(),
+            ],
+        ],
+    }
+}
+
+/// Settings, parameters that differ from their defaults, and components.
+pub(super) fn what_was_run(run: &Run) -> Vec<Table> {
+    let motion = run.motion;
+    let mut rows = vec![
+        vec![Cell::from("ended"), run.ended.into()],
+        vec![
+            "duration of the motion".into(),
+            Cell::Quantity(run.whole.duration, Units::TIME, 5),
+        ],
+        vec![
+            "sample time".into(),
+            Cell::Quantity(1e3 * motion.dt, Units::same("ms"), 3),
+        ],
+    ];
+    if let Some(seed) = motion.seed {
+        rows.push(vec!["seed of the motion".into(), seed.to_string().into()]);
+    }
+    let settings = run.settings.iter();
+    rows.extend(settings.map(|(name, value)| vec![name.as_str().into(), value.clone()]));
+    let mut tables = vec![Table {
+        columns: columns(["", ""]),
+        rows,
+        ..Table::default()
+    }];
+    if !run.changed.is_empty() {
+        let rows = run.changed.iter();
+        tables.push(Table {
+            caption: "Values that differ from their component's default".into(),
+            columns: columns(["parameter", "value", "default"]),
+            rows: rows
+                .map(|one| {
+                    vec![
+                        one.name.as_str().into(),
+                        one.value.clone(),
+                        one.default.clone(),
+                    ]
+                })
+                .collect(),
+        });
+    }
+    if !run.components.is_empty() {
+        tables.push(components(run));
+    }
+    tables
+}
+
+fn components(run: &Run) -> Table {
+    let sum: f64 = run.components.iter().filter_map(|one| one.time).sum();
+    let rows = run.components.iter().map(|one| {
+        let [time, share] = match one.time {
+            Some(time) => [
+                Cell::Quantity(1e3 * time, Units::same("ms"), 3),
+                Cell::Quantity(100.0 * time / sum.max(1e-300), Units::PERCENT, 2),
+            ],
+            None => [Cell::from(""), Cell::from("")],
+        };
+        vec![
+            one.name.as_str().into(),
+            one.model.as_str().into(),
+            time,
+            share,
+        ]
+    });
+    Table {
+        caption: "Components, and the time that their steps took".into(),
+        columns: columns(["component", "FMU", "time in its steps", "share"]),
+        rows: rows.collect(),
+    }
+}

@@ -1,0 +1,146 @@
+//! The pages in a real browser: `tests/browser/` drives a headless Chromium. Without one the tests say
+//! that they were skipped, unless `SHAKEBENCH_REQUIRE_BROWSER` is set, as `.ci/run` does.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::{shakebench, stderr};
+
+/// Runs a script; none where there is no browser and none is required.
+fn script(name: &str, arguments: &[&str]) -> Option<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/browser");
+    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
+    let output = Command::new(&python)
+        .arg(folder.join(name))
+        .args(arguments)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .unwrap_or_else(|error| panic!("{python}: {error}"));
+    let said = format!(
+        "{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    if output.status.code() == Some(3) && std::env::var_os("SHAKEBENCH_REQUIRE_BROWSER").is_none() {
+        eprintln!("{said}");
+        return None;
+    }
+    assert!(output.status.success(), "{name}:\n{said}");
+    println!("{said}");
+    Some(said)
+}
+
+fn done(folder: &Path, arguments: &[&str], code: i32) {
+    let output = shakebench(folder, arguments);
+    assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
+}
+
+/// A recording of the shared folder's first case with its nominal model, where it is there.
+fn case() -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
+    let shared = std::env::var_os("SHAKEBENCH_SHARED").map_or(beside, PathBuf::from);
+    let cases = std::fs::read_dir(shared.join("hidden-effects/cases"));
+    let mut cases: Vec<PathBuf> = cases.ok()?.flatten().map(|entry| entry.path()).collect();
+    cases.sort();
+    cases
+        .into_iter()
+        .find(|case| case.join("nominal.toml").is_file())
+}
+
+#[test]
+fn pages_are_drawn_whole_and_tell_the_figures_of_their_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let rig = ["--plant", "servohydraulic", "--specimen", "yielding"];
+    let run = |system, rest: &[&str], code| {
+        let all = [&["run", system, "--duration", "9 s"], &rig[..], rest].concat();
+        done(folder, &all, code);
+    };
+    run("mpc", &["--out", "mpc"], 0);
+    let lost = ["--set", "table.supply_loss_time=6 s", "--units", "si"];
+    run(
+        "three-variable",
+        &[&lost[..], &["--out", "lost"]].concat(),
+        1,
+    );
+    done(folder, &["compare-runs", "mpc", "lost", "--out", "runs"], 0);
+    done(folder, &["design", "--out", "design"], 0);
+    let mut pages = ["mpc", "lost", "runs", "design"]
+        .map(|name| folder.join(name).join("report.html"))
+        .to_vec();
+    if let Some(case) = case() {
+        let data = case.join("identification.csv");
+        done(
+            folder,
+            &["identify", &data.to_string_lossy(), "--out", "model.toml"],
+            0,
+        );
+        pages.push(folder.join("model.html"));
+        done(
+            folder,
+            &["diagnose", &case.to_string_lossy(), "--out", "diagnosis"],
+            0,
+        );
+        pages.push(folder.join("diagnosis/report.html"));
+    } else {
+        eprintln!("SKIPPED: the pages of identification and diagnosis, for there is no case");
+    }
+    let pages: Vec<String> = pages
+        .iter()
+        .map(|page| page.display().to_string())
+        .collect();
+    let mut arguments: Vec<&str> = pages.iter().map(String::as_str).collect();
+    // To look at them: SHAKEBENCH_PICTURES=FOLDER.
+    let pictures = std::env::var("SHAKEBENCH_PICTURES").ok();
+    if let Some(pictures) = &pictures {
+        arguments.splice(0..0, ["--pictures", pictures]);
+    }
+    script("pages.py", &arguments);
+    for page in &pages {
+        let bytes = std::fs::metadata(page).unwrap().len();
+        assert!(bytes < 3_000_000, "{page}: {bytes} bytes");
+    }
+}
+
+#[test]
+fn a_run_is_watched_until_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [
+        "run",
+        "three-variable",
+        "--plant",
+        "servohydraulic",
+        "--specimen",
+        "yielding",
+        "--duration",
+        "8 s",
+        "--watch",
+        "--out",
+        "out",
+    ];
+    let mut run = Command::new(env!("CARGO_BIN_EXE_shakebench"))
+        .args(arguments)
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Kept until the end: the program writes there.
+    let mut lines = BufReader::new(run.stderr.take().unwrap()).lines();
+    let url = lines
+        .by_ref()
+        .map_while(Result::ok)
+        .find_map(|line| Some(line.strip_prefix("watch it at ")?.to_string()))
+        .unwrap();
+    assert!(url.starts_with("http://127.0.0.1:"), "{url}");
+    let said = script("live.py", &[&url]);
+    assert!(run.wait().unwrap().success());
+    assert!(folder.path().join("out/report.html").is_file());
+    if let Some(said) = said {
+        assert!(
+            said.contains("'running'") && said.contains("complete"),
+            "{said}"
+        );
+    }
+}
