@@ -20,16 +20,16 @@ use crate::component_library::{ComponentLibrary, Descriptions};
 pub use crate::fmu::FmiVersion;
 pub use annotation::build_of;
 pub use archive::PackedFmu;
+pub(crate) use archive::write_archive;
 pub use error::PackError;
 pub(crate) use error::file_error;
-pub(crate) use archive::write_archive;
 pub use merge::merge;
 use notices::Notices;
 use packing::Form;
 pub use platform::Platform;
 pub use supply::all_fmus;
-pub use variant::{StartValue, write_variant};
 pub(crate) use variant::with_resource;
+pub use variant::{StartValue, write_variant};
 use workspace::{Component, Workspace};
 
 /// Builds every component and packs it as `out/fmi2/NAME.fmu` and `out/fmi3/NAME.fmu`, as far as

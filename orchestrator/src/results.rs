@@ -161,7 +161,8 @@ impl Results {
     /// Files of these names are taken away where this result has none of them, so that they are not
     /// taken for its own.
     pub fn replaces(&mut self, names: &[&str]) {
-        self.replaced.extend(names.iter().map(|name| name.to_string()));
+        self.replaced
+            .extend(names.iter().map(|name| name.to_string()));
     }
 
     /// Whether a file of data would change; pages, pictures and summaries follow the data.
@@ -203,7 +204,11 @@ impl Results {
         // Where folders cannot be locked, nothing waits.
         let lock = File::open(&self.folder);
         let _held = lock.as_ref().map(File::lock);
-        for name in self.replaced.iter().filter(|name| !self.names.contains(name)) {
+        for name in self
+            .replaced
+            .iter()
+            .filter(|name| !self.names.contains(name))
+        {
             // Mostly there is none.
             let _ = fs::remove_file(self.folder.join(name));
         }

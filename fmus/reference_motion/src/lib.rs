@@ -50,9 +50,12 @@ fn histories(
 ) -> Vec<Variable<ReferenceMotion>> {
     let mut all = vec![Variable::output(name, now).about(&format!("Wanted {name}"))];
     let elements = Variable::array(name, Causality::Output, AHEAD, ahead);
-    all.extend(elements.into_iter().enumerate().map(|(i, element)| {
-        element.about(&format!("Wanted {name} {} samples ahead", i + 1))
-    }));
+    all.extend(
+        elements
+            .into_iter()
+            .enumerate()
+            .map(|(i, element)| element.about(&format!("Wanted {name} {} samples ahead", i + 1))),
+    );
     all.into_iter()
         .map(|variable| variable.unit(unit).shown_in(shown).nominal(nominal))
         .collect()

@@ -35,7 +35,10 @@ impl Motion {
         let lines = text.lines().enumerate().skip(1);
         for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
             let fault = || format!("line {}: `{line}`, expected four numbers", number + 1);
-            let cells: Option<Vec<f64>> = line.split(',').map(|cell| cell.trim().parse().ok()).collect();
+            let cells: Option<Vec<f64>> = line
+                .split(',')
+                .map(|cell| cell.trim().parse().ok())
+                .collect();
             match cells.as_deref() {
                 Some(&[time, x, v, a]) if [time, x, v, a].iter().all(|value| value.is_finite()) => {
                     times.push(time);
@@ -56,9 +59,8 @@ impl Motion {
             .into_iter()
             .find(|step| (step / mean - 1.0).abs() < 1e-12)
             .unwrap_or(mean);
-        let even = |(k, time): (usize, &f64)| {
-            (time - first - k as f64 * mean).abs() <= 1e-6 * mean.abs()
-        };
+        let even =
+            |(k, time): (usize, &f64)| (time - first - k as f64 * mean).abs() <= 1e-6 * mean.abs();
         if mean <= 0.0 || !times.iter().enumerate().all(even) {
             return Err("the times are not evenly spaced".to_string());
         }
@@ -90,7 +92,11 @@ impl Motion {
         let rate = TAU * frequency;
         let (sin, cos) = (rate * sample as f64 * self.sample_time).sin_cos();
         let half = 0.5 * amplitude;
-        [half * (1.0 - cos), half * rate * sin, half * rate * rate * cos]
+        [
+            half * (1.0 - cos),
+            half * rate * sin,
+            half * rate * rate * cos,
+        ]
     }
 }
 

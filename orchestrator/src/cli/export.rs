@@ -82,7 +82,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             ("--specimen", arguments.rig.specimen.is_some()),
         ];
         for (option, _) in given.into_iter().filter(|(_, given)| *given) {
-            let reason = format!("{} is a file and has its own; edit it instead", arguments.system);
+            let reason = format!(
+                "{} is a file and has its own; edit it instead",
+                arguments.system
+            );
             return Err(Error::Option { option, reason });
         }
     }
@@ -100,7 +103,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ..Request::built_in(&arguments.system)
     };
     let prepared = prepare(&request)?;
-    let parent = arguments.ssp.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let parent = arguments
+        .ssp
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty());
     Results::check(parent.unwrap_or(Path::new(".")))?;
     if let Some(parent) = parent {
         std::fs::create_dir_all(parent).map_err(|error| Error::File {

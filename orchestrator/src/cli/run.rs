@@ -260,7 +260,10 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
 
 /// The figures as a table for people.
 fn table(summary: &Summary, motion: &Motion) -> String {
-    let mut text = format!("{} on {}\n", summary.system, summary.motion.name);
+    let mut text = match motion.is_empty() {
+        true => format!("{}\n", summary.system),
+        false => format!("{} on {}\n", summary.system, summary.motion.name),
+    };
     for note in &motion.notes {
         text += &format!("  {note}\n");
     }

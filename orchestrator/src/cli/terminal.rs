@@ -19,7 +19,9 @@ pub(super) fn out(text: Arguments, end: &str) {
         && error.kind() != ErrorKind::BrokenPipe
         && !FAILED.swap(true, Ordering::Relaxed)
     {
-        err(format_args!("error: standard output cannot be written: {error}"));
+        err(format_args!(
+            "error: standard output cannot be written: {error}"
+        ));
     }
 }
 

@@ -45,7 +45,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let version = version.map_or(String::new(), |version| format!(", FMI {version}"));
         println!("{} ({}{version})\n", found.file, found.kind.to_uppercase());
         for finding in &found.findings {
-            println!("{}: {}: {}", finding.severity, finding.place, finding.message);
+            println!(
+                "{}: {}: {}",
+                finding.severity, finding.place, finding.message
+            );
         }
         if !found.findings.is_empty() {
             println!();

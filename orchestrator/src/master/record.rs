@@ -47,7 +47,8 @@ impl Record {
         exact: &[Datum],
     ) {
         self.push(time, signals, exact);
-        self.values.extend(again.iter().map(|&signal| signals[signal]));
+        self.values
+            .extend(again.iter().map(|&signal| signals[signal]));
     }
 
     /// The values of a row that numbers do not hold, in the order of `exact_columns`.

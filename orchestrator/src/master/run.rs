@@ -184,7 +184,12 @@ impl Simulation {
     /// What was computed is returned however the run ends.
     pub fn run(mut self, samples: usize, pace: Pace, progress: &mut dyn FnMut(usize)) -> Outcome {
         let rows = samples.div_ceil(self.keep_every);
-        let names: Vec<String> = self.names.iter().chain(&self.alias_names).cloned().collect();
+        let names: Vec<String> = self
+            .names
+            .iter()
+            .chain(&self.alias_names)
+            .cloned()
+            .collect();
         let mut record = Record::with_capacity(&names, rows).beside(&self.exact_names);
         self.clock = (pace == Pace::RealTime).then(|| Clock::new(self.step));
         let begin = Instant::now();
@@ -235,7 +240,10 @@ impl Simulation {
             if let Some(clock) = &mut self.clock {
                 clock.wait(self.tick);
             }
-            if self.interrupt.is_some_and(|asked| asked.load(Ordering::Relaxed)) {
+            if self
+                .interrupt
+                .is_some_and(|asked| asked.load(Ordering::Relaxed))
+            {
                 return Ok(Ended::Interrupted { time: self.time() });
             }
             self.observe()?;

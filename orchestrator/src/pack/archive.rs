@@ -151,11 +151,7 @@ pub(super) fn archive_bytes(entries: &Entries) -> io::Result<Vec<u8>> {
     Ok(write_to(Cursor::new(Vec::new()), entries, String::new())?.into_inner())
 }
 
-fn write_to<W: Write + Seek>(
-    writer: W,
-    entries: &Entries,
-    stamp: String,
-) -> io::Result<W> {
+fn write_to<W: Write + Seek>(writer: W, entries: &Entries, stamp: String) -> io::Result<W> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default());

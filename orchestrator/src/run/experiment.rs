@@ -143,7 +143,10 @@ impl Prepared {
             return;
         };
         let peak = self.motion.peak_displacement();
-        let errors = table.iter().zip(&asked).map(|(x, wanted)| (x - wanted).abs());
+        let errors = table
+            .iter()
+            .zip(&asked)
+            .map(|(x, wanted)| (x - wanted).abs());
         let errors: Vec<f64> = errors.collect();
         let first = errors.iter().position(|error| *error > LOST * peak);
         let Some(first) = first.filter(|_| peak > 0.0 && outcome.ended.is_regular()) else {
@@ -207,7 +210,9 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
         }
         let count = (duration / motion.dt).round();
         if count > MOST_SAMPLES {
-            return Err(fault(format!("{duration} s are {count:e} samples, too many")));
+            return Err(fault(format!(
+                "{duration} s are {count:e} samples, too many"
+            )));
         }
         samples = count as usize;
         if motion.is_empty() {
@@ -280,7 +285,15 @@ fn drive(file: &mut SystemFile, path: &Path) -> Result<(), Error> {
         option: "--input",
         reason,
     };
-    let name = path.display().to_string();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let is_taken = |name: &str| {
+        let own = file.own_tables.iter().any(|table| table.name == name);
+        own || file.components.contains_key(name) || file.tables.contains_key(name)
+    };
+    let mut name = stem.replace('.', "_");
+    while is_taken(&name) || name == "reference" {
+        name += "_";
+    }
     let table = InputTable::read(&name, path, Between::Linear).map_err(fault)?;
     let single = match file.components.len() {
         1 => file.components.keys().next().cloned(),
@@ -307,8 +320,9 @@ fn drive(file: &mut SystemFile, path: &Path) -> Result<(), Error> {
         if targets.is_empty() {
             let known = file.open_inputs.iter().map(|(input, _)| input.as_str());
             return Err(fault(format!(
-                "{name}: the column `{column}` is no input of the system{}; expected \
+                "{}: the column `{column}` is no input of the system{}; expected \
                  `component.input`",
+                path.display(),
                 hint(column, known)
             )));
         }

@@ -108,11 +108,7 @@ impl Summary {
     }
 
     /// Measures a run.
-    pub fn new(
-        prepared: &Prepared,
-        outcome: &Outcome,
-        manifest: &Manifest,
-    ) -> Self {
+    pub fn new(prepared: &Prepared, outcome: &Outcome, manifest: &Manifest) -> Self {
         let Prepared { system, motion, .. } = prepared;
         let mut warnings: Vec<String> = outcome
             .messages

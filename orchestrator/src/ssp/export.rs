@@ -39,11 +39,7 @@ pub struct Experiment<'a> {
 ///
 /// # Errors
 /// What the format does not hold, an FMU that cannot be read, a file that cannot be written.
-pub fn write(
-    system: &System,
-    experiment: &Experiment,
-    path: &Path,
-) -> Result<Vec<String>, Error> {
+pub fn write(system: &System, experiment: &Experiment, path: &Path) -> Result<Vec<String>, Error> {
     let mut writer = Writer {
         system,
         units: BTreeMap::new(),
@@ -143,7 +139,11 @@ impl<'a> Writer<'a> {
             escape(&self.system.description),
             env!("CARGO_PKG_VERSION"),
         );
-        let _ = writeln!(text, "  <ssd:System name=\"{}\">", escape(&self.system.name));
+        let _ = writeln!(
+            text,
+            "  <ssd:System name=\"{}\">",
+            escape(&self.system.name)
+        );
         if !tables.is_empty() {
             text += "    <ssd:Connectors>\n";
             for name in &tables {
@@ -321,7 +321,9 @@ impl<'a> Writer<'a> {
     }
 
     fn connector_type(&mut self, connector: &Connector) -> String {
-        let kind = connector.variable.map_or(&Kind::Float64, |variable| &variable.kind);
+        let kind = connector
+            .variable
+            .map_or(&Kind::Float64, |variable| &variable.kind);
         let unit = match (connector.variable, connector.unit) {
             (_, Some((name, base))) => Some((name.to_string(), base)),
             (Some(variable), _) => variable.unit.clone().zip(variable.base_unit),
@@ -452,8 +454,7 @@ impl<'a> Writer<'a> {
         let part = &self.system.components[connection.component];
         let size = part.fmu.description.variables[first].element.1;
         let all = self.system.connections.iter().filter(|other| {
-            other.component == connection.component
-                && (first..first + size).contains(&other.input)
+            other.component == connection.component && (first..first + size).contains(&other.input)
         });
         let mut count = 0;
         let mut alike = true;
@@ -524,7 +525,11 @@ impl<'a> Writer<'a> {
         if !self.units.is_empty() {
             text += "  <ssd:Units>\n";
             for (name, base) in &self.units {
-                let _ = write!(text, "    <ssc:Unit name=\"{}\"><ssc:BaseUnit", escape(name));
+                let _ = write!(
+                    text,
+                    "    <ssc:Unit name=\"{}\"><ssc:BaseUnit",
+                    escape(name)
+                );
                 let names = ["kg", "m", "s", "A", "K", "mol", "cd"];
                 for (name, exponent) in names.iter().zip(base.exponents) {
                     if exponent != 0 {

@@ -30,7 +30,9 @@ pub fn read(name: &str) -> Result<SystemFile, SspError> {
     let is_open = path
         .extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("ssd"));
-    let own = path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let own = path
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned());
     let file = match (is_open, own) {
         (true, Some(own)) => own,
         _ => variant.unwrap_or(STRUCTURE).to_string(),
@@ -187,7 +189,9 @@ impl Flat<'_> {
             return Err(wrong(format!("more than {MOST_COMPONENTS} components")));
         }
         let Some(source) = &component.source else {
-            return Err(wrong("it has no source, so there is nothing to run".to_string()));
+            return Err(wrong(
+                "it has no source, so there is nothing to run".to_string(),
+            ));
         };
         let (uri, part) = split(source);
         let base = place.file.rsplit_once('/').map_or("", |(folder, _)| folder);
@@ -199,7 +203,8 @@ impl Flat<'_> {
             .collect();
         if let Some(id) = part.filter(|_| uri.is_empty()) {
             let found = structure.system.with_id(id);
-            let system = found.ok_or_else(|| wrong(format!("there is no system with the id `{id}`")))?;
+            let system =
+                found.ok_or_else(|| wrong(format!("there is no system with the id `{id}`")))?;
             return self.system(structure, &system.clone(), place, &bindings);
         }
         let file = resolve(base, uri).map_err(wrong)?;
@@ -283,8 +288,9 @@ impl Flat<'_> {
                 Some(system) => targets(system, &place.path, &name),
             };
             if ports.is_empty() {
-                self.notes
-                    .push(format!("no element has the parameter `{name}`: it is passed over"));
+                self.notes.push(format!(
+                    "no element has the parameter `{name}`: it is passed over"
+                ));
             }
             for port in ports {
                 self.values.push((port, value.clone()));
@@ -326,9 +332,9 @@ impl Flat<'_> {
         let wrong = |package: &Package, reason: String| at(package, file, Fault::new(reason));
         let mut out = SystemFile::new(&structure.name);
         if out.name.is_empty() {
-            out.name = path.file_stem().map_or_else(String::new, |stem| {
-                stem.to_string_lossy().into_owned()
-            });
+            out.name = path
+                .file_stem()
+                .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         }
         out.description = structure.description;
         out.is_lenient = true;
@@ -356,9 +362,9 @@ impl Flat<'_> {
         for feed in &root_inputs.feeds {
             let held = feed.along.iter().find_map(|(port, hops)| {
                 let value = assigned.get(port)?;
-                let value = hops
-                    .iter()
-                    .fold(value.clone(), |value, hop| super::parameters::along(&value, hop));
+                let value = hops.iter().fold(value.clone(), |value, hop| {
+                    super::parameters::along(&value, hop)
+                });
                 Some(value)
             });
             if let Some(value) = held {
@@ -443,9 +449,13 @@ impl Flat<'_> {
                 _ => None,
             })
             .collect();
-        let from_it = |link: &&Link| matches!(&link.from, Origin::Output(name) if name.component == MOTION);
+        let from_it =
+            |link: &&Link| matches!(&link.from, Origin::Output(name) if name.component == MOTION);
         let all = out.connections.iter().filter(from_it).count();
-        let into_it = out.connections.iter().any(|link| link.to.component == MOTION);
+        let into_it = out
+            .connections
+            .iter()
+            .any(|link| link.to.component == MOTION);
         if let (true, Ok(table), false) = (is_ours && wired.len() == all, table, into_it) {
             let lines = table.split_once('\n').map_or("", |(_, lines)| lines);
             let head = "time [s],displacement [m],velocity [m/s],acceleration [m/s2]";

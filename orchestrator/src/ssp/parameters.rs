@@ -30,7 +30,9 @@ pub(super) struct Mapping {
 /// A unit without a name, or numbers that cannot be read.
 pub(super) fn units(root: Node) -> Result<Units, Fault> {
     let mut units = Units::new();
-    let all = child(root, "Units").into_iter().flat_map(|all| children(all, "Unit"));
+    let all = child(root, "Units")
+        .into_iter()
+        .flat_map(|all| children(all, "Unit"));
     for unit in all {
         let name = required(unit, "name")?;
         let Some(base) = child(unit, "BaseUnit") else {
@@ -40,9 +42,10 @@ pub(super) fn units(root: Node) -> Result<Units, Fault> {
         let names = ["kg", "m", "s", "A", "K", "mol", "cd"];
         for (exponent, name) in exponents.iter_mut().zip(names) {
             if let Some(text) = base.attribute(name) {
-                *exponent = text.trim().parse().map_err(|_| {
-                    fault(base, format!("{name}=\"{text}\" is no whole number"))
-                })?;
+                *exponent = text
+                    .trim()
+                    .parse()
+                    .map_err(|_| fault(base, format!("{name}=\"{text}\" is no whole number")))?;
             }
         }
         let base_unit = BaseUnit {
@@ -101,7 +104,10 @@ fn value(parameter: Node, units: &Units) -> Result<Setting, Fault> {
         node.is_element() && !other.contains(&node.tag_name().name())
     });
     let Some(typed) = typed else {
-        return Err(fault(parameter, format!("the parameter `{name}` has no value")));
+        return Err(fault(
+            parameter,
+            format!("the parameter `{name}` has no value"),
+        ));
     };
     let kind = typed.tag_name().name();
     let is_array = child(parameter, "Dimension").is_some();
@@ -137,7 +143,12 @@ fn value(parameter: Node, units: &Units) -> Result<Setting, Fault> {
                 Setting::Boolean(truth)
             }
             "String" | "Enumeration" | "Binary" => Setting::Text((*text).to_string()),
-            kind => return Err(fault(typed, format!("`{name}` has the unknown type <{kind}>"))),
+            kind => {
+                return Err(fault(
+                    typed,
+                    format!("`{name}` has the unknown type <{kind}>"),
+                ));
+            }
         };
         Ok(Setting::Declared(Box::new(Declared {
             value,
@@ -230,9 +241,9 @@ pub(super) fn along(value: &Setting, hop: &Hop) -> Setting {
 /// # Errors
 /// Values that cannot be read.
 pub(super) fn transformation(node: Node) -> Result<Transformation, Fault> {
-    let found = node.children().find(|child| {
-        child.is_element() && child.tag_name().name().ends_with("Transformation")
-    });
+    let found = node
+        .children()
+        .find(|child| child.is_element() && child.tag_name().name().ends_with("Transformation"));
     let Some(found) = found else {
         return Ok(Transformation::None);
     };
@@ -246,7 +257,10 @@ pub(super) fn transformation(node: Node) -> Result<Transformation, Fault> {
             let value = |entry: Node, name: &str| -> Result<f64, Fault> {
                 let text = required(entry, name)?;
                 let truth = xml::truth(text).ok_or_else(|| {
-                    fault(entry, format!("{name}=\"{text}\" is neither true nor false"))
+                    fault(
+                        entry,
+                        format!("{name}=\"{text}\" is neither true nor false"),
+                    )
                 })?;
                 Ok(f64::from(u8::from(truth)))
             };
@@ -255,9 +269,10 @@ pub(super) fn transformation(node: Node) -> Result<Transformation, Fault> {
         "IntegerMappingTransformation" => {
             let value = |entry: Node, name: &str| -> Result<f64, Fault> {
                 let text = required(entry, name)?;
-                let whole: i64 = text.trim().parse().map_err(|_| {
-                    fault(entry, format!("{name}=\"{text}\" is no whole number"))
-                })?;
+                let whole: i64 = text
+                    .trim()
+                    .parse()
+                    .map_err(|_| fault(entry, format!("{name}=\"{text}\" is no whole number")))?;
                 Ok(whole as f64)
             };
             Transformation::Numbers(pairs(entries, value)?)
@@ -291,7 +306,10 @@ pub(super) fn expect(node: Node, name: &str) -> Result<(), Fault> {
     if found == name {
         return Ok(());
     }
-    Err(fault(node, format!("the element is <{found}>, expected <{name}>")))
+    Err(fault(
+        node,
+        format!("the element is <{found}>, expected <{name}>"),
+    ))
 }
 
 /// Whether the version is 1 or 2.
@@ -303,5 +321,8 @@ pub(super) fn version<'a>(node: Node<'a, '_>) -> Result<&'a str, Fault> {
     if version.starts_with("1.") || version.starts_with("2.") {
         return Ok(version);
     }
-    Err(fault(node, format!("the version is \"{version}\", expected \"1.0\" or \"2.0\"")))
+    Err(fault(
+        node,
+        format!("the version is \"{version}\", expected \"1.0\" or \"2.0\""),
+    ))
 }

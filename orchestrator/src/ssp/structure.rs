@@ -178,8 +178,14 @@ pub(super) fn read(text: &str) -> Result<Structure, Fault> {
     Ok(Structure {
         name: required(root, "name")?.to_string(),
         version,
-        description: root.attribute("description").unwrap_or_default().to_string(),
-        tool: root.attribute("generationTool").unwrap_or_default().to_string(),
+        description: root
+            .attribute("description")
+            .unwrap_or_default()
+            .to_string(),
+        tool: root
+            .attribute("generationTool")
+            .unwrap_or_default()
+            .to_string(),
         system: system_read,
         experiment,
         own: own(root)?,
@@ -280,7 +286,9 @@ fn name(node: Node) -> Result<String, Fault> {
 fn component(node: Node, units: &Units) -> Result<Component, Fault> {
     let own = annotation(node);
     let period = own.filter(|own| own.attribute("period").is_some());
-    let period = period.map(|own| xml::number(own, "period", 0.0)).transpose()?;
+    let period = period
+        .map(|own| xml::number(own, "period", 0.0))
+        .transpose()?;
     Ok(Component {
         name: name(node)?,
         line: xml::line(node),
@@ -291,7 +299,10 @@ fn component(node: Node, units: &Units) -> Result<Component, Fault> {
             .unwrap_or("application/x-fmu-sharedlibrary")
             .to_string(),
         source: node.attribute("source").map(str::to_string),
-        implementation: node.attribute("implementation").unwrap_or("any").to_string(),
+        implementation: node
+            .attribute("implementation")
+            .unwrap_or("any")
+            .to_string(),
         period: period.filter(|period| *period > 0.0),
     })
 }
@@ -313,9 +324,14 @@ fn connectors(node: Node, units: &Units) -> Result<Vec<Connector>, Fault> {
             }
         };
         if connectors.iter().any(|known| known.name == name) {
-            return Err(fault(connector, format!("two connectors are called `{name}`")));
+            return Err(fault(
+                connector,
+                format!("two connectors are called `{name}`"),
+            ));
         }
-        let typed = connector.children().find(|child| child.has_attribute("unit"));
+        let typed = connector
+            .children()
+            .find(|child| child.has_attribute("unit"));
         let declared = typed.and_then(|typed| typed.attribute("unit"));
         connectors.push(Connector {
             name: name.to_string(),
@@ -338,8 +354,14 @@ fn connection(node: Node) -> Result<Connection, Fault> {
     let element = |name: &str| node.attribute(name).map(str::to_string);
     Ok(Connection {
         line: xml::line(node),
-        start: (element("startElement"), required(node, "startConnector")?.to_string()),
-        end: (element("endElement"), required(node, "endConnector")?.to_string()),
+        start: (
+            element("startElement"),
+            required(node, "startConnector")?.to_string(),
+        ),
+        end: (
+            element("endElement"),
+            required(node, "endConnector")?.to_string(),
+        ),
         suppresses_units: xml::flag(node, "suppressUnitConversion")?,
         transformation: transformation(node)?,
     })
@@ -368,7 +390,10 @@ fn bindings(node: Node) -> Result<Vec<Binding>, Fault> {
                 Values::Inline(read_set(set, "")?)
             }
             (None, None) => {
-                return Err(fault(binding, "it has neither a source nor <ParameterValues>"));
+                return Err(fault(
+                    binding,
+                    "it has neither a source nor <ParameterValues>",
+                ));
             }
         };
         let mapping = child(binding, "ParameterMapping").map(|mapping| {

@@ -91,10 +91,16 @@ impl Wiring {
         };
         let forwards = match (start.gives, end.gives) {
             (Some(true), Some(true)) => {
-                return Err(format!("`{}` and `{}` both give values", start.label, end.label));
+                return Err(format!(
+                    "`{}` and `{}` both give values",
+                    start.label, end.label
+                ));
             }
             (Some(false), Some(false)) => {
-                return Err(format!("`{}` and `{}` both take values", start.label, end.label));
+                return Err(format!(
+                    "`{}` and `{}` both take values",
+                    start.label, end.label
+                ));
             }
             (Some(true), _) | (_, Some(false)) => true,
             (Some(false), _) | (_, Some(true)) => false,
@@ -195,7 +201,10 @@ impl Wiring {
         let mut wires = Wires::default();
         let mut driven: Vec<&Port> = self.drivers.keys().collect();
         driven.sort();
-        for to in driven.into_iter().filter(|port| components.contains(&port.0)) {
+        for to in driven
+            .into_iter()
+            .filter(|port| components.contains(&port.0))
+        {
             let mut hops: Vec<Hop> = Vec::new();
             let mut along: Vec<(Port, Vec<Hop>)> = Vec::new();
             let mut port = to;

@@ -98,14 +98,18 @@ pub(super) fn required<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, Fa
 pub(super) fn number(node: Node, name: &str, usual: f64) -> Result<f64, Fault> {
     match node.attribute(name) {
         None => Ok(usual),
-        Some(text) => real(text)
-            .ok_or_else(|| fault(node, format!("{name}=\"{text}\" is no finite number"))),
+        Some(text) => {
+            real(text).ok_or_else(|| fault(node, format!("{name}=\"{text}\" is no finite number")))
+        }
     }
 }
 
 /// A finite number.
 pub(super) fn real(text: &str) -> Option<f64> {
-    text.trim().parse().ok().filter(|value: &f64| value.is_finite())
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|value: &f64| value.is_finite())
 }
 
 /// A truth value.

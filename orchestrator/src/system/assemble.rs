@@ -324,9 +324,8 @@ fn component(
 ) -> Result<Component, SystemError> {
     let at = |place: &str, reason| file.fault(&format!("components.{name}{place}"), reason);
     let fmu = resized(fmu, name, part, settings).map_err(|reason| at("", reason))?;
-    let fmu = with_units(fmu, part).map_err(|(variable, reason)| {
-        at(&format!(".units.{variable}"), reason)
-    })?;
+    let fmu = with_units(fmu, part)
+        .map_err(|(variable, reason)| at(&format!(".units.{variable}"), reason))?;
     let description = &fmu.description;
     let mut parameters = Vec::new();
     if let Some(model) = &part.model {
@@ -336,8 +335,8 @@ fn component(
     let mut inputs = Vec::new();
     for (variable, written) in &part.parameters {
         let place = format!(".parameters.{variable}");
-        let is_known = description.position(variable).is_some()
-            || description.array(variable).is_some();
+        let is_known =
+            description.position(variable).is_some() || description.array(variable).is_some();
         if file.is_lenient && !is_known {
             let known = description
                 .of(Causality::Parameter)
@@ -380,7 +379,10 @@ fn component(
         let place = format!(".aliases.{alias}");
         let found = find(&fmu, variable, Causality::Output);
         let found = found.map_err(|reason| at(&place, reason))?;
-        if description.position(alias).is_some_and(|known| known != found) {
+        if description
+            .position(alias)
+            .is_some_and(|known| known != found)
+        {
             let reason = format!("`{alias}` is a variable of it");
             return Err(at(&place, reason));
         }

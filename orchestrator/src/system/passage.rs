@@ -174,7 +174,9 @@ impl Passage {
                     ));
                 }
                 if !(factor.is_finite() && offset.is_finite()) {
-                    return Err(format!("factor {factor} and offset {offset} are not finite"));
+                    return Err(format!(
+                        "factor {factor} and offset {offset} are not finite"
+                    ));
                 }
                 self.then(*factor, *offset);
                 return Ok(());

@@ -84,14 +84,18 @@ impl InputTable {
                 continue;
             }
             if column.is_empty() || table.columns.iter().any(|known| known == column) {
-                let reason = format!("column {}: the name `{column}` is empty or taken", place + 1);
+                let reason = format!(
+                    "column {}: the name `{column}` is empty or taken",
+                    place + 1
+                );
                 return Err(fault(sheet.header_line(), reason));
             }
             table.columns.push(column.to_string());
             table.units.push(unit);
             table.values.push(values);
         }
-        if let Some(row) = (1..table.times.len()).find(|&row| table.times[row] < table.times[row - 1])
+        if let Some(row) =
+            (1..table.times.len()).find(|&row| table.times[row] < table.times[row - 1])
         {
             let (now, before) = (table.times[row], table.times[row - 1]);
             let reason = format!("the time falls from {before} s to {now} s");
@@ -120,13 +124,13 @@ impl InputTable {
     /// then on. `row` is where the last look-up ended and is kept.
     pub fn at(&self, column: usize, time: f64, row: &mut usize) -> f64 {
         let values = &self.values[column];
-        // Times of ticks are rounded.
-        let time = time + 1e-9 * time.abs().max(1e-3);
+        // Times of ticks are rounded: a row counts as reached a little before its time.
+        let reached = time + 1e-9 * time.abs().max(1e-3);
         let times = &self.times;
-        if *row >= times.len() || times[*row] > time {
+        if *row >= times.len() || times[*row] > reached {
             *row = 0;
         }
-        while *row + 1 < times.len() && times[*row + 1] <= time {
+        while *row + 1 < times.len() && times[*row + 1] <= reached {
             *row += 1;
         }
         let (Some(&here), Some(&value)) = (times.get(*row), values.get(*row)) else {
@@ -136,8 +140,7 @@ impl InputTable {
         match (self.between, next) {
             (Between::Linear, Some((&there, &other))) if time > here && there > here => {
                 let share = ((time - here) / (there - here)).clamp(0.0, 1.0);
-                // On a row, its value to the bit.
-                if share < 1e-6 { value } else { value + share * (other - value) }
+                value + share * (other - value)
             }
             _ => value,
         }

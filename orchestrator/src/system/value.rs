@@ -243,9 +243,7 @@ fn read_declared(variable: &Variable, declared: &Declared) -> Result<Value, Stri
             Value::Number(number) => Ok(Value::Number(passage.of(number))),
             other => Ok(other),
         },
-        Setting::List(_) | Setting::Declared(_) => {
-            Err(format!("`{value}` is no single value"))
-        }
+        Setting::List(_) | Setting::Declared(_) => Err(format!("`{value}` is no single value")),
     }
 }
 

@@ -39,10 +39,16 @@ pub(super) fn check(findings: &mut Findings, path: &Path) -> Option<String> {
         };
         let name = String::from_utf8_lossy(entry.name_raw()).into_owned();
         if !name.is_ascii() {
-            findings.warning("archive", format!("the name `{name}` has letters beyond ASCII"));
+            findings.warning(
+                "archive",
+                format!("the name `{name}` has letters beyond ASCII"),
+            );
         }
         if name.contains('\\') {
-            findings.error("archive", format!("`{name}` has a backslash where `/` belongs"));
+            findings.error(
+                "archive",
+                format!("`{name}` has a backslash where `/` belongs"),
+            );
         }
         if entry.is_symlink() {
             findings.error("archive", format!("`{name}` is a symbolic link"));
@@ -111,27 +117,47 @@ fn folders(findings: &mut Findings, names: &[String]) {
     strange.sort_unstable();
     strange.dedup();
     for name in strange {
-        findings.note("archive", format!("`{name}` at the top is not of the standard"));
+        findings.note(
+            "archive",
+            format!("`{name}` at the top is not of the standard"),
+        );
     }
-    let has = |front: &str| names.iter().any(|name| name.starts_with(front) && name.len() > front.len());
+    let has = |front: &str| {
+        names
+            .iter()
+            .any(|name| name.starts_with(front) && name.len() > front.len())
+    };
     if !has("binaries/") && !has("sources/") {
         findings.error("archive", "there are neither binaries nor sources");
     } else if !has("binaries/") {
-        findings.warning("archive", "there are sources only: importers have to compile them");
+        findings.warning(
+            "archive",
+            "there are sources only: importers have to compile them",
+        );
     }
     if !has("documentation/") {
         findings.note("archive", "there is no documentation");
-    } else if !names.iter().any(|name| {
-        name == "documentation/index.html" || name == "documentation/_main.html"
-    }) {
-        findings.warning("archive", "documentation/index.html, where one begins to read, is missing");
+    } else if !names
+        .iter()
+        .any(|name| name == "documentation/index.html" || name == "documentation/_main.html")
+    {
+        findings.warning(
+            "archive",
+            "documentation/index.html, where one begins to read, is missing",
+        );
     }
 }
 
 fn licences(findings: &mut Findings, names: &[String]) {
-    let folders = ["documentation/licenses/", "licenses/", "documentation/license"];
+    let folders = [
+        "documentation/licenses/",
+        "licenses/",
+        "documentation/license",
+    ];
     let is_licence = |name: &String| {
-        folders.iter().any(|folder| name.starts_with(folder) && name.len() > folder.len())
+        folders
+            .iter()
+            .any(|folder| name.starts_with(folder) && name.len() > folder.len())
     };
     if !names.iter().any(is_licence) {
         findings.note("archive", "no licence lies in documentation/licenses");
@@ -139,6 +165,9 @@ fn licences(findings: &mut Findings, names: &[String]) {
     let main = ["txt", "html", "spdx"].map(|end| format!("documentation/licenses/license.{end}"));
     let has_folder = names.iter().any(|name| name.starts_with(folders[0]));
     if has_folder && !names.iter().any(|name| main.contains(name)) {
-        findings.note("archive", "documentation/licenses has no license.txt, .html or .spdx");
+        findings.note(
+            "archive",
+            "documentation/licenses has no license.txt, .html or .spdx",
+        );
     }
 }

@@ -144,12 +144,14 @@ fn read(findings: &mut Findings, instance: &mut Instance) -> Result<Vec<Datum>, 
             }
             findings.error("library", message);
         }
-        if let (Kind::Enumeration(items), Some(Datum::Number(value))) =
-            (&variable.kind, row.last())
+        if let (Kind::Enumeration(items), Some(Datum::Number(value))) = (&variable.kind, row.last())
             && !items.is_empty()
             && !items.iter().any(|item| item.value as f64 == *value)
         {
-            let message = format!("`{}` is {value}, which is none of its choices", variable.name);
+            let message = format!(
+                "`{}` is {value}, which is none of its choices",
+                variable.name
+            );
             findings.warning("library", message);
         }
     }
@@ -189,8 +191,10 @@ fn two_at_once(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options, alone
     match both() {
         Err(reason) => findings.error(
             "library",
-            format!("two instances in one process: {reason}; canBeInstantiatedOnlyOncePerProcess \
-                     is not set"),
+            format!(
+                "two instances in one process: {reason}; canBeInstantiatedOnlyOncePerProcess \
+                     is not set"
+            ),
         ),
         Ok(rows) if rows.iter().any(|rows| rows != alone) => findings.error(
             "library",
@@ -203,7 +207,10 @@ fn two_at_once(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options, alone
 /// Going on from a saved state gives the same again.
 fn from_a_state(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) {
     if !fmu.description.saves_state {
-        findings.note("library", "it cannot save its state, so its steps cannot be repeated");
+        findings.note(
+            "library",
+            "it cannot save its state, so its steps cannot be repeated",
+        );
         return;
     }
     let tried = || -> Result<bool, String> {
@@ -237,7 +244,9 @@ fn from_a_state(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) {
         Ok(rows[0] == rows[1])
     };
     match tried() {
-        Ok(true) => findings.check("library: steps repeated from a saved state, the same to the bit"),
+        Ok(true) => {
+            findings.check("library: steps repeated from a saved state, the same to the bit")
+        }
         Ok(false) => findings.error("library", "steps from a saved state give other values"),
         Err(reason) => findings.error("library", format!("a state saved and restored: {reason}")),
     }
@@ -258,16 +267,26 @@ fn out_of_order(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) {
     let uninitialized = |instance: &mut Instance| instance.exit_initialization();
     let backwards = |instance: &mut Instance| instance.do_step(0.0, -step).map(|_| ());
     let elsewhere = |instance: &mut Instance| instance.do_step(1e6 * step, step).map(|_| ());
-    let stranger = |instance: &mut Instance| {
-        instance.get(&Kind::Float64, &[unknown], &mut [0.0])
-    };
+    let stranger = |instance: &mut Instance| instance.get(&Kind::Float64, &[unknown], &mut [0.0]);
     let not_a_number = |instance: &mut Instance| instance.do_step(f64::NAN, step).map(|_| ());
     let tries: [(&str, bool, Step); 6] = [
         ("doStep before initialization", false, &early),
-        ("ExitInitializationMode without entering it", false, &uninitialized),
+        (
+            "ExitInitializationMode without entering it",
+            false,
+            &uninitialized,
+        ),
         ("doStep by a negative step", true, &backwards),
-        ("doStep from a time that it has not reached", true, &elsewhere),
-        ("reading a value reference that is not there", true, &stranger),
+        (
+            "doStep from a time that it has not reached",
+            true,
+            &elsewhere,
+        ),
+        (
+            "reading a value reference that is not there",
+            true,
+            &stranger,
+        ),
         ("doStep from a time that is no number", true, &not_a_number),
     ];
     for (what, is_ready, forbidden) in tries {

@@ -149,7 +149,10 @@ fn fmu(findings: &mut Findings, path: &Path) {
         findings.warning(DESCRIPTION, remark.clone());
     }
     if fmu.description.interface == Interface::ScheduledExecution {
-        findings.note(DESCRIPTION, "scheduled execution only: its library is not called");
+        findings.note(
+            DESCRIPTION,
+            "scheduled execution only: its library is not called",
+        );
         return;
     }
     calls::check(findings, &fmu);

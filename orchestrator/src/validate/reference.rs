@@ -20,7 +20,10 @@ const LARGEST: u64 = 64 << 20;
 /// Compares the results that the archive holds, if it holds some.
 pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path) {
     let Some((name, text)) = table(path) else {
-        findings.note("archive", "there is no reference result to compare a run with");
+        findings.note(
+            "archive",
+            "there is no reference result to compare a run with",
+        );
         return;
     };
     let mut lines = text.lines().filter(|line| !line.trim().is_empty());
@@ -38,13 +41,16 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path) {
         .map(|line| line.split(',').map(clean).collect())
         .collect();
     let time = |row: &Vec<String>| row.first().and_then(|cell| cell.parse::<f64>().ok());
-    let (Some(first), Some(last)) = (rows.first().and_then(time), rows.last().and_then(time)) else {
+    let (Some(first), Some(last)) = (rows.first().and_then(time), rows.last().and_then(time))
+    else {
         findings.warning(&name, "the times cannot be read");
         return;
     };
     let times: Vec<f64> = rows.iter().filter_map(time).collect();
     let spans = times.windows(2).map(|pair| pair[1] - pair[0]);
-    let usual = spans.filter(|span| *span > 0.0).fold(f64::INFINITY, f64::min);
+    let usual = spans
+        .filter(|span| *span > 0.0)
+        .fold(f64::INFINITY, f64::min);
     // Without the rounding of differences.
     let usual = (usual * 1e12).round() / 1e12;
     let step = fmu.description.preferred_step.unwrap_or(usual);
@@ -57,23 +63,34 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path) {
         duration_s: Some(last - first),
         ..Request::built_in(&path.display().to_string())
     };
-    let run = prepare(&request).map_err(|error| error.to_string()).and_then(|mut prepared| {
-        prepared.options = Options {
-            isolation: Isolation::All,
-            ..Options::default()
-        };
-        let run = prepared.run(prepared.algorithm);
-        run.map_err(|error| error.to_string())
-    });
+    let run = prepare(&request)
+        .map_err(|error| error.to_string())
+        .and_then(|mut prepared| {
+            prepared.options = Options {
+                isolation: Isolation::All,
+                ..Options::default()
+            };
+            let run = prepared.run(prepared.algorithm);
+            run.map_err(|error| error.to_string())
+        });
     let outcome = match run {
         Ok(outcome) => outcome,
         Err(reason) => {
-            findings.error(&name, format!("the run to compare with cannot begin: {reason}"));
+            findings.error(
+                &name,
+                format!("the run to compare with cannot begin: {reason}"),
+            );
             return;
         }
     };
     if !outcome.ended.is_regular() {
-        findings.error(&name, format!("the run to compare with failed: {}", outcome.ended.message()));
+        findings.error(
+            &name,
+            format!(
+                "the run to compare with failed: {}",
+                outcome.ended.message()
+            ),
+        );
         return;
     }
     let record = &outcome.record;
@@ -91,7 +108,9 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path) {
             continue;
         }
         let found = record.columns.iter().position(|known| {
-            known.split_once('.').is_some_and(|(_, variable)| variable == column)
+            known
+                .split_once('.')
+                .is_some_and(|(_, variable)| variable == column)
         });
         let Some(found) = found else {
             continue;
@@ -99,7 +118,10 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path) {
         let values: Vec<f64> = record.rows().map(|row| row[found]).collect();
         let (mut worst, mut at, mut size): (f64, f64, f64) = (0.0, 0.0, 0.0);
         for row in &rows {
-            let cells = (time(row), row.get(place).and_then(|cell| cell.parse::<f64>().ok()));
+            let cells = (
+                time(row),
+                row.get(place).and_then(|cell| cell.parse::<f64>().ok()),
+            );
             let (Some(time), Some(theirs)) = cells else {
                 continue;
             };
@@ -116,11 +138,15 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path) {
         if worst > ALLOWED * size.max(1e-9) {
             findings.error(
                 &name,
-                format!("`{column}` differs by {worst:.3e} at {at} s (its largest value is {size:.3e})"),
+                format!(
+                    "`{column}` differs by {worst:.3e} at {at} s (its largest value is {size:.3e})"
+                ),
             );
         }
     }
-    findings.check(format!("{name}: {compared} columns compared with a run of {step} s steps"));
+    findings.check(format!(
+        "{name}: {compared} columns compared with a run of {step} s steps"
+    ));
 }
 
 /// The table with results, by its name.
@@ -131,7 +157,9 @@ fn table(path: &Path) -> Option<(String, String)> {
         .filter_map(|name| Some(name.ok()?.to_string()))
         .collect();
     let fits = |name: &&String| {
-        ["_out.csv", "_ref.csv"].iter().any(|end| name.ends_with(end))
+        ["_out.csv", "_ref.csv"]
+            .iter()
+            .any(|end| name.ends_with(end))
     };
     let name = names.iter().find(fits)?.clone();
     let mut text = String::new();

@@ -31,7 +31,9 @@ pub(super) fn check(findings: &mut Findings, text: &str) {
     };
     let root = document.root_element();
     let is_second = root.attribute("fmiVersion") == Some("2.0");
-    let all = root.children().find(|node| node.has_tag_name("ModelVariables"));
+    let all = root
+        .children()
+        .find(|node| node.has_tag_name("ModelVariables"));
     let all: Vec<Variable> = all
         .into_iter()
         .flat_map(|all| all.children())
@@ -52,7 +54,10 @@ pub(super) fn check(findings: &mut Findings, text: &str) {
             findings.warning(&place(variable.node), message);
         }
     }
-    findings.check(format!("modelDescription.xml: rules of {} variables", all.len()));
+    findings.check(format!(
+        "modelDescription.xml: rules of {} variables",
+        all.len()
+    ));
 }
 
 fn place(node: Node) -> String {
@@ -62,9 +67,9 @@ fn place(node: Node) -> String {
 
 fn variable<'a>(node: Node<'a, 'a>, is_second: bool) -> Option<Variable<'a>> {
     let typed = match is_second {
-        true => node.children().find(|child| {
-            child.is_element() && !child.has_tag_name("Annotations")
-        })?,
+        true => node
+            .children()
+            .find(|child| child.is_element() && !child.has_tag_name("Annotations"))?,
         false => node,
     };
     let kind = typed.tag_name().name();
@@ -90,22 +95,34 @@ fn variable<'a>(node: Node<'a, 'a>, is_second: bool) -> Option<Variable<'a>> {
 }
 
 fn experiment(findings: &mut Findings, root: Node) {
-    let Some(node) = root.children().find(|node| node.has_tag_name("DefaultExperiment")) else {
+    let Some(node) = root
+        .children()
+        .find(|node| node.has_tag_name("DefaultExperiment"))
+    else {
         findings.note(DESCRIPTION, "there is no default experiment");
         return;
     };
-    let number = |name: &str| node.attribute(name).and_then(|text| text.trim().parse::<f64>().ok());
+    let number = |name: &str| {
+        node.attribute(name)
+            .and_then(|text| text.trim().parse::<f64>().ok())
+    };
     let start = number("startTime").unwrap_or(0.0);
     if let Some(stop) = number("stopTime")
         && stop <= start
     {
-        findings.error(&place(node), format!("it stops at {stop} s, not after {start} s"));
+        findings.error(
+            &place(node),
+            format!("it stops at {stop} s, not after {start} s"),
+        );
     }
     for name in ["stepSize", "tolerance"] {
         if let Some(value) = number(name)
             && !(value > 0.0 && value.is_finite())
         {
-            findings.error(&place(node), format!("{name} is {value}, expected more than 0"));
+            findings.error(
+                &place(node),
+                format!("{name} is {value}, expected more than 0"),
+            );
         }
     }
 }
@@ -114,19 +131,28 @@ fn experiment(findings: &mut Findings, root: Node) {
 fn definitions<'a>(findings: &mut Findings, root: Node<'a, 'a>) -> HashSet<&'a str> {
     let below = |name: &'static str| {
         let found = root.children().find(move |node| node.has_tag_name(name));
-        found.into_iter().flat_map(|node| node.children()).filter(Node::is_element)
+        found
+            .into_iter()
+            .flat_map(|node| node.children())
+            .filter(Node::is_element)
     };
     let mut units = HashSet::new();
     for unit in below("UnitDefinitions") {
         let name = unit.attribute("name").unwrap_or_default();
         if !units.insert(name) {
-            findings.error(&place(unit), format!("the unit `{name}` stands there twice"));
+            findings.error(
+                &place(unit),
+                format!("the unit `{name}` stands there twice"),
+            );
         }
         let base = unit.children().find(|node| node.has_tag_name("BaseUnit"));
         match base {
             None => findings.note(&place(unit), format!("the unit `{name}` has no base units")),
             Some(base) if base.attribute("factor") == Some("0") => {
-                findings.error(&place(unit), format!("the factor of the unit `{name}` is 0"));
+                findings.error(
+                    &place(unit),
+                    format!("the factor of the unit `{name}` is 0"),
+                );
             }
             Some(_) => {}
         }
@@ -135,13 +161,19 @@ fn definitions<'a>(findings: &mut Findings, root: Node<'a, 'a>) -> HashSet<&'a s
     for kind in below("TypeDefinitions") {
         let name = kind.attribute("name").unwrap_or_default();
         if !types.insert(name) {
-            findings.error(&place(kind), format!("the type `{name}` stands there twice"));
+            findings.error(
+                &place(kind),
+                format!("the type `{name}` stands there twice"),
+            );
         }
         let items = kind.descendants().filter(|node| node.has_tag_name("Item"));
         let mut values = HashSet::new();
         for item in items {
             if !values.insert(item.attribute("value")) {
-                findings.error(&place(item), format!("two items of `{name}` have one value"));
+                findings.error(
+                    &place(item),
+                    format!("two items of `{name}` have one value"),
+                );
             }
         }
     }
@@ -167,7 +199,10 @@ fn names(findings: &mut Findings, all: &[Variable], root: Node) {
         if variable.name.is_empty() {
             findings.error(&place(variable.node), "the name is empty");
         }
-        let reference = variable.node.attribute("valueReference").unwrap_or_default();
+        let reference = variable
+            .node
+            .attribute("valueReference")
+            .unwrap_or_default();
         let key = match root.attribute("fmiVersion") {
             Some("2.0") => (variable.kind, reference),
             // References are unique over all types.
@@ -177,14 +212,15 @@ fn names(findings: &mut Findings, all: &[Variable], root: Node) {
             continue;
         };
         if key.0.is_empty() {
-            let message = format!("`{}` has the value reference of `{}`", variable.name, first.name);
+            let message = format!(
+                "`{}` has the value reference of `{}`",
+                variable.name, first.name
+            );
             findings.error(&place(variable.node), message);
             continue;
         }
         // Aliases: at most one may be set.
-        let is_set = |variable: &Variable| {
-            ["input", "parameter"].contains(&variable.causality)
-        };
+        let is_set = |variable: &Variable| ["input", "parameter"].contains(&variable.causality);
         if is_set(variable) && is_set(first) {
             let message = format!(
                 "`{}` and `{}` are aliases and can both be set",
@@ -220,7 +256,10 @@ fn combination(findings: &mut Findings, variable: &Variable, is_second: bool) {
         "local" | "dependent" => &["constant", "fixed", "tunable", "discrete", "continuous"],
         "independent" => &["continuous"],
         other => {
-            findings.error(&place(*node), format!("`{name}`: causality=\"{other}\" is unknown"));
+            findings.error(
+                &place(*node),
+                format!("`{name}`: causality=\"{other}\" is unknown"),
+            );
             return;
         }
     };
@@ -233,13 +272,19 @@ fn combination(findings: &mut Findings, variable: &Variable, is_second: bool) {
     }
     let is_real = ["Real", "Float32", "Float64"].contains(kind);
     if *variability == "continuous" && !is_real && !is_clock {
-        findings.error(&place(*node), format!("`{name}`: a {kind} cannot be continuous"));
+        findings.error(
+            &place(*node),
+            format!("`{name}`: a {kind} cannot be continuous"),
+        );
     }
     let Some(initial) = initial else {
         return;
     };
     if !["exact", "approx", "calculated"].contains(initial) {
-        findings.error(&place(*node), format!("`{name}`: initial=\"{initial}\" is unknown"));
+        findings.error(
+            &place(*node),
+            format!("`{name}`: initial=\"{initial}\" is unknown"),
+        );
         return;
     }
     let fits = match *causality {
@@ -282,7 +327,10 @@ fn start(findings: &mut Findings, variable: &Variable) {
     }
     let may_not = *initial == Some("calculated") || *causality == "independent";
     if may_not && *has_start {
-        findings.error(&place(*node), format!("`{name}` must not have a start value"));
+        findings.error(
+            &place(*node),
+            format!("`{name}` must not have a start value"),
+        );
     }
 }
 
@@ -301,15 +349,24 @@ fn limits(findings: &mut Findings, variable: &Variable) {
         findings.error(&at, format!("`{name}`: min {min} above max {max}"));
     }
     let starts = variable.typed.attribute("start").unwrap_or_default();
-    for start in starts.split_whitespace().filter_map(|text| text.parse::<f64>().ok()) {
+    for start in starts
+        .split_whitespace()
+        .filter_map(|text| text.parse::<f64>().ok())
+    {
         if min.is_some_and(|min| start < min) || max.is_some_and(|max| start > max) {
-            findings.warning(&at, format!("`{name}` starts at {start}, beyond its limits"));
+            findings.warning(
+                &at,
+                format!("`{name}` starts at {start}, beyond its limits"),
+            );
             break;
         }
     }
     if let Some(nominal) = number("nominal")
         && nominal <= 0.0
     {
-        findings.error(&at, format!("`{name}`: nominal {nominal}, expected more than 0"));
+        findings.error(
+            &at,
+            format!("`{name}`: nominal {nominal}, expected more than 0"),
+        );
     }
 }

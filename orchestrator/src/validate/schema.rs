@@ -96,25 +96,62 @@ const VARIABLE: &str = "name! valueReference! description causality variability 
 
 /// Attributes that are true or false.
 const TRUTHS: &[&str] = &[
-    "needsExecutionTool", "completedIntegratorStepNotNeeded", "canBeInstantiatedOnlyOncePerProcess",
-    "canNotUseMemoryManagementFunctions", "canGetAndSetFMUstate", "canGetAndSetFMUState",
-    "canSerializeFMUstate", "canSerializeFMUState", "providesDirectionalDerivative",
-    "providesDirectionalDerivatives", "canHandleVariableCommunicationStepSize",
-    "canInterpolateInputs", "canRunAsynchronuously", "relativeQuantity", "unbounded", "reinit",
-    "canHandleMultipleSetPerTimeInstant", "intermediateUpdate", "hasEventMode",
-    "providesIntermediateUpdate", "mightReturnEarlyFromDoStep",
-    "canReturnEarlyAfterIntermediateUpdate", "needsCompletedIntegratorStep",
-    "providesEvaluateDiscreteStates", "canBeDeactivated", "supportsFraction",
+    "needsExecutionTool",
+    "completedIntegratorStepNotNeeded",
+    "canBeInstantiatedOnlyOncePerProcess",
+    "canNotUseMemoryManagementFunctions",
+    "canGetAndSetFMUstate",
+    "canGetAndSetFMUState",
+    "canSerializeFMUstate",
+    "canSerializeFMUState",
+    "providesDirectionalDerivative",
+    "providesDirectionalDerivatives",
+    "canHandleVariableCommunicationStepSize",
+    "canInterpolateInputs",
+    "canRunAsynchronuously",
+    "relativeQuantity",
+    "unbounded",
+    "reinit",
+    "canHandleMultipleSetPerTimeInstant",
+    "intermediateUpdate",
+    "hasEventMode",
+    "providesIntermediateUpdate",
+    "mightReturnEarlyFromDoStep",
+    "canReturnEarlyAfterIntermediateUpdate",
+    "needsCompletedIntegratorStep",
+    "providesEvaluateDiscreteStates",
+    "canBeDeactivated",
+    "supportsFraction",
 ];
 /// Attributes that are real numbers.
 const REALS: &[&str] = &[
-    "factor", "offset", "nominal", "startTime", "stopTime", "tolerance", "stepSize",
-    "fixedInternalStepSize", "intervalDecimal", "shiftDecimal",
+    "factor",
+    "offset",
+    "nominal",
+    "startTime",
+    "stopTime",
+    "tolerance",
+    "stepSize",
+    "fixedInternalStepSize",
+    "intervalDecimal",
+    "shiftDecimal",
 ];
 /// Attributes that are whole numbers.
 const WHOLE: &[&str] = &[
-    "valueReference", "kg", "m", "s", "A", "K", "mol", "cd", "rad", "numberOfEventIndicators",
-    "maxOutputDerivativeOrder", "index", "value", "priority",
+    "valueReference",
+    "kg",
+    "m",
+    "s",
+    "A",
+    "K",
+    "mol",
+    "cd",
+    "rad",
+    "numberOfEventIndicators",
+    "maxOutputDerivativeOrder",
+    "index",
+    "value",
+    "priority",
 ];
 
 struct Shape {
@@ -167,7 +204,10 @@ pub(super) fn check(findings: &mut Findings, text: &str) {
         _ => return,
     };
     if root.tag_name().namespace().is_some() {
-        findings.error(&place(root), "the root element has a namespace, and it should have none");
+        findings.error(
+            &place(root),
+            "the root element has a namespace, and it should have none",
+        );
     }
     element(findings, root, None, shapes);
     findings.check("modelDescription.xml: elements, attributes and their types");
@@ -187,7 +227,10 @@ fn element(findings: &mut Findings, node: Node, parent: Option<&str>, shapes: &S
     let Some(shape) = shape else {
         return;
     };
-    for attribute in node.attributes().filter(|attribute| attribute.namespace().is_none()) {
+    for attribute in node
+        .attributes()
+        .filter(|attribute| attribute.namespace().is_none())
+    {
         let (known, value) = (attribute.name(), attribute.value());
         if !shape.attributes.iter().any(|(name, _)| *name == known) {
             findings.error(&place(node), format!("<{name}> has no attribute `{known}`"));
@@ -198,7 +241,11 @@ fn element(findings: &mut Findings, node: Node, parent: Option<&str>, shapes: &S
         } else if REALS.contains(&known) {
             value.trim().parse::<f64>().is_err().then_some("a number")
         } else if WHOLE.contains(&known) && (known != "value" || name == "Item") {
-            value.trim().parse::<i64>().is_err().then_some("a whole number")
+            value
+                .trim()
+                .parse::<i64>()
+                .is_err()
+                .then_some("a whole number")
         } else {
             None
         };
@@ -222,7 +269,10 @@ fn element(findings: &mut Findings, node: Node, parent: Option<&str>, shapes: &S
         if children.iter().any(|(name, _)| *name == known) {
             element(findings, child, Some(name), shapes);
         } else {
-            findings.error(&place(child), format!("<{known}> may not stand in <{name}>"));
+            findings.error(
+                &place(child),
+                format!("<{known}> may not stand in <{name}>"),
+            );
         }
     }
     for (child, _) in children.iter().filter(|(_, must)| *must) {

@@ -60,6 +60,9 @@ pub(super) fn check(findings: &mut Findings, path: &Path) {
         }
     }
     if !sound {
-        findings.note(ssp::STRUCTURE, "a component is at fault, so the system was not run");
+        findings.note(
+            ssp::STRUCTURE,
+            "a component is at fault, so the system was not run",
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! The FMUs: what is packed, what is published, and what importers make of them.
 
+mod corpus;
 mod importers;
 mod model_descriptions;
 mod packing;

@@ -51,9 +51,10 @@ fn archive(folder: &Path, description: &str, files: &[(&str, &str)]) -> PathBuf 
     let path = folder.join("nested.ssp");
     let mut archive = ZipWriter::new(File::create(&path).unwrap());
     let options = SimpleFileOptions::default();
-    let motion = all_fmus().unwrap().iter().find(|fmu| {
-        fmu.name == "ReferenceMotion" && fmu.version == FmiVersion::V2
-    });
+    let motion = all_fmus()
+        .unwrap()
+        .iter()
+        .find(|fmu| fmu.name == "ReferenceMotion" && fmu.version == FmiVersion::V2);
     let fmu = fs::read(&motion.unwrap().path).unwrap();
     let mut add = |name: &str, content: &[u8]| {
         archive.start_file(name, options).unwrap();
@@ -150,14 +151,20 @@ fn nested_systems_units_transformations_and_parameters_mean_what_the_standard_sa
         let second = (2.0 * 1000.0 * first + 1.0) * wave(0.5, 2.0, t);
         let third = 10.0 * second * wave(0.0254, 1.0, t);
         for (got, wanted) in [(a[row], first), (b[row], second), (c[row], third)] {
-            assert!((got - wanted).abs() < 1e-12 * (1.0 + wanted.abs()), "{t}: {got} {wanted}");
+            assert!(
+                (got - wanted).abs() < 1e-12 * (1.0 + wanted.abs()),
+                "{t}: {got} {wanted}"
+            );
         }
     }
     let notes = prepare(&Request::built_in(&path.display().to_string()))
         .unwrap()
         .system
         .notes;
-    assert!(notes.iter().any(|note| note.contains("nobody.is_here")), "{notes:?}");
+    assert!(
+        notes.iter().any(|note| note.contains("nobody.is_here")),
+        "{notes:?}"
+    );
 }
 
 #[test]
@@ -177,30 +184,81 @@ fn faults_of_an_archive_are_named_with_file_and_line() {
             let (element, connector) = at.split_once('.').unwrap();
             format!("{which}Element=\"{element}\" {which}Connector=\"{connector}\"")
         };
-        format!("<ssd:Connection {} {}/>", end("start", from), end("end", to))
+        format!(
+            "<ssd:Connection {} {}/>",
+            end("start", from),
+            end("end", to)
+        )
     };
     let there = link("a.displacement", "b.scale");
     for (description, words) in [
-        (with(&link("a.displacment", "b.scale"), ""), "did you mean `displacement`"),
-        (with(&link("a.displacement", "d.scale"), ""), "no element `d`"),
-        (with(&link("a.displacement", "b.displacement"), ""), "both give values"),
+        (
+            with(&link("a.displacment", "b.scale"), ""),
+            "did you mean `displacement`",
+        ),
+        (
+            with(&link("a.displacement", "d.scale"), ""),
+            "no element `d`",
+        ),
+        (
+            with(&link("a.displacement", "b.displacement"), ""),
+            "both give values",
+        ),
         (with(&link("a.scale", "b.scale"), ""), "both take values"),
-        (with(&format!("{there}{there}"), ""), "driven by `a.displacement` already"),
-        (with("", "<ssd:Component name=\"a\" source=\"x\"/>"), "two elements are called `a`"),
-        (with("", "<ssd:Component name=\"d\" source=\"../x.fmu\"/>"), "leads out of the archive"),
-        (with("", "<ssd:Component name=\"d\" source=\"file:///x.fmu\"/>"), "not relative"),
-        (with("", "<ssd:Component name=\"d\" source=\"resources/no.fmu\"/>"), "resources/no.fmu"),
+        (
+            with(&format!("{there}{there}"), ""),
+            "driven by `a.displacement` already",
+        ),
+        (
+            with("", "<ssd:Component name=\"a\" source=\"x\"/>"),
+            "two elements are called `a`",
+        ),
+        (
+            with("", "<ssd:Component name=\"d\" source=\"../x.fmu\"/>"),
+            "leads out of the archive",
+        ),
+        (
+            with("", "<ssd:Component name=\"d\" source=\"file:///x.fmu\"/>"),
+            "not relative",
+        ),
+        (
+            with(
+                "",
+                "<ssd:Component name=\"d\" source=\"resources/no.fmu\"/>",
+            ),
+            "resources/no.fmu",
+        ),
         (with("", "<ssd:Component name=\"d\"/>"), "no source"),
-        (with("", "<ssd:Component name=\"d\" type=\"text/x-modelica\" source=\"M\"/>"), "text/x-modelica"),
-        (with("", "<ssd:Component name=\"d\" type=\"application/x-ssp-definition\" source=\"SystemStructure.ssd\"/>"), "loop"),
-        (with("<ssd:Connection startConnector=\"x\"/>", ""), "`endConnector`"),
+        (
+            with(
+                "",
+                "<ssd:Component name=\"d\" type=\"text/x-modelica\" source=\"M\"/>",
+            ),
+            "text/x-modelica",
+        ),
+        (
+            with(
+                "",
+                "<ssd:Component name=\"d\" type=\"application/x-ssp-definition\" source=\"SystemStructure.ssd\"/>",
+            ),
+            "loop",
+        ),
+        (
+            with("<ssd:Connection startConnector=\"x\"/>", ""),
+            "`endConnector`",
+        ),
         (HEAD.to_string(), "not well-formed"),
-        (format!("{HEAD}</ssd:SystemStructureDescription>"), "no <System>"),
+        (
+            format!("{HEAD}</ssd:SystemStructureDescription>"),
+            "no <System>",
+        ),
         (format!("{HEAD}{}", "<a>".repeat(100_000)), "deeper than"),
     ] {
         let path = archive(folder.path(), &description, &[]);
         let problem = prepare(&Request::built_in(&path.display().to_string())).err();
-        let problem = problem.unwrap_or_else(|| panic!("{words}: accepted")).to_string();
+        let problem = problem
+            .unwrap_or_else(|| panic!("{words}: accepted"))
+            .to_string();
         assert!(problem.contains(words), "{words}: {problem}");
         assert!(problem.contains("nested.ssp"), "{problem}");
     }
@@ -218,7 +276,10 @@ fn exported(folder: &Path, system: &str, plant: &str, fmi: FmiVersion) -> (PathB
     let prepared = prepare(&request).unwrap();
     let outcome = prepared.run(Algorithm::Jacobi).unwrap();
     let stem = format!("{system}-{plant}-{}", fmi.folder());
-    let (archive, csv) = (folder.join(format!("{stem}.ssp")), folder.join(format!("{stem}.csv")));
+    let (archive, csv) = (
+        folder.join(format!("{stem}.ssp")),
+        folder.join(format!("{stem}.csv")),
+    );
     let experiment = Experiment {
         motion: Some(&prepared.motion),
         step: prepared.step,
@@ -250,12 +311,27 @@ fn built_in_systems_are_valid_archives_and_give_in_ecos_and_libcosim_what_jacobi
     let folder = tempfile::tempdir().unwrap();
     let mut second = Vec::new();
     for system in shakebench::system::built_in::names() {
-        second.push(exported(folder.path(), system, "identified", FmiVersion::V2));
+        second.push(exported(
+            folder.path(),
+            system,
+            "identified",
+            FmiVersion::V2,
+        ));
     }
     for system in ["three-variable", "mpc"] {
-        second.push(exported(folder.path(), system, "servohydraulic", FmiVersion::V2));
+        second.push(exported(
+            folder.path(),
+            system,
+            "servohydraulic",
+            FmiVersion::V2,
+        ));
     }
-    let third = [exported(folder.path(), "three-variable", "identified", FmiVersion::V3)];
+    let third = [exported(
+        folder.path(),
+        "three-variable",
+        "identified",
+        FmiVersion::V3,
+    )];
     let files = |pairs: &[(PathBuf, PathBuf)]| -> Vec<PathBuf> {
         pairs.iter().map(|(archive, _)| archive.clone()).collect()
     };
@@ -275,7 +351,11 @@ fn built_in_systems_are_valid_archives_and_give_in_ecos_and_libcosim_what_jacobi
         ("ecos", &third[..]),
     ] {
         let mut arguments = vec![PathBuf::from(program), PathBuf::from("0.002")];
-        arguments.extend(pairs.iter().flat_map(|(archive, csv)| [archive.clone(), csv.clone()]));
+        arguments.extend(
+            pairs
+                .iter()
+                .flat_map(|(archive, csv)| [archive.clone(), csv.clone()]),
+        );
         let report = run_script("ssp_gate.py", &arguments);
         println!("{report}");
         assert_eq!(report.matches("ok ").count(), pairs.len(), "{report}");

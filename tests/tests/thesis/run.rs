@@ -12,7 +12,7 @@ use shakebench::run::experiment::{Request, prepare};
 
 fn play(request: &Request) -> Record {
     let prepared = prepare(request).unwrap();
-    let outcome = prepared.run(request.algorithm).unwrap();
+    let outcome = prepared.run(prepared.algorithm).unwrap();
     assert!(
         matches!(outcome.ended, Ended::Complete),
         "{}",

@@ -280,12 +280,13 @@ fn preferred_step(
     (step > 0.0).then_some(step)
 }
 
-fn default_stop(
-    experiment: Option<&fmi_rs::model_description::DefaultExperiment>,
-) -> Option<f64> {
+fn default_stop(experiment: Option<&fmi_rs::model_description::DefaultExperiment>) -> Option<f64> {
     let experiment = experiment?;
     let stop: f64 = experiment.stopTime.as_ref()?.parse().ok()?;
-    let start = experiment.startTime.as_ref().and_then(|text| text.parse().ok());
+    let start = experiment
+        .startTime
+        .as_ref()
+        .and_then(|text| text.parse().ok());
     let length = stop - start.unwrap_or(0.0);
     (length > 0.0 && length.is_finite()).then_some(length)
 }
