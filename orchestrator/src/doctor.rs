@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::fmu::{FmiVersion, Fmu, Instance, Isolation, Options, Processes};
 use crate::pack::supply::{self, Origin};
 use crate::pack::{self, PackedFmu};
+use crate::program;
 
 /// How an examined part is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -79,7 +80,7 @@ pub fn examine() -> Examination {
     Examination {
         shakebench: supply::VERSION,
         platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
-        program: std::env::current_exe().ok(),
+        program: program::file().ok(),
         origin: folder.as_ref().map(|folder| folder.origin),
         fmus: folder.map(|folder| folder.path),
         ready: findings.iter().all(|finding| finding.state != State::Bad),

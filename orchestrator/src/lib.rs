@@ -18,6 +18,7 @@ pub mod master;
 pub mod metrics;
 pub mod motion;
 pub mod pack;
+pub mod program;
 pub mod report;
 pub mod results;
 pub mod run;

@@ -2,18 +2,20 @@
 """Steps every component's library of every platform with the same inputs and compares with this
 machine's, bit by bit: Windows' under Wine, ARM's under qemu-user.
 
-    compare.py FMUS [--faulty FOLDER] [--components A,B] [--seconds T] [--platforms P,Q] [--json FILE]
+    compare.py FMUS [--libraries FOLDER] [--components A,B] [--seconds T] [--platforms P,Q] [--json FILE]
 
-FMUS holds fmi2/NAME.fmu and fmi3/NAME.fmu with libraries of several platforms. FOLDER holds the
-libraries of the component that panics on demand, as PLATFORM/FILE. Needed: gcc; for Windows
-x86_64-w64-mingw32-gcc and wine64; for ARM qemu-aarch64 and zig (or aarch64-linux-gnu-gcc). Exit
-status: 0 all within bounds, 1 not, 3 a platform could not be run and was asked for by name.
+FMUS holds fmi2/NAME.fmu and fmi3/NAME.fmu with libraries of several platforms; those in FOLDER, which
+`dist/release` leaves in target/dist/libraries as PLATFORM/FILE, stand in for them, and hold the component
+that panics on demand. Needed: gcc; for Windows x86_64-w64-mingw32-gcc and wine64; for ARM qemu-aarch64,
+libc6-arm64-cross and zig (or aarch64-linux-gnu-gcc). Exit status: 0 all within bounds, 1 not, 3 a
+platform that was asked for by name could not be run.
 """
 
 from __future__ import annotations
 
 import argparse
 import array
+import ctypes
 import json
 import math
 import os
@@ -26,7 +28,6 @@ import zipfile
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-STEP = 0.002
 NATIVE = "x86_64-linux"
 FOLDERS = {
     "x86_64-linux": ("linux64", "x86_64-linux", ".so"),
@@ -58,10 +59,12 @@ class Runner:
                 WINEPREFIX=str(folder / "wine"), WINEDEBUG="-all", WINEARCH="win64", DISPLAY=""
             )
         else:
-            zig = shutil.which("python-zig") or shutil.which("zig")
-            compiler = [zig, "cc", "-target", "aarch64-linux-gnu.2.17"] if zig else []
-            compiler = compiler or ["aarch64-linux-gnu-gcc"]
-            # Zig brings no loader; the libraries of the target stand where QEMU_LD_PREFIX says.
+            python = HERE / "../../target/dist/tools/bin/python"
+            if python.is_file():
+                compiler = [str(python), "-m", "ziglang", "cc", "-target", "aarch64-linux-gnu.2.17"]
+            else:
+                compiler = ["aarch64-linux-gnu-gcc"]
+            # Neither brings a loader; qemu looks for it where QEMU_LD_PREFIX says.
             self.prefix = ["qemu-aarch64"]
         for tool in [compiler[0], *self.prefix]:
             if not (shutil.which(tool) or Path(tool).is_file()):
@@ -77,10 +80,10 @@ class Runner:
             self.missing = self._loader()
 
     def _loader(self) -> str | None:
-        for place in ("/usr/aarch64-linux-gnu", str(HERE / "../../target/dist/arm64")):
-            if (Path(place) / "lib/ld-linux-aarch64.so.1").exists():
-                self.environment["QEMU_LD_PREFIX"] = place
-                return None
+        place = "/usr/aarch64-linux-gnu"
+        if (Path(place) / "lib/ld-linux-aarch64.so.1").exists():
+            self.environment["QEMU_LD_PREFIX"] = place
+            return None
         return "no C library for ARM: install libc6-arm64-cross, or name a root in QEMU_LD_PREFIX"
 
     def _stand_in(self, folder: Path) -> None:
@@ -115,9 +118,11 @@ class Runner:
         return "Z:" + text.replace("/", "\\") if "windows" in self.platform else text
 
 
-def plan(description: ET.Element, steps: int) -> tuple[str, list[str]]:
+def plan(description: ET.Element, seconds: float) -> tuple[str, list[str]]:
     """What the driver is told, and the names of the outputs."""
-    lines = [f"token {description.get('instantiationToken')}", f"step {STEP} {steps}"]
+    step = float(description.find("DefaultExperiment").get("stepSize"))
+    lines = [f"token {description.get('instantiationToken')}"]
+    lines.append(f"step {step!r} {round(seconds / step)}")
     names = []
     for variable in description.find("ModelVariables"):
         reference, causality = variable.get("valueReference"), variable.get("causality")
@@ -132,7 +137,16 @@ def plan(description: ET.Element, steps: int) -> tuple[str, list[str]]:
     return "\n".join(lines) + "\n", names
 
 
-def library(fmu: Path, version: int, platform: str, folder: Path) -> Path | None:
+def file_name(name: str, platform: str) -> str:
+    """A library as cargo names it."""
+    return name + ".dll" if "windows" in platform else f"lib{name}.so"
+
+
+def library(
+    fmu: Path, version: int, platform: str, folder: Path, built: Path | None
+) -> Path | None:
+    if built and (built / platform / file_name(fmu.stem, platform)).is_file():
+        return built / platform / file_name(fmu.stem, platform)
     two, three, suffix = FOLDERS[platform]
     name = f"binaries/{two if version == 2 else three}/{fmu.stem}{suffix}"
     with zipfile.ZipFile(fmu) as archive:
@@ -168,28 +182,32 @@ def largest(names: list[str], here: array.array, there: array.array) -> tuple[fl
     return worst
 
 
-def faults(runners: dict[str, Runner], folder: Path, scratch: Path) -> dict[str, str]:
+def faults(runners: dict[str, Runner], built: Path, scratch: Path) -> dict[str, str]:
     """Whether a panic stays inside its instance, on each platform."""
+    own = built / NATIVE / file_name("Faulty", NATIVE)
+    if not own.is_file():
+        return {}
+    describe = ctypes.CDLL(str(own)).shakebench_describe
+    describe.restype = ctypes.c_char_p
+    description = ET.fromstring(describe(3))
+    choice = next(v for v in description.iter("Enumeration") if v.get("name") == "fault")
+    text = f"token {description.get('instantiationToken')}\nstep 0.002 3\nfault\n"
+    text += f"choice {choice.get('valueReference')} 1\n"
+    path = scratch / "faulty.plan"
+    path.write_text(text)
     found = {}
     for platform, runner in runners.items():
-        suffix = FOLDERS[platform][2]
-        files = sorted((folder / platform).glob(f"*Faulty{suffix}"))
-        if not files:
-            continue
-        description = json.loads((folder / "faulty.json").read_text())
-        text = f"token {description['token']}\nstep {STEP} 3\nfault\n"
-        text += f"choice {description['fault']} 1\n"
-        path = scratch / "faulty.plan"
-        path.write_text(text)
-        said = [runner.run(files[0], v, path, scratch / "faulty.out") for v in (2, 3)]
-        found[platform] = said[0] if said[0] == said[1] else " / ".join(said)
+        file = built / platform / file_name("Faulty", platform)
+        if file.is_file():
+            said = [runner.run(file, v, path, scratch / "faulty.out") for v in (2, 3)]
+            found[platform] = said[0] if said[0] == said[1] else " / ".join(said)
     return found
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("fmus", type=Path)
-    parser.add_argument("--faulty", type=Path)
+    parser.add_argument("--libraries", type=Path)
     parser.add_argument("--components", default="")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--platforms", default="")
@@ -215,12 +233,11 @@ def main() -> int:
                 status = 3 if platform in asked else status
             else:
                 runners[platform] = runner
-        steps = round(arguments.seconds / STEP)
         rows = []
         for file in files:
             with zipfile.ZipFile(file) as archive:
                 description = ET.fromstring(archive.read("modelDescription.xml"))
-            text, names = plan(description, steps)
+            text, names = plan(description, arguments.seconds)
             path = scratch / f"{file.stem}.plan"
             path.write_text(text)
             for version in (2, 3):
@@ -228,7 +245,7 @@ def main() -> int:
                 reference = None
                 for platform, runner in runners.items():
                     row = {"component": file.stem, "fmi": version, "platform": platform}
-                    own = library(fmu, version, platform, scratch)
+                    own = library(fmu, version, platform, scratch, arguments.libraries)
                     if own is None:
                         row["problem"] = "no library in the archive"
                     else:
@@ -247,7 +264,9 @@ def main() -> int:
                     bad = "problem" in row or row.get("difference", 0.0) > BOUND
                     status = 1 if bad else status
                     print(words(row), flush=True)
-        caught = faults(runners, arguments.faulty, scratch) if arguments.faulty else {}
+        caught = {}
+        if arguments.libraries:
+            caught = faults(runners, arguments.libraries, scratch)
         for platform, said in caught.items():
             print(f"panic on {platform}: {said}")
             status = 1 if said != "caught" else status

@@ -154,6 +154,7 @@ pub(super) fn archive_bytes(entries: &Entries) -> io::Result<Vec<u8>> {
 fn write_to<W: Write + Seek>(writer: W, entries: &Entries, stamp: String) -> io::Result<W> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
+        .compression_level(Some(9))
         .last_modified_time(DateTime::default());
     let mut archive = ZipWriter::new(writer);
     archive.set_comment(stamp).map_err(io::Error::from)?;

@@ -18,12 +18,27 @@ struct Metadata {
 #[derive(Deserialize)]
 struct Package {
     id: String,
+    targets: Vec<Target>,
+    dependencies: Vec<Dependency>,
+    features: HashMap<String, Vec<String>>,
     name: String,
     version: String,
     license: Option<String>,
     repository: Option<String>,
     source: Option<String>,
     manifest_path: PathBuf,
+}
+
+#[derive(Deserialize)]
+struct Target {
+    kind: Vec<String>,
+}
+
+#[derive(Deserialize)]
+struct Dependency {
+    name: String,
+    rename: Option<String>,
+    optional: bool,
 }
 
 #[derive(Deserialize)]
@@ -35,6 +50,7 @@ struct Resolve {
 struct Node {
     id: String,
     deps: Vec<Link>,
+    features: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -46,6 +62,15 @@ struct Link {
 #[derive(Deserialize)]
 struct Kind {
     kind: Option<String>,
+    target: Option<String>,
+}
+
+impl Kind {
+    /// Whether it is linked on a platform that FMI knows.
+    fn is_linked(&self) -> bool {
+        let is_foreign = self.target.as_ref().is_some_and(|on| on.contains("wasm"));
+        self.kind.is_none() && !is_foreign
+    }
 }
 
 /// The crates that a workspace's packages are linked with.
@@ -69,20 +94,22 @@ impl Notices {
                 command: "metadata",
                 problem: error.to_string(),
             })?;
+        let packages: HashMap<String, Package> = metadata
+            .packages
+            .into_iter()
+            .map(|package| (package.id.clone(), package))
+            .collect();
         let linked = |node: Node| {
-            let normal = node.deps.into_iter().filter(|link| {
-                let mut kinds = link.dep_kinds.iter();
-                kinds.any(|kind| kind.kind.is_none())
+            let links = node.deps.iter().filter(|link| {
+                let is_normal = link.dep_kinds.iter().any(Kind::is_linked);
+                is_normal && is_linked(&packages, &node, link)
             });
-            (node.id, normal.map(|link| link.pkg).collect())
+            let links = links.map(|link| link.pkg.clone()).collect();
+            (node.id.clone(), links)
         };
         Ok(Self {
             links: metadata.resolve.nodes.into_iter().map(linked).collect(),
-            packages: metadata
-                .packages
-                .into_iter()
-                .map(|package| (package.id.clone(), package))
-                .collect(),
+            packages,
         })
     }
 
@@ -114,6 +141,33 @@ impl Notices {
         foreign.sort_by(|a, b| (&a.name, &a.version).cmp(&(&b.name, &b.version)));
         Ok(text(&foreign))
     }
+}
+
+/// Whether a dependency gets into the library: macros run in the compiler alone, and cargo also
+/// lists optional dependencies of which no feature is on.
+fn is_linked(packages: &HashMap<String, Package>, node: &Node, link: &Link) -> bool {
+    let (Some(package), Some(other)) = (packages.get(&node.id), packages.get(&link.pkg)) else {
+        return true;
+    };
+    let mut kinds = other.targets.iter().flat_map(|target| &target.kind);
+    if kinds.any(|kind| kind == "proc-macro") {
+        return false;
+    }
+    let mut named = package.dependencies.iter().filter(|d| d.name == other.name);
+    named.any(|dependency| {
+        let name = dependency.rename.as_ref().unwrap_or(&dependency.name);
+        let turned_on = |feature: &String| {
+            let mut values = package.features.get(feature).into_iter().flatten();
+            values.any(|value| {
+                let value = value.strip_prefix("dep:").unwrap_or(value);
+                value == name
+                    || value
+                        .strip_prefix(name.as_str())
+                        .is_some_and(|rest| rest.starts_with('/'))
+            })
+        };
+        !dependency.optional || node.features.contains(name) || node.features.iter().any(turned_on)
+    })
 }
 
 fn text(packages: &[&Package]) -> String {
@@ -184,7 +238,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_texts_stand_once_and_build_dependencies_not_at_all() {
+    fn equal_texts_stand_once_and_what_is_not_linked_not_at_all() {
         let folder = tempfile::tempdir().unwrap();
         let package = |name: &str, licence: Option<&str>| {
             let place = folder.path().join(name);
@@ -192,22 +246,31 @@ mod tests {
             if let Some(text) = licence {
                 fs::write(place.join("LICENSE-MIT"), text).unwrap();
             }
+            let named = ["a", "b", "builder", "bare", "macros", "idle"].map(|other| {
+                let is_optional = ["b", "idle"].contains(&other);
+                serde_json::json!({"name": other, "rename": null, "optional": is_optional})
+            });
             serde_json::json!({
                 "id": name, "name": name, "version": "1.0.0", "license": "MIT",
                 "repository": null, "manifest_path": place.join("Cargo.toml"),
                 "source": if name == "own" { None } else { Some("registry") },
+                "targets": [{"kind": [if name == "macros" { "proc-macro" } else { "lib" }]}],
+                "features": {"with": ["dep:b"], "fast": ["idle?/fast"]},
+                "dependencies": named,
             })
         };
         let dependency = |name: &str, kind: Option<&str>| serde_json::json!({"pkg": name, "dep_kinds": [{"kind": kind}]});
+        let direct = [dependency("a", None), dependency("builder", Some("build"))];
+        let indirect = ["b", "bare", "macros", "idle"].map(|name| dependency(name, None));
         let metadata = serde_json::json!({
             "packages": [
                 package("own", Some("ours")), package("a", Some("free\r\n")),
                 package("b", Some("free\n\n")), package("builder", Some("no")),
-                package("bare", None),
+                package("bare", None), package("macros", None), package("idle", None),
             ],
             "resolve": {"nodes": [
-                {"id": "own", "deps": [dependency("a", None), dependency("builder", Some("build"))]},
-                {"id": "a", "deps": [dependency("b", None), dependency("bare", None)]},
+                {"id": "own", "features": [], "deps": direct},
+                {"id": "a", "features": ["with", "fast"], "deps": indirect},
             ]},
         });
         let notices = Notices::read(&metadata.to_string()).unwrap();
@@ -218,7 +281,9 @@ mod tests {
             text.contains("bare 1.0.0") && !text.contains("builder"),
             "{text}"
         );
-        assert!(!text.contains("ours"), "{text}");
+        for absent in ["ours", "macros", "idle"] {
+            assert!(!text.contains(absent), "{text}");
+        }
         assert!(notices.of(folder.path()).is_err());
     }
 }

@@ -48,8 +48,8 @@ pub(super) fn pack(
             .map(|(platform, library)| Ok((platform.clone(), read(library)?)))
             .collect();
         let contents = Contents {
-            descriptions: ComponentLibrary::open(&component.library)?.describe()?,
             libraries: libraries?,
+            descriptions: ComponentLibrary::open(&component.library)?.describe()?,
             licences: licences.clone(),
             notices: notices.of(&component.folder)?,
             revision: form.revision,

@@ -17,6 +17,7 @@ use super::archive::PackedFmu;
 use super::error::{PackError, file_error};
 use super::workspace::Workspace;
 use crate::fmu::FmiVersion;
+use crate::program;
 
 /// The environment variable that names a folder of packed FMUs.
 pub const VARIABLE: &str = "SHAKEBENCH_FMUS";
@@ -177,7 +178,7 @@ fn description(path: &Path) -> io::Result<String> {
 
 /// Where an installation may keep them: the program's own folder, or `share` beside its `bin`.
 fn beside_program() -> Vec<PathBuf> {
-    let program = env::current_exe().and_then(fs::canonicalize).ok();
+    let program = program::file().ok();
     let Some(folder) = program.as_deref().and_then(Path::parent) else {
         return Vec::new();
     };

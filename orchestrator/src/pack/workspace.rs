@@ -9,6 +9,7 @@ use std::{
 
 use super::error::{PackError, file_error};
 use super::platform::Platform;
+use crate::program;
 
 /// The project's folder.
 pub(super) struct Workspace {
@@ -30,7 +31,7 @@ impl Workspace {
     pub(super) fn find() -> Result<Self, PackError> {
         let here = std::env::current_dir().unwrap_or_default();
         let package = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
-        let program = std::env::current_exe().ok();
+        let program = program::file().ok();
         let places = [package, Some(here.clone()), program];
         places
             .iter()

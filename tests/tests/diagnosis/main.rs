@@ -4,3 +4,4 @@ mod extended_model;
 mod hidden_effects;
 mod measured;
 mod spreadsheet_files;
+mod walkthrough;

@@ -316,7 +316,7 @@ pub(in super::super) fn program() -> Result<PathBuf, String> {
         return Ok(named.into());
     }
     let name = format!("shakebench{}", std::env::consts::EXE_SUFFIX);
-    let own = std::env::current_exe().map_err(|error| error.to_string())?;
+    let own = crate::program::file().map_err(|error| error.to_string())?;
     if own.file_name().is_some_and(|file| file == name.as_str()) {
         return Ok(own);
     }
