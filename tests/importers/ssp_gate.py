@@ -42,7 +42,7 @@ def in_ecos(path, folder, step, rows, columns):
 
     values = np.zeros((rows, len(columns)))
     with EcosSimulation(ssp_path=path, step_size=step) as simulation:
-        simulation.init()
+        simulation.init(parameter_set="parameters")
         for row in range(rows):
             values[row] = [simulation.get_real(f"{c}::{v.name}") for _, c, v in columns]
             simulation.step()

@@ -17,6 +17,8 @@ use crate::system::{Component, Connection, Quantity, Source, System, Value};
 const MOTION: &str = "reference";
 /// Its FMU.
 const MOTION_FMU: &str = "ReferenceMotion";
+/// The name of every component's set of parameters: readers may ask for one by its name.
+const SET: &str = "parameters";
 /// Samples ahead that it has as outputs.
 const AHEAD: isize = 20;
 
@@ -302,11 +304,10 @@ impl<'a> Writer<'a> {
                 text,
                 "        <ssd:ParameterBindings>\n          <ssd:ParameterBinding>\n            \
                  <ssd:ParameterValues>\n            <ssv:ParameterSet version=\"1.0\" \
-                 name=\"{}\">\n            <ssv:Parameters>\n{values}            \
+                 name=\"{SET}\">\n            <ssv:Parameters>\n{values}            \
                  </ssv:Parameters>\n            </ssv:ParameterSet>\n            \
                  </ssd:ParameterValues>\n          </ssd:ParameterBinding>\n        \
-                 </ssd:ParameterBindings>\n",
-                escape(name)
+                 </ssd:ParameterBindings>\n"
             );
         }
         if let Some(period) = period {
@@ -600,12 +601,9 @@ fn typed(kind: &Kind, value: &Value) -> String {
         (Kind::Boolean, Value::Number(number)) => {
             format!("<ssv:Boolean value=\"{}\"/>", *number != 0.0)
         }
-        (Kind::Enumeration(items), Value::Number(number)) => {
-            let item = items.iter().find(|item| item.value as f64 == *number);
-            match item {
-                Some(item) => format!("<ssv:Enumeration value=\"{}\"/>", escape(&item.name)),
-                None => format!("<ssv:Integer value=\"{number}\"/>"),
-            }
+        // By its number: not every reader knows the names of choices.
+        (Kind::Enumeration(_), Value::Number(number)) => {
+            format!("<ssv:Integer value=\"{number}\"/>")
         }
         (Kind::Float64 | Kind::Float32, Value::Number(number)) => {
             format!("<ssv:Real value=\"{number}\"/>")

@@ -265,17 +265,17 @@ fn faults_of_an_archive_are_named_with_file_and_line() {
 }
 
 /// A built-in system as an archive, and its results with the Jacobi algorithm.
-fn exported(folder: &Path, system: &str, plant: &str, fmi: FmiVersion) -> (PathBuf, PathBuf) {
+fn exported(folder: &Path, system: &str, specimen: &str, fmi: FmiVersion) -> (PathBuf, PathBuf) {
     let request = Request {
-        plant: plant.to_string(),
+        specimen: specimen.to_string(),
         fmi,
         algorithm: Some(Algorithm::Jacobi),
-        duration_s: Some(2.0),
+        duration_s: Some(1.0),
         ..Request::built_in(system)
     };
     let prepared = prepare(&request).unwrap();
     let outcome = prepared.run(Algorithm::Jacobi).unwrap();
-    let stem = format!("{system}-{plant}-{}", fmi.folder());
+    let stem = format!("{system}-{specimen}-{}", fmi.folder());
     let (archive, csv) = (
         folder.join(format!("{stem}.ssp")),
         folder.join(format!("{stem}.csv")),
@@ -283,7 +283,7 @@ fn exported(folder: &Path, system: &str, plant: &str, fmi: FmiVersion) -> (PathB
     let experiment = Experiment {
         motion: Some(&prepared.motion),
         step: prepared.step,
-        duration: 2.0,
+        duration: 1.0,
         algorithm: Algorithm::Jacobi.to_string(),
         fmi,
     };
@@ -309,35 +309,21 @@ fn exported(folder: &Path, system: &str, plant: &str, fmi: FmiVersion) -> (PathB
 #[test]
 fn built_in_systems_are_valid_archives_and_give_in_ecos_and_libcosim_what_jacobi_gives_here() {
     let folder = tempfile::tempdir().unwrap();
-    let mut second = Vec::new();
-    for system in shakebench::system::built_in::names() {
-        second.push(exported(
-            folder.path(),
-            system,
-            "identified",
-            FmiVersion::V2,
-        ));
-    }
-    for system in ["three-variable", "mpc"] {
-        second.push(exported(
-            folder.path(),
-            system,
-            "servohydraulic",
-            FmiVersion::V2,
-        ));
-    }
+    let of = |specimen: &str| -> Vec<(PathBuf, PathBuf)> {
+        shakebench::system::built_in::names()
+            .map(|system| exported(folder.path(), system, specimen, FmiVersion::V2))
+            .collect()
+    };
+    let (bare, loaded) = (of("none"), of("linear"));
     let third = [exported(
         folder.path(),
         "three-variable",
-        "identified",
+        "none",
         FmiVersion::V3,
     )];
-    let files = |pairs: &[(PathBuf, PathBuf)]| -> Vec<PathBuf> {
-        pairs.iter().map(|(archive, _)| archive.clone()).collect()
-    };
-    for (version, pairs) in [("1.0", &second[..]), ("2.0", &third[..])] {
+    for (version, pairs) in [("1.0", &bare[..]), ("1.0", &loaded), ("2.0", &third)] {
         let mut arguments = vec![PathBuf::from(version)];
-        arguments.extend(files(pairs));
+        arguments.extend(pairs.iter().map(|(archive, _)| archive.clone()));
         let report = match version {
             "1.0" => run_script("ssp_schema.py", &arguments),
             _ => run_script_in("ssp", "requirements-ssp.txt", "ssp_schema.py", &arguments),
@@ -345,17 +331,17 @@ fn built_in_systems_are_valid_archives_and_give_in_ecos_and_libcosim_what_jacobi
         println!("{report}");
         assert_eq!(report.matches("ok ").count(), pairs.len(), "{report}");
     }
+    // ecos reads an output after inputs were set that it depends on directly: with a specimen, whose force
+    // and the table's acceleration follow each other without a step, it is no Jacobi master.
     for (program, pairs) in [
-        ("ecos", &second[..]),
-        ("libcosim", &second[..]),
-        ("ecos", &third[..]),
+        ("ecos", &bare[..]),
+        ("ecos", &third),
+        ("libcosim", &bare),
+        ("libcosim", &loaded),
     ] {
         let mut arguments = vec![PathBuf::from(program), PathBuf::from("0.002")];
-        arguments.extend(
-            pairs
-                .iter()
-                .flat_map(|(archive, csv)| [archive.clone(), csv.clone()]),
-        );
+        let files = pairs.iter();
+        arguments.extend(files.flat_map(|(archive, csv)| [archive.clone(), csv.clone()]));
         let report = run_script("ssp_gate.py", &arguments);
         println!("{report}");
         assert_eq!(report.matches("ok ").count(), pairs.len(), "{report}");
