@@ -24,15 +24,15 @@ pub(super) fn file_name(path: &Path) -> String {
 /// What an archive is unpacked as: what it is called, and the file that it must have at its top.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sort {
-    /// `FMU` or `SSP`.
-    pub word: &'static str,
+    /// What is said of a file that is none.
+    pub refusal: &'static str,
     /// `modelDescription.xml`, or `SystemStructure.ssd`.
     pub file: &'static str,
 }
 
 /// An FMU.
 pub(super) const FMU: Sort = Sort {
-    word: "FMU",
+    refusal: "not an FMU",
     file: "modelDescription.xml",
 };
 
@@ -43,7 +43,7 @@ pub(super) const FMU: Sort = Sort {
 pub(crate) fn unpack(sort: Sort, fmu: &Path, bytes: &[u8]) -> Result<Folder, FmuError> {
     let broken = |reason: String| FmuError::Archive {
         fmu: fmu.to_path_buf(),
-        sort: sort.word,
+        sort: sort.refusal,
         reason,
     };
     if bytes.is_empty() {

@@ -18,11 +18,11 @@ pub enum FmuError {
         source: std::io::Error,
     },
     /// The file is no zip archive, or a damaged one.
-    #[error("{}: not an {sort}: {reason}", fmu.display())]
+    #[error("{}: {sort}: {reason}", fmu.display())]
     Archive {
         /// The file.
         fmu: PathBuf,
-        /// What it should be: `FMU` or `SSP`.
+        /// What it is not.
         sort: &'static str,
         /// What is wrong.
         reason: String,

@@ -14,7 +14,7 @@ use crate::fmu::folder::Folder;
 
 /// An SSP archive.
 const SSP: Sort = Sort {
-    word: "SSP",
+    refusal: "not an SSP archive",
     file: STRUCTURE,
 };
 /// Larger files of parameters are mistakes or attacks, bytes.
