@@ -79,8 +79,9 @@ fn every_cause_trips_at_its_sample_ramps_without_a_jump_and_stays() {
         (Trip::TrackingError, 0, |i| {
             i.measured.displacement = i.reference_displacement + 0.16 * INCH
         }),
-        // Each change of 14 V adds 14 V / 0.102 s = 137 V/s to the mean; the first one is smaller.
-        (Trip::Activity, 2, |i| {
+        // Each change of 14 V adds 14 V / 0.102 s = 137 V/s to the mean, which fades by 2 % a sample; the
+        // first one is smaller. The command itself may go four times 250 V/s.
+        (Trip::Activity, 8, |i| {
             i.valve_command = if i.heartbeat % 2 == 0 { 7.0 } else { -7.0 };
         }),
         // 0.1 s of saturation are allowed: 50 samples, the next one trips.
@@ -136,6 +137,41 @@ fn activity_is_the_way_of_the_command_per_second() {
     // swings by 3 %.
     assert_eq!(trip_under_a_sine(2.9), None);
     assert!(trip_under_a_sine(3.3).is_some());
+}
+
+#[test]
+fn noise_is_no_oscillation_and_a_weak_supply_trips() {
+    // White noise of 0.9 V goes 0.9 * 2/sqrt(pi) / 2 ms = 508 V in a second, its mean of four samples
+    // a quarter of it.
+    let noisy = |size: f64| {
+        run(Interlock::laboratory(), 4000, move |k, input| {
+            let noise = plant::sensors::channel::Noise {
+                seed: 5,
+                channel: 0,
+                sample: u64::from(k),
+            };
+            input.valve_command = size * noise.gaussian();
+        })
+        .0
+        .memory
+        .trip
+    };
+    assert_eq!(noisy(0.9), Trip::None);
+    assert_eq!(noisy(3.0), Trip::Activity);
+    let watched = Interlock {
+        pressure_limit: 1e7,
+        ..Interlock::laboratory()
+    };
+    let supply = |pressure: f64| {
+        run(watched, 100, move |_, input| {
+            input.supply_pressure = pressure
+        })
+        .0
+        .memory
+        .trip
+    };
+    assert_eq!(supply(2e7), Trip::None);
+    assert_eq!(supply(3.4e6), Trip::Pressure);
 }
 
 #[test]

@@ -1,5 +1,7 @@
-//! Loop shaping: the second-order displacement controller of Section 3.4 as a sampled law.
+//! Loop shaping: the displacement controller of Section 3.4 as a sampled law, of second order as
+//! printed or with further sections of second order.
 
+use nalgebra::Complex;
 use units::constants::INCH;
 
 use crate::pid::{PidInput, VALVE_LIMIT, limit_and_integrate};
@@ -10,11 +12,13 @@ use crate::{Controller, ModelError};
 /// As a sampled law it is discretised by the trapezoidal rule (Tustin) in the form
 /// `u = g (e + (n1 - p) l + n0 ∫l dt)`, `dl/dt = e - p l`: exact for its integrator under an error
 /// that is linear between samples. The integral stands still while the command is at its limit
-/// and would be pushed further.
+/// and would be pushed further. Further sections, discretised in the same way, stand before it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LoopShaping {
     /// The coefficients.
     pub coefficients: LoopShapingCoefficients,
+    /// Further sections.
+    pub sections: [Section; SECTIONS],
     /// Largest magnitude of the valve command, V.
     pub limit: f64,
     /// What the law remembers.
@@ -34,6 +38,70 @@ pub struct LoopShapingCoefficients {
     pub pole: f64,
 }
 
+/// Number of further sections.
+pub const SECTIONS: usize = 2;
+
+/// `(b2 s² + b1 s + 1) / (a2 s² + a1 s + 1)`; one by default.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Section {
+    /// `b2`, s².
+    pub b2: f64,
+    /// `b1`, s.
+    pub b1: f64,
+    /// `a2`, s².
+    pub a2: f64,
+    /// `a1`, s.
+    pub a1: f64,
+}
+
+impl Section {
+    /// Checks that it is stable.
+    ///
+    /// # Errors
+    /// A coefficient that is not finite, or a pole that does not decay.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        ModelError::require_finite("section_b2", self.b2)?;
+        ModelError::require_finite("section_b1", self.b1)?;
+        ModelError::require_non_negative("section_a2", self.a2)?;
+        if self.a2 > 0.0 {
+            return ModelError::require_positive("section_a1", self.a1);
+        }
+        ModelError::require_non_negative("section_a1", self.a1)
+    }
+
+    /// The difference equation by the trapezoidal rule at `period` s, in powers of `1/z`:
+    /// numerator, then denominator less its leading one.
+    pub fn sampled(&self, period: f64) -> ([f64; 3], [f64; 2]) {
+        let (w, w2) = (2.0 / period, 4.0 / (period * period));
+        let powers = |two: f64, one: f64| {
+            [
+                two * w2 + one * w + 1.0,
+                2.0 - 2.0 * two * w2,
+                two * w2 - one * w + 1.0,
+            ]
+        };
+        let (b, a) = (powers(self.b2, self.b1), powers(self.a2, self.a1));
+        (b.map(|own| own / a[0]), [a[1] / a[0], a[2] / a[0]])
+    }
+
+    /// Whether it is one at all frequencies.
+    pub fn is_one(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// One sample, by the transposed second direct form.
+    fn step(&self, memory: &mut [f64; 2], input: f64, period: f64) -> f64 {
+        if self.is_one() {
+            return input;
+        }
+        let (b, a) = self.sampled(period);
+        let output = b[0] * input + memory[0];
+        memory[0] = b[1] * input - a[0] * output + memory[1];
+        memory[1] = b[2] * input - a[1] * output;
+        output
+    }
+}
+
 /// Memory of [`LoopShaping`].
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct LoopShapingMemory {
@@ -43,6 +111,8 @@ pub struct LoopShapingMemory {
     pub lag: f64,
     /// Integral part of the command, V.
     pub integral: f64,
+    /// Of the further sections.
+    pub sections: [[f64; 2]; SECTIONS],
 }
 
 impl LoopShapingCoefficients {
@@ -73,9 +143,52 @@ impl LoopShaping {
     pub fn new(coefficients: LoopShapingCoefficients) -> Self {
         Self {
             coefficients,
+            sections: [Section::default(); SECTIONS],
             limit: VALVE_LIMIT,
             memory: LoopShapingMemory::default(),
         }
+    }
+
+    /// Response at `omega` (rad/s) from the error to the command, sampled every `period` s, V/m.
+    pub fn response(&self, omega: f64, period: f64) -> Complex<f64> {
+        let s = Complex::new(0.0, 2.0 / period * (0.5 * omega * period).tan());
+        let c = &self.coefficients;
+        let mut value =
+            c.gain * ((s + c.numerator_rate) * s + c.numerator_constant) / (s * (s + c.pole));
+        for own in &self.sections {
+            value *= ((s * own.b2 + own.b1) * s + 1.0) / ((s * own.a2 + own.a1) * s + 1.0);
+        }
+        value
+    }
+
+    /// Root mean square of the command that white noise of unit size makes of the error, V/m.
+    pub fn noise_gain(&self, period: f64) -> f64 {
+        const LINES: usize = 200;
+        let nyquist = std::f64::consts::PI / period;
+        // Midpoints: the integral's pole at zero and the Nyquist frequency stay out.
+        let square: f64 = (0..LINES)
+            .map(|line| (line as f64 + 0.5) / LINES as f64 * nyquist)
+            .map(|omega| self.response(omega, period).norm_sqr())
+            .sum();
+        (square / LINES as f64).sqrt()
+    }
+
+    /// The parameters with the names that the component gives them.
+    pub fn named(&self) -> Vec<(String, f64)> {
+        let c = &self.coefficients;
+        let mut all = vec![
+            ("gain".to_string(), c.gain),
+            ("numerator_rate".to_string(), c.numerator_rate),
+            ("numerator_constant".to_string(), c.numerator_constant),
+            ("pole".to_string(), c.pole),
+        ];
+        for (number, section) in (1..).zip(&self.sections) {
+            let Section { b2, b1, a2, a1 } = *section;
+            for (name, value) in [("b2", b2), ("b1", b1), ("a2", a2), ("a1", a1)] {
+                all.push((format!("section_{number}_{name}"), value));
+            }
+        }
+        all
     }
 
     /// The controller of Eq 3-10.
@@ -96,6 +209,7 @@ impl Controller for LoopShaping {
 
     fn validate(&self) -> Result<(), ModelError> {
         self.coefficients.validate()?;
+        self.sections.iter().try_for_each(Section::validate)?;
         ModelError::require_positive("valve_limit", self.limit)
     }
 
@@ -108,7 +222,10 @@ impl Controller for LoopShaping {
         } = self.coefficients;
         let memory = &mut self.memory;
         let half = 0.5 * period;
-        let error = input.reference - input.measured;
+        let mut error = input.reference - input.measured;
+        for (section, memory) in self.sections.iter().zip(&mut memory.sections) {
+            error = section.step(memory, error, period);
+        }
         let lag = ((1.0 - pole * half) * memory.lag + half * (error + memory.error))
             / (1.0 + pole * half);
         let increment = gain * numerator_constant * half * (lag + memory.lag);
@@ -159,6 +276,33 @@ mod tests {
             assert!((command - expected).abs() < 1e-9, "{command} {expected}");
             e = [error, e[0]];
             u = [expected, u[0]];
+        }
+    }
+
+    #[test]
+    fn a_section_turns_a_sine_as_its_transfer_function_does() {
+        // A notch at 90 rad/s with its poles at 200 rad/s, Tustin at 2 ms.
+        let h: f64 = 0.002;
+        let section = Section {
+            b2: 1.0 / 8100.0,
+            b1: 0.3 / 90.0,
+            a2: 1.0 / 4e4,
+            a1: 1.4 / 200.0,
+        };
+        section.validate().unwrap();
+        let omega: f64 = 75.0;
+        let s = nalgebra::Complex::new(0.0, 2.0 / h * (0.5 * omega * h).tan());
+        let expected = (section.b2 * s * s + section.b1 * s + 1.0)
+            / (section.a2 * s * s + section.a1 * s + 1.0);
+        let mut memory = [0.0; 2];
+        for k in 0..5000 {
+            let phase = omega * h * f64::from(k);
+            let got = section.step(&mut memory, phase.cos(), h);
+            let wanted = (expected * nalgebra::Complex::new(0.0, phase).exp()).re;
+            assert!(
+                k < 1000 || (got - wanted).abs() < 1e-9,
+                "{k} {got} {wanted}"
+            );
         }
     }
 

@@ -11,7 +11,7 @@ use plant::linear::{DiscreteStateSpace, StateSpace, TransferFunction};
 
 use crate::ModelError;
 use crate::allocation::ControlAllocation;
-use crate::loop_shaping::LoopShapingCoefficients;
+use crate::loop_shaping::{LoopShaping, LoopShapingCoefficients, Section};
 use crate::pid::Pid;
 use crate::sliding_mode::SlidingMode;
 use crate::three_variable::ThreeVariableGains;
@@ -134,6 +134,36 @@ impl LinearLaw {
         })
     }
 
+    /// A controller of the form of Eq 3-10 with its further sections.
+    ///
+    /// # Errors
+    /// Coefficients with which there is none.
+    pub fn shaped(law: &LoopShaping, period: f64) -> Result<Self, ModelError> {
+        let mut whole = Self::loop_shaping(&law.coefficients, period)?;
+        for section in law.sections.iter().filter(|section| !section.is_one()) {
+            section.validate()?;
+            let Section { b2, b1, a2, a1 } = *section;
+            let continuous =
+                TransferFunction::new(&[b2, b1, 1.0], &[a2, a1, 1.0])?.to_state_space()?;
+            let (b, a) = section.sampled(period);
+            // The transposed second direct form, as the law runs.
+            let sampled = DiscreteStateSpace::new(
+                dmatrix![-a[0], 1.0; -a[1], 0.0],
+                dmatrix![b[1] - a[0] * b[0]; b[2] - a[1] * b[0]],
+                dmatrix![1.0, 0.0],
+                dmatrix![b[0]],
+                period,
+            )?;
+            for channel in &mut whole.channels {
+                channel.continuous = in_series(&continuous, &channel.continuous);
+                let first = as_continuous(&sampled);
+                let both = in_series(&first, &as_continuous(&channel.sampled));
+                channel.sampled = DiscreteStateSpace::new(both.a, both.b, both.c, both.d, period)?;
+            }
+        }
+        Ok(whole)
+    }
+
     /// Three-variable control (Fig 3-5).
     ///
     /// # Errors
@@ -197,6 +227,38 @@ impl LinearLaw {
             ],
             period,
         })
+    }
+}
+
+/// The matrices alone: joining systems does not ask what time is.
+fn as_continuous(system: &DiscreteStateSpace) -> StateSpace {
+    StateSpace {
+        a: system.a.clone(),
+        b: system.b.clone(),
+        c: system.c.clone(),
+        d: system.d.clone(),
+    }
+}
+
+/// `second` behind `first`, one input and one output each.
+fn in_series(first: &StateSpace, second: &StateSpace) -> StateSpace {
+    let (n, m) = (first.order(), second.order());
+    let mut a = DMatrix::zeros(n + m, n + m);
+    a.view_mut((0, 0), (n, n)).copy_from(&first.a);
+    a.view_mut((n, 0), (m, n))
+        .copy_from(&(&second.b * &first.c));
+    a.view_mut((n, n), (m, m)).copy_from(&second.a);
+    let mut b = DMatrix::zeros(n + m, 1);
+    b.rows_mut(0, n).copy_from(&first.b);
+    b.rows_mut(n, m).copy_from(&(&second.b * &first.d));
+    let mut c = DMatrix::zeros(1, n + m);
+    c.columns_mut(0, n).copy_from(&(&second.d * &first.c));
+    c.columns_mut(n, m).copy_from(&second.c);
+    StateSpace {
+        a,
+        b,
+        c,
+        d: &second.d * &first.d,
     }
 }
 

@@ -177,6 +177,7 @@ fn model_file(model: &Estimated, effects: EffectSections, errors: EffectSections
         effects,
         noise: None,
         hydraulics: None,
+        covariance: None,
         uncertainty: None,
         standard_errors: Some(StandardErrors {
             actuator: Some(actuator_errors),

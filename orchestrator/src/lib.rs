@@ -2,6 +2,7 @@
 
 pub mod benchmark;
 pub mod cli;
+pub mod commission;
 pub mod comparison;
 pub mod component_library;
 pub mod design;
@@ -21,6 +22,7 @@ pub mod pack;
 pub mod program;
 pub mod report;
 pub mod results;
+pub mod rigs;
 pub mod run;
 pub mod run_comparison;
 pub mod ssp;

@@ -19,6 +19,7 @@
 
 pub mod balanced;
 pub mod coprime;
+pub mod whole_plant;
 
 use nalgebra::{Complex, DMatrix};
 use plant::linear::{StateSpace, TransferFunction};

@@ -208,6 +208,7 @@ pub fn rate_by_rule(
 
 #[cfg(test)]
 mod tests {
+    use super::super::known_rig::fitted;
     use super::*;
     use crate::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
     use crate::three_variable::ThreeVariableGains;
@@ -217,7 +218,7 @@ mod tests {
     #[test]
     fn the_margin_is_6_db_on_the_linear_and_on_the_whole_rig() {
         let table = ServoHydraulicTable::default();
-        let (rig, model) = (table.linearised(), table.fitted().unwrap());
+        let (rig, model) = (table.linearised(), fitted(&table));
         let gains = ThreeVariableGains::tuned(&model, 1, PERIOD).unwrap();
         let printed = Pid::equation_3_6();
         let displacement = Pid {

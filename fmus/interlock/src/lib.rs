@@ -42,6 +42,7 @@ pub struct Interlock {
     measured: controllers::Motion,
     measured_force: f64,
     specimen_acceleration: f64,
+    supply_pressure: f64,
     measurement_valid: bool,
     heartbeat: i32,
     stop: bool,
@@ -62,6 +63,7 @@ impl Default for Interlock {
             measured: controllers::Motion::default(),
             measured_force: 0.0,
             specimen_acceleration: 0.0,
+            supply_pressure: 0.0,
             measurement_valid: true,
             heartbeat: 0,
             stop: false,
@@ -104,7 +106,7 @@ impl Component for Interlock {
     ];
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 7] = [
+        const INPUTS: [&str; 8] = [
             "controller_command",
             "reference_displacement",
             "measured_displacement",
@@ -112,6 +114,7 @@ impl Component for Interlock {
             "measured_acceleration",
             "measured_force",
             "specimen_acceleration",
+            "supply_pressure",
         ];
         fmu_kit::table! { Self, s:
             input("controller_command", s.controller_command, "Command of the controller", "V").nominal(10.0);
@@ -121,6 +124,7 @@ impl Component for Interlock {
             input("measured_acceleration", s.measured.acceleration, "Measured acceleration", "m/s2" => "g").nominal(10.0);
             input("measured_force", s.measured_force, "Measured force of the actuator", "N" => "lbf").nominal(400.0);
             input("specimen_acceleration", s.specimen_acceleration, "Measured absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
+            input("supply_pressure", s.supply_pressure, "Pressure of the supply; unused without a limit of it", "Pa" => "psi").nominal(2e7);
             input("measurement_valid", s.measurement_valid, "Whether all measurements are numbers");
             input("heartbeat", s.heartbeat, "A number that the controller changes at every sample");
             input("stop", s.stop, "The operator's stop");
@@ -137,7 +141,7 @@ impl Component for Interlock {
             parameter("force_limit", s.law.force_limit, "Largest force", "N" => "lbf");
             parameter("tracking_limit", s.law.tracking_limit, "Largest distance of the measured displacement from what the reference lately was", "m" => "in");
             parameter("tracking_time", s.law.tracking_time, "How lately: time constant of the reference's range", "s");
-            parameter("activity_limit", s.law.activity_limit, "Largest way of the controller's command per second, to and fro", "V/s");
+            parameter("activity_limit", s.law.activity_limit, "Largest way of the controller's command, as a mean of four samples, per second, to and fro; four times as much for the command itself", "V/s");
             parameter("activity_time", s.law.activity_time, "Time constant of that mean", "s");
             parameter("saturation_level", s.law.saturation_level, "Commands from here on count as saturated", "V");
             parameter("saturation_time", s.law.saturation_time, "Longest time in saturation", "s");
@@ -149,6 +153,7 @@ impl Component for Interlock {
             parameter("specimen_silence", s.law.specimen_silence, "The specimen is silent below this acceleration, 0 for no check", "m/s2" => "g");
             parameter("specimen_table_motion", s.law.specimen_table_motion, "The table moves above this acceleration ...", "m/s2" => "g");
             parameter("specimen_table_velocity", s.law.specimen_table_velocity, "... and its mean speed this one", "m/s" => "in/s");
+            parameter("pressure_limit", s.law.pressure_limit, "Least pressure of the supply, 0 for no check", "Pa" => "psi").min(0.0);
             parameter("specimen_silence_time", s.law.specimen_silence_time, "Time of the moving table in which a specimen must not be silent", "s");
         }
     }
@@ -176,6 +181,7 @@ impl Component for Interlock {
                     f64::NAN
                 },
                 specimen_acceleration: self.specimen_acceleration,
+                supply_pressure: self.supply_pressure,
                 heartbeat: self.heartbeat,
                 stop: self.stop,
                 reset: self.reset,

@@ -5,7 +5,7 @@ use controllers::{Controller, loop_shaping::LoopShaping as Law, pid::PidInput};
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
-/// The second-order controller of Eq 3-10 from displacement to valve command.
+/// The controller of Eq 3-10, with further sections or without, from displacement to valve command.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct LoopShaping {
     law: Law,
@@ -45,6 +45,14 @@ impl Component for LoopShaping {
             parameter("numerator_rate", s.law.coefficients.numerator_rate, "Coefficient of s in the numerator", "1/s");
             parameter("numerator_constant", s.law.coefficients.numerator_constant, "Constant of the numerator", "1/s2");
             parameter("pole", s.law.coefficients.pole, "Rate p of the slow pole", "1/s");
+            parameter("section_1_b2", s.law.sections[0].b2, "First further section, numerator, s^2", "s2");
+            parameter("section_1_b1", s.law.sections[0].b1, "First further section, numerator, s", "s");
+            parameter("section_1_a2", s.law.sections[0].a2, "First further section, denominator, s^2", "s2");
+            parameter("section_1_a1", s.law.sections[0].a1, "First further section, denominator, s", "s");
+            parameter("section_2_b2", s.law.sections[1].b2, "Second further section, numerator, s^2", "s2");
+            parameter("section_2_b1", s.law.sections[1].b1, "Second further section, numerator, s", "s");
+            parameter("section_2_a2", s.law.sections[1].a2, "Second further section, denominator, s^2", "s2");
+            parameter("section_2_a1", s.law.sections[1].a1, "Second further section, denominator, s", "s");
             parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }

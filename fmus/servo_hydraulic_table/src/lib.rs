@@ -139,6 +139,7 @@ impl Component for ServoHydraulicTable {
             parameter("supply_drain_time", s.rig.table.supply.drain_time, "Time constant at which a lost supply drains", "s");
             parameter("valve_frequency", s.rig.table.valve.frequency, "Natural frequency of the spool", "Hz");
             parameter("valve_damping_ratio", s.rig.table.valve.damping_ratio, "Damping ratio of the spool");
+            parameter("spool_slew_limit", s.rig.table.valve.slew_limit, "Largest velocity of the spool", "V/s");
             parameter("spool_travel_limit", s.rig.table.valve.travel_limit, "Travel limit of the spool", "V");
             parameter("valve_overlap", s.rig.table.valve.overlap, "Overlap of the edges (dead band, half width)", "V");
             parameter("valve_null_bias", s.rig.table.valve.null_bias, "Position of the spool at zero command", "V");
@@ -181,7 +182,7 @@ impl Component for ServoHydraulicTable {
             local("der(spool_velocity)", s.rates.spool_velocity, "Acceleration of the spool", "V/s2")
                 .derivative_of("spool_velocity")
                 .depends_on(&["valve_command"], Dependent).depends_on(&["spool", "spool_velocity"], Fixed)
-                .initially_depends_on(&["valve_command", "valve_null_bias", "spool_travel_limit", "valve_frequency"]);
+                .initially_depends_on(&["valve_command", "valve_null_bias", "spool_travel_limit", "spool_slew_limit", "valve_frequency"]);
             local("der(pressure_a)", s.rates.pressures[0], "Rate of the pressure of chamber A", "Pa/s")
                 .derivative_of("pressure_a").depends_on(&CHAMBERS, Dependent).initially_depends_on(&VALVE);
             local("der(pressure_b)", s.rates.pressures[1], "Rate of the pressure of chamber B", "Pa/s")

@@ -1,9 +1,10 @@
 //! An identified hydraulic rig as a model file.
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::Found;
-use super::equations::{HydraulicRig, PARAMETERS};
+use super::equations::{HydraulicRig, NAMES, PARAMETERS};
 use super::friction::SealShape;
 use super::thesis_form::{coefficients, standard_errors};
 use crate::IdentificationError;
@@ -52,6 +53,76 @@ pub struct HydraulicSection {
 pub struct UncertaintySection {
     /// Relative standard deviation of every parameter.
     pub relative: f64,
+}
+
+/// `[covariance]`: how the errors of the identified parameters go together, SI whatever the file's
+/// units.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CovarianceSection {
+    /// The parameters, in the order of rows and columns.
+    pub parameters: Vec<String>,
+    /// The covariance, row after row.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+impl CovarianceSection {
+    fn new(covariance: &DMatrix<f64>) -> Self {
+        let rows = covariance.row_iter();
+        Self {
+            parameters: NAMES.map(|name| name.replace(' ', "_")).to_vec(),
+            matrix: rows.map(|row| row.iter().copied().collect()).collect(),
+        }
+    }
+
+    /// The covariance in the order of [`NAMES`]; `None` where the section is of other parameters.
+    pub fn ordered(&self) -> Option<DMatrix<f64>> {
+        let names = NAMES.map(|name| name.replace(' ', "_"));
+        let known = self.parameters == names && self.matrix.len() == PARAMETERS;
+        let square = self.matrix.iter().all(|row| row.len() == PARAMETERS);
+        (known && square)
+            .then(|| DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| self.matrix[i][j]))
+    }
+}
+
+impl ModelFile {
+    /// The hydraulic rig and the shape of its friction, SI, where the file holds one.
+    ///
+    /// # Errors
+    /// Unknown units.
+    pub fn hydraulic_rig(
+        &self,
+        name: &str,
+    ) -> Result<Option<(HydraulicRig, SealShape)>, IdentificationError> {
+        let Some(own) = &self.hydraulics else {
+            return Ok(None);
+        };
+        let table = self.table(name)?;
+        let rig = HydraulicRig {
+            spool_lag: own.spool_lag,
+            spool_inertia: own.spool_inertia,
+            force_rate: own.force_rate,
+            oil_stiffness: own.oil_stiffness,
+            leakage_rate: own.leakage_rate,
+            seal_damping: own.seal_damping,
+            seal_friction: own.seal_friction,
+            mass: table.mass,
+            damping: table.damping,
+            stiffness: table.stiffness,
+            specimen_mass: self.specimen(name)?.map_or(0.0, |body| body.mass),
+            command_delay: self.command_delay.unwrap_or(0.0),
+            accelerometer_delay: own.accelerometer_delay,
+            load_cell_delay: own.load_cell_delay,
+            accelerometer_scale: own.accelerometer_scale,
+        };
+        let shape = SealShape {
+            presliding: own.seal_presliding,
+            excess: own.seal_excess,
+            stribeck_velocity: own.seal_stribeck_velocity,
+            sharpness: own.seal_sharpness,
+            relaxation: own.seal_relaxation,
+        };
+        Ok(Some((rig, shape)))
+    }
 }
 
 impl HydraulicSection {
@@ -156,6 +227,7 @@ impl Found {
             uncertainty: Some(UncertaintySection {
                 relative: relative.min(0.3),
             }),
+            covariance: Some(CovarianceSection::new(&self.covariance)),
             standard_errors: Some(StandardErrors {
                 effects: EffectSections::new(),
                 actuator: Some(actuator_errors),

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use units::constants::{INCH, LBF};
 
 use crate::IdentificationError;
-use crate::closed_loop::model_section::{HydraulicSection, UncertaintySection};
+use crate::closed_loop::model_section::{CovarianceSection, HydraulicSection, UncertaintySection};
 use crate::data::OUTPUT_NAMES;
 use crate::identify::identified::RigIdentification;
 use crate::identify::parameters::Physical;
@@ -60,6 +60,9 @@ pub struct ModelFile {
     /// How far a diagnosis may take the parameters from their values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<UncertaintySection>,
+    /// How the errors of the hydraulic rig's parameters go together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<CovarianceSection>,
     /// Standard errors of everything above, in the same layout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_errors: Option<StandardErrors>,
@@ -357,6 +360,7 @@ impl ModelFile {
             noise: Some(noise),
             hydraulics: None,
             uncertainty: None,
+            covariance: None,
             standard_errors: Some(StandardErrors {
                 effects: EffectSections::new(),
                 actuator: found.identifiable.then_some(actuator_errors),

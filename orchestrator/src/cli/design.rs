@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::design::{self, LoopName, Options, Synthesis};
+use crate::design::{self, LoopName, Options, Synthesis, model};
 use crate::error::Error;
 use crate::report::columns::aligned;
 use crate::report::number::significant;
@@ -16,16 +16,32 @@ use crate::units::INCH;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     shakebench design\n  \
-    shakebench design --loop loop-shaping-synthesis --crossover 50 --json")]
+    shakebench design --loop loop-shaping-synthesis --crossover 50 --json\n  \
+    shakebench design --model MODEL.toml")]
 pub struct Arguments {
     /// One loop: displacement-pid, force-pid, loop-shaping, loop-shaping-synthesis,
     /// three-variable or sliding-mode [default: all]
     #[arg(long = "loop", value_name = "NAME")]
     only: Option<String>,
-    /// Target crossover of the loop-shaping synthesis, rad/s [default: 65, which comes nearest to
-    /// Eq 3-10]
+    /// Crossover that loop shaping is to reach, rad/s [default: the synthesis that comes nearest to
+    /// Eq 3-10; with --model the fastest with 6 dB and 45 degrees]
     #[arg(long, value_name = "RAD_PER_S")]
     crossover: Option<f64>,
+    /// Design every controller on this model, as `shakebench identify` writes it: displacement-pid,
+    /// three-variable, loop-shaping, sliding-mode, mpc
+    #[arg(
+        long,
+        alias = "control-model",
+        value_name = "MODEL.toml",
+        conflicts_with = "specimen"
+    )]
+    model: Option<PathBuf>,
+    /// With --model: rigs drawn from its uncertainty
+    #[arg(long, value_name = "N", default_value_t = model::DRAWS, requires = "model")]
+    draws: u64,
+    /// With --model: seed of the draws
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "model")]
+    seed: u64,
     /// What stands on the table: none, linear [default: none]
     #[arg(long, value_name = "NAME")]
     specimen: Option<String>,
@@ -43,6 +59,9 @@ pub struct Arguments {
 /// An unknown name, a crossover for which there is no controller, or a report that cannot be
 /// written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if let Some(path) = &arguments.model {
+        return on_model(arguments, path);
+    }
     let fault = |option| move |reason| Error::Option { option, reason };
     let only = arguments.only.as_deref().map(str::parse).transpose();
     let specimen = arguments.specimen.as_deref().map(str::parse).transpose();
@@ -76,10 +95,70 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Designs every controller on a model; one that was asked for alone and is not robust is an error.
+fn on_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
+    let design = model::design(&model::Options {
+        model: path.to_path_buf(),
+        only: arguments.only.clone(),
+        crossover: arguments.crossover,
+        draws: arguments.draws,
+        seed: arguments.seed,
+    })?;
+    if let (Some(_), [only]) = (&arguments.only, design.loops.as_slice())
+        && !only.robust
+    {
+        return Err(Error::Option {
+            option: "--model",
+            reason: format!("{}: {} {}", path.display(), only.name, only.note),
+        });
+    }
+    let folder = arguments.out.clone();
+    let folder = folder.unwrap_or_else(|| "shakebench-results/design".into());
+    let report = design.write(&folder)?;
+    if arguments.json {
+        let mut json = serde_json::json!(design);
+        json["report"] = report.display().to_string().into();
+        println!("{json}");
+        return Ok(ExitCode::SUCCESS);
+    }
+    for warning in &design.warnings {
+        println!("{warning}");
+    }
+    println!(
+        "measurements {:.2} ms late; band: 5 to 95 % of {} rigs drawn from the model's errors (seed {})\n",
+        design.late_ms, design.draws, design.seed
+    );
+    print!("{}", aligned(&design.table()));
+    for own in design.loops.iter().filter(|own| !own.robust) {
+        println!("\n{}: refused, it {}", own.name, own.note);
+    }
+    println!("\nwritten:\n  {}", report.display());
+    Ok(ExitCode::SUCCESS)
+}
+
 fn words(synthesis: &Synthesis) -> String {
+    let reached = synthesis
+        .reached_crossover_rad_s
+        .map_or(String::new(), |reached| {
+            format!(", reached {}", significant(reached, 4))
+        });
+    let sections: String = synthesis
+        .sections
+        .iter()
+        .map(|[b2, b1, a2, a1]| {
+            let cell = |value: &f64| significant(*value, 4);
+            format!(
+                " ({} s^2 + {} s + 1)/({} s^2 + {} s + 1)",
+                cell(b2),
+                cell(b1),
+                cell(a2),
+                cell(a1)
+            )
+        })
+        .collect();
     format!(
-        "loop-shaping-synthesis: target {} rad/s, gamma_min {:.4}; C = {:.4} (s^2 + {:.4} s + {:.4}) / \
-             (s (s + {:.5})) V/in (Eq 3-10: 6.986, 0.2975, 0.5892, 0.01046)\n",
+        "loop-shaping-synthesis: target {} rad/s{reached}, gamma_min {:.4}; C = {:.4} (s^2 + {:.4} s + {:.4}) / \
+             (s (s + {:.5})){sections} V/in (Eq 3-10: 6.986, 0.2975, 0.5892, 0.01046)\n",
         significant(synthesis.crossover_rad_s, 3),
         synthesis.gamma_min,
         synthesis.gain_v_m * INCH,

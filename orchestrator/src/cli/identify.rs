@@ -61,6 +61,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         model: arguments.out.clone(),
         fit_part: arguments.fit_part,
         specimen: arguments.specimen.clone(),
+        hydraulic_first: false,
     });
     bar.finish_and_clear();
     let identified = identified?;
@@ -128,6 +129,19 @@ fn pole(pole: &[f64; 2]) -> String {
 /// What is printed without `--json`.
 fn text(found: &RigIdentification, summary: &Summary) -> String {
     let mut text = String::new();
+    let colours: Vec<String> = found
+        .residuals
+        .iter()
+        .filter(|(_, _, test)| !test.is_white())
+        .map(|(recording, channel, _)| format!("{channel} of {recording}"))
+        .collect();
+    if !colours.is_empty() {
+        text += &format!(
+            "not white: the one-step errors of {}: this model lacks something that the rig does, and \
+             the standard errors are too small\n\n",
+            colours.join(", ")
+        );
+    }
     if summary.identifiable {
         text += "actuator poles\n";
         for own in &summary.actuator_poles_rad_s {

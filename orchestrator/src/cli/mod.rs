@@ -15,6 +15,7 @@ macro_rules! eprintln {
 
 pub mod benchmark;
 pub mod build;
+pub mod commission;
 pub mod compare;
 pub mod compare_runs;
 pub mod design;
@@ -28,6 +29,7 @@ mod interrupt;
 mod progress;
 pub mod report;
 mod rig;
+pub mod rigs;
 pub mod run;
 mod terminal;
 pub mod validate;
@@ -79,6 +81,8 @@ enum Command {
     Benchmark(benchmark::Arguments),
     /// Build the components and pack them as FMUs
     Build(build::Arguments),
+    /// Record, identify and validate a rig, and design all controllers on the result
+    Commission(commission::Arguments),
     /// Run controllers on records and print the thesis's tables beside the results
     Compare(compare::Arguments),
     /// Lay any runs over each other and say what differs between them
@@ -113,6 +117,8 @@ enum Command {
         /// File that the calls come through
         file: PathBuf,
     },
+    /// Draw rigs about the physical one and compare designs on them
+    Rigs(rigs::Arguments),
     /// Run a system on a motion
     Run(Box<run::Arguments>),
     /// Say what is wrong with an FMU or an SSP archive
@@ -135,6 +141,7 @@ pub fn main() -> ExitCode {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
         Some(Command::Build(arguments)) => build::execute(&arguments),
+        Some(Command::Commission(arguments)) => commission::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::CompareRuns(arguments)) => compare_runs::execute(&arguments),
         Some(Command::Completions { shell }) => {
@@ -151,6 +158,7 @@ pub fn main() -> ExitCode {
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
+        Some(Command::Rigs(arguments)) => rigs::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
         Some(Command::Validate(arguments)) => validate::execute(&arguments),
     };

@@ -10,7 +10,7 @@ use crate::system::tuning::Tuning;
 /// Options that choose a rig.
 #[derive(Debug, Default, Args)]
 pub struct RigArguments {
-    /// Plant of a built-in system: identified, servohydraulic [default: identified]
+    /// Plant of a built-in system: identified, servohydraulic, or a .toml file of one [default: identified]
     #[arg(long)]
     pub plant: Option<String>,
     /// Specimen of a built-in system: none, linear, yielding [default: linear]
@@ -28,7 +28,7 @@ impl RigArguments {
     /// The plant, chosen or not.
     pub fn plant(&self) -> String {
         let plant = self.plant.as_deref();
-        plant.unwrap_or(built_in::DEFAULT_PLANT).to_string()
+        built_in::plant_path(plant.unwrap_or(built_in::DEFAULT_PLANT))
     }
 
     /// The specimen, chosen or not.

@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use super::result::{Comparison, History, Row};
 use crate::error::Error;
 use crate::metrics;
-use crate::motion;
 use crate::run::experiment::{Request, prepare};
 use crate::system::tuning::Tuning;
 
@@ -50,6 +49,17 @@ pub struct Progress {
 }
 
 impl Played {
+    /// `base` with this motion.
+    pub fn request(&self, base: &Request) -> Request {
+        let mut own = base.clone();
+        match self {
+            Self::Record(path) => own.record = Some(path.clone()),
+            Self::Reference(path) => own.reference = Some(path.clone()),
+            Self::Seed(number) => own.seed = *number,
+        }
+        own
+    }
+
     /// The records in a folder (`.AT2`, `.csv`), by name.
     ///
     /// # Errors
@@ -116,22 +126,13 @@ pub fn compare(plan: &Plan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Comp
 }
 
 fn request(plan: &Plan, controller: &str, played: &Played) -> Request {
-    let (mut record, mut reference, mut seed) = (None, None, motion::DEFAULT_SEED);
-    match played {
-        Played::Record(path) => record = Some(path.clone()),
-        Played::Reference(path) => reference = Some(path.clone()),
-        Played::Seed(number) => seed = *number,
-    }
-    Request {
+    played.request(&Request {
         plant: plan.plant.clone(),
         specimen: plan.specimen.clone(),
         tuning: plan.tuning,
         control_model: plan.control_model.clone(),
-        record,
-        reference,
-        seed,
         ..Request::built_in(controller)
-    }
+    })
 }
 
 fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {

@@ -6,11 +6,10 @@ use std::str::FromStr;
 use controllers::ModelError;
 use controllers::allocation::ControlAllocation;
 use controllers::hierarchy;
-use controllers::loop_shaping::LoopShapingCoefficients;
+use controllers::loop_shaping::{LoopShaping, LoopShapingCoefficients};
 use controllers::loops::{Controlled, LinearLaw, Loop};
 use controllers::pid::Pid;
 use controllers::sliding_mode::SlidingMode;
-use controllers::synthesis::LoopShapingDesign;
 use controllers::three_variable::ThreeVariableGains;
 use plant::identified::coupled::Rig;
 use serde::Serialize;
@@ -89,7 +88,7 @@ impl LoopName {
     }
 
     /// The loop's law, sampled every `period` seconds.
-    fn law(self, design: &LoopShapingDesign, period: f64) -> Result<LinearLaw, ModelError> {
+    fn law(self, synthesised: &LoopShaping, period: f64) -> Result<LinearLaw, ModelError> {
         match self {
             Self::DisplacementPid => {
                 LinearLaw::pid(&Pid::equation_3_6(), Controlled::Displacement, period)
@@ -98,7 +97,7 @@ impl LoopName {
             Self::LoopShaping => {
                 LinearLaw::loop_shaping(&LoopShapingCoefficients::equation_3_10(), period)
             }
-            Self::LoopShapingSynthesis => LinearLaw::loop_shaping(&design.coefficients, period),
+            Self::LoopShapingSynthesis => LinearLaw::shaped(synthesised, period),
             Self::ThreeVariable => {
                 LinearLaw::three_variable(&ThreeVariableGains::table_3_2(), period)
             }
@@ -135,13 +134,13 @@ impl FromStr for LoopName {
 }
 
 impl NamedLoop {
-    /// Around `rig`, with the synthesised controller of `design`.
+    /// Around `rig`, with the controller that was synthesised.
     pub(super) fn new(
         name: LoopName,
         rig: &Rig,
-        design: &LoopShapingDesign,
+        synthesised: &LoopShaping,
     ) -> Result<Self, ModelError> {
-        let law = name.law(design, SAMPLING_PERIOD)?;
+        let law = name.law(synthesised, SAMPLING_PERIOD)?;
         Ok(Self {
             name,
             rig_loop: Loop::new(rig, law),

@@ -3,18 +3,22 @@
 mod bode;
 mod figures;
 mod loops;
+pub mod model;
 mod page;
 mod table;
 
 use std::str::FromStr;
 
 use controllers::ModelError;
+use controllers::loop_shaping::LoopShaping;
 use controllers::sliding_mode;
+use controllers::synthesis::whole_plant::{Shaped, WholePlantDesign};
 use controllers::synthesis::{self, EQUATION_3_10_CROSSOVER, LoopShapingDesign};
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
 use serde::Serialize;
+use units::constants::SAMPLING_PERIOD;
 
 pub use figures::{Figures, LoopFigures};
 pub use loops::LoopName;
@@ -27,7 +31,8 @@ pub use table::table;
 pub struct Options {
     /// One loop; none: all.
     pub only: Option<LoopName>,
-    /// Target crossover of the synthesis, rad/s; none: that of Eq 3-10.
+    /// Crossover that the synthesised controller's sampled loop is to reach, rad/s; none: the
+    /// thesis's synthesis, for the target that comes nearest to Eq 3-10.
     pub crossover: Option<f64>,
     /// What stands on the table.
     pub specimen: Specimen,
@@ -91,10 +96,14 @@ pub struct Design {
 pub struct Synthesis {
     /// Target crossover.
     pub crossover_rad_s: f64,
+    /// Crossover that the sampled loop reaches, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reached_crossover_rad_s: Option<f64>,
     /// Smallest bound that a controller can reach.
     pub gamma_min: f64,
     /// Bound of the controller.
-    pub gamma: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gamma: Option<f64>,
     /// Gain of the second-order controller (Eq 3-10), V/m.
     pub gain_v_m: f64,
     /// `n1` of its numerator `s² + n1 s + n0`.
@@ -103,6 +112,8 @@ pub struct Synthesis {
     pub numerator_constant_1_s2: f64,
     /// `p` of its denominator `s (s + p)`.
     pub pole_1_s: f64,
+    /// Further sections, `[b2, b1, a2, a1]` of `(b2 s² + b1 s + 1)/(a2 s² + a1 s + 1)`.
+    pub sections: Vec<[f64; 4]>,
     /// Of the controller of full order.
     pub hankel_singular_values: Vec<f64>,
 }
@@ -121,17 +132,34 @@ pub fn design(options: &Options) -> Result<Design, ModelError> {
     };
     let shaping = synthesis::loop_shaping(
         &ShakeTable::default().voltage_to_displacement(),
-        options.crossover.unwrap_or(EQUATION_3_10_CROSSOVER),
+        EQUATION_3_10_CROSSOVER,
     )?;
+    let whole = options
+        .crossover
+        .map(|crossover| {
+            Shaped {
+                rig: &rig.shake_table,
+                late: 0.0,
+                noise: 0.0,
+                period: SAMPLING_PERIOD,
+            }
+            .design(crossover)
+        })
+        .transpose()?;
+    let synthesised = whole
+        .as_ref()
+        .map_or(LoopShaping::new(shaping.coefficients), |own| own.law);
     let chosen = LoopName::ALL.into_iter();
     let drawn = chosen
         .filter(|name| options.only.is_none_or(|only| only == *name))
-        .map(|name| NamedLoop::new(name, &rig, &shaping))
+        .map(|name| NamedLoop::new(name, &rig, &synthesised))
         .collect::<Result<Vec<_>, _>>()?;
     Ok(Design {
         loops: drawn.iter().map(LoopFigures::of).collect(),
         specimen: options.specimen,
-        synthesis: Synthesis::from(&shaping),
+        synthesis: whole
+            .as_ref()
+            .map_or_else(|| Synthesis::from(&shaping), Synthesis::from),
         sliding_mode_rate_1_s: sliding_mode::IDENTIFIED_RATE,
         drawn,
         shaping,
@@ -143,13 +171,36 @@ impl From<&LoopShapingDesign> for Synthesis {
         let c = design.coefficients;
         Self {
             crossover_rad_s: design.crossover,
+            reached_crossover_rad_s: None,
             gamma_min: design.robust.gamma_min,
-            gamma: design.robust.gamma,
+            gamma: Some(design.robust.gamma),
             gain_v_m: c.gain,
             numerator_rate_1_s: c.numerator_rate,
             numerator_constant_1_s2: c.numerator_constant,
             pole_1_s: c.pole,
+            sections: Vec::new(),
             hankel_singular_values: design.hankel_singular_values.clone(),
+        }
+    }
+}
+
+impl From<&WholePlantDesign> for Synthesis {
+    fn from(design: &WholePlantDesign) -> Self {
+        let c = design.law.coefficients;
+        let sections = design.law.sections.iter().filter(|own| !own.is_one());
+        Self {
+            crossover_rad_s: design.target,
+            reached_crossover_rad_s: Some(design.reached),
+            gamma_min: design.gamma_min,
+            gamma: None,
+            gain_v_m: c.gain,
+            numerator_rate_1_s: c.numerator_rate,
+            numerator_constant_1_s2: c.numerator_constant,
+            pole_1_s: c.pole,
+            sections: sections
+                .map(|own| [own.b2, own.b1, own.a2, own.a1])
+                .collect(),
+            hankel_singular_values: Vec::new(),
         }
     }
 }

@@ -37,6 +37,8 @@ pub struct Request {
     pub fit_part: f64,
     /// File of a known specimen.
     pub specimen: Option<PathBuf>,
+    /// Whether a hydraulic rig is tried before the general form.
+    pub hydraulic_first: bool,
 }
 
 /// What kind of rig explains the recordings.
@@ -61,7 +63,6 @@ pub struct Identified {
 /// # Errors
 /// Data at fault.
 pub fn identify(request: &Request) -> Result<Identified, Error> {
-    let started = Instant::now();
     let mut recordings = Vec::new();
     let mut warnings = Vec::new();
     for path in &request.data {
@@ -70,6 +71,18 @@ pub fn identify(request: &Request) -> Result<Identified, Error> {
         warnings.extend(findings.iter().map(ToString::to_string));
         recordings.extend(long_enough(pieces, &mut warnings));
     }
+    let mut identified = from_recordings(recordings, request)?;
+    identified.summary.warnings.extend(warnings);
+    Ok(identified)
+}
+
+/// As [`identify`], from recordings on an even base; of `request` the data are not read.
+///
+/// # Errors
+/// Recordings that give no model.
+pub fn from_recordings(recordings: Vec<Recording>, request: &Request) -> Result<Identified, Error> {
+    let started = Instant::now();
+    let mut warnings = Vec::new();
     let specimen = match &request.specimen {
         Some(path) => Some(specimen_file::read(path)?),
         None => None,
@@ -79,7 +92,7 @@ pub fn identify(request: &Request) -> Result<Identified, Error> {
         specimen,
         ..Options::default()
     };
-    let form = form(&recordings, options)?;
+    let form = form(&recordings, options, request.hydraulic_first)?;
     let wall = started.elapsed().as_secs_f64();
     let summary = match &form {
         Form::General(found) => {
@@ -95,8 +108,19 @@ pub fn identify(request: &Request) -> Result<Identified, Error> {
     })
 }
 
-/// The general form where it explains the recordings, else a hydraulic rig where that does.
-fn form(recordings: &[Recording], options: Options) -> Result<Form, IdentificationError> {
+/// The general form where it explains the recordings, else a hydraulic rig where that does; with
+/// `hydraulic_first` the other way about.
+fn form(
+    recordings: &[Recording],
+    options: Options,
+    hydraulic_first: bool,
+) -> Result<Form, IdentificationError> {
+    if hydraulic_first
+        && let Ok(own) = HydraulicIdentification::new(recordings, options.fit_part)
+        && own.holds()
+    {
+        return Ok(Form::Hydraulic(Box::new(own)));
+    }
     let general = match rig::identify(recordings, options) {
         Ok(found) if found.residuals.iter().all(|(_, _, test)| test.is_white()) => {
             return Ok(Form::General(Box::new(found)));
@@ -137,6 +161,17 @@ fn long_enough(pieces: Vec<Recording>, warnings: &mut Vec<String>) -> Vec<Record
 }
 
 impl Identified {
+    /// The model file.
+    ///
+    /// # Errors
+    /// A rig that a model file cannot hold.
+    pub fn model_file(&self) -> Result<ModelFile, IdentificationError> {
+        Ok(match &self.form {
+            Form::General(found) => ModelFile::from_identification(found),
+            Form::Hydraulic(own) => own.file.clone(),
+        })
+    }
+
     /// Writes model and report beside each other, both or none.
     ///
     /// # Errors
@@ -152,10 +187,7 @@ impl Identified {
             path: beside.clone(),
             reason: error.to_string(),
         })?;
-        let model = match &self.form {
-            Form::General(found) => ModelFile::from_identification(found).to_toml()?,
-            Form::Hydraulic(own) => own.file.to_toml()?,
-        };
+        let model = self.model_file()?.to_toml()?;
         let folder = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),

@@ -170,7 +170,15 @@ const MOST_SAMPLES: f64 = 1e10;
 /// # Errors
 /// Whatever is at fault.
 pub fn prepare(request: &Request) -> Result<Prepared, Error> {
-    let mut file = system_file(request)?;
+    prepare_file(request, &system_file(request)?)
+}
+
+/// As [`prepare`], of a system that has been read or put together.
+///
+/// # Errors
+/// Whatever is at fault.
+pub fn prepare_file(request: &Request, file: &SystemFile) -> Result<Prepared, Error> {
+    let mut file = file.clone();
     let algorithm = algorithm(request, &file)?;
     if algorithm == Algorithm::Jacobi {
         tuning::know_jacobi(&mut file, !is_file(&request.system));
@@ -251,6 +259,7 @@ fn system_file(request: &Request) -> Result<SystemFile, Error> {
     let wanted = Wanted {
         tuning: request.tuning,
         model: request.control_model.as_deref(),
+        rules: None,
     };
     Ok(built_in::system(
         name,

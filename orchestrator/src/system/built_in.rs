@@ -1,6 +1,8 @@
 //! The systems that come with the program. A rig (plant and specimen) and a controller are files
 //! of their own; a system is a controller on a rig.
 
+use std::path::Path;
+
 use crate::units::hint;
 use plant::specimens::YieldingSpecimen;
 use plant::specimens::linear::LinearSpecimen;
@@ -72,6 +74,19 @@ pub fn specimens() -> impl Iterator<Item = &'static str> {
     std::iter::once(NONE).chain(SPECIMENS.iter().map(|(part, _)| part.name))
 }
 
+/// Whether a plant is a file, written as the built-in ones are: components `table` and what belongs to
+/// it, `instead` for what controllers are connected to.
+fn is_plant_file(plant: &str) -> bool {
+    plant.ends_with(".toml")
+}
+
+/// A plant's name as it is; a file's path absolute, so that it stays true elsewhere.
+pub fn plant_path(plant: &str) -> String {
+    let absolute = is_plant_file(plant).then(|| std::path::absolute(plant).ok());
+    let absolute = absolute.flatten();
+    absolute.map_or(plant.to_string(), |path| path.display().to_string())
+}
+
 /// A built-in system: the controller `name` on a rig of `plant` and `specimen` (or `none`), with the
 /// parameters that are `wanted`, by default tuned for the physical rig and as printed for the
 /// identified.
@@ -87,8 +102,14 @@ pub fn system(
     let controller = CONTROLLERS.iter().find(|part| part.name == name);
     let mut file = read("system", controller, name, names())?;
     file.origin = format!("{name} (built-in)");
-    let rig = PLANTS.iter().find(|part| part.name == plant);
-    let rig = read("plant", rig, plant, plants())?;
+    let rig = if is_plant_file(plant) {
+        let rig = SystemFile::read(Path::new(plant))?;
+        file.directory.clone_from(&rig.directory);
+        rig
+    } else {
+        let rig = PLANTS.iter().find(|part| part.name == plant);
+        read("plant", rig, plant, plants())?
+    };
     let mut on_table = None;
     if specimen != NONE {
         let found = SPECIMENS.iter().find(|(part, _)| part.name == specimen);

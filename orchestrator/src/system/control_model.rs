@@ -2,8 +2,14 @@
 
 use std::path::Path;
 
+use controllers::ModelError;
+use controllers::tuning::suite::{Measurements, Suite};
+use identification::closed_loop::equations::{HydraulicRig, PARAMETERS};
+use identification::closed_loop::friction::SealShape;
 use identification::identify::model_file::{ModelFile, Units};
+use nalgebra::{DMatrix, DVector};
 use plant::identified::shake_table::ShakeTable;
+use plant::sensors::channel;
 use units::constants::{G, INCH, SAMPLING_PERIOD};
 
 /// The model of the physical rig that comes with the program, as its commissioning found it.
@@ -21,16 +27,41 @@ pub struct Noise {
 }
 
 /// An identified rig with the lateness and noise of its measurements.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ControlModel {
     /// Actuator and table.
     pub rig: ShakeTable,
     /// Samples by which measurements are late behind the command's effect.
     pub delay: usize,
+    /// The same to a part of a sample, s.
+    pub late: f64,
     /// Noise of the measurements.
     pub noise: Noise,
     /// Mass of the specimen in the recordings, kg.
     pub specimen_mass: Option<f64>,
+    /// Valve, oil and seals beyond the form of Eq 2-4, where they were identified.
+    pub hydraulics: Option<(HydraulicRig, SealShape)>,
+    uncertainty: Uncertainty,
+}
+
+/// What is known of the errors of a model.
+#[derive(Debug, Clone, PartialEq)]
+enum Uncertainty {
+    /// Nothing.
+    Unknown,
+    /// A factor of the covariance of the hydraulic rig's parameters.
+    Hydraulic(DMatrix<f64>),
+    /// Standard errors of the coefficients of actuator and table, taken as independent.
+    Coefficients(Box<ShakeTable>),
+}
+
+/// A rig as the model's uncertainty allows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Draw {
+    /// Actuator and table.
+    pub rig: ShakeTable,
+    /// Lateness, s.
+    pub late: f64,
 }
 
 impl ControlModel {
@@ -53,7 +84,11 @@ impl ControlModel {
         Self::new(&file, NAME)
     }
 
-    fn new(file: &ModelFile, name: &str) -> Result<Self, String> {
+    /// From a file; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn new(file: &ModelFile, name: &str) -> Result<Self, String> {
         let said = |error: identification::IdentificationError| error.to_string();
         let rig = file.shake_table(name).map_err(said)?;
         let units: Units = file.units(name).map_err(said)?;
@@ -72,6 +107,7 @@ impl ControlModel {
         let late = file.command_delay.unwrap_or(0.0);
         Ok(Self {
             rig,
+            late: late.max(0.0),
             delay: (late / SAMPLING_PERIOD).round().max(0.0) as usize,
             noise: Noise {
                 displacement,
@@ -79,6 +115,111 @@ impl ControlModel {
                 acceleration,
             },
             specimen_mass: file.specimen(name).map_err(said)?.map(|own| own.mass),
+            hydraulics: file.hydraulic_rig(name).map_err(said)?,
+            uncertainty: Uncertainty::of(file, units),
         })
+    }
+
+    /// Lateness and noise, as the rules of the controllers take them.
+    pub fn measurements(&self) -> Measurements {
+        Measurements {
+            late: self.late,
+            noise: [
+                self.noise.displacement,
+                self.noise.velocity,
+                self.noise.acceleration,
+            ],
+            period: SAMPLING_PERIOD,
+        }
+    }
+
+    /// All controllers by their rules.
+    ///
+    /// # Errors
+    /// A rig for which a rule finds none.
+    pub fn suite(&self) -> Result<Suite, ModelError> {
+        Suite::new(&self.rig, &self.measurements())
+    }
+
+    /// Whether the model says how uncertain it is.
+    pub fn knows_its_errors(&self) -> bool {
+        self.uncertainty != Uncertainty::Unknown
+    }
+
+    /// Rigs as likely as the model's errors make them; draws that are no rig are left out. Without
+    /// errors, none.
+    pub fn draws(&self, count: u64, seed: u64) -> Vec<Draw> {
+        let gaussian = |sample: u64, channel: u64| {
+            channel::Noise {
+                seed,
+                channel,
+                sample,
+            }
+            .gaussian()
+        };
+        (0..count)
+            .filter_map(|sample| match (&self.uncertainty, &self.hydraulics) {
+                (Uncertainty::Hydraulic(factor), Some((rig, _))) => {
+                    let own: [f64; PARAMETERS] = (*rig).into();
+                    let z = DVector::from_fn(PARAMETERS, |i, _| gaussian(sample, i as u64));
+                    let change = factor * z;
+                    let moved = HydraulicRig::from(std::array::from_fn(|i| own[i] + change[i]));
+                    let late = moved.command_delay.max(0.0);
+                    let rig = moved.is_sound().then(|| moved.shake_table()).flatten()?;
+                    Some(Draw { rig, late })
+                }
+                (Uncertainty::Coefficients(errors), _) => {
+                    let mut rig = self.rig;
+                    let mut place = 0;
+                    let mut move_by = |value: &mut f64, error: f64| {
+                        *value += error * gaussian(sample, place);
+                        place += 1;
+                    };
+                    let (own, other) = (&mut rig.actuator, &errors.actuator);
+                    for i in 0..3 {
+                        move_by(&mut own.denominator[i], other.denominator[i]);
+                        move_by(&mut own.voltage_to_force[i], other.voltage_to_force[i]);
+                        move_by(&mut own.velocity_to_force[i], other.velocity_to_force[i]);
+                    }
+                    let (own, other) = (&mut rig.table, &errors.table);
+                    move_by(&mut own.mass, other.mass);
+                    move_by(&mut own.damping, other.damping);
+                    move_by(&mut own.stiffness, other.stiffness);
+                    let late = self.late;
+                    Some(Draw { rig, late })
+                }
+                _ => None,
+            })
+            .filter(|draw| draw.rig.validate().is_ok())
+            .collect()
+    }
+}
+
+impl Uncertainty {
+    fn of(file: &ModelFile, units: Units) -> Self {
+        let covariance = file.covariance.as_ref().and_then(|own| own.ordered());
+        if let (Some(covariance), Some(_)) = (covariance, &file.hydraulics) {
+            let eigen = covariance.symmetric_eigen();
+            let sizes = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+            return Self::Hydraulic(eigen.eigenvectors * DMatrix::from_diagonal(&sizes));
+        }
+        let Some(errors) = &file.standard_errors else {
+            return Self::Unknown;
+        };
+        let Some(actuator) = &errors.actuator else {
+            return Self::Unknown;
+        };
+        let three = |values: &[f64], first: usize, factor: f64| -> [f64; 3] {
+            std::array::from_fn(|i| values.get(first + i).copied().unwrap_or(0.0) * factor)
+        };
+        let per_length = units.force / units.length;
+        let mut own = ShakeTable::default();
+        own.actuator.denominator = three(&actuator.denominator, 1, 1.0);
+        own.actuator.voltage_to_force = three(&actuator.voltage_to_force, 0, units.force);
+        own.actuator.velocity_to_force = three(&actuator.velocity_to_force, 0, per_length);
+        own.table.mass = errors.table.mass * per_length;
+        own.table.damping = errors.table.damping * per_length;
+        own.table.stiffness = errors.table.stiffness * per_length;
+        Self::Coefficients(Box::new(own))
     }
 }

@@ -5,7 +5,7 @@ mod assemble;
 pub mod built_in;
 mod checked;
 mod connection;
-mod control_model;
+pub mod control_model;
 mod error;
 mod file;
 mod graph;
@@ -17,6 +17,7 @@ mod rule;
 mod table;
 pub mod tuning;
 mod value;
+mod written;
 
 pub use assemble::{Library, assemble};
 pub use checked::{Component, Connection, DEFAULT_PERIOD, Source, System};

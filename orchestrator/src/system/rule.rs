@@ -10,7 +10,7 @@ pub enum Rule {
     DisplacementPid,
     /// The gain of force PID under sliding mode.
     ForcePid,
-    /// The gain of loop shaping.
+    /// All coefficients of loop shaping.
     LoopShaping,
     /// Model and weights of model predictive control.
     ModelPredictive,
@@ -18,4 +18,6 @@ pub enum Rule {
     SlidingMode,
     /// All gains of three-variable control.
     ThreeVariable,
+    /// The gains of three-variable control under model predictive control.
+    UnderPrediction,
 }

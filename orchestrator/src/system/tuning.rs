@@ -3,12 +3,11 @@
 //! Every rule works on what a `ControlModel` says: a model file of `shakebench identify`, by
 //! default the one of the physical rig's commissioning. Nothing here knows the rig itself.
 //!
-//! - three-variable control: [`ThreeVariableGains::tuned`];
-//! - displacement PID and loop shaping: the printed controller, its gain changed so that the
-//!   displacement gain is that of three-variable control (half the gain at which the loop
-//!   oscillates);
-//! - force loop, lambda and K of sliding mode: [`Hierarchy::tuned`], the largest gain that leaves the
-//!   whole hierarchy a margin of 6 dB on the model;
+//! - displacement PID: the printed controller with half the gain at which the loop oscillates;
+//! - three-variable control: [`ThreeVariableGains::damped`](controllers::three_variable::ThreeVariableGains::damped);
+//! - loop shaping: [`Shaped::fastest`](controllers::synthesis::whole_plant::Shaped::fastest);
+//! - force loop, lambda and K of sliding mode: [`Hierarchy::tuned`](controllers::tuning::sliding_mode::Hierarchy::tuned),
+//!   the largest gain that leaves the whole hierarchy a margin of 6 dB on the model;
 //! - sliding mode and model predictive control have the model as theirs and know the delay; the
 //!   latter also knows the measurements' noise and weighs outputs in units of stroke, 20 in/s and
 //!   1 g.
@@ -17,12 +16,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use controllers::hierarchy::DISPLACEMENT_INTEGRAL_LEAK;
-use controllers::pid::Pid;
-use controllers::three_variable::ThreeVariableGains;
-use controllers::tuning::sliding_mode::{Hierarchy, SlidingModeTuning};
+use controllers::tuning::suite::{Member, Suite};
 use serde::{Deserialize, Serialize};
-use units::constants::SAMPLING_PERIOD;
 
 use super::control_model::ControlModel;
 use super::file::{ComponentFile, SystemFile};
@@ -48,6 +43,8 @@ pub struct Wanted<'a> {
     pub tuning: Option<Tuning>,
     /// Model file to tune on; none: the physical rig's commissioning.
     pub model: Option<&'a Path>,
+    /// Rules on a model that has been read; they go before everything else.
+    pub rules: Option<&'a Rules>,
 }
 
 /// Tells the controllers in `file` that predict over a delay how many samples a master that steps
@@ -145,6 +142,10 @@ pub(super) fn apply(
     specimen_mass: Option<f64>,
     wanted: Wanted<'_>,
 ) -> Result<(), String> {
+    if let Some(rules) = wanted.rules {
+        rules.apply(file, specimen_mass);
+        return Ok(());
+    }
     let own;
     let rules = match (wanted.tuning, wanted.model, plant.commissioned) {
         (Some(Tuning::Printed), Some(_), _) => {
@@ -173,23 +174,7 @@ pub(super) fn apply(
             rules.as_ref().map_err(Clone::clone)?
         }
     };
-    let specimen_mass = rules.model.specimen_mass.or(specimen_mass);
-    for (name, component) in &mut file.components {
-        match component.tuning {
-            None => {}
-            Some(Rule::DisplacementPid) => rules.displacement_pid(component),
-            Some(Rule::ForcePid) => rules.force_pid(component),
-            Some(Rule::LoopShaping) => rules.loop_shaping(component),
-            Some(Rule::ModelPredictive) => {
-                rules.model_predictive(component);
-                delay_references(&mut file.connections, name, rules.model.delay);
-            }
-            Some(Rule::SlidingMode) => {
-                rules.sliding_mode(component, specimen_mass);
-            }
-            Some(Rule::ThreeVariable) => rules.three_variable(component),
-        }
-    }
+    rules.apply(file, specimen_mass);
     Ok(())
 }
 
@@ -204,13 +189,11 @@ fn delay_references(connections: &mut [Link], name: &str, delay: usize) {
     }
 }
 
-/// What all rules use.
-struct Rules {
+/// All rules on a model.
+#[derive(Debug, Clone)]
+pub struct Rules {
     model: ControlModel,
-    gains: ThreeVariableGains,
-    /// Displacement gain over the printed one.
-    displacement: f64,
-    sliding: SlidingModeTuning,
+    suite: Suite,
 }
 
 fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
@@ -220,56 +203,50 @@ fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
 }
 
 impl Rules {
-    fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
-        let ControlModel { rig, delay, .. } = model;
-        let gains = ThreeVariableGains::tuned(&rig, delay, SAMPLING_PERIOD)?;
-        let printed = Pid::equation_3_6();
-        let displacement = gains.proportional / printed.proportional;
-        let sliding = Hierarchy {
-            rig: &rig.state_space(),
-            model: &rig,
-            displacement: Pid {
-                proportional: gains.proportional,
-                integral: printed.integral * displacement,
-                integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
-                ..printed
-            },
-            delay,
-            period: SAMPLING_PERIOD,
+    /// Finds all controllers on a model.
+    ///
+    /// # Errors
+    /// A model for which a rule finds none.
+    pub fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
+        let suite = model.suite()?;
+        Ok(Self { model, suite })
+    }
+
+    /// Gives the controllers in `file` their parameters, under a specimen of that mass (kg) where the
+    /// model knows of none.
+    fn apply(&self, file: &mut SystemFile, specimen_mass: Option<f64>) {
+        let specimen_mass = self.model.specimen_mass.or(specimen_mass);
+        for (name, component) in &mut file.components {
+            match component.tuning {
+                None => {}
+                Some(Rule::DisplacementPid) => self.named(component, Member::DisplacementPid),
+                Some(Rule::ForcePid) => self.force_pid(component),
+                Some(Rule::LoopShaping) => self.named(component, Member::LoopShaping),
+                Some(Rule::ModelPredictive) => {
+                    self.model_predictive(component);
+                    delay_references(&mut file.connections, name, self.model.delay);
+                }
+                Some(Rule::SlidingMode) => self.sliding_mode(component, specimen_mass),
+                Some(Rule::ThreeVariable) => self.named(component, Member::ThreeVariable),
+                Some(Rule::UnderPrediction) => self.under_prediction(component),
+            }
         }
-        .tuned()?;
-        Ok(Self {
-            model,
-            gains,
-            displacement,
-            sliding,
-        })
     }
 
-    fn displacement_pid(&self, component: &mut ComponentFile) {
-        let printed = Pid::equation_3_6();
-        set(
-            component,
-            &[
-                (
-                    "proportional_gain",
-                    printed.proportional * self.displacement,
-                ),
-                ("integral_gain", printed.integral * self.displacement),
-            ],
-        );
+    /// What the suite sets a controller to.
+    fn named(&self, component: &mut ComponentFile, member: Member) {
+        for (name, value) in self.suite.named(member) {
+            component.set(&name, value);
+        }
     }
 
-    fn loop_shaping(&self, component: &mut ComponentFile) {
-        set(component, &[("gain", self.gains.proportional)]);
-    }
-
-    fn three_variable(&self, component: &mut ComponentFile) {
-        set(component, &self.gains.named());
+    /// Three-variable control as the prediction above it knows it.
+    fn under_prediction(&self, component: &mut ComponentFile) {
+        set(component, &self.suite.mpc.low_level.gains.named());
     }
 
     fn force_pid(&self, component: &mut ComponentFile) {
-        let force = &self.sliding.force;
+        let force = &self.suite.sliding_mode.force;
         set(
             component,
             &[
@@ -281,24 +258,7 @@ impl Rules {
 
     fn sliding_mode(&self, component: &mut ComponentFile, specimen_mass: Option<f64>) {
         self.model(component);
-        let (displacement, force) = (Pid::equation_3_6(), &self.sliding.force);
-        set(
-            component,
-            &[
-                ("surface_rate", self.sliding.rate),
-                ("reaching_rate", self.sliding.rate),
-                (
-                    "displacement_loop_proportional_gain",
-                    displacement.proportional * self.displacement,
-                ),
-                (
-                    "displacement_loop_integral_gain",
-                    displacement.integral * self.displacement,
-                ),
-                ("force_loop_proportional_gain", force.proportional),
-                ("force_loop_integral_gain", force.integral),
-            ],
-        );
+        self.named(component, Member::SlidingMode);
         if let Some(mass) = specimen_mass {
             component.set("specimen_mass", mass);
         }
@@ -308,22 +268,8 @@ impl Rules {
     }
 
     fn model_predictive(&self, component: &mut ComponentFile) {
-        let noise = &self.model.noise;
         self.model(component);
-        self.three_variable(component);
-        // The sensors' noise, and outputs in units of the stroke, 20 in/s and 1 g: with the printed
-        // weights on unscaled outputs displacement counts for nothing and drifts.
-        set(
-            component,
-            &[
-                ("displacement_measurement_noise", noise.displacement),
-                ("velocity_measurement_noise", noise.velocity),
-                ("acceleration_measurement_noise", noise.acceleration),
-                ("displacement_scale", 0.0381),
-                ("velocity_scale", 0.508),
-                ("acceleration_scale", 9.80665),
-            ],
-        );
+        self.named(component, Member::ModelPredictive);
         component.set("loop_delay_samples", self.model.delay as i64);
     }
 

@@ -69,7 +69,8 @@ fn median(json: &Value, controller: &str) -> f64 {
         .unwrap()
 }
 
-/// No run ends early or leaves the stroke, and the order of the controllers holds.
+/// No run ends early or leaves the stroke; displacement PID is the worst and model predictive control
+/// far from it.
 #[track_caller]
 fn holds_its_order(json: &Value, status: i32, said: &str) {
     assert_eq!(status, 0, "{said}");
@@ -82,12 +83,15 @@ fn holds_its_order(json: &Value, status: i32, said: &str) {
             "{row}"
         );
     }
-    let order = ["mpc", "sliding-mode", "three-variable", "loop-shaping"];
-    let medians = order.map(|controller| median(json, controller));
-    println!("{}: {order:?} {medians:.2?} %", json["specimen"]);
-    assert!(medians.is_sorted(), "{medians:?}");
-    // The distances are of some size: MPC at least a quarter below three-variable control.
-    assert!(medians[0] < 0.75 * medians[2], "{medians:?}");
+    let all = ["mpc", "sliding-mode", "three-variable", "loop-shaping"];
+    let medians = all.map(|controller| median(json, controller));
+    let worst = median(json, "displacement-pid");
+    println!(
+        "{}: {all:?} {medians:.2?} %, PID {worst:.2} %",
+        json["specimen"]
+    );
+    assert!(medians.iter().all(|own| *own < worst), "{medians:?}");
+    assert!(medians[0] < 0.6 * worst, "{medians:?}");
 }
 
 #[test]
@@ -121,7 +125,12 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
     let (status, json, said) = compare(&["--specimen", "yielding", "--records", &records]);
     holds_its_order(&json, status, &said);
     // Stated in docs/physical-rig.md.
-    for (controller, largest) in [("mpc", 5.5), ("sliding-mode", 7.5), ("three-variable", 8.5)] {
+    for (controller, largest) in [
+        ("mpc", 5.5),
+        ("three-variable", 6.5),
+        ("sliding-mode", 7.5),
+        ("loop-shaping", 9.0),
+    ] {
         assert!(median(&json, controller) < largest, "{controller}");
     }
 }
@@ -311,7 +320,10 @@ fn a_broken_rig_is_brought_to_null_in_the_time_that_the_docs_state() {
             0.024,
         ));
     }
-    let lost: &[&str] = &["interlock.tripped", "too far from the reference"];
+    let lost: &[&str] = &[
+        "interlock.tripped",
+        "the supply's pressure is below its limit",
+    ];
     cases.push((
         "supply lost".into(),
         vec![format!("table.supply_loss_time{at}")],

@@ -8,7 +8,6 @@
 mod cylinder;
 mod energy;
 mod extended;
-mod fitted;
 mod friction;
 mod linearisation;
 mod rig;

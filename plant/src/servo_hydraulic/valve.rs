@@ -13,6 +13,8 @@ pub struct ServoValve {
     pub frequency: f64,
     /// Damping ratio of the spool.
     pub damping_ratio: f64,
+    /// Largest velocity of the spool, V/s.
+    pub slew_limit: f64,
     /// Travel limit of the spool, V.
     pub travel_limit: f64,
     /// Overlap of the edges: the flow is zero within ± this opening, V.
@@ -31,10 +33,11 @@ pub struct ServoValve {
 impl Default for ServoValve {
     fn default() -> Self {
         // Values chosen so that the rig comes near Eq 2-13 and 2-14: 0.0418 in³/s/V/√psi, 60 Hz,
-        // 0.9. Null leakage: a tenth of the leakage of 4e-4 in³/s/psi, assumed.
+        // 0.9. A slew limit that a spool of that frequency does not reach. Null leakage: a tenth of the leakage of 4e-4 in³/s/psi, assumed.
         Self {
             frequency: 60.0,
             damping_ratio: 0.9,
+            slew_limit: 1e4,
             travel_limit: 10.0,
             overlap: 0.0,
             null_bias: 0.0,
@@ -73,6 +76,7 @@ impl ServoValve {
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_positive("valve_frequency", self.frequency)?;
         ModelError::require_positive("valve_damping_ratio", self.damping_ratio)?;
+        ModelError::require_positive("spool_slew_limit", self.slew_limit)?;
         ModelError::require_positive("spool_travel_limit", self.travel_limit)?;
         ModelError::require_non_negative("valve_overlap", self.overlap)?;
         ModelError::require_finite("valve_null_bias", self.null_bias)?;
@@ -88,11 +92,14 @@ impl ServoValve {
         })
     }
 
-    /// Acceleration of the spool, V/s², under `command` (V).
+    /// Acceleration of the spool, V/s², under `command` (V). The pilot stage gives no more than
+    /// drives the spool at its slew limit against its damping.
     pub fn spool_acceleration(&self, spool: f64, spool_velocity: f64, command: f64) -> f64 {
         let omega = TAU * self.frequency;
         let wanted = (command + self.null_bias).clamp(-self.travel_limit, self.travel_limit);
-        omega * (omega * (wanted - spool) - 2.0 * self.damping_ratio * spool_velocity)
+        let most = 2.0 * self.damping_ratio * self.slew_limit;
+        let driven = (omega * (wanted - spool)).clamp(-most, most);
+        omega * (driven - 2.0 * self.damping_ratio * spool_velocity)
     }
 
     /// The steepest slope of an edge's flow by its pressure drop, m³/(s Pa): fully open, without a
@@ -165,6 +172,30 @@ mod tests {
                 "{got} {expected}"
             );
         }
+    }
+
+    #[test]
+    fn the_spool_slews_no_faster_than_its_limit_and_small_steps_do_not_meet_it() {
+        let valve = ServoValve {
+            slew_limit: 500.0,
+            ..ServoValve::default()
+        };
+        let free = ServoValve::default();
+        // A step of `height`, by Euler steps of 1 us: largest velocity and time to 90 %.
+        let step = |valve: &ServoValve, height: f64| {
+            let (mut spool, mut velocity, mut most, mut time) = (0.0, 0.0_f64, 0.0_f64, 0.0);
+            while spool < 0.9 * height {
+                velocity += 1e-6 * valve.spool_acceleration(spool, velocity, height);
+                spool += 1e-6 * velocity;
+                most = most.max(velocity);
+                time += 1e-6;
+            }
+            (most, time)
+        };
+        let (most, time) = step(&valve, 10.0);
+        assert!(most <= 500.0 && most > 490.0, "{most}");
+        assert!(time > 9.0 / 500.0, "{time}");
+        assert_eq!(step(&valve, 1.0), step(&free, 1.0));
     }
 
     #[test]

@@ -78,7 +78,7 @@ fn what_cannot_be_designed_is_refused() {
     assert!(refused.contains("`yielding`"), "{refused}");
     for (crossover, words) in [
         (-1.0, "parameter `crossover` is -1"),
-        (1e4, "does not stabilise"),
+        (1e4, "no controller crosses at 10000"),
     ] {
         let options = Options {
             crossover: Some(crossover),

@@ -7,6 +7,7 @@ use controllers::three_variable::ThreeVariableGains;
 use rayon::prelude::*;
 use shakebench::metrics;
 use shakebench::motion::{self, Motion, Options, Scaling};
+use shakebench::system::control_model::ControlModel;
 use units::constants::{INCH, STROKE};
 
 fn records(options: &Options) -> Vec<Motion> {
@@ -56,9 +57,9 @@ fn gains_tuned_on_a_model_of_the_rig_follow_better_in_the_median() {
         return;
     }
     let printed = NativeRig::laboratory(7);
-    let model = printed.table.fitted().unwrap();
+    let model = ControlModel::commissioned().unwrap();
     let tuned = NativeRig {
-        gains: ThreeVariableGains::tuned(&model, 1, PERIOD).unwrap(),
+        gains: ThreeVariableGains::damped(&model.rig, model.late, PERIOD).unwrap(),
         ..printed
     };
     let errors = |rig: &NativeRig| {

@@ -1,0 +1,344 @@
+//! Every controller of a rig from its model, each by its stated rule, and each as it runs.
+
+use plant::identified::coupled::Rig;
+use plant::identified::shake_table::ShakeTable;
+use units::constants::{G, STROKE};
+
+use super::sliding_mode::{Hierarchy, SlidingModeTuning};
+use crate::allocation::{ControlAllocation, LoopCommands};
+use crate::hierarchy::{DISPLACEMENT_INTEGRAL_LEAK, SlidingModeInput};
+use crate::mpc::{
+    ModelPredictiveControl, ModelPredictiveInput, Noise, Outlook, Parameters, Weights,
+    prediction_plant,
+};
+use crate::pid::{Pid, PidInput};
+use crate::prediction_over_delay::PredictionOverDelay;
+use crate::robustness::{Heard, ValveLaw};
+use crate::sliding_mode::SlidingMode;
+use crate::synthesis::whole_plant::{Shaped, WholePlantDesign};
+use crate::three_variable::{ThreeVariableControl, ThreeVariableGains, ThreeVariableInput};
+use crate::{Controller, ModelError, Motion};
+
+/// What is known of a rig's measurements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measurements {
+    /// Lateness behind the command's effect, s.
+    pub late: f64,
+    /// One standard deviation of the noise of displacement (m), velocity (m/s) and acceleration
+    /// (m/s²).
+    pub noise: [f64; 3],
+    /// Sampling period, s.
+    pub period: f64,
+}
+
+impl Measurements {
+    /// The lateness in whole samples.
+    pub fn delay(&self) -> usize {
+        (self.late / self.period).round().max(0.0) as usize
+    }
+}
+
+/// The controllers of a rig.
+#[derive(Debug, Clone)]
+pub struct Suite {
+    /// The model.
+    pub rig: ShakeTable,
+    /// Its measurements.
+    pub measurements: Measurements,
+    /// Displacement PID: half the gain at which the sampled loop oscillates, the printed ratio of
+    /// integral to proportional.
+    pub displacement_pid: Pid,
+    /// Three-variable control: [`ThreeVariableGains::damped`].
+    pub three_variable: ThreeVariableGains,
+    /// Loop shaping: [`Shaped::fastest`].
+    pub loop_shaping: WholePlantDesign,
+    /// Displacement loop under sliding mode.
+    pub displacement_loop: Pid,
+    /// Force loop and rates of sliding mode: [`Hierarchy::tuned`].
+    pub sliding_mode: SlidingModeTuning,
+    /// Model predictive control on the model, with its lateness and noise; outputs in units of the
+    /// stroke, 20 in/s and 1 g.
+    pub mpc: Parameters,
+}
+
+/// A controller of a [`Suite`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Member {
+    /// Displacement PID.
+    DisplacementPid,
+    /// Three-variable control.
+    ThreeVariable,
+    /// Loop shaping.
+    LoopShaping,
+    /// Sliding mode.
+    SlidingMode,
+    /// Model predictive control.
+    ModelPredictive,
+}
+
+impl Member {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::DisplacementPid,
+        Self::ThreeVariable,
+        Self::LoopShaping,
+        Self::SlidingMode,
+        Self::ModelPredictive,
+    ];
+
+    /// The name of the built-in system that runs it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::DisplacementPid => "displacement-pid",
+            Self::ThreeVariable => "three-variable",
+            Self::LoopShaping => "loop-shaping",
+            Self::SlidingMode => "sliding-mode",
+            Self::ModelPredictive => "mpc",
+        }
+    }
+}
+
+/// Velocity of one unit in the cost of model predictive control, m/s: 20 in/s.
+const VELOCITY_UNIT: f64 = 0.508;
+
+impl Suite {
+    /// Designs all controllers for `rig`.
+    ///
+    /// # Errors
+    /// A rig for which a rule finds no controller, with the rule.
+    pub fn new(rig: &ShakeTable, measurements: &Measurements) -> Result<Self, ModelError> {
+        let Measurements {
+            late,
+            noise,
+            period,
+        } = *measurements;
+        let delay = measurements.delay();
+        let gains = ThreeVariableGains::tuned(rig, delay, period)?;
+        let printed = Pid::equation_3_6();
+        let displacement_pid = Pid {
+            proportional: gains.proportional,
+            integral: printed.integral * gains.proportional / printed.proportional,
+            ..printed
+        };
+        let allocation = ControlAllocation::default();
+        let displacement_loop = Pid {
+            integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
+            limit: allocation.limit / allocation.displacement_share,
+            ..displacement_pid
+        };
+        let sliding_mode = Hierarchy {
+            rig: &rig.state_space(),
+            model: rig,
+            displacement: displacement_loop,
+            delay,
+            period,
+        }
+        .tuned()?;
+        let mpc = Parameters {
+            plant: prediction_plant(&Rig {
+                shake_table: *rig,
+                specimen: None,
+            }),
+            low_level: ThreeVariableControl {
+                gains,
+                ..ThreeVariableControl::table_3_2()
+            },
+            period,
+            weights: Weights {
+                scale: [STROKE, VELOCITY_UNIT, G],
+                ..Weights::TABLE_5_1
+            },
+            outlook: Outlook::Extrapolate,
+            loop_delay_samples: delay,
+            noise: Noise {
+                measurement: noise,
+                ..Noise::default()
+            },
+            ..Parameters::default()
+        };
+        mpc.validate()?;
+        let shaped = Shaped {
+            rig,
+            late,
+            noise: noise[0],
+            period,
+        };
+        Ok(Self {
+            rig: *rig,
+            measurements: *measurements,
+            displacement_pid,
+            three_variable: ThreeVariableGains::damped(rig, late, period)?,
+            loop_shaping: shaped.fastest()?,
+            displacement_loop,
+            sliding_mode,
+            mpc,
+        })
+    }
+
+    /// The same with another crossover of loop shaping, rad/s.
+    ///
+    /// # Errors
+    /// A crossover that is not reached.
+    pub fn with_crossover(mut self, crossover: f64) -> Result<Self, ModelError> {
+        let Measurements {
+            late,
+            noise,
+            period,
+        } = self.measurements;
+        self.loop_shaping = Shaped {
+            rig: &self.rig,
+            late,
+            noise: noise[0],
+            period,
+        }
+        .design(crossover)?;
+        Ok(self)
+    }
+
+    /// What a controller is set to, by the names of its component, SI; beside it the model.
+    pub fn named(&self, member: Member) -> Vec<(String, f64)> {
+        let own = |all: &[(&str, f64)]| -> Vec<(String, f64)> {
+            all.iter().map(|(n, v)| ((*n).to_string(), *v)).collect()
+        };
+        let pid = |pid: &Pid| {
+            [
+                ("proportional_gain", pid.proportional),
+                ("integral_gain", pid.integral),
+            ]
+        };
+        match member {
+            Member::DisplacementPid => own(&pid(&self.displacement_pid)),
+            Member::ThreeVariable => own(&self.three_variable.named()),
+            Member::LoopShaping => self.loop_shaping.law.named(),
+            Member::SlidingMode => {
+                let force = &self.sliding_mode.force;
+                own(&[
+                    ("surface_rate", self.sliding_mode.rate),
+                    ("reaching_rate", self.sliding_mode.rate),
+                    (
+                        "displacement_loop_proportional_gain",
+                        self.displacement_loop.proportional,
+                    ),
+                    (
+                        "displacement_loop_integral_gain",
+                        self.displacement_loop.integral,
+                    ),
+                    ("force_loop_proportional_gain", force.proportional),
+                    ("force_loop_integral_gain", force.integral),
+                ])
+            }
+            Member::ModelPredictive => {
+                let (noise, scale) = (self.mpc.noise.measurement, self.mpc.weights.scale);
+                let mut all = own(&self.mpc.low_level.gains.named());
+                // The sensors' noise, and outputs in units of the stroke, 20 in/s and 1 g: with the
+                // printed weights on unscaled outputs displacement counts for nothing and drifts.
+                all.extend(own(&[
+                    ("displacement_measurement_noise", noise[0]),
+                    ("velocity_measurement_noise", noise[1]),
+                    ("acceleration_measurement_noise", noise[2]),
+                    ("displacement_scale", scale[0]),
+                    ("velocity_scale", scale[1]),
+                    ("acceleration_scale", scale[2]),
+                ]));
+                all
+            }
+        }
+    }
+
+    /// A controller as it runs, at rest, its references at zero.
+    ///
+    /// # Errors
+    /// Parameters with which it cannot run.
+    pub fn law(&self, member: Member) -> Result<Box<ValveLaw<'static>>, ModelError> {
+        let period = self.measurements.period;
+        let at_displacement = |heard: &Heard| PidInput {
+            reference: 0.0,
+            measured: heard.motion.displacement,
+        };
+        Ok(match member {
+            Member::DisplacementPid => {
+                let mut law = self.displacement_pid;
+                law.validate()?;
+                Box::new(move |heard| law.step(&at_displacement(heard), period))
+            }
+            Member::LoopShaping => {
+                let mut law = self.loop_shaping.law;
+                law.validate()?;
+                Box::new(move |heard| law.step(&at_displacement(heard), period))
+            }
+            Member::ThreeVariable => {
+                let mut law = ThreeVariableControl {
+                    gains: self.three_variable,
+                    ..ThreeVariableControl::table_3_2()
+                };
+                law.validate()?;
+                Box::new(move |heard| {
+                    let input = ThreeVariableInput {
+                        reference: Motion::default(),
+                        measured: heard.motion,
+                    };
+                    law.step(&input, period)
+                })
+            }
+            Member::SlidingMode => self.hierarchy()?,
+            Member::ModelPredictive => {
+                let mut law = ModelPredictiveControl::new(self.mpc.clone())?;
+                let mut below = self.mpc.low_level;
+                Box::new(move |heard| {
+                    let input = ModelPredictiveInput {
+                        measured: heard.motion,
+                        ..ModelPredictiveInput::default()
+                    };
+                    let input = ThreeVariableInput {
+                        reference: law.step(&input, period),
+                        measured: heard.motion,
+                    };
+                    below.step(&input, period)
+                })
+            }
+        })
+    }
+
+    /// Sliding mode over its two loops.
+    fn hierarchy(&self) -> Result<Box<ValveLaw<'static>>, ModelError> {
+        let Measurements { period, .. } = self.measurements;
+        let delay = self.measurements.delay();
+        let SlidingModeTuning { force, rate } = self.sliding_mode;
+        let mut allocation = ControlAllocation::default();
+        let (mut displacement, mut force) = (self.displacement_loop, force);
+        let mut law = SlidingMode::new(self.rig.table, 0.0, rate, rate);
+        if delay > 0 {
+            let mut prediction = PredictionOverDelay::new(&self.rig, period, delay, 0)?;
+            prediction.reference_ahead = true;
+            prediction.displacement_loop = displacement;
+            prediction.force_loop = force;
+            prediction.allocation = allocation;
+            law.prediction = Some(prediction);
+        }
+        law.validate()?;
+        Ok(Box::new(move |heard| {
+            let input = SlidingModeInput {
+                measured: Motion {
+                    acceleration: 0.0,
+                    ..heard.motion
+                },
+                measured_force: heard.force,
+                ..SlidingModeInput::default()
+            };
+            let references = law.step(&input, period);
+            let to_displacement = PidInput {
+                reference: references.displacement,
+                measured: heard.motion.displacement,
+            };
+            let to_force = PidInput {
+                reference: references.force,
+                measured: heard.force,
+            };
+            let commands = LoopCommands {
+                displacement_loop: displacement.step(&to_displacement, period),
+                force_loop: force.step(&to_force, period),
+            };
+            allocation.step(&commands, period)
+        }))
+    }
+}
