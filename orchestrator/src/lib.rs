@@ -13,6 +13,7 @@ pub mod extended_model;
 pub mod figures;
 pub mod fmu;
 pub mod identify;
+pub mod iteration;
 pub mod library;
 pub mod live;
 pub mod master;

@@ -26,6 +26,7 @@ pub mod figures;
 pub mod identify;
 pub mod info;
 mod interrupt;
+pub mod iterate;
 mod progress;
 pub mod report;
 mod rig;
@@ -109,6 +110,8 @@ enum Command {
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
     Info(info::Arguments),
+    /// Correct the drive from run to run until the table follows
+    Iterate(Box<iterate::Arguments>),
     /// Write the HTML report of a run, a comparison or a diagnosis again
     Report(report::Arguments),
     /// Carry out calls of FMUs for another process of this program
@@ -156,6 +159,7 @@ pub fn main() -> ExitCode {
         Some(Command::Export(arguments)) => export::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
+        Some(Command::Iterate(arguments)) => iterate::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
         Some(Command::Rigs(arguments)) => rigs::execute(&arguments),

@@ -14,7 +14,8 @@ use super::rig::RigArguments;
 use crate::error::Error;
 use crate::fmu::{Isolation, Options, Trace};
 use crate::live::{Scene, Server, Tap};
-use crate::master::{Algorithm, Ended, Pace, Simulation};
+use crate::master::{Algorithm, Ended, Pace, Record, Simulation};
+use crate::metrics::laboratory::Laboratory;
 use crate::motion::{self, Motion};
 use crate::report::columns::aligned;
 use crate::report::number::significant;
@@ -23,7 +24,7 @@ use crate::results::{Results, unused};
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
-use crate::run::summary::Summary;
+use crate::run::summary::{Summary, asked};
 use crate::system::built_in;
 use crate::units::{self, STANDARD_GRAVITY};
 
@@ -48,6 +49,10 @@ pub struct Arguments {
     reference: Option<PathBuf>,
     #[command(flatten)]
     rig: RigArguments,
+    /// Hybrid simulation: a computed structure between the ground, which the motion then is, and the
+    /// specimen of a built-in system: none, two-storeys [default: none]
+    #[arg(long, value_name = "NAME")]
+    structure: Option<String>,
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
@@ -109,10 +114,34 @@ pub struct Arguments {
     log: Option<Vec<String>>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
-        "system", "record", "reference", "input", "plant", "specimen", "tuning", "control_model", "set", "fmi", "algorithm", "step",
+        "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
         "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// A run of `system` on the `[record, reference]` or the built-in motion, scaled by `[pga, peak]`.
+    pub(super) fn of(
+        system: Option<String>,
+        [record, reference]: [Option<PathBuf>; 2],
+        rig: RigArguments,
+        set: Vec<String>,
+        [pga, peak]: [Option<String>; 2],
+        seed: Option<u64>,
+    ) -> Self {
+        Self {
+            system,
+            record,
+            reference,
+            rig,
+            set,
+            pga,
+            peak,
+            seed,
+            ..Self::default()
+        }
+    }
 }
 
 /// Runs a system on a motion and writes the results.
@@ -180,7 +209,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.json {
         println!("{}", serde_json::json!(summary));
     } else {
-        print!("{}", table(&summary, motion));
+        print!("{}", table(&summary, &outcome.record, motion));
         println!("\nwritten:");
         for file in files {
             println!("  {}", file.display());
@@ -259,7 +288,7 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
 }
 
 /// The figures as a table for people.
-fn table(summary: &Summary, motion: &Motion) -> String {
+fn table(summary: &Summary, record: &Record, motion: &Motion) -> String {
     let mut text = match motion.is_empty() {
         true => format!("{}\n", summary.system),
         false => format!("{} on {}\n", summary.system, summary.motion.name),
@@ -295,6 +324,11 @@ fn table(summary: &Summary, motion: &Motion) -> String {
     let Some(tracking) = &summary.tracking else {
         return text;
     };
+    let asked = asked(record, motion);
+    let (motion, heading) = match &asked {
+        Some(asked) => (asked, "structure"),
+        None => (motion, "reference"),
+    };
     let row = |name: &str, cells: [String; 3]| {
         let mut row = vec![name.to_string()];
         row.extend(cells);
@@ -305,10 +339,7 @@ fn table(summary: &Summary, motion: &Motion) -> String {
     let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4).text(system);
     let percent = |value: f64| format!("{value:.4} %");
     text += &aligned(&[
-        row(
-            "",
-            ["reference".into(), "table".into(), "largest error".into()],
-        ),
+        row("", [heading.into(), "table".into(), "largest error".into()]),
         row(
             "displacement, peak",
             [
@@ -346,13 +377,62 @@ fn table(summary: &Summary, motion: &Motion) -> String {
             format!("{:.1} ms", 1e3 * tracking.delay),
         ),
     ]);
+    if let Some(own) = &tracking.laboratory {
+        text += "\n";
+        text += &aligned(&bands(own));
+        text += "\n";
+        text += &aligned(&[
+            pair(
+                "error over the significant duration, acceleration",
+                format!(
+                    "{} of {:.2} s",
+                    percent(own.significant_duration_percent),
+                    own.significant_duration_s
+                ),
+            ),
+            pair("peak ratio", format!("{:.4}", own.peak_ratio)),
+            pair("Arias ratio", format!("{:.4}", own.arias_ratio)),
+        ]);
+    }
     text
 }
+
+/// Response spectra and transfer function, a row for each band.
+fn bands(own: &Laboratory) -> Vec<Vec<String>> {
+    let head = [
+        "band",
+        "response spectrum, largest",
+        "mean",
+        "gain",
+        "delay",
+        "coherence",
+    ];
+    let mut rows = vec![head.map(str::to_string).to_vec()];
+    for (n, spectrum) in own.response_spectrum_percent.iter().enumerate() {
+        let [from, to] = spectrum.band_hz;
+        let mut row = vec![
+            format!("{from} to {to} Hz"),
+            format!("{:.2} %", spectrum.largest),
+            format!("{:.2} %", spectrum.mean),
+        ];
+        row.extend(match own.coherence.as_ref().map(|bands| &bands[n]) {
+            Some(band) => [
+                format!("{:.4}", band.gain),
+                format!("{:.2} ms", 1e3 * band.delay_s),
+                format!("{:.4}", band.coherence),
+            ],
+            None => ["-", "-", "-"].map(str::to_string),
+        });
+        rows.push(row);
+    }
+    rows
+}
+
 /// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.
 ///
 /// # Errors
 /// Values that cannot be read.
-fn request(arguments: &Arguments) -> Result<Request, Error> {
+pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
     let system = arguments
         .system
         .clone()
@@ -361,6 +441,7 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
     for (option, given) in [
         ("--plant", &arguments.rig.plant),
         ("--specimen", &arguments.rig.specimen),
+        ("--structure", &arguments.structure),
     ] {
         if let (true, Some(_)) = (is_file, given) {
             let reason = format!("{system} is a file and has its own; edit it instead");
@@ -389,6 +470,7 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         },
         plant: arguments.rig.plant(),
         specimen: arguments.rig.specimen(),
+        structure: arguments.structure.clone(),
         tuning: arguments.rig.tuning,
         control_model: arguments.rig.control_model.as_deref().map(absolute),
         record: arguments.record.as_deref().map(absolute),
@@ -409,7 +491,7 @@ fn absolute(path: &Path) -> PathBuf {
 }
 
 /// A positive quantity; a number alone is in `unit`.
-fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
+pub(super) fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
     let fault = |reason: String| Error::Option { option, reason };
     let value = units::value_in(text, unit).map_err(|error| fault(error.to_string()))?;
     if value > 0.0 {

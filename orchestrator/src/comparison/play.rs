@@ -158,6 +158,10 @@ fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {
         controller: request.system.clone(),
         time_domain_percent: tracking.map(|t| t.time_domain_percent),
         frequency_domain_percent: tracking.map(|t| t.frequency_domain_percent),
+        response_spectrum_percent: tracking
+            .and_then(|t| Some(t.laboratory?.largest_spectrum_deviation())),
+        significant_duration_percent: tracking
+            .and_then(|t| Some(t.laboratory?.significant_duration_percent)),
         peak_displacement_m: tracking.map(|t| t.peak_displacement),
         ended: outcome.ended.kind(),
         ended_because: outcome.ended.reason(),

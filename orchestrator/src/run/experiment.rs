@@ -26,6 +26,9 @@ pub struct Request {
     pub plant: String,
     /// Specimen of a built-in system.
     pub specimen: String,
+    /// Computed structure under the specimen of a built-in system.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub structure: Option<String>,
     /// Parameters of a built-in system's controllers; absent: by its plant.
     #[serde(default)]
     pub tuning: Option<Tuning>,
@@ -91,6 +94,7 @@ impl Request {
             system: system.to_string(),
             plant: built_in::DEFAULT_PLANT.to_string(),
             specimen: built_in::DEFAULT_SPECIMEN.to_string(),
+            structure: None,
             tuning: None,
             control_model: None,
             record: None,
@@ -170,7 +174,11 @@ const MOST_SAMPLES: f64 = 1e10;
 /// # Errors
 /// Whatever is at fault.
 pub fn prepare(request: &Request) -> Result<Prepared, Error> {
-    prepare_file(request, &system_file(request)?)
+    let mut file = system_file(request)?;
+    if let Some(structure) = &request.structure {
+        built_in::add_structure(&mut file, structure, &request.plant)?;
+    }
+    prepare_file(request, &file)
 }
 
 /// As [`prepare`], of a system that has been read or put together.

@@ -10,7 +10,7 @@ use super::experiment::Prepared;
 use super::identity;
 use super::manifest::Manifest;
 use super::signals::{COLUMNS, RESULTS, columns, read_csv, write_columns, write_csv};
-use super::summary::{Summary, Table};
+use super::summary::{Summary, Table, asked};
 use crate::error::Error;
 use crate::fmu::hexadecimal;
 use crate::master::{Outcome, Record};
@@ -85,6 +85,11 @@ fn page(
     record: &Record,
 ) -> Option<String> {
     let table = Table::find(manifest, record)?;
+    let asked = asked(record, motion);
+    let (motion, whole) = match &asked {
+        Some(asked) => (asked, asked.into()),
+        None => (motion, whole),
+    };
     let column = |output| record.column(&table.name(output)).unwrap_or_default();
     let row = |name: &str, value: String| (name.to_string(), Cell::from(value));
     let settings = vec![

@@ -10,6 +10,7 @@ use super::manifest::Manifest;
 use crate::error::Error;
 use crate::master::{Ended, Ending, Outcome, RealTime, Record};
 use crate::metrics::{self, Tracking};
+use crate::motion::Motion;
 use crate::system::Origin;
 use crate::units::{self, INCH, STANDARD_GRAVITY};
 
@@ -123,6 +124,8 @@ impl Summary {
             .collect();
         let notes = system.notes.iter().chain(&outcome.notes);
         warnings.splice(0..0, notes.cloned());
+        let asked = asked(&outcome.record, motion);
+        let wanted = asked.as_ref().unwrap_or(motion);
         let is_whole = outcome.record.len() < 2 || {
             let times = outcome.record.column("time").unwrap_or_default();
             times[1] - times[0] < 1.5 * motion.dt
@@ -135,7 +138,7 @@ impl Summary {
             }
             let displacement = outcome.record.column(&table.name("displacement"))?;
             let acceleration = outcome.record.column(&table.name("acceleration"))?;
-            match metrics::tracking(motion, &displacement, &acceleration) {
+            match metrics::tracking(wanted, &displacement, &acceleration) {
                 Ok(tracking) => Some(tracking),
                 Err(error) => {
                     warnings.push(format!("tracking cannot be measured: {error}"));
@@ -192,6 +195,21 @@ impl Summary {
             real_time: outcome.real_time.clone(),
         }
     }
+}
+
+/// What a table is asked for, where that is not the motion itself: what a component computes that has
+/// the outputs `table_displacement`, `table_velocity` and `table_acceleration`.
+pub fn asked(record: &Record, motion: &Motion) -> Option<Motion> {
+    let mut columns = record.columns.iter();
+    let name = columns.find_map(|column| column.strip_suffix(".table_displacement"))?;
+    let column = |quantity| record.column(&format!("{name}.table_{quantity}"));
+    Some(Motion {
+        name: format!("{} through `{name}`", motion.name),
+        displacement: column("displacement")?,
+        velocity: column("velocity")?,
+        acceleration: column("acceleration")?,
+        ..motion.clone()
+    })
 }
 
 /// The component that is the table: `table`, or the first with a displacement, velocity and

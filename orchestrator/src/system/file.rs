@@ -442,6 +442,19 @@ impl SystemFile {
         }
     }
 
+    /// Connects whatever takes the present reference to the motion that the component `structure` asks
+    /// a table for. What takes the reference ahead of time is left open: a structure that reacts to
+    /// what stands on it cannot tell.
+    pub fn follow(&mut self, structure: &str) {
+        self.connections.retain_mut(|link| {
+            if let Origin::Reference { quantity, ahead } = link.from {
+                link.from = Origin::output(structure, &format!("table_{}", quantity.name()));
+                return ahead == 0;
+            }
+            true
+        });
+    }
+
     /// Adds the components, connections and experiment of `part`; what `part` says goes before.
     pub fn extend(&mut self, part: Self) {
         self.connections.extend(part.connections);
