@@ -26,5 +26,7 @@ pub mod results;
 pub mod rigs;
 pub mod run;
 pub mod run_comparison;
+pub mod ssp;
 pub mod system;
+pub mod validate;
 pub use units;

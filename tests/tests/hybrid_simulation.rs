@@ -226,7 +226,7 @@ fn partitions_through_the_master_are_the_run_without_fmi() {
             ..Request::built_in(&system(case))
         };
         let prepared = prepare(&request).unwrap();
-        let outcome = prepared.run(request.algorithm).unwrap();
+        let outcome = prepared.run(prepared.algorithm).unwrap();
         assert!(
             matches!(outcome.ended, Ended::Complete),
             "{}",

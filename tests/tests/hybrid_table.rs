@@ -58,7 +58,7 @@ fn errors(controller: &str, plant: &str, fmi: FmiVersion, set: &[String]) -> Err
         ..Request::built_in(controller)
     };
     let prepared = prepare(&request).unwrap();
-    let outcome = prepared.run(request.algorithm).unwrap();
+    let outcome = prepared.run(prepared.algorithm).unwrap();
     assert!(
         matches!(outcome.ended, Ended::Complete),
         "{}",

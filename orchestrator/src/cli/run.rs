@@ -9,6 +9,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::OneVersion;
+use super::interrupt;
 use super::rig::RigArguments;
 use crate::error::Error;
 use crate::fmu::{Isolation, Options, Trace};
@@ -33,9 +34,11 @@ use crate::units::{self, STANDARD_GRAVITY};
     shakebench run three-variable --record NGA/RSN1633_MANJIL_ABBAR--L.AT2\n  \
     shakebench run displacement-pid --specimen none --pga 0.2 --set control.integral_gain=\"0.5 V/(in s)\"\n  \
     shakebench run my-rig.toml --algorithm jacobi --step 1ms --json\n  \
+    shakebench run system.ssp --duration \"10 s\"\n  \
+    shakebench run Theirs.fmu --input forces.csv\n  \
     shakebench run --manifest shakebench-results/three-variable-synthetic-1/manifest.json")]
 pub struct Arguments {
-    /// Built-in system or .toml file [default: three-variable]
+    /// Built-in system, .toml file, .ssp archive or single .fmu [default: three-variable]
     #[arg(value_name = "SYSTEM")]
     system: Option<String>,
     /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
@@ -56,9 +59,13 @@ pub struct Arguments {
     /// Version of FMI of the components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
-    /// Order of calls
-    #[arg(long, value_enum, default_value_t)]
-    algorithm: Algorithm,
+    /// Order of calls [default: what the system says, otherwise gauss-seidel]
+    #[arg(long, value_enum)]
+    algorithm: Option<Algorithm>,
+    /// Input table: .csv with a column `time`, then columns named as inputs (component.input), with
+    /// units; may be given several times
+    #[arg(long, value_name = "FILE")]
+    input: Vec<PathBuf>,
     /// Coupling step, such as "0.5 ms"; controllers keep their own period [default: 2 ms]
     #[arg(long, value_name = "T")]
     step: Option<String>,
@@ -77,9 +84,12 @@ pub struct Arguments {
     /// Seed of the built-in motion [default: 1]
     #[arg(long, conflicts_with_all = ["record", "reference"])]
     seed: Option<u64>,
-    /// Keep pace with real time
+    /// Keep pace with real time, and say how well that went
     #[arg(long)]
     real_time: bool,
+    /// Keep one sample of so many in the results
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
+    record_every: usize,
     /// Show the run while it goes on, on a page of this machine at this port (any free one where none
     /// is given); it keeps pace with real time
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
@@ -104,7 +114,7 @@ pub struct Arguments {
     log: Option<Vec<String>>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
-        "system", "record", "reference", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
+        "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
         "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
@@ -162,12 +172,17 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         before.is_ok_and(|before| before.request == request)
     };
     let folder = arguments.out.clone().unwrap_or_else(|| {
-        let name = format!("{}-{}", system.name, motion.name);
+        let name = match motion.is_empty() {
+            true => system.name.clone(),
+            false => format!("{}-{}", system.name, motion.name),
+        };
         let name = name.replace(['/', '\\', ' '], "-");
         unused(&Path::new("shakebench-results").join(name), is_same)
     });
     Results::check(&folder)?;
-    let mut simulation = prepared.simulation(request.algorithm)?;
+    let mut simulation = prepared.simulation(prepared.algorithm)?;
+    simulation.heed(interrupt::heed());
+    simulation.keep_every(arguments.record_every);
     let live = match arguments.watch {
         Some(port) => Some(watch(&prepared, &mut simulation, port)?),
         None => None,
@@ -178,15 +193,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     } else {
         Pace::Fastest
     };
-    let outcome = simulation.run(*samples, pace, &mut |sample| {
+    let mut outcome = simulation.run(*samples, pace, &mut |sample| {
         bar.set_position(sample as u64)
     });
     bar.finish_and_clear();
+    prepared.judge(&mut outcome);
 
-    let plan = (request.algorithm, *step, *samples);
-    let manifest = Manifest::new(&request, system, motion, plan, &outcome.record);
-    let summary = Summary::new(&request, &prepared, &outcome, &manifest);
-    let files = page::write(&folder, &prepared, &outcome, &summary, &manifest)?;
+    let plan = (prepared.algorithm, *step, *samples);
+    let mut manifest = Manifest::new(&request, system, motion, plan);
+    let summary = Summary::new(&prepared, &outcome, &manifest);
+    let files = page::write(&folder, &prepared, &outcome, &summary, &mut manifest)?;
     for line in &summary.warnings {
         eprintln!("warning: {line}");
     }
@@ -273,7 +289,10 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
 
 /// The figures as a table for people.
 fn table(summary: &Summary, record: &Record, motion: &Motion) -> String {
-    let mut text = format!("{} on {}\n", summary.system, summary.motion.name);
+    let mut text = match motion.is_empty() {
+        true => format!("{}\n", summary.system),
+        false => format!("{} on {}\n", summary.system, summary.motion.name),
+    };
     for note in &motion.notes {
         text += &format!("  {note}\n");
     }
@@ -291,6 +310,17 @@ fn table(summary: &Summary, record: &Record, motion: &Motion) -> String {
         significant(summary.real_time_factor, 2),
         summary.ended.word(),
     );
+    if let Some(kept) = &summary.real_time {
+        text += &format!(
+            "in real time: {} of {} steps were not done in time, the latest by {:.2} ms; steps began \
+             {:.0} us late (median), 99 of 100 less than {:.0} us\n\n",
+            kept.missed,
+            kept.deadlines,
+            1e3 * kept.worst_s,
+            1e6 * kept.jitter_median_s,
+            1e6 * kept.jitter_p99_s,
+        );
+    }
     let Some(tracking) = &summary.tracking else {
         return text;
     };
@@ -452,6 +482,7 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
         algorithm: arguments.algorithm,
         step_s: text("--step", &arguments.step, "s")?,
         duration_s: text("--duration", &arguments.duration, "s")?,
+        inputs: arguments.input.iter().map(|path| absolute(path)).collect(),
     })
 }
 
@@ -467,6 +498,12 @@ pub(super) fn quantity(option: &'static str, text: &str, unit: &'static str) -> 
         return Ok(value);
     }
     Err(fault(format!("`{text}` is not positive")))
+}
+
+/// A whole number above 0.
+fn at_least_one(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|number| *number > 0);
+    number.ok_or_else(|| "expected a whole number from 1".to_string())
 }
 
 fn progress_bar(samples: usize) -> ProgressBar {

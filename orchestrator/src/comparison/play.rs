@@ -137,7 +137,7 @@ fn request(plan: &Plan, controller: &str, played: &Played) -> Request {
 
 fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {
     let prepared = prepare(request)?;
-    let outcome = prepared.run(request.algorithm)?;
+    let outcome = prepared.run(prepared.algorithm)?;
     let column = |name: &str| outcome.record.column(&format!("table.{name}"));
     let motion = &prepared.motion;
     let histories = column("displacement").zip(column("acceleration"));

@@ -189,7 +189,7 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
     let mut first_error = Vec::new();
     let stop = loop {
         let iteration = runs.len();
-        let played = play(&prepared, &plan.request, drive.clone(), late)?;
+        let played = play(&prepared, drive.clone(), late)?;
         progress(2 + iteration);
         exposure += energy(&played.acceleration) / whole;
         let complete = played.ended.kind() == Ending::Complete;
@@ -308,7 +308,7 @@ fn find_inverse(plan: &Plan, late: usize, crossover: f64) -> Result<Inverse, Err
         ..motion::Options::default()
     };
     let drive = motion::built_in(FINDING_SEED, &options)?;
-    let played = play(&prepared, &request, drive.clone(), late)?;
+    let played = play(&prepared, drive.clone(), late)?;
     if played.ended.kind() != Ending::Complete {
         return Err(Error::Option {
             option: "--iterations",
@@ -325,20 +325,16 @@ fn find_inverse(plan: &Plan, late: usize, crossover: f64) -> Result<Inverse, Err
 }
 
 /// Plays `drive` in place of the motion; what is measured is `late` samples late.
-fn play(
-    prepared: &Prepared,
-    request: &Request,
-    drive: Motion,
-    late: usize,
-) -> Result<Played, Error> {
+fn play(prepared: &Prepared, drive: Motion, late: usize) -> Result<Played, Error> {
     let own = Prepared {
+        algorithm: prepared.algorithm,
         system: prepared.system.clone(),
         step: prepared.step,
         samples: drive.len(),
         motion: drive,
         options: prepared.options.clone(),
     };
-    let outcome = own.run(request.algorithm)?;
+    let outcome = own.run(own.algorithm)?;
     let record = &outcome.record;
     let [displacement, acceleration] = pair(record, "displacement", "acceleration")
         .filter(|(name, _)| name == "table")

@@ -15,6 +15,7 @@
 //!   latter also knows the measurements' noise and weighs outputs in units of stroke, 20 in/s and
 //!   1 g.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -28,6 +29,7 @@ use super::control_model::ControlModel;
 use super::file::{ComponentFile, SystemFile};
 use super::link::{Link, Origin};
 use super::rule::Rule;
+use super::value::Setting;
 use plant::identified::nominal::shake_table_values;
 use plant::specimens::YieldingSpecimen;
 
@@ -50,6 +52,91 @@ pub struct Wanted<'a> {
     pub model: Option<&'a Path>,
     /// Rules on a model that has been read; they go before everything else.
     pub rules: Option<&'a Rules>,
+}
+
+/// Tells the controllers in `file` that predict over a delay how many samples a master that steps
+/// all components from the same values adds: one for each sampled component that a value passes
+/// between measurement and valve. What a file says itself stays, but for a built-in system, whose
+/// delay is that of its rig.
+pub fn know_jacobi(file: &mut SystemFile, is_built_in: bool) {
+    let sampled = |name: &String| {
+        file.components
+            .get(name)
+            .is_some_and(|part| part.period.is_some())
+    };
+    let mut next: BTreeMap<&String, Vec<&String>> = BTreeMap::new();
+    for link in &file.connections {
+        if let Origin::Output(from) = &link.from {
+            next.entry(&from.component)
+                .or_default()
+                .push(&link.to.component);
+        }
+    }
+    let mut found: Vec<(String, i64)> = Vec::new();
+    for (name, part) in &file.components {
+        // Sliding mode counts from the measurement, the other from the loop below it.
+        let through = match part.fmu.as_str() {
+            "SlidingMode" => true,
+            "ModelPredictive" => false,
+            _ => continue,
+        };
+        let longest = |start: &String| longest_path(start, &next, &sampled, name, through);
+        let starts = file.components.keys().filter(|name| !sampled(name));
+        let hops = starts.filter_map(longest).max();
+        if let Some(hops) = hops {
+            found.push((name.clone(), hops));
+        }
+    }
+    for (name, hops) in found {
+        let Some(part) = file.components.get_mut(&name) else {
+            continue;
+        };
+        for (parameter, samples) in [("loop_delay_samples", hops), ("command_delay_samples", 1)] {
+            let own = match part.parameters.get(parameter) {
+                Some(Setting::Integer(own)) if is_built_in => *own,
+                Some(_) => continue,
+                None => 0,
+            };
+            part.set(parameter, own + samples);
+        }
+    }
+}
+
+/// Sampled components on the longest way from `at` to a component that is none, through the
+/// component `by` where `through` is set and past it otherwise.
+fn longest_path(
+    at: &String,
+    next: &BTreeMap<&String, Vec<&String>>,
+    sampled: &impl Fn(&String) -> bool,
+    by: &String,
+    through: bool,
+) -> Option<i64> {
+    fn walk<'a>(
+        at: &'a String,
+        next: &BTreeMap<&'a String, Vec<&'a String>>,
+        sampled: &impl Fn(&String) -> bool,
+        seen: &mut Vec<&'a String>,
+        fits: &impl Fn(&[&String]) -> bool,
+    ) -> Option<i64> {
+        let mut most = None;
+        for &to in next.get(at).into_iter().flatten() {
+            if !sampled(to) {
+                if !seen.is_empty() && fits(seen) {
+                    most = most.max(Some(seen.len() as i64));
+                }
+                continue;
+            }
+            if seen.contains(&to) {
+                continue;
+            }
+            seen.push(to);
+            most = most.max(walk(to, next, sampled, seen, fits));
+            seen.pop();
+        }
+        most
+    }
+    let fits = |seen: &[&String]| seen.contains(&by) == through;
+    walk(at, next, sampled, &mut Vec::new(), &fits)
 }
 
 /// Gives the controllers in `file` the parameters for `plant` with a specimen.
