@@ -81,7 +81,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             ("--plant", arguments.rig.plant.is_some()),
             ("--specimen", arguments.rig.specimen.is_some()),
         ];
-        for (option, _) in given.into_iter().filter(|(_, given)| *given) {
+        if let Some((option, _)) = given.into_iter().find(|(_, given)| *given) {
             let reason = format!(
                 "{} is a file and has its own; edit it instead",
                 arguments.system

@@ -43,7 +43,7 @@ pub fn read(name: &str) -> Result<SystemFile, SspError> {
         components: BTreeMap::new(),
         wiring: Wiring::default(),
         values: Vec::new(),
-        notes: structure.notes.clone(),
+        notes: Vec::new(),
         count: 0,
     };
     let place = Place {
@@ -145,7 +145,7 @@ impl Flat<'_> {
                         let reason = format!("there is no signal dictionary `{name}`");
                         return Err(self.fault(place, signals.line, reason));
                     };
-                    let owner = [path.as_slice(), &[name.clone()]].concat();
+                    let owner = [path.as_slice(), std::slice::from_ref(name)].concat();
                     self.wiring.share(below.path.clone(), owner);
                 }
             }

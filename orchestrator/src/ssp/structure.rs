@@ -27,8 +27,6 @@ pub struct Structure {
     pub experiment: (Option<f64>, Option<f64>),
     /// What this program wrote beside the standard.
     pub(super) own: Own,
-    /// What is passed over.
-    pub(super) notes: Vec<String>,
 }
 
 /// What this program writes beside the standard, so that it reads its own systems as they were.
@@ -165,8 +163,7 @@ pub(super) fn read(text: &str) -> Result<Structure, Fault> {
     let Some(system) = child(root, "System") else {
         return Err(fault(root, "there is no <System>"));
     };
-    let mut notes = Vec::new();
-    let system_read = read_system(system, &units, &mut notes)?;
+    let system_read = read_system(system, &units)?;
     let time = |node: Node, name: &str| -> Result<Option<f64>, Fault> {
         let given = node.attribute(name).map(|_| xml::number(node, name, 0.0));
         given.transpose()
@@ -189,7 +186,6 @@ pub(super) fn read(text: &str) -> Result<Structure, Fault> {
         system: system_read,
         experiment,
         own: own(root)?,
-        notes,
     })
 }
 
@@ -225,7 +221,7 @@ fn own(root: Node) -> Result<Own, Fault> {
     })
 }
 
-fn read_system(node: Node, units: &Units, notes: &mut Vec<String>) -> Result<System, Fault> {
+fn read_system(node: Node, units: &Units) -> Result<System, Fault> {
     let mut elements: Vec<Element> = Vec::new();
     let inside = child(node, "Elements");
     for element in inside.into_iter().flat_map(|inside| inside.children()) {
@@ -234,7 +230,7 @@ fn read_system(node: Node, units: &Units, notes: &mut Vec<String>) -> Result<Sys
         }
         let read = match element.tag_name().name() {
             "Component" => Element::Component(component(element, units)?),
-            "System" => Element::System(read_system(element, units, notes)?),
+            "System" => Element::System(read_system(element, units)?),
             "SignalDictionaryReference" => Element::Signals(Signals {
                 name: name(element)?,
                 line: xml::line(element),

@@ -392,8 +392,8 @@ fn special_case(candidates: &[Candidate], point: &Point, place: usize) -> Option
     let mut values = candidates[special].starts.first()?.clone();
     for (value, parameter) in values.iter_mut().zip(&candidates[special].parameters) {
         let pairs = general.parameters.iter().zip(general.values(internal));
-        let same = pairs.filter(|(own, _)| own.name == parameter.name);
-        if let Some((_, shared)) = same.last() {
+        let mut same = pairs.filter(|(own, _)| own.name == parameter.name);
+        if let Some((_, shared)) = same.next_back() {
             *value = shared;
         }
     }

@@ -317,7 +317,7 @@ impl SimulatedModel for Measured<'_> {
         let [fitted, tested] = [fitted, tested].map(|record| &self.places[record][block]);
         // How a file begins has died away where a later part of it was fitted.
         let is_start = self.rig.session()[place].role == SessionRole::Start;
-        !fitted.is_empty() && !(is_start && tested.first() < fitted.first())
+        !fitted.is_empty() && (!is_start || tested.first() >= fitted.first())
     }
 
     fn samples(&self, record: usize, block: usize) -> usize {

@@ -332,10 +332,9 @@ impl Equations for Oscillator {
                     // A staircase jumps at the end of its step, where the old stair still acts.
                     let mut forces = [place, place + stride, place + 2 * stride].map(at);
                     if held != 0.0 && late == 0.0 {
-                        forces[2] = forces[2]
-                            + held
-                                * (at_stair(between, k)
-                                    - at_stair(between, (place + 2 * stride) / PLACES));
+                        forces[2] += held
+                            * (at_stair(between, k)
+                                - at_stair(between, (place + 2 * stride) / PLACES));
                     }
                     *state = law.step(state, h, forces);
                 }

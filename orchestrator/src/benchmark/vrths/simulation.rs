@@ -134,17 +134,23 @@ pub struct Setting<'a> {
 
 /// A plant with or without effects.
 enum AnyPlant {
-    Linear(TransferSystem),
-    Extended(ExtendedTransferSystem),
+    Linear(Box<TransferSystem>),
+    Extended(Box<ExtendedTransferSystem>),
 }
 
 impl AnyPlant {
     fn new(setting: &Setting<'_>) -> Result<Self, ModelError> {
         let (parameters, effects) = (*setting.plant, *setting.effects);
         Ok(if effects.is_active() {
-            Self::Extended(ExtendedTransferSystem::new(parameters, effects, PERIOD)?)
+            Self::Extended(Box::new(ExtendedTransferSystem::new(
+                parameters, effects, PERIOD,
+            )?))
         } else {
-            Self::Linear(TransferSystem::new(parameters, setting.form, PERIOD)?)
+            Self::Linear(Box::new(TransferSystem::new(
+                parameters,
+                setting.form,
+                PERIOD,
+            )?))
         })
     }
 
