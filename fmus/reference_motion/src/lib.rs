@@ -5,7 +5,9 @@ mod motion;
 
 use std::path::Path;
 
-use fmu_kit::{Causality, Component, ComponentResult, Variable, resources::optional_text};
+use fmu_kit::{
+    Causality, Component, ComponentResult, Dependency, Variable, resources::optional_text,
+};
 use motion::Motion;
 use serde::{Deserialize, Serialize};
 
@@ -57,7 +59,10 @@ fn histories(
             .map(|(i, element)| element.about(&format!("Wanted {name} {} samples ahead", i + 1))),
     );
     all.into_iter()
-        .map(|variable| variable.unit(unit).shown_in(shown).nominal(nominal))
+        .map(|variable| {
+            let shown = variable.unit(unit).shown_in(shown).nominal(nominal);
+            shown.depends_on(&["scale"], Dependency::Dependent)
+        })
         .collect()
 }
 
