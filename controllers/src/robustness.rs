@@ -54,8 +54,6 @@ impl LateRig {
         if part > (1.0 - 1e-6) * period {
             (delay, part) = (delay + 1.0, 0.0);
         }
-        // Observer forms have entries over nine decades: balanced first, lest the exponential suffer.
-        let rig = &balanced(rig);
         let sampled = rig.sample(period);
         // Held over [0, part) is the command before, over [part, period) the present one.
         let rest = rig.sample(period - part);
@@ -115,34 +113,6 @@ impl LateRig {
         }
         a.complex_eigenvalues().iter().all(|pole| pole.norm() < 1.0)
     }
-}
-
-/// The same system in states of comparable size (Parlett and Reinsch 1969); powers of two, so that
-/// nothing is rounded.
-fn balanced(rig: &StateSpace) -> StateSpace {
-    let mut own = rig.clone();
-    for _ in 0..20 {
-        for i in 0..own.order() {
-            let others = |values: &mut dyn Iterator<Item = f64>| -> f64 {
-                values
-                    .enumerate()
-                    .filter(|(j, _)| *j != i)
-                    .map(|(_, v)| v.abs())
-                    .sum()
-            };
-            let column = others(&mut own.a.column(i).iter().copied());
-            let row = others(&mut own.a.row(i).iter().copied());
-            if column == 0.0 || row == 0.0 {
-                continue;
-            }
-            let factor = (row / column).sqrt().log2().round().exp2();
-            own.a.column_mut(i).scale_mut(factor);
-            own.a.row_mut(i).scale_mut(1.0 / factor);
-            own.b.row_mut(i).scale_mut(1.0 / factor);
-            own.c.column_mut(i).scale_mut(factor);
-        }
-    }
-    own
 }
 
 /// The command after a unit push at the valve.
