@@ -12,6 +12,7 @@ pub mod loops;
 pub mod mpc;
 pub mod pid;
 pub mod prediction_over_delay;
+pub mod preview;
 pub mod robustness;
 pub mod sliding_mode;
 pub mod synthesis;

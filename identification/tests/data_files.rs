@@ -17,7 +17,10 @@ fn read(text: &str) -> Recording {
 }
 
 fn fault(text: &str) -> String {
-    parse(text.as_bytes()).unwrap_err().to_string()
+    match parse(text.as_bytes()) {
+        Err(error) => error.to_string(),
+        Ok(recording) => panic!("{text}\n{recording:?}"),
+    }
 }
 
 fn stamps(recording: &Recording) -> &[f64] {
@@ -185,6 +188,21 @@ fn columns_of_any_name_are_picked_with_their_units() {
         error.to_string(),
         "rig.csv, line 1: no column `f` among t_s, x_mm, F"
     );
+}
+
+#[test]
+fn the_page_on_data_files_lists_every_channel() {
+    let page = include_str!("../../docs/data-files.md");
+    for channel in Channel::KNOWN {
+        let names = channel.aliases().iter().map(|name| format!("`{name}`"));
+        let unit = channel.unit().replace("^2", "²");
+        let row = format!(
+            "| `{}` | {unit} | {} |",
+            channel.name(),
+            names.collect::<Vec<_>>().join(", ")
+        );
+        assert!(page.contains(&row), "{row}");
+    }
 }
 
 /// How a program writes a file.

@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         // Reads and checks what the request names; builds and packs the FMUs when they are stale.
         let prepared = prepare(&request)?;
-        let outcome = prepared.run(request.algorithm)?;
+        let outcome = prepared.run(prepared.algorithm)?;
         let column = |name| {
             let missing = || format!("{system} has no variable `{name}`");
             outcome.record.column(name).ok_or_else(missing)

@@ -9,6 +9,7 @@ use crate::master::MasterError;
 use crate::motion::MotionError;
 use crate::pack::PackError;
 use crate::results::ResultsError;
+use crate::ssp::SspError;
 use crate::system::SystemError;
 
 /// Why a command did not do what it was asked for; nothing has been written then.
@@ -23,6 +24,9 @@ pub enum Error {
     /// An FMU is at fault.
     #[error(transparent)]
     Fmu(#[from] FmuError),
+    /// An SSP archive is at fault.
+    #[error(transparent)]
+    Ssp(#[from] SspError),
     /// A run cannot begin.
     #[error(transparent)]
     Master(#[from] MasterError),

@@ -7,6 +7,8 @@ use std::sync::Arc;
 
 use crate::fmu::{FmiVersion, Fmu};
 use crate::pack::{self, PackedFmu};
+use crate::ssp::Package;
+use crate::system::SystemFile;
 use crate::units::hint;
 
 /// FMUs by the name that a system file gives them, each opened once.
@@ -14,6 +16,8 @@ pub struct FmuLibrary {
     version: FmiVersion,
     /// Paths in the system file count from here.
     directory: Option<PathBuf>,
+    /// The archive in which files lie.
+    package: Option<Arc<Package>>,
     open: HashMap<PathBuf, Arc<Fmu>>,
 }
 
@@ -23,7 +27,16 @@ impl FmuLibrary {
         Self {
             version,
             directory: directory.map(Path::to_path_buf),
+            package: None,
             open: HashMap::new(),
+        }
+    }
+
+    /// The library of a system file: with its directory, or its archive.
+    pub fn of(version: FmiVersion, file: &SystemFile) -> Self {
+        Self {
+            package: file.package.clone(),
+            ..Self::new(version, file.directory.as_deref())
         }
     }
 
@@ -32,7 +45,8 @@ impl FmuLibrary {
     /// # Errors
     /// An unknown name (with the nearest one), a component that does not build, an FMU at fault.
     pub fn find(&mut self, name: &str) -> Result<Arc<Fmu>, Box<dyn Error>> {
-        let is_file = name.ends_with(".fmu");
+        // Whatever lies in an archive is a file.
+        let is_file = name.ends_with(".fmu") || self.package.is_some();
         let path = if is_file {
             self.directory
                 .as_deref()
@@ -44,7 +58,9 @@ impl FmuLibrary {
         if let Some(fmu) = self.open.get(&path) {
             return Ok(fmu.clone());
         }
-        let fmu = if is_file {
+        let fmu = if let Some(package) = &self.package {
+            Fmu::open_within(&path, &package.shown(name))?
+        } else if is_file {
             Fmu::open(&path)?
         } else {
             Fmu::open_own(&path)?

@@ -1,5 +1,6 @@
 //! How well a table followed its reference.
 
+pub mod laboratory;
 mod response_spectrum;
 
 pub use response_spectrum::{USUAL_DAMPING, pseudo_acceleration};
@@ -8,6 +9,7 @@ use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 use thiserror::Error;
 
+use self::laboratory::Laboratory;
 use crate::motion::{Motion, peak};
 
 /// Highest frequency of the frequency-domain error, Hz.
@@ -69,6 +71,9 @@ pub struct Tracking {
     /// cross-correlation within half a second; negative when it leads.
     #[serde(rename = "delay_s")]
     pub delay: f64,
+    /// What laboratories read off a test; absent from the files of older versions.
+    #[serde(flatten)]
+    pub laboratory: Option<Laboratory>,
 }
 
 /// JSON has no NaN, which the correlation with a table at rest is.
@@ -121,6 +126,7 @@ pub fn tracking(
         peak_acceleration_error: peak(&a_error),
         correlation: correlation(a_ref, acceleration),
         delay: delay(a_ref, acceleration, reference.dt),
+        laboratory: (peak(a_ref) > 0.0).then(|| Laboratory::new(a_ref, acceleration, reference.dt)),
     })
 }
 
@@ -146,7 +152,7 @@ fn amplitude_error(reference: &[f64], history: &[f64], dt: f64) -> f64 {
 }
 
 /// Spectrum of `history`, padded with zeros to `length`; empty when there is nothing.
-fn spectrum(history: &[f64], length: usize) -> Vec<Complex64> {
+pub(crate) fn spectrum(history: &[f64], length: usize) -> Vec<Complex64> {
     if history.is_empty() {
         return Vec::new();
     }

@@ -20,6 +20,7 @@ use crate::component_library::{ComponentLibrary, Descriptions};
 pub use crate::fmu::FmiVersion;
 pub use annotation::build_of;
 pub use archive::PackedFmu;
+pub(crate) use archive::write_archive;
 pub use error::PackError;
 pub(crate) use error::file_error;
 pub use merge::merge;
@@ -27,6 +28,7 @@ use notices::Notices;
 use packing::Form;
 pub use platform::Platform;
 pub use supply::all_fmus;
+pub(crate) use variant::with_resource;
 pub use variant::{StartValue, write_variant};
 use workspace::{Component, Workspace};
 

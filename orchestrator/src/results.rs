@@ -73,6 +73,8 @@ pub struct Results {
     folder: PathBuf,
     staging: tempfile::TempDir,
     names: Vec<String>,
+    /// Files of an earlier run that do not stay.
+    replaced: Vec<String>,
 }
 
 impl Results {
@@ -100,6 +102,7 @@ impl Results {
             folder: folder.to_path_buf(),
             staging,
             names: Vec::new(),
+            replaced: Vec::new(),
         })
     }
 
@@ -155,6 +158,13 @@ impl Results {
         self.names.push(name.to_string());
     }
 
+    /// Files of these names are taken away where this result has none of them, so that they are not
+    /// taken for its own.
+    pub fn replaces(&mut self, names: &[&str]) {
+        self.replaced
+            .extend(names.iter().map(|name| name.to_string()));
+    }
+
     /// Whether a file of data would change; pages, pictures and summaries follow the data.
     fn check_existing(&self) -> Result<(), ResultsError> {
         let is_volatile = |name: &&String| {
@@ -177,7 +187,8 @@ impl Results {
         Ok(())
     }
 
-    /// Moves the files into their folder; others stay.
+    /// Moves the files into their folder; others stay. Of two that do so at once, one waits for the
+    /// other.
     ///
     /// # Errors
     /// A folder that cannot be made; a file of data that is there and would change, unless
@@ -190,6 +201,17 @@ impl Results {
             folder: self.folder.clone(),
             source,
         })?;
+        // Where folders cannot be locked, nothing waits.
+        let lock = File::open(&self.folder);
+        let _held = lock.as_ref().map(File::lock);
+        for name in self
+            .replaced
+            .iter()
+            .filter(|name| !self.names.contains(name))
+        {
+            // Mostly there is none.
+            let _ = fs::remove_file(self.folder.join(name));
+        }
         let mut files = Vec::new();
         for name in &self.names {
             let file = self.folder.join(name);

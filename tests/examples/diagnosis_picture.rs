@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = root.canonicalize()?.join("target/diagnosis-walkthrough");
     let case = folder.join(format!("cases/case-{SEED:05}"));
     Case::draw(SEED, &Settings::new(Kind::This("valve_dead_band"))).write(&case)?;
-    let report = diagnose(&case, &[], &folder.join("results"), Observer::none())?;
+    let report = diagnose(&case, &[], None, &folder.join("results"), Observer::none())?;
     println!("{}", report.sentence);
     let page = folder.join("results").join(REPORT);
     let picture = root.join("docs/diagnosis-report.png");

@@ -1,12 +1,14 @@
 //! Hides effects in fresh cases, diagnoses them and prints what came of it.
 //!
 //! `cargo run --release -p acceptance --example hidden_effects_suite -- [--one N] [--effect NAME]
-//! [--two N] [--nothing N] [--outside N] [--noise F,...] [--mismatch F,...] [--seed S] [--verbose 1]`
+//! [--two N] [--nothing N] [--outside N] [--noise F,...] [--mismatch F,...] [--seed S] [--verbose 1]
+//! [--world plain|open|noisy]`
 
 use std::env;
 use std::process::ExitCode;
 
 use acceptance::hidden_suite::{Plan, line, run_all, table};
+use hidden_effects::World;
 use hidden_effects::catalogue::entry;
 
 fn main() -> ExitCode {
@@ -19,6 +21,7 @@ fn main() -> ExitCode {
         outside: 40,
         mismatch: vec![0.01],
         noise: vec![1.0],
+        world: World::Plain,
         verbose: false,
     };
     let mut arguments = env::args().skip(1);
@@ -30,6 +33,21 @@ fn main() -> ExitCode {
                 return ExitCode::from(2);
             };
             plan.effect = Some(entry.name);
+            continue;
+        }
+        if option == "--world" {
+            plan.world = match text.as_str() {
+                "plain" => World::Plain,
+                "open" => World::Open,
+                "noisy" => World::Noisy,
+                _ => {
+                    eprintln!("--world: `{text}` is unknown; expected plain, open or noisy");
+                    return ExitCode::from(2);
+                }
+            };
+            if plan.world == World::Noisy {
+                (plan.noise, plan.mismatch) = (vec![3.0], vec![0.02]);
+            }
             continue;
         }
         let list: Result<Vec<f64>, _> = text.split(',').map(str::parse::<f64>).collect();
@@ -49,7 +67,7 @@ fn main() -> ExitCode {
             _ => {
                 eprintln!(
                     "{option} is unknown; expected --one, --effect, --two, --nothing, --outside, --noise, \
-                     --mismatch, --seed or --verbose"
+                     --mismatch, --seed, --world or --verbose"
                 );
                 return ExitCode::from(2);
             }

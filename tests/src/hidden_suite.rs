@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::time::UNIX_EPOCH;
 
 use hidden_effects::score::{Estimate, NamedEffect, outcome, parameter_errors, wilson};
-use hidden_effects::{Case, Kind, Outcome, Settings, Truth, Verdict};
+use hidden_effects::{Case, Kind, Outcome, Settings, Truth, Verdict, World};
 use identification::diagnosis::case::Case as Laboratory;
 use identification::diagnosis::engine::{Observer, Progress};
 use identification::diagnosis::rigs::shake_table::{Diagnosis, diagnose};
@@ -30,6 +30,8 @@ pub struct Plan {
     pub mismatch: Vec<f64>,
     /// Factors on the sensors' noise, which the cases take in turn.
     pub noise: Vec<f64>,
+    /// What disturbs the rigs and their sensors.
+    pub world: World,
     /// Prints each search's steps and what is left over to standard error.
     pub verbose: bool,
 }
@@ -161,6 +163,7 @@ pub fn run_all(plan: &Plan, progress: impl Fn(&Scored) + Sync) -> Vec<Scored> {
             let settings = Settings {
                 mismatch: in_turn(&plan.mismatch, i / plan.noise.len().max(1), plain.mismatch),
                 noise: in_turn(&plan.noise, i, plain.noise),
+                world: plan.world,
                 ..plain
             };
             let scored = run(plan.seed + i as u64, name, &settings, plan.verbose);

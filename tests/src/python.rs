@@ -56,7 +56,30 @@ pub fn sippy() -> Command {
 /// # Panics
 /// When the script fails, with all of its output.
 pub fn run_script<S: AsRef<OsStr>>(script: &str, arguments: impl IntoIterator<Item = S>) -> String {
-    let mut command = python();
+    finish(python(), script, arguments)
+}
+
+/// As [`run_script`], with a Python of its own: `name`, with what the file `pinned` lists.
+///
+/// # Panics
+/// As [`run_script`], or when the environment cannot be made.
+pub fn run_script_in<S: AsRef<OsStr>>(
+    name: &str,
+    pinned: &str,
+    script: &str,
+    arguments: impl IntoIterator<Item = S>,
+) -> String {
+    match make_environment(name, pinned) {
+        Ok(environment) => finish(Command::new(program(&environment)), script, arguments),
+        Err(problem) => panic!("no Python `{name}`: {problem}"),
+    }
+}
+
+fn finish<S: AsRef<OsStr>>(
+    mut command: Command,
+    script: &str,
+    arguments: impl IntoIterator<Item = S>,
+) -> String {
     command.arg(importers().join(script)).args(arguments);
     let output = command
         .output()

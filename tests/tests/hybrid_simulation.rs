@@ -193,6 +193,7 @@ fn nothing_grows_in_two_minutes_of_rest() {
         let setting = simulation::Setting {
             frame: &frame,
             plant: &plant,
+            effects: &simulation::NO_EFFECTS,
             form: InteractionForm::DerivativeBlocks,
             ground: &ground,
             noise: &noise,
@@ -225,7 +226,7 @@ fn partitions_through_the_master_are_the_run_without_fmi() {
             ..Request::built_in(&system(case))
         };
         let prepared = prepare(&request).unwrap();
-        let outcome = prepared.run(request.algorithm).unwrap();
+        let outcome = prepared.run(prepared.algorithm).unwrap();
         assert!(
             matches!(outcome.ended, Ended::Complete),
             "{}",
@@ -238,6 +239,7 @@ fn partitions_through_the_master_are_the_run_without_fmi() {
         let setting = simulation::Setting {
             frame: &case.frame(),
             plant: &TransferSystemParameters::default(),
+            effects: &simulation::NO_EFFECTS,
             form: InteractionForm::TransferFunction,
             ground: &ground,
             noise: &noise,
@@ -278,6 +280,7 @@ fn the_best_controller_scores_the_same_in_fmpy() {
     let setting = simulation::Setting {
         frame: &frame,
         plant: &TransferSystemParameters::default(),
+        effects: &simulation::NO_EFFECTS,
         form: InteractionForm::TransferFunction,
         ground,
         noise: &noise,

@@ -64,16 +64,19 @@ impl AdaptiveInverse {
     /// # Errors
     /// None with these constants.
     pub fn benchmark(period: f64) -> Result<Self, ModelError> {
+        Self::around(&TransferSystemParameters::default(), period)
+    }
+
+    /// The same around another plant.
+    ///
+    /// # Errors
+    /// None with these constants.
+    pub fn around(nominal: &TransferSystemParameters, period: f64) -> Result<Self, ModelError> {
         let deviation = Deviation {
             specimen_stiffness: Self::STIFFNESS_DEVIATION,
             ..Deviation::default()
         };
-        Self::for_family(
-            &TransferSystemParameters::default(),
-            &deviation,
-            period,
-            Self::LEAD,
-        )
+        Self::for_family(nominal, &deviation, period, Self::LEAD)
     }
 
     /// For a family of plants around `nominal`.

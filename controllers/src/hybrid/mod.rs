@@ -5,6 +5,7 @@
 //! force, and nothing else; models that a law is designed on are parameters of it.
 
 pub mod adaptive_inverse;
+pub mod compensation;
 pub mod extrapolation;
 pub mod gradient_inverse;
 pub mod lag_chain;

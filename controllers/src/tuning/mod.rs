@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod known_rig;
+pub mod preview;
 pub mod sliding_mode;
 pub mod suite;
 pub mod three_variable;

@@ -271,7 +271,11 @@ impl Described {
 fn effect_parameters() -> impl Iterator<Item = Variable<Instrumentation>> {
     let of_channels: Vec<String> = CHANNELS
         .iter()
-        .flat_map(|channel| channel.parameters().map(|variable| variable.name))
+        .flat_map(|channel| {
+            channel
+                .parameters()
+                .map(|variable| variable.declaration.name)
+        })
         .collect();
     effects::variables(Part::Instrumentation).filter_map(move |(name, parameter)| {
         let Some(Field::Sensors(field)) = parameter.field else {

@@ -1,5 +1,7 @@
 //! What a component is: plain data, a table of variables, and the laws that move it.
 
+use std::path::Path;
+
 use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{terminal::Terminal, variable::Variable};
@@ -41,6 +43,16 @@ pub trait Component: Clone + Default + Serialize + DeserializeOwned + Send + 'st
     /// A component whose table holds derivatives of continuous states (see
     /// [`Variable::derivative_of`]) is offered for model exchange, too.
     fn variables() -> Vec<Variable<Self>>;
+
+    /// Reads what it needs from the folder `resources` of the FMU, once, before anything else; most
+    /// components need nothing.
+    ///
+    /// # Errors
+    /// A file that cannot be used; the instance is then not made.
+    fn load(&mut self, resources: &Path) -> ComponentResult {
+        let _ = resources;
+        Ok(())
+    }
 
     /// Prepares the component from its parameters and puts it into its initial state.
     ///

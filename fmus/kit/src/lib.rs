@@ -53,6 +53,7 @@ mod pointers;
 mod shared;
 mod start;
 mod state;
+mod structure;
 mod values;
 
 pub mod conformance;

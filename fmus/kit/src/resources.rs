@@ -62,8 +62,16 @@ pub fn start_values(location: Location<'_>) -> Result<Option<(PathBuf, String)>,
     let Some(file) = location.folder().map(|folder| folder.join(START_VALUES)) else {
         return Ok(None);
     };
-    match fs::read_to_string(&file) {
-        Ok(text) => Ok(Some((file, text))),
+    Ok(optional_text(&file)?.map(|text| (file, text)))
+}
+
+/// The text of a file; `None` if there is none.
+///
+/// # Errors
+/// When the file is there but cannot be read.
+pub fn optional_text(file: &Path) -> Result<Option<String>, String> {
+    match fs::read_to_string(file) {
+        Ok(text) => Ok(Some(text)),
         Err(e)
             if matches!(
                 e.kind(),

@@ -74,6 +74,9 @@ fn prepare<C: Component>(
         return Err("offers co-simulation only, no model exchange".into());
     }
     let mut start = C::default();
+    if let Some(folder) = location.folder() {
+        start.load(&folder).map_err(|problem| problem.to_string())?;
+    }
     if let Some((file, text)) = start_values {
         resources::apply(model, &mut start, &text, &file)?;
     }

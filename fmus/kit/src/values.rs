@@ -243,7 +243,7 @@ impl<C: Component> Instance<C> {
 
 #[cold]
 fn wrong_type<C>(variable: &Variable<C>, asked: &str) -> Box<Fault> {
-    let is = variable.access.type_name();
+    let is = variable.access.kind().name();
     Fault::error(format!(
         "variable `{}` is a {is}, not a {asked}",
         variable.name

@@ -1,5 +1,7 @@
 //! One row of a component's table of variables.
 
+use std::ops::Deref;
+
 /// Where a variable's value comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Causality {
@@ -78,22 +80,91 @@ pub enum Access<C> {
     Choice(fn(&mut C) -> &mut i32, Enumeration),
 }
 
-impl<C> Access<C> {
-    /// The name of the type as FMI 3.0 calls it.
-    pub fn type_name(&self) -> &'static str {
+/// The type of a variable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Type {
+    /// Float64, Real in FMI 2.0.
+    Real,
+    /// Int32.
+    Integer,
+    /// Boolean.
+    Boolean,
+    /// String.
+    Text,
+    /// An enumeration.
+    Choice(Enumeration),
+}
+
+impl Type {
+    /// As FMI 3.0 calls it.
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Real(_) | Self::Within(_) | Self::Element(..) => "Float64",
-            Self::Integer(_) => "Int32",
-            Self::Boolean(_) => "Boolean",
-            Self::Text(_) => "String",
-            Self::Choice(..) => "Enumeration",
+            Self::Real => "Float64",
+            Self::Integer => "Int32",
+            Self::Boolean => "Boolean",
+            Self::Text => "String",
+            Self::Choice(_) => "Enumeration",
+        }
+    }
+}
+
+impl<C> Access<C> {
+    /// The type of what is there.
+    pub fn kind(&self) -> Type {
+        match self {
+            Self::Real(_) | Self::Within(_) | Self::Element(..) => Type::Real,
+            Self::Integer(_) => Type::Integer,
+            Self::Boolean(_) => Type::Boolean,
+            Self::Text(_) => Type::Text,
+            Self::Choice(_, choices) => Type::Choice(*choices),
         }
     }
 
     /// Whether the variable is a Float64.
+    #[inline]
     pub fn is_real(&self) -> bool {
         matches!(self, Self::Real(_) | Self::Within(_) | Self::Element(..))
     }
+
+    /// What the field holds.
+    fn value(&self, component: &mut C) -> Value {
+        match self {
+            Self::Real(field) => Value::Real(*field(component)),
+            Self::Within(place) => Value::Real(*place(component)),
+            Self::Element(field, index) => field(component)
+                .get(*index)
+                .map_or(Value::Missing, |value| Value::Real(*value)),
+            Self::Integer(field) | Self::Choice(field, _) => Value::Integer(*field(component)),
+            Self::Boolean(field) => Value::Boolean(*field(component)),
+            Self::Text(field) => Value::Text(field(component).clone()),
+        }
+    }
+}
+
+/// What a field holds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// A Float64.
+    Real(f64),
+    /// An Int32 or a choice.
+    Integer(i32),
+    /// A Boolean.
+    Boolean(bool),
+    /// A text.
+    Text(String),
+    /// Nothing: an element beyond the end of its array.
+    Missing,
+}
+
+/// A row of the table without the way to the field, so that what reads it is compiled once and not
+/// for every component.
+pub struct Row<'a> {
+    /// What the table says.
+    pub declaration: &'a Declaration,
+    /// The type.
+    pub kind: Type,
+    /// The start value.
+    pub start: Value,
 }
 
 /// A type that a variable's field may have.
@@ -126,10 +197,9 @@ impl Scalar for String {
     }
 }
 
-/// A variable of the component `C`: its name, its meaning and the way to its field.
-///
-/// The start value is what the field holds in `C::default()`.
-pub struct Variable<C> {
+/// What a table says of a variable, but for the way to its field.
+#[derive(Debug, Clone)]
+pub struct Declaration {
     /// Name, unique in the component, with array elements as `name[1]`.
     pub name: String,
     /// What it means, in one line.
@@ -154,8 +224,33 @@ pub struct Variable<C> {
     pub initial_dependencies: Vec<String>,
     /// The continuous state whose time derivative it is.
     pub state: Option<String>,
+}
+
+impl Declaration {
+    /// Whether the component computes it.
+    #[inline]
+    pub fn is_computed(&self) -> bool {
+        matches!(self.causality, Causality::Output | Causality::Local)
+    }
+}
+
+/// A variable of the component `C`: its name, its meaning and the way to its field.
+///
+/// The start value is what the field holds in `C::default()`.
+pub struct Variable<C> {
+    /// Name, meaning, units, dependencies.
+    pub declaration: Declaration,
     /// The way to the field.
     pub access: Access<C>,
+}
+
+impl<C> Deref for Variable<C> {
+    type Target = Declaration;
+
+    #[inline]
+    fn deref(&self) -> &Declaration {
+        &self.declaration
+    }
 }
 
 impl<C> Variable<C> {
@@ -165,7 +260,7 @@ impl<C> Variable<C> {
             _ if access.is_real() => Variability::Continuous,
             _ => Variability::Discrete,
         };
-        Self {
+        let declaration = Declaration {
             name,
             description: String::new(),
             causality,
@@ -178,6 +273,9 @@ impl<C> Variable<C> {
             dependencies: Vec::new(),
             initial_dependencies: Vec::new(),
             state: None,
+        };
+        Self {
+            declaration,
             access,
         }
     }
@@ -240,88 +338,94 @@ impl<C> Variable<C> {
 
     /// Says what the variable means, in one line.
     pub fn about(mut self, description: &str) -> Self {
-        self.description = description.into();
+        self.declaration.description = description.into();
         self
     }
 
     /// Gives the SI unit.
     pub fn unit(mut self, unit: &'static str) -> Self {
-        self.unit = Some(unit);
+        self.declaration.unit = Some(unit);
         self
     }
 
     /// Gives the unit in which a laboratory wants to see it.
     pub fn shown_in(mut self, unit: &'static str) -> Self {
-        self.display_unit = Some(unit);
+        self.declaration.display_unit = Some(unit);
         self
     }
 
     /// Gives the SI unit and the one in which a laboratory wants to see it.
     pub fn measured_in(mut self, unit: &'static str, shown: Option<&'static str>) -> Self {
-        self.unit = Some(unit);
-        self.display_unit = shown;
+        self.declaration.unit = Some(unit);
+        self.declaration.display_unit = shown;
         self
     }
 
     /// Gives the smallest and the largest value accepted, where there are such.
     pub fn between(mut self, min: Option<f64>, max: Option<f64>) -> Self {
-        self.min = min;
-        self.max = max;
+        self.declaration.min = min;
+        self.declaration.max = max;
         self
     }
 
     /// Gives the smallest value accepted.
     pub fn min(mut self, min: f64) -> Self {
-        self.min = Some(min);
+        self.declaration.min = Some(min);
         self
     }
 
     /// Gives the largest value accepted.
     pub fn max(mut self, max: f64) -> Self {
-        self.max = Some(max);
+        self.declaration.max = Some(max);
         self
     }
 
     /// Gives the typical magnitude.
     pub fn nominal(mut self, nominal: f64) -> Self {
-        self.nominal = Some(nominal);
+        self.declaration.nominal = Some(nominal);
         self
     }
 
     /// Makes it change at steps and events only.
     pub fn discrete(mut self) -> Self {
-        self.variability = Variability::Discrete;
+        self.declaration.variability = Variability::Discrete;
         self
     }
 
     /// Lets a parameter be changed between steps.
     pub fn tunable(mut self) -> Self {
-        self.variability = Variability::Tunable;
+        self.declaration.variability = Variability::Tunable;
         self
     }
 
     /// Declares that it depends directly on inputs or states.
     pub fn depends_on(mut self, names: &[&str], kind: Dependency) -> Self {
-        self.dependencies
+        self.declaration
+            .dependencies
             .extend(names.iter().map(|name| (name.to_string(), kind)));
         self
     }
 
     /// Declares that its initial value depends on inputs or parameters.
     pub fn initially_depends_on<S: AsRef<str>>(mut self, names: &[S]) -> Self {
-        self.initial_dependencies
+        self.declaration
+            .initial_dependencies
             .extend(names.iter().map(|name| name.as_ref().to_string()));
         self
     }
 
     /// Declares it the time derivative of a continuous state, an output or local of the table.
     pub fn derivative_of(mut self, state: &str) -> Self {
-        self.state = Some(state.into());
+        self.declaration.state = Some(state.into());
         self
     }
 
-    /// Whether the component computes it.
-    pub fn is_computed(&self) -> bool {
-        matches!(self.causality, Causality::Output | Causality::Local)
+    /// The row without the way to the field; `start` is a component as it begins.
+    pub fn row(&self, start: &mut C) -> Row<'_> {
+        Row {
+            declaration: &self.declaration,
+            kind: self.access.kind(),
+            start: self.access.value(start),
+        }
     }
 }

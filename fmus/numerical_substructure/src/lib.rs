@@ -3,10 +3,16 @@
 
 mod matrix;
 
-use fmu_kit::{Causality, Component, ComponentResult, Terminal, Variable};
+use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::hybrid::{BenchmarkCase, Frame, NumericalSubstructure as Part, PERIOD};
 use serde::{Deserialize, Serialize};
 
+/// Inputs that accelerations follow at once.
+const ACCELERATING: [&str; 3] = [
+    "measured_force",
+    "ground_acceleration",
+    "payload_acceleration",
+];
 /// Largest number of degrees of freedom.
 const MOST: usize = 8;
 
@@ -21,12 +27,26 @@ pub struct NumericalSubstructure {
     interface: i32,
     force_delay: i32,
     part: Option<Part>,
+    payload_mass: f64,
     force: f64,
+    payload_acceleration: f64,
     ground: f64,
     ground_next: f64,
+    ground_displacement: f64,
+    ground_velocity: f64,
+    lead: f64,
+    table: Motion,
     displacement: [f64; MOST],
     velocity: [f64; MOST],
     acceleration: [f64; MOST],
+}
+
+/// Absolute motion of the degree of freedom that the specimen belongs to.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+struct Motion {
+    displacement: f64,
+    velocity: f64,
+    acceleration: f64,
 }
 
 impl Default for NumericalSubstructure {
@@ -45,9 +65,15 @@ impl Default for NumericalSubstructure {
             interface: 1,
             force_delay: 1,
             part: None,
+            payload_mass: 0.0,
             force: 0.0,
+            payload_acceleration: 0.0,
             ground: 0.0,
             ground_next: 0.0,
+            ground_displacement: 0.0,
+            ground_velocity: 0.0,
+            lead: 0.0,
+            table: Motion::default(),
             displacement: [0.0; MOST],
             velocity: [0.0; MOST],
             acceleration: [0.0; MOST],
@@ -69,6 +95,37 @@ impl NumericalSubstructure {
     }
 }
 
+impl NumericalSubstructure {
+    /// The place of the degree of freedom that the specimen belongs to, from 0.
+    fn interface(&self) -> usize {
+        usize::try_from(self.interface - 1).unwrap_or(usize::MAX)
+    }
+
+    /// What the specimen takes from the structure, N.
+    fn specimen_force(&self) -> f64 {
+        self.force + self.payload_mass * self.payload_acceleration
+    }
+
+    fn part(&self, period: f64) -> Result<Part, Box<dyn std::error::Error>> {
+        let frame = self.frame()?;
+        if frame.order() > MOST {
+            return Err(format!(
+                "the frame has {} degrees of freedom, at most {MOST} are possible",
+                frame.order()
+            )
+            .into());
+        }
+        let delay = usize::try_from(self.force_delay).unwrap_or_default();
+        Ok(Part::new(
+            &frame,
+            self.specimen,
+            self.interface(),
+            delay,
+            period,
+        )?)
+    }
+}
+
 impl Component for NumericalSubstructure {
     const NAME: &'static str = "NumericalSubstructure";
     const DESCRIPTION: &'static str = "The computed part of a structure in hybrid simulation";
@@ -79,7 +136,6 @@ impl Component for NumericalSubstructure {
         &[("force", "measured_force")],
     )];
     const STEP_SIZE: f64 = PERIOD;
-    const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::table! { Self, s:
@@ -120,43 +176,75 @@ impl Component for NumericalSubstructure {
         });
         variables.extend(accelerations.into_iter().map(|element| {
             element
-                .depends_on(&["ground_acceleration"], fmu_kit::Dependency::Dependent)
-                .initially_depends_on(&["ground_acceleration", "specimen_mass"])
+                .depends_on(&ACCELERATING, Dependent)
+                .initially_depends_on(&ACCELERATING)
+                .initially_depends_on(&["specimen_mass", "payload_mass"])
         }));
+        variables.extend(fmu_kit::table! { Self, s:
+            input("payload_acceleration", s.payload_acceleration, "Measured absolute acceleration of a storey that is tested", "m/s2" => "g").nominal(3.0);
+            input("ground_displacement", s.ground_displacement, "Displacement of the ground", "m" => "in").nominal(0.02);
+            input("ground_velocity", s.ground_velocity, "Velocity of the ground", "m/s" => "in/s").nominal(0.2);
+            parameter("payload_mass", s.payload_mass, "Mass of that storey: times its acceleration it is a force taken from the structure", "kg").min(0.0);
+            parameter("lead", s.lead, "Time by which the table's motion is asked for ahead: how late the table is", "s" => "ms").min(0.0).max(0.05);
+            output("table_displacement", s.table.displacement, "Absolute displacement of the degree of freedom `interface`: what a table under the specimen is asked for", "m" => "in")
+                .nominal(0.02).depends_on(&["ground_displacement", "ground_velocity"], Dependent).depends_on(&ACCELERATING, Dependent)
+                .initially_depends_on(&["ground_displacement", "ground_velocity", "lead"]).initially_depends_on(&ACCELERATING)
+                .initially_depends_on(&["specimen_mass", "payload_mass"]);
+            output("table_velocity", s.table.velocity, "Absolute velocity of the same", "m/s" => "in/s")
+                .nominal(0.2).depends_on(&["ground_velocity"], Dependent).depends_on(&ACCELERATING, Dependent)
+                .initially_depends_on(&["ground_velocity", "lead"]).initially_depends_on(&ACCELERATING)
+                .initially_depends_on(&["specimen_mass", "payload_mass"]);
+            output("table_acceleration", s.table.acceleration, "Absolute acceleration of the same", "m/s2" => "g")
+                .nominal(3.0).depends_on(&ACCELERATING, Dependent).initially_depends_on(&ACCELERATING)
+                .initially_depends_on(&["specimen_mass", "payload_mass"]);
+        });
         variables
     }
 
     fn initialize(&mut self) -> ComponentResult {
-        let frame = self.frame()?;
-        if frame.order() > MOST {
-            return Err(format!(
-                "the frame has {} degrees of freedom, at most {MOST} are possible",
-                frame.order()
-            )
-            .into());
-        }
-        let interface = usize::try_from(self.interface - 1).unwrap_or(usize::MAX);
-        let delay = usize::try_from(self.force_delay).unwrap_or_default();
-        let part = Part::new(&frame, self.specimen, interface, delay, Self::STEP_SIZE)?;
-        self.part = Some(part);
+        self.part = Some(self.part(Self::STEP_SIZE)?);
         Ok(())
     }
 
     fn update_outputs(&mut self, _time: f64) {
-        if let Some(part) = &self.part {
-            let n = part.order();
-            self.displacement[..n].copy_from_slice(part.displacements());
-            self.velocity[..n].copy_from_slice(part.velocities());
-            for (i, acceleration) in self.acceleration[..n].iter_mut().enumerate() {
-                *acceleration = part.total_acceleration(i, self.ground);
-            }
+        let (force, interface) = (self.specimen_force(), self.interface());
+        let Some(part) = &self.part else { return };
+        let n = part.order();
+        self.displacement[..n].copy_from_slice(part.displacements());
+        self.velocity[..n].copy_from_slice(part.velocities());
+        for (i, acceleration) in self.acceleration[..n].iter_mut().enumerate() {
+            *acceleration = part.total_acceleration(i, force, self.ground);
+        }
+        if interface < n {
+            let (displacement, velocity) = (
+                self.ground_displacement + self.displacement[interface],
+                self.ground_velocity + self.velocity[interface],
+            );
+            let (acceleration, lead) = (self.acceleration[interface], self.lead);
+            self.table = Motion {
+                displacement: displacement + lead * (velocity + 0.5 * lead * acceleration),
+                velocity: velocity + lead * acceleration,
+                acceleration,
+            };
         }
     }
 
-    fn step(&mut self, _time: f64, _step_size: f64) -> ComponentResult {
+    fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        let force = self.specimen_force();
+        if self
+            .part
+            .as_ref()
+            .is_some_and(|part| part.period() != step_size)
+        {
+            let mut part = self.part(step_size)?;
+            if let Some(before) = &self.part {
+                part.resume(before);
+            }
+            self.part = Some(part);
+        }
         if let Some(part) = &mut self.part {
             let middle = 0.5 * (self.ground + self.ground_next);
-            part.step(self.force, [self.ground, middle, self.ground_next]);
+            part.step(force, [self.ground, middle, self.ground_next]);
         }
         Ok(())
     }

@@ -15,7 +15,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::bands::{Band, Bands};
-use super::friction::{SHAPE, SealShape};
+use super::friction::{SHAPE, SealShape, Searched};
 use super::least_squares::Residuals;
 
 /// Channels of an experiment, in the order of [`Bands::new`].

@@ -9,7 +9,7 @@ pub mod bands;
 pub mod equations;
 pub mod friction;
 pub mod least_squares;
-pub mod model_section;
+mod model_section;
 pub mod simulation;
 pub mod specimen;
 pub mod start;
@@ -20,7 +20,7 @@ use nalgebra::DMatrix;
 
 use self::bands::Bands;
 use self::equations::{EQUATIONS, Equations, HydraulicRig, PARAMETERS};
-use self::friction::{SHAPE, SealShape};
+use self::friction::{SHAPE, SealShape, Searched};
 use self::least_squares::{Coordinate, Optimum, minimise};
 use self::specimen::SpecimenFit;
 use crate::IdentificationError;

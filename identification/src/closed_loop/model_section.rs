@@ -1,7 +1,6 @@
 //! An identified hydraulic rig as a model file.
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
 use super::Found;
 use super::equations::{HydraulicRig, NAMES, PARAMETERS};
@@ -9,61 +8,10 @@ use super::friction::SealShape;
 use super::thesis_form::{coefficients, standard_errors};
 use crate::IdentificationError;
 use crate::identify::model_file::{
-    ActuatorSection, BodySection, EffectSections, INCH_POUND, ModelFile, StandardErrors, Units,
+    ActuatorSection, BodySection, CovarianceSection, EffectSections, HydraulicSection, INCH_POUND,
+    ModelFile, StandardErrors, UncertaintySection, Units,
 };
 use plant::identified::actuator::IdentifiedActuator;
-
-/// `[hydraulics]`: what the form of Eq 2-4 has no place for, SI whatever the file's units.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct HydraulicSection {
-    /// `2 D/w` of the spool, s.
-    pub spool_lag: f64,
-    /// `1/w²` of the spool, s².
-    pub spool_inertia: f64,
-    /// N/(V s).
-    pub force_rate: f64,
-    /// N/m.
-    pub oil_stiffness: f64,
-    /// 1/s.
-    pub leakage_rate: f64,
-    /// N s/m.
-    pub seal_damping: f64,
-    /// Coulomb friction of the seals, N.
-    pub seal_friction: f64,
-    /// Deflection of the seals before they slide, m.
-    pub seal_presliding: f64,
-    /// Breakaway force over the Coulomb force, less one.
-    pub seal_excess: f64,
-    /// m/s.
-    pub seal_stribeck_velocity: f64,
-    /// Exponent with which the seals begin to slide.
-    pub seal_sharpness: f64,
-    /// Damping of their deflection over its stiffness, s.
-    pub seal_relaxation: f64,
-    /// Lateness of the accelerometers behind the displacement, s.
-    pub accelerometer_delay: f64,
-    /// Lateness of the load cell behind the displacement, s.
-    pub load_cell_delay: f64,
-    /// What the accelerometers show over the displacement's second derivative.
-    pub accelerometer_scale: f64,
-}
-
-/// `[uncertainty]`: how far a diagnosis may take the parameters from their values.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct UncertaintySection {
-    /// Relative standard deviation of every parameter.
-    pub relative: f64,
-}
-
-/// `[covariance]`: how the errors of the identified parameters go together, SI whatever the file's
-/// units.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CovarianceSection {
-    /// The parameters, in the order of rows and columns.
-    pub parameters: Vec<String>,
-    /// The covariance, row after row.
-    pub matrix: Vec<Vec<f64>>,
-}
 
 impl CovarianceSection {
     fn new(covariance: &DMatrix<f64>) -> Self {
@@ -125,26 +73,24 @@ impl ModelFile {
     }
 }
 
-impl HydraulicSection {
-    /// The section of a rig with friction of `shape`.
-    pub fn new(rig: &HydraulicRig, shape: &SealShape) -> Self {
-        Self {
-            spool_lag: rig.spool_lag,
-            spool_inertia: rig.spool_inertia,
-            force_rate: rig.force_rate,
-            oil_stiffness: rig.oil_stiffness,
-            leakage_rate: rig.leakage_rate,
-            seal_damping: rig.seal_damping,
-            seal_friction: rig.seal_friction,
-            seal_presliding: shape.presliding,
-            seal_excess: shape.excess,
-            seal_stribeck_velocity: shape.stribeck_velocity,
-            seal_sharpness: shape.sharpness,
-            seal_relaxation: shape.relaxation,
-            accelerometer_delay: rig.accelerometer_delay,
-            load_cell_delay: rig.load_cell_delay,
-            accelerometer_scale: rig.accelerometer_scale,
-        }
+/// The section of a rig with friction of `shape`.
+fn hydraulic_section(rig: &HydraulicRig, shape: &SealShape) -> HydraulicSection {
+    HydraulicSection {
+        spool_lag: rig.spool_lag,
+        spool_inertia: rig.spool_inertia,
+        force_rate: rig.force_rate,
+        oil_stiffness: rig.oil_stiffness,
+        leakage_rate: rig.leakage_rate,
+        seal_damping: rig.seal_damping,
+        seal_friction: rig.seal_friction,
+        seal_presliding: shape.presliding,
+        seal_excess: shape.excess,
+        seal_stribeck_velocity: shape.stribeck_velocity,
+        seal_sharpness: shape.sharpness,
+        seal_relaxation: shape.relaxation,
+        accelerometer_delay: rig.accelerometer_delay,
+        load_cell_delay: rig.load_cell_delay,
+        accelerometer_scale: rig.accelerometer_scale,
     }
 }
 
@@ -223,7 +169,7 @@ impl Found {
             specimen: specimen.map(|own| own.0),
             effects: EffectSections::new(),
             noise: Some(noise),
-            hydraulics: Some(HydraulicSection::new(&self.rig, &self.shape)),
+            hydraulics: Some(hydraulic_section(&self.rig, &self.shape)),
             uncertainty: Some(UncertaintySection {
                 relative: relative.min(0.3),
             }),

@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::engine::{NamedEffect, Verdict};
 use super::rigs::shake_table::{self, RelationReport};
-use super::rigs::{PartEffect, RigDiagnosis};
+use super::rigs::{NamedValue, RigDiagnosis};
 
 /// A diagnosis of a case or of a rig; SI.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -224,8 +224,9 @@ impl From<&shake_table::Diagnosis> for DiagnosisReport {
 impl From<&RigDiagnosis> for DiagnosisReport {
     fn from(found: &RigDiagnosis) -> Self {
         let part = &found.as_described;
-        let effect = |one: &PartEffect| {
-            let parameters = one.parameters.iter().map(|p| {
+        let confirmed = &found.confirmed;
+        let effect = |(name, values): &(String, Vec<NamedValue>)| {
+            let parameters = values.iter().map(|p| {
                 let report = ParameterReport {
                     value: p.value,
                     unit: p.unit.clone(),
@@ -233,26 +234,27 @@ impl From<&RigDiagnosis> for DiagnosisReport {
                 };
                 (p.name.clone(), report)
             });
+            let own = part.effects.iter().find(|one| one.effect == *name);
             EffectReport {
-                effect: one.effect.clone(),
+                effect: name.clone(),
                 parameters: parameters.collect(),
-                confidence: one.confidence,
-                share_explained: Some(one.share),
-                on_every_part: Some(!found.not_confirmed.contains(&one.effect)),
+                confidence: own.map_or(f64::NAN, |one| one.confidence),
+                share_explained: own.map(|one| one.share),
+                on_every_part: Some(true),
             }
         };
         let rivals = part.rivals.iter();
         Self {
             sentence: found.sentence(),
             verdict: found.verdict,
-            effects: part.effects.iter().map(effect).collect(),
+            effects: confirmed.effects.iter().map(effect).collect(),
             alternatives: rivals.map(|(rival, _)| vec![rival.clone()]).collect(),
             separating_experiment: None,
             gain: GainReport {
                 before_nrmse: part.nominal_error,
-                after_nrmse: part.extended_error,
+                after_nrmse: confirmed.error,
                 noise_floor_nrmse: None,
-                interval_95: part.gain_interval,
+                interval_95: confirmed.gain_interval,
                 interval_of: Some(
                     "share of the refitted model's squared error that the effects take away".into(),
                 ),
@@ -262,7 +264,7 @@ impl From<&RigDiagnosis> for DiagnosisReport {
             extended_model: None,
             extended_fmu: None,
             extended_fmus: Vec::new(),
-            notes: Vec::new(),
+            notes: found.notes(),
             evidence: Evidence::Rig(Box::new(RigEvidence {
                 unexplained_share: found.unexplained,
                 rig: found.clone(),

@@ -6,7 +6,7 @@ use super::case::{Case, CaseError};
 use super::engine::Observer;
 use super::report::DiagnosisReport;
 use super::rigs::shake_table;
-use super::rigs::{self, Description, DescriptionError, Measurement, RigDiagnosis};
+use super::rigs::{self, Description, DescriptionError, Measurement, RigDiagnosis, renamed};
 
 /// What is diagnosed.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +32,12 @@ pub enum DiagnosisError {
          with the description of a rig (.toml) only"
     )]
     DataOfACase,
+    /// Names of columns were given with a case.
+    #[error(
+        "the columns of a case have the names of docs/data-files.md, or others that it lists; a map \
+         goes with the description of a rig (.toml) only"
+    )]
+    ColumnsOfACase,
 }
 
 /// What came out, in full.
@@ -57,18 +63,28 @@ pub enum Diagnosis<'a> {
 
 impl Subject {
     /// Reads the description of a rig where `path` ends in `.toml`, with `data` in place of the files
-    /// that it names if there are any; a case folder elsewhere.
+    /// that it names if there are any, whose columns the file `columns` may name otherwise; a case
+    /// folder elsewhere.
     ///
     /// # Errors
-    /// Files that cannot be read or understood, by name and place; `data` with a case.
-    pub fn read(path: &Path, data: &[PathBuf]) -> Result<Self, DiagnosisError> {
+    /// Files that cannot be read or understood, by name and place; `data` or `columns` with a case.
+    pub fn read(
+        path: &Path,
+        data: &[PathBuf],
+        columns: Option<&Path>,
+    ) -> Result<Self, DiagnosisError> {
         if path
             .extension()
             .is_some_and(|extension| extension == "toml")
         {
-            let description = Description::read(path)?;
+            let mut description = Description::read(path)?;
+            if let Some(map) = columns {
+                description.columns = renamed(&description.columns, map)?;
+            }
             let measurement = description.measurement(data)?;
             Ok(Self::Rig(Box::new((description, measurement))))
+        } else if columns.is_some() {
+            Err(DiagnosisError::ColumnsOfACase)
         } else if data.is_empty() {
             Ok(Self::Case(Box::new(Case::read(path)?)))
         } else {

@@ -5,6 +5,7 @@ pub mod frequency_response;
 pub mod gauss_newton;
 pub mod input_matrices;
 pub mod instrumental_variables;
+pub mod interpolation;
 pub(crate) mod least_squares;
 pub mod prediction;
 pub mod residuals;

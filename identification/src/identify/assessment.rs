@@ -9,8 +9,8 @@ use crate::estimation::gauss_newton::GaussNewtonEstimate;
 use crate::estimation::prediction::{Parameter, PredictionModel};
 use crate::estimation::residuals::{ResidualTest, residual_test};
 use crate::identify::identified::RigIdentification;
-use crate::identify::model::{OUTPUTS, RigModel};
-use crate::identify::parameters::PhysicalValues;
+use crate::identify::model::RigModel;
+use crate::identify::parameters::{OUTPUTS, PhysicalValues};
 use crate::identify::validation;
 
 /// Refuses a rig that is none, and compares what was fitted with what was not.

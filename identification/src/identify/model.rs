@@ -10,14 +10,9 @@
 use nalgebra::{DMatrix, SMatrix, SVector};
 use plant::linear::{StateSpace, discrete_riccati};
 
-use super::parameters::{NoiseOn, Own, Physical, PhysicalValues};
-use crate::data::Channel;
+use super::parameters::{NoiseOn, OUTPUTS, Own, Physical, PhysicalValues, STATES};
 use crate::estimation::prediction::{self, PredictionModel};
 
-/// Number of outputs.
-pub const OUTPUTS: usize = Channel::OUTPUTS.len();
-/// Number of states: actuator, table, specimen.
-pub const STATES: usize = 7;
 /// The states before those of the specimen.
 pub const SPECIMEN_STATES: usize = 5;
 /// Rows of the rig's state space that are measured.

@@ -9,7 +9,12 @@ use plant::identified::shake_table::ShakeTable;
 use plant::identified::table::Table;
 use plant::specimens::linear::LinearSpecimen;
 
-use super::model::{OUTPUTS, STATES};
+use crate::data::Channel;
+
+/// Number of outputs.
+pub const OUTPUTS: usize = Channel::OUTPUTS.len();
+/// Number of states: actuator, table, specimen.
+pub const STATES: usize = 7;
 
 macro_rules! physical {
     ($($(#[$about:meta])* $parameter:ident $name:literal),* $(,)?) => {

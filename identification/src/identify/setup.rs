@@ -3,8 +3,8 @@
 use crate::IdentificationError;
 use crate::data::{Channel, OUTPUT_NAMES, Recording, mean_and_deviation};
 use crate::estimation::prediction::Parameter;
-use crate::identify::model::{OUTPUTS, RigModel, SPECIMEN_STATES, ScaledRecording};
-use crate::identify::parameters::{NoiseOn, Own, Physical};
+use crate::identify::model::{RigModel, SPECIMEN_STATES, ScaledRecording};
+use crate::identify::parameters::{NoiseOn, OUTPUTS, Own, Physical};
 use crate::identify::start;
 
 /// The same experiments to their end, with the scales of the fitted part.

@@ -13,8 +13,8 @@ use crate::data::mean_and_deviation;
 use crate::estimation::instrumental_variables::{Signal, Signals, regress, simulate, stabilised};
 use crate::estimation::state_variable_filter::{Between, equal_lags, filter};
 use crate::estimation::subspace;
-use crate::identify::model::{OUTPUTS, ScaledRecording};
-use crate::identify::parameters::{Physical, PhysicalValues};
+use crate::identify::model::ScaledRecording;
+use crate::identify::parameters::{OUTPUTS, Physical, PhysicalValues};
 
 /// Corner of the filters, rad/s: between the table's and the oil column's natural frequency.
 const CORNER: f64 = 80.0;

@@ -10,8 +10,8 @@ use plant::identified::coupled::Rig;
 use plant::linear::StateSpace;
 
 use crate::data::{OUTPUT_NAMES, fit_percent};
-use crate::identify::model::{OUTPUTS, RigModel, ScaledRecording};
-use crate::identify::parameters::{Own, PhysicalValues};
+use crate::identify::model::{RigModel, ScaledRecording};
+use crate::identify::parameters::{OUTPUTS, Own, PhysicalValues};
 
 /// Fit of one channel of one recording.
 #[derive(Debug, Clone, PartialEq)]

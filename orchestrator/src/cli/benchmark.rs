@@ -4,13 +4,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand, ValueEnum};
+use identification::diagnosis::engine::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 use plant::hybrid::{BenchmarkCase, InteractionForm};
 
+use crate::benchmark::vrths::hidden::{HiddenStudy, read_hidden};
 use crate::benchmark::vrths::motions::{self, INTENSITY, RECORDS};
 use crate::benchmark::vrths::outcome::Outcome;
 use crate::benchmark::vrths::study::{Plants, Study};
 use crate::benchmark::vrths::{page, published, roster};
+use crate::diagnosis::EXTENDED_MODEL;
 use crate::error::Error;
 use crate::report;
 use crate::results::Results;
@@ -36,6 +39,7 @@ enum Benchmark {
     gradient-inverse, adaptive-inverse.\n\nExamples:\n  \
     shakebench benchmark vrths --case 1 --motion el-centro --perturbed 0\n  \
     shakebench benchmark vrths --controller adaptive-inverse --plant derivative-blocks --corners 3\n  \
+    shakebench benchmark vrths --hidden delay=1ms --case 1 --out play\n  \
     shakebench benchmark vrths --json > scores.json")]
 pub struct Vrths {
     /// Cases, 1 to 4 [default: all]
@@ -62,6 +66,11 @@ pub struct Vrths {
     /// How the plant forms its derivatives
     #[arg(long, value_enum, default_value_t)]
     plant: Form,
+    /// Hide this in the nominal plant, record it, diagnose the record and design the laws again on
+    /// what was found: EFFECT=VALUE, such as "delay=1 ms"
+    #[arg(long = "hidden", value_name = "EFFECT=VALUE",
+          conflicts_with_all = ["perturbed", "corners", "stiffness_within", "plant"])]
+    hidden: Vec<String>,
     /// Factor on the ground motions
     #[arg(long, value_name = "FACTOR", default_value_t = INTENSITY)]
     intensity: f64,
@@ -113,6 +122,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         });
     }
     let study = study(arguments, folder.as_deref())?;
+    if let Some(out) = &arguments.out {
+        Results::check(out)?;
+    }
+    if !arguments.hidden.is_empty() {
+        return hidden(arguments, study);
+    }
     let published = folder
         .as_deref()
         .map(published::read)
@@ -122,9 +137,6 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Some(folder) => motions::motions(&[RECORDS[0].into()], Some(folder), INTENSITY)?.pop(),
         None => None,
     };
-    if let Some(out) = &arguments.out {
-        Results::check(out)?;
-    }
 
     let bar = ProgressBar::new(study.runs() as u64);
     // A template that cannot be read leaves the plain bar.
@@ -151,18 +163,69 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let pictures = page::pictures(&study).map_err(simulation)?;
         files = write(out, &outcome, &page::report(&outcome, &pictures))?;
     }
-    if arguments.json {
-        println!("{}", serde_json::json!(outcome));
-    } else {
-        print!("{}", outcome.text());
-        if !files.is_empty() {
-            println!("\nwritten:");
-        }
-        for file in &files {
-            println!("  {}", file.display());
-        }
-    }
+    print(
+        arguments.json,
+        &serde_json::json!(outcome),
+        &outcome.text(),
+        &files,
+    );
     Ok(ExitCode::SUCCESS)
+}
+
+/// Hides effects in the plant and shows what comes of it.
+fn hidden(arguments: &Vrths, study: Study) -> Result<ExitCode, Error> {
+    let refused = |reason: String| Error::Option {
+        option: "--hidden",
+        reason,
+    };
+    let read = arguments.hidden.iter().map(|text| read_hidden(text));
+    let hidden = HiddenStudy {
+        hidden: read.collect::<Result<_, _>>().map_err(refused)?,
+        cases: study.cases,
+        motions: study.motions,
+        controllers: study.controllers,
+        seed: study.seed,
+    };
+    let outcome = hidden.run(Observer::none());
+    let outcome = outcome.map_err(|error| refused(error.to_string()))?;
+    let mut files = Vec::new();
+    if let Some(out) = &arguments.out {
+        let fault = |name: &str, reason: String| Error::File {
+            path: out.join(name),
+            reason,
+        };
+        let model = outcome.extended_model();
+        let model = model.map_err(|error| fault(EXTENDED_MODEL, error.to_string()))?;
+        let mut results = Results::begin(out)?;
+        results.write("record.csv", |file| outcome.write_record(file))?;
+        results.write_text(EXTENDED_MODEL, &model)?;
+        results.write("scores.json", |file| {
+            serde_json::to_writer_pretty(file, &outcome).map_err(std::io::Error::other)
+        })?;
+        files = results.finish()?;
+    }
+    print(
+        arguments.json,
+        &serde_json::json!(outcome),
+        &outcome.text(),
+        &files,
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints the one object, or what people read.
+fn print(json: bool, object: &serde_json::Value, text: &str, files: &[PathBuf]) {
+    if json {
+        println!("{object}");
+        return;
+    }
+    print!("{text}");
+    if !files.is_empty() {
+        println!("\nwritten:");
+    }
+    for file in files {
+        println!("  {}", file.display());
+    }
 }
 
 fn study(arguments: &Vrths, folder: Option<&std::path::Path>) -> Result<Study, Error> {

@@ -1,4 +1,5 @@
-//! `shakebench diagnose`: a case of the shake table, or the description of a rig.
+//! `shakebench diagnose`: a case of the shake table, or the description of a rig; and what a model
+//! that came out of it makes of further records.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -7,7 +8,7 @@ use clap::Args;
 use identification::diagnosis::engine::{Observer, Progress};
 
 use super::progress;
-use crate::diagnosis::{diagnose, files, text};
+use crate::diagnosis::{diagnose, files, model, template, text};
 use crate::error::Error;
 use crate::results::unused;
 
@@ -15,18 +16,48 @@ use crate::results::unused;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     shakebench diagnose cases/dev-03 --out results/dev-03 --json\n  \
-    shakebench diagnose identification/rigs/positioning_drive.toml --out results\n\n\
+    shakebench diagnose identification/rigs/positioning_drive.toml --out results\n  \
+    shakebench diagnose --template oscillator > rig.toml\n  \
+    shakebench diagnose --model results/extended_model.toml --validate later.csv\n  \
+    shakebench diagnose --model results/extended_model.toml --predict input.csv --out prediction.csv\n\n\
     A case is a folder with nominal.toml, identification.csv and validation.csv, and may have\n\
     small.csv and baseline.csv. Each header cell is `name [unit]`, in any order and unit; columns\n\
     of other names are left alone.")]
 pub struct Arguments {
     /// Folder of a case (nominal.toml and records), or description of a rig (.toml)
-    case: PathBuf,
+    #[arg(required_unless_present_any = ["template", "model"])]
+    case: Option<PathBuf>,
     /// Data files in place of those that the description of a rig names
     #[arg(long, value_name = "FILE")]
     data: Vec<PathBuf>,
-    /// Folder for report, JSON and extended model [default: shakebench-results/diagnosis-NAME]
-    #[arg(long, value_name = "DIR")]
+    /// What the columns of a rig's files are called: `channel = "header"` or
+    /// `channel = { column = "header", unit = "mm" }` a line, in place of the description's
+    #[arg(long, value_name = "MAP.toml")]
+    columns: Option<PathBuf>,
+    /// Print a commented description to fill in: table, actuator, drive, hysteretic device, material or
+    /// oscillator
+    #[arg(long, value_name = "KIND", conflicts_with_all = ["case", "model", "data"])]
+    template: Option<String>,
+    /// Extended model of a rig that a diagnosis wrote; nothing is fitted
+    #[arg(long, value_name = "EXTENDED.toml", conflicts_with_all = ["case", "data"])]
+    model: Option<PathBuf>,
+    /// Score the model on these files
+    #[arg(long, value_name = "FILE", num_args = 1.., requires = "model")]
+    validate: Vec<PathBuf>,
+    /// Predict the output for every row of this file, whose output cells may be empty
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "model",
+        conflicts_with = "validate"
+    )]
+    predict: Option<PathBuf>,
+    /// The predicted file is a period of a motion that goes on: predict its steady state
+    #[arg(long, requires = "predict")]
+    periodic: bool,
+    /// Folder for report, JSON and extended model [default: shakebench-results/diagnosis-NAME], or file
+    /// for a prediction [default: prediction.csv]
+    #[arg(long, value_name = "DIR|FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
@@ -36,13 +67,23 @@ pub struct Arguments {
     verbose: bool,
 }
 
-/// Diagnoses, writes the files and prints what was found.
+/// Diagnoses, writes the files and prints what was found; or does what `--template` and `--model` ask
+/// for.
 ///
 /// # Errors
-/// As [`diagnose`]; nothing is written then.
+/// What is at fault, by file and place; nothing is written then.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if let Some(kind) = &arguments.template {
+        print!("{}", template(kind)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(path) = &arguments.model {
+        return with_model(arguments, path);
+    }
+    let Some(case) = &arguments.case else {
+        return Ok(ExitCode::SUCCESS);
+    };
     let folder = arguments.out.clone().unwrap_or_else(|| {
-        let case = &arguments.case;
         let place = std::path::absolute(case).unwrap_or_else(|_| case.clone());
         let name = if place.is_dir() {
             place.file_name()
@@ -65,12 +106,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.verbose {
         bar.finish_and_clear();
     }
-    let report = diagnose(
-        &arguments.case,
-        &arguments.data,
-        &folder,
-        Observer::new(&tell),
-    );
+    let columns = arguments.columns.as_deref();
+    let observer = Observer::new(&tell);
+    let report = diagnose(case, &arguments.data, columns, &folder, observer);
     bar.finish_and_clear();
     let report = report?;
     if arguments.json {
@@ -80,6 +118,40 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         println!("\nwritten ({:.1} s):", report.wall_s);
         for file in files(&report, &folder) {
             println!("  {}", file.display());
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn with_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
+    let columns = arguments.columns.as_deref();
+    if let Some(file) = &arguments.predict {
+        let out = arguments.out.clone();
+        let out = out.unwrap_or_else(|| PathBuf::from("prediction.csv"));
+        let found = model::predict(path, columns, file, arguments.periodic, &out)?;
+        if arguments.json {
+            println!("{}", serde_json::json!(found));
+        } else {
+            println!(
+                "{} in {} for {} rows, {} of them given: {}",
+                found.channel,
+                found.unit,
+                found.rows,
+                found.given,
+                found.prediction.display()
+            );
+        }
+    } else if arguments.validate.is_empty() {
+        return Err(Error::Option {
+            option: "--model",
+            reason: "expected --validate FILE... or --predict FILE with it".into(),
+        });
+    } else {
+        let found = model::validate(path, columns, &arguments.validate)?;
+        if arguments.json {
+            println!("{}", serde_json::json!(found));
+        } else {
+            print!("{}", found.text());
         }
     }
     Ok(ExitCode::SUCCESS)

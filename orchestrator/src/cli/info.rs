@@ -12,9 +12,10 @@ use crate::motion;
 use crate::pack;
 use crate::report::columns::last_left;
 use crate::report::number::significant;
+use crate::report::{Cell, UnitSystem, Units};
+use crate::ssp;
 use crate::system::tuning::Wanted;
 use crate::system::{self, Operation, SystemFile, built_in};
-use crate::units::STANDARD_GRAVITY;
 
 /// Options of `shakebench info`.
 #[derive(Debug, Args)]
@@ -24,7 +25,7 @@ use crate::units::STANDARD_GRAVITY;
     shakebench info target/fmus/fmi3/ShakeTable.fmu\n  \
     shakebench info records/RSN1633_MANJIL_ABBAR--L.AT2")]
 pub struct Arguments {
-    /// A component's name, an .fmu, a system (.toml or built-in), or a motion (.AT2, .csv)
+    /// A component's name, an .fmu, a system (.toml, .ssp or built-in), or a motion (.AT2, .csv)
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }
@@ -40,6 +41,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let text = match extension.as_deref() {
         Some("fmu") => fmu(&*Fmu::open(path)?),
         Some("toml") => system(&SystemFile::read(path)?)?,
+        _ if ssp::is_ssp(&name) => system(&ssp::read(&name)?)?,
         Some("at2" | "csv") => motion(path)?,
         _ if built_in::names().any(|known| known == name) => system(&built_in::system(
             &name,
@@ -62,7 +64,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 .collect();
             components.dedup();
             let reason = format!(
-                "expected an .fmu, .toml, .AT2 or .csv file, a built-in system ({}), or a \
+                "expected an .fmu, .ssp, .toml, .AT2 or .csv file, a built-in system ({}), or a \
                  component ({})",
                 built_in::names().collect::<Vec<_>>().join(", "),
                 components.join(", ")
@@ -131,7 +133,7 @@ fn fmu(fmu: &Fmu) -> String {
 }
 
 fn system(file: &SystemFile) -> Result<String, Error> {
-    let mut library = FmuLibrary::new(FmiVersion::V3, file.directory.as_deref());
+    let mut library = FmuLibrary::of(FmiVersion::V3, file);
     let system = system::assemble(file, &[], &mut |name| library.find(name))?;
     let mut text = format!("{}: {}\n\ncomponents\n", system.name, system.description);
     let rows = system.components.iter().map(|component| {
@@ -186,14 +188,15 @@ fn motion(path: &Path) -> Result<String, Error> {
     for note in &playable.notes {
         text += &format!("  {note}\n");
     }
+    let shown = |value, units| Cell::Quantity(value, units, 4).text(UnitSystem::of_text());
     text += &format!(
-        "  as played: {} s, {} samples of {} ms, {} g, {} m/s, {} in\n",
+        "  as played: {} s, {} samples of {} ms, {}, {}, {}\n",
         significant(playable.duration(), 4),
         playable.len(),
         1e3 * playable.dt,
-        significant(playable.peak_acceleration() / STANDARD_GRAVITY, 4),
-        significant(playable.peak_velocity(), 4),
-        significant(playable.peak_displacement() / crate::units::INCH, 4),
+        shown(playable.peak_acceleration(), Units::ACCELERATION),
+        shown(playable.peak_velocity(), Units::VELOCITY),
+        shown(playable.peak_displacement(), Units::DISPLACEMENT),
     );
     Ok(text)
 }

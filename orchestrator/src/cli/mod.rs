@@ -1,5 +1,18 @@
 //! The command line: one file a command, which parses, calls and prints.
 
+/// As those of the standard library, but through [`terminal`].
+macro_rules! println {
+    () => { $crate::cli::terminal::out(format_args!(""), "\n") };
+    ($($text:tt)*) => { $crate::cli::terminal::out(format_args!($($text)*), "\n") };
+}
+macro_rules! print {
+    ($($text:tt)*) => { $crate::cli::terminal::out(format_args!($($text)*), "") };
+}
+macro_rules! eprintln {
+    () => { $crate::cli::terminal::err(format_args!("")) };
+    ($($text:tt)*) => { $crate::cli::terminal::err(format_args!($($text)*)) };
+}
+
 pub mod benchmark;
 pub mod build;
 pub mod commission;
@@ -8,14 +21,19 @@ pub mod compare_runs;
 pub mod design;
 pub mod diagnose;
 pub mod doctor;
+pub mod export;
 pub mod figures;
 pub mod identify;
 pub mod info;
+mod interrupt;
+pub mod iterate;
 mod progress;
 pub mod report;
 mod rig;
 pub mod rigs;
 pub mod run;
+mod terminal;
+pub mod validate;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -86,10 +104,14 @@ enum Command {
     Figures(figures::Arguments),
     /// Say what is here, what is missing, and the cure
     Doctor(doctor::Arguments),
+    /// Write a system with its components as an SSP archive
+    Export(export::Arguments),
     /// Find a rig's parameters from measured data
     Identify(identify::Arguments),
     /// Show what an .fmu, system or motion file holds
     Info(info::Arguments),
+    /// Correct the drive from run to run until the table follows
+    Iterate(Box<iterate::Arguments>),
     /// Write the HTML report of a run, a comparison or a diagnosis again
     Report(report::Arguments),
     /// Carry out calls of FMUs for another process of this program
@@ -102,6 +124,8 @@ enum Command {
     Rigs(rigs::Arguments),
     /// Run a system on a motion
     Run(Box<run::Arguments>),
+    /// Say what is wrong with an FMU or an SSP archive
+    Validate(validate::Arguments),
 }
 
 /// Reads the command line, does what it says and gives the exit status.
@@ -132,17 +156,25 @@ pub fn main() -> ExitCode {
         Some(Command::Diagnose(arguments)) => diagnose::execute(&arguments),
         Some(Command::Figures(arguments)) => figures::execute(&arguments),
         Some(Command::Doctor(arguments)) => doctor::execute(&arguments),
+        Some(Command::Export(arguments)) => export::execute(&arguments),
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
+        Some(Command::Iterate(arguments)) => iterate::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
         Some(Command::Rigs(arguments)) => rigs::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
+        Some(Command::Validate(arguments)) => validate::execute(&arguments),
     };
-    done.unwrap_or_else(|error| {
+    let status = done.unwrap_or_else(|error| {
         eprintln!("error: {error}");
         ExitCode::from(2)
-    })
+    });
+    terminal::flush();
+    match terminal::has_failed() {
+        true => ExitCode::from(1),
+        false => status,
+    }
 }
 
 /// `--fmi` where one version is meant.

@@ -8,12 +8,12 @@ use crate::system::built_in;
 use crate::system::tuning::Tuning;
 
 /// Options that choose a rig.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct RigArguments {
     /// Plant of a built-in system: identified, servohydraulic, or a .toml file of one [default: identified]
     #[arg(long)]
     pub plant: Option<String>,
-    /// Specimen of a built-in system: none, linear, yielding [default: linear]
+    /// Specimen of a built-in system: none, linear, yielding, storeys [default: linear]
     #[arg(long)]
     pub specimen: Option<String>,
     /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]

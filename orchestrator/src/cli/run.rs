@@ -9,11 +9,13 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::OneVersion;
+use super::interrupt;
 use super::rig::RigArguments;
 use crate::error::Error;
 use crate::fmu::{Isolation, Options, Trace};
 use crate::live::{Scene, Server, Tap};
-use crate::master::{Algorithm, Ended, Pace, Simulation};
+use crate::master::{Algorithm, Ended, Pace, Record, Simulation};
+use crate::metrics::laboratory::Laboratory;
 use crate::motion::{self, Motion};
 use crate::report::columns::aligned;
 use crate::report::number::significant;
@@ -22,7 +24,7 @@ use crate::results::{Results, unused};
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
-use crate::run::summary::Summary;
+use crate::run::summary::{Summary, asked};
 use crate::system::built_in;
 use crate::units::{self, STANDARD_GRAVITY};
 
@@ -32,9 +34,11 @@ use crate::units::{self, STANDARD_GRAVITY};
     shakebench run three-variable --record NGA/RSN1633_MANJIL_ABBAR--L.AT2\n  \
     shakebench run displacement-pid --specimen none --pga 0.2 --set control.integral_gain=\"0.5 V/(in s)\"\n  \
     shakebench run my-rig.toml --algorithm jacobi --step 1ms --json\n  \
+    shakebench run system.ssp --duration \"10 s\"\n  \
+    shakebench run Theirs.fmu --input forces.csv\n  \
     shakebench run --manifest shakebench-results/three-variable-synthetic-1/manifest.json")]
 pub struct Arguments {
-    /// Built-in system or .toml file [default: three-variable]
+    /// Built-in system, .toml file, .ssp archive or single .fmu [default: three-variable]
     #[arg(value_name = "SYSTEM")]
     system: Option<String>,
     /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
@@ -45,15 +49,23 @@ pub struct Arguments {
     reference: Option<PathBuf>,
     #[command(flatten)]
     rig: RigArguments,
+    /// Hybrid simulation: a computed structure between the ground, which the motion then is, and the
+    /// specimen of a built-in system: none, two-storeys [default: none]
+    #[arg(long, value_name = "NAME")]
+    structure: Option<String>,
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
     /// Version of FMI of the components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
-    /// Order of calls
-    #[arg(long, value_enum, default_value_t)]
-    algorithm: Algorithm,
+    /// Order of calls [default: what the system says, otherwise gauss-seidel]
+    #[arg(long, value_enum)]
+    algorithm: Option<Algorithm>,
+    /// Input table: .csv with a column `time`, then columns named as inputs (component.input), with
+    /// units; may be given several times
+    #[arg(long, value_name = "FILE")]
+    input: Vec<PathBuf>,
     /// Coupling step, such as "0.5 ms"; controllers keep their own period [default: 2 ms]
     #[arg(long, value_name = "T")]
     step: Option<String>,
@@ -72,9 +84,12 @@ pub struct Arguments {
     /// Seed of the built-in motion [default: 1]
     #[arg(long, conflicts_with_all = ["record", "reference"])]
     seed: Option<u64>,
-    /// Keep pace with real time
+    /// Keep pace with real time, and say how well that went
     #[arg(long)]
     real_time: bool,
+    /// Keep one sample of so many in the results
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
+    record_every: usize,
     /// Show the run while it goes on, on a page of this machine at this port (any free one where none
     /// is given); it keeps pace with real time
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
@@ -99,10 +114,34 @@ pub struct Arguments {
     log: Option<Vec<String>>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
-        "system", "record", "reference", "plant", "specimen", "tuning", "control_model", "set", "fmi", "algorithm", "step",
+        "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
         "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// A run of `system` on the `[record, reference]` or the built-in motion, scaled by `[pga, peak]`.
+    pub(super) fn of(
+        system: Option<String>,
+        [record, reference]: [Option<PathBuf>; 2],
+        rig: RigArguments,
+        set: Vec<String>,
+        [pga, peak]: [Option<String>; 2],
+        seed: Option<u64>,
+    ) -> Self {
+        Self {
+            system,
+            record,
+            reference,
+            rig,
+            set,
+            pga,
+            peak,
+            seed,
+            ..Self::default()
+        }
+    }
 }
 
 /// Runs a system on a motion and writes the results.
@@ -133,12 +172,17 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         before.is_ok_and(|before| before.request == request)
     };
     let folder = arguments.out.clone().unwrap_or_else(|| {
-        let name = format!("{}-{}", system.name, motion.name);
+        let name = match motion.is_empty() {
+            true => system.name.clone(),
+            false => format!("{}-{}", system.name, motion.name),
+        };
         let name = name.replace(['/', '\\', ' '], "-");
         unused(&Path::new("shakebench-results").join(name), is_same)
     });
     Results::check(&folder)?;
-    let mut simulation = prepared.simulation(request.algorithm)?;
+    let mut simulation = prepared.simulation(prepared.algorithm)?;
+    simulation.heed(interrupt::heed());
+    simulation.keep_every(arguments.record_every);
     let live = match arguments.watch {
         Some(port) => Some(watch(&prepared, &mut simulation, port)?),
         None => None,
@@ -149,22 +193,23 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     } else {
         Pace::Fastest
     };
-    let outcome = simulation.run(*samples, pace, &mut |sample| {
+    let mut outcome = simulation.run(*samples, pace, &mut |sample| {
         bar.set_position(sample as u64)
     });
     bar.finish_and_clear();
+    prepared.judge(&mut outcome);
 
-    let plan = (request.algorithm, *step, *samples);
-    let manifest = Manifest::new(&request, system, motion, plan, &outcome.record);
-    let summary = Summary::new(&request, &prepared, &outcome, &manifest);
-    let files = page::write(&folder, &prepared, &outcome, &summary, &manifest)?;
+    let plan = (prepared.algorithm, *step, *samples);
+    let mut manifest = Manifest::new(&request, system, motion, plan);
+    let summary = Summary::new(&prepared, &outcome, &manifest);
+    let files = page::write(&folder, &prepared, &outcome, &summary, &mut manifest)?;
     for line in &summary.warnings {
         eprintln!("warning: {line}");
     }
     if arguments.json {
         println!("{}", serde_json::json!(summary));
     } else {
-        print!("{}", table(&summary, motion));
+        print!("{}", table(&summary, &outcome.record, motion));
         println!("\nwritten:");
         for file in files {
             println!("  {}", file.display());
@@ -243,8 +288,11 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
 }
 
 /// The figures as a table for people.
-fn table(summary: &Summary, motion: &Motion) -> String {
-    let mut text = format!("{} on {}\n", summary.system, summary.motion.name);
+fn table(summary: &Summary, record: &Record, motion: &Motion) -> String {
+    let mut text = match motion.is_empty() {
+        true => format!("{}\n", summary.system),
+        false => format!("{} on {}\n", summary.system, summary.motion.name),
+    };
     for note in &motion.notes {
         text += &format!("  {note}\n");
     }
@@ -262,8 +310,24 @@ fn table(summary: &Summary, motion: &Motion) -> String {
         significant(summary.real_time_factor, 2),
         summary.ended.word(),
     );
+    if let Some(kept) = &summary.real_time {
+        text += &format!(
+            "in real time: {} of {} steps were not done in time, the latest by {:.2} ms; steps began \
+             {:.0} us late (median), 99 of 100 less than {:.0} us\n\n",
+            kept.missed,
+            kept.deadlines,
+            1e3 * kept.worst_s,
+            1e6 * kept.jitter_median_s,
+            1e6 * kept.jitter_p99_s,
+        );
+    }
     let Some(tracking) = &summary.tracking else {
         return text;
+    };
+    let asked = asked(record, motion);
+    let (motion, heading) = match &asked {
+        Some(asked) => (asked, "structure"),
+        None => (motion, "reference"),
     };
     let row = |name: &str, cells: [String; 3]| {
         let mut row = vec![name.to_string()];
@@ -275,10 +339,7 @@ fn table(summary: &Summary, motion: &Motion) -> String {
     let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4).text(system);
     let percent = |value: f64| format!("{value:.4} %");
     text += &aligned(&[
-        row(
-            "",
-            ["reference".into(), "table".into(), "largest error".into()],
-        ),
+        row("", [heading.into(), "table".into(), "largest error".into()]),
         row(
             "displacement, peak",
             [
@@ -316,13 +377,62 @@ fn table(summary: &Summary, motion: &Motion) -> String {
             format!("{:.1} ms", 1e3 * tracking.delay),
         ),
     ]);
+    if let Some(own) = &tracking.laboratory {
+        text += "\n";
+        text += &aligned(&bands(own));
+        text += "\n";
+        text += &aligned(&[
+            pair(
+                "error over the significant duration, acceleration",
+                format!(
+                    "{} of {:.2} s",
+                    percent(own.significant_duration_percent),
+                    own.significant_duration_s
+                ),
+            ),
+            pair("peak ratio", format!("{:.4}", own.peak_ratio)),
+            pair("Arias ratio", format!("{:.4}", own.arias_ratio)),
+        ]);
+    }
     text
 }
+
+/// Response spectra and transfer function, a row for each band.
+fn bands(own: &Laboratory) -> Vec<Vec<String>> {
+    let head = [
+        "band",
+        "response spectrum, largest",
+        "mean",
+        "gain",
+        "delay",
+        "coherence",
+    ];
+    let mut rows = vec![head.map(str::to_string).to_vec()];
+    for (n, spectrum) in own.response_spectrum_percent.iter().enumerate() {
+        let [from, to] = spectrum.band_hz;
+        let mut row = vec![
+            format!("{from} to {to} Hz"),
+            format!("{:.2} %", spectrum.largest),
+            format!("{:.2} %", spectrum.mean),
+        ];
+        row.extend(match own.coherence.as_ref().map(|bands| &bands[n]) {
+            Some(band) => [
+                format!("{:.4}", band.gain),
+                format!("{:.2} ms", 1e3 * band.delay_s),
+                format!("{:.4}", band.coherence),
+            ],
+            None => ["-", "-", "-"].map(str::to_string),
+        });
+        rows.push(row);
+    }
+    rows
+}
+
 /// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.
 ///
 /// # Errors
 /// Values that cannot be read.
-fn request(arguments: &Arguments) -> Result<Request, Error> {
+pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
     let system = arguments
         .system
         .clone()
@@ -331,6 +441,7 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
     for (option, given) in [
         ("--plant", &arguments.rig.plant),
         ("--specimen", &arguments.rig.specimen),
+        ("--structure", &arguments.structure),
     ] {
         if let (true, Some(_)) = (is_file, given) {
             let reason = format!("{system} is a file and has its own; edit it instead");
@@ -359,6 +470,7 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         },
         plant: arguments.rig.plant(),
         specimen: arguments.rig.specimen(),
+        structure: arguments.structure.clone(),
         tuning: arguments.rig.tuning,
         control_model: arguments.rig.control_model.as_deref().map(absolute),
         record: arguments.record.as_deref().map(absolute),
@@ -370,6 +482,7 @@ fn request(arguments: &Arguments) -> Result<Request, Error> {
         algorithm: arguments.algorithm,
         step_s: text("--step", &arguments.step, "s")?,
         duration_s: text("--duration", &arguments.duration, "s")?,
+        inputs: arguments.input.iter().map(|path| absolute(path)).collect(),
     })
 }
 
@@ -378,13 +491,19 @@ fn absolute(path: &Path) -> PathBuf {
 }
 
 /// A positive quantity; a number alone is in `unit`.
-fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
+pub(super) fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
     let fault = |reason: String| Error::Option { option, reason };
     let value = units::value_in(text, unit).map_err(|error| fault(error.to_string()))?;
     if value > 0.0 {
         return Ok(value);
     }
     Err(fault(format!("`{text}` is not positive")))
+}
+
+/// A whole number above 0.
+fn at_least_one(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|number| *number > 0);
+    number.ok_or_else(|| "expected a whole number from 1".to_string())
 }
 
 fn progress_bar(samples: usize) -> ProgressBar {

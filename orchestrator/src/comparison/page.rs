@@ -53,7 +53,6 @@ fn page(comparison: &Comparison, folder: &Path) -> Result<String, Error> {
                 .collect(),
             notes: early(comparison),
             panels: panels(rows),
-            ..Section::default()
         }],
         footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
         ..Report::default()

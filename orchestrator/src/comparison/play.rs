@@ -137,7 +137,7 @@ fn request(plan: &Plan, controller: &str, played: &Played) -> Request {
 
 fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {
     let prepared = prepare(request)?;
-    let outcome = prepared.run(request.algorithm)?;
+    let outcome = prepared.run(prepared.algorithm)?;
     let column = |name: &str| outcome.record.column(&format!("table.{name}"));
     let motion = &prepared.motion;
     let histories = column("displacement").zip(column("acceleration"));
@@ -158,6 +158,10 @@ fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {
         controller: request.system.clone(),
         time_domain_percent: tracking.map(|t| t.time_domain_percent),
         frequency_domain_percent: tracking.map(|t| t.frequency_domain_percent),
+        response_spectrum_percent: tracking
+            .and_then(|t| Some(t.laboratory?.largest_spectrum_deviation())),
+        significant_duration_percent: tracking
+            .and_then(|t| Some(t.laboratory?.significant_duration_percent)),
         peak_displacement_m: tracking.map(|t| t.peak_displacement),
         ended: outcome.ended.kind(),
         ended_because: outcome.ended.reason(),

@@ -30,6 +30,12 @@ pub struct Row {
     pub time_domain_percent: Option<f64>,
     /// Frequency-domain error of the acceleration, %.
     pub frequency_domain_percent: Option<f64>,
+    /// Largest deviation of the response spectrum at 5 % damping from 0.5 to 15 Hz, %.
+    #[serde(default)]
+    pub response_spectrum_percent: Option<f64>,
+    /// Time-domain error over the significant duration, %.
+    #[serde(default)]
+    pub significant_duration_percent: Option<f64>,
     /// Largest displacement of the table, m.
     pub peak_displacement_m: Option<f64>,
     /// How it ended.
@@ -61,6 +67,12 @@ pub struct Median {
     pub time_domain_percent: Option<f64>,
     /// Frequency-domain error, %.
     pub frequency_domain_percent: Option<f64>,
+    /// Largest deviation of the response spectrum, %.
+    #[serde(default)]
+    pub response_spectrum_percent: Option<f64>,
+    /// Time-domain error over the significant duration, %.
+    #[serde(default)]
+    pub significant_duration_percent: Option<f64>,
     /// Runs that were stopped or failed; they count as worse than any other.
     pub ended_early: usize,
 }
@@ -116,6 +128,10 @@ impl Comparison {
                 let median = Median {
                     time_domain_percent: of(controller, |row| row.time_domain_percent),
                     frequency_domain_percent: of(controller, |row| row.frequency_domain_percent),
+                    response_spectrum_percent: of(controller, |row| row.response_spectrum_percent),
+                    significant_duration_percent: of(controller, |row| {
+                        row.significant_duration_percent
+                    }),
                     ended_early: own.count(),
                 };
                 (controller.to_string(), median)

@@ -11,33 +11,46 @@ pub struct ErrorTable {
     rows: Vec<Vec<String>>,
 }
 
-/// Errors in time and in frequency, a row for each motion, then median and standard deviation.
-pub fn tables(comparison: &Comparison) -> [ErrorTable; 2] {
+/// Errors in time and in frequency, as laboratories measure, a row for each motion, then median and
+/// standard deviation.
+pub fn tables(comparison: &Comparison) -> [ErrorTable; 4] {
     [
         table(
             "Normalised RMS acceleration error, % (printed values of Table 4-1 and 5-2 in brackets)",
             comparison,
             |row| row.time_domain_percent,
-            |printed| printed.time,
-            PRINTED_TIME,
+            Some((|printed| printed.time, PRINTED_TIME)),
         ),
         table(
             "Fourier amplitude error, % (printed values in brackets; their scaling is not given, and the \
              printed median 0.65 should be 0.63)",
             comparison,
             |row| row.frequency_domain_percent,
-            |printed| printed.frequency,
-            PRINTED_FREQUENCY,
+            Some((|printed| printed.frequency, PRINTED_FREQUENCY)),
+        ),
+        table(
+            "Response spectrum at 5 % damping, largest deviation from 0.5 to 15 Hz, %",
+            comparison,
+            |row| row.response_spectrum_percent,
+            None,
+        ),
+        table(
+            "Normalised RMS acceleration error over the significant duration (5 to 95 % of the Arias intensity), %",
+            comparison,
+            |row| row.significant_duration_percent,
+            None,
         ),
     ]
 }
+
+/// The printed values of a motion, and their medians and deviations.
+type PrintedColumn = (fn(&Printed) -> [f64; 3], [[f64; 3]; 2]);
 
 fn table(
     caption: &str,
     comparison: &Comparison,
     measure: Measure,
-    values: fn(&Printed) -> [f64; 3],
-    [medians, deviations]: [[f64; 3]; 2],
+    printed: Option<PrintedColumn>,
 ) -> ErrorTable {
     let (rows, controllers) = (&comparison.rows, comparison.controllers());
     let place = |controller: &str| CONTROLLERS.iter().position(|known| *known == controller);
@@ -61,9 +74,8 @@ fn table(
             let mut ours = rows
                 .iter()
                 .filter(|r| r.record == *record && r.controller == controller);
-            let theirs = known
-                .zip(place(controller))
-                .map(|(printed, at)| values(printed)[at]);
+            let theirs = known.zip(place(controller)).zip(printed);
+            let theirs = theirs.map(|((known, at), (values, _))| values(known)[at]);
             let ours = ours.next();
             line.push(match ours {
                 Some(row) if !row.is_complete() => match row.ended_s {
@@ -81,13 +93,17 @@ fn table(
             .iter()
             .any(|record| known(record).is_some_and(|found| found.title == printed.title))
     });
-    for (name, statistic, printed) in [
-        ("Median", median as fn(&[f64]) -> Option<f64>, medians),
-        ("Standard deviation", deviation, deviations),
-    ] {
+    for (index, (name, statistic)) in [
+        ("Median", median as fn(&[f64]) -> Option<f64>),
+        ("Standard deviation", deviation),
+    ]
+    .into_iter()
+    .enumerate()
+    {
         let mut line = vec![name.to_string()];
         for &controller in &controllers {
-            let theirs = place(controller).filter(|_| all).map(|at| printed[at]);
+            let theirs = place(controller).filter(|_| all).zip(printed);
+            let theirs = theirs.map(|(at, (_, statistics))| statistics[index][at]);
             line.push(cell(statistic(&column(rows, controller, measure)), theirs));
         }
         lines.push(line);
@@ -129,6 +145,8 @@ mod tests {
             controller: "mpc".into(),
             time_domain_percent: Some(percent),
             frequency_domain_percent: Some(percent),
+            response_spectrum_percent: None,
+            significant_duration_percent: None,
             peak_displacement_m: None,
             ended,
             ended_because: None,

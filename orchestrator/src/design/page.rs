@@ -157,10 +157,7 @@ fn comparison(all: &[NamedLoop]) -> Section {
                 ),
             ),
             gain_panel("All, gain", series(&tracking, FrequencyResponse::gain_db)),
-            phase_panel(
-                "All, phase",
-                series(&tracking, |response| bode::closed_phase(response)),
-            ),
+            phase_panel("All, phase", series(&tracking, bode::closed_phase)),
         ],
         ..Section::default()
     }

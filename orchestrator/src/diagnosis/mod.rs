@@ -3,6 +3,7 @@
 
 mod case;
 pub mod co_simulation;
+pub mod model;
 mod page;
 mod pictures;
 mod rig;
@@ -11,9 +12,11 @@ pub mod text;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use identification::diagnosis::case::CaseError;
+use identification::diagnosis::case::{CaseError, template as case_template};
 use identification::diagnosis::engine::Observer;
-use identification::diagnosis::rigs::DescriptionError;
+use identification::diagnosis::rigs::{
+    DescriptionError, KINDS, Rig, like, template as rig_template,
+};
 use identification::diagnosis::{
     self as library, Diagnosis, DiagnosisError, DiagnosisReport, Evidence, Subject,
 };
@@ -32,19 +35,21 @@ pub const REPORT: &str = "report.html";
 /// Diagnoses the case in folder `subject`, or the rig that the description `subject` (`.toml`)
 /// tells of, on `data` in place of its own files if there are any. Writes the extended model, its
 /// FMUs, the JSON object, the report and, of a rig, curves and pictures into `folder`, all or
-/// nothing. `observer` is told what is tried.
+/// nothing. The file `columns` may name the columns of a rig's files otherwise. `observer` is told what
+/// is tried.
 ///
 /// # Errors
 /// What cannot be read, records that would mislead, a folder that cannot be written.
 pub fn diagnose(
     subject: &Path,
     data: &[PathBuf],
+    columns: Option<&Path>,
     folder: &Path,
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
     let begun = Instant::now();
     Results::check(folder)?;
-    let read = Subject::read(subject, data).map_err(|error| fault(subject, error))?;
+    let read = Subject::read(subject, data, columns).map_err(|error| fault(subject, error))?;
     let found = library::diagnose(&read, observer).map_err(|error| fault(subject, error))?;
     let mut report = found.report();
     report.extended_model = Some(folder.join(EXTENDED_MODEL));
@@ -83,6 +88,27 @@ pub fn files(report: &DiagnosisReport, folder: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// A commented description of a rig of the kind that `word` names, or the `nominal.toml` of a table.
+///
+/// # Errors
+/// A word that names no kind, with those that there are.
+pub fn template(word: &str) -> Result<String, Error> {
+    if word.eq_ignore_ascii_case("table") || word.eq_ignore_ascii_case("shake_table") {
+        return Ok(case_template());
+    }
+    like(word).map(rig_template).ok_or_else(|| {
+        let kinds: Vec<&str> = KINDS.into_iter().map(Rig::kind).collect();
+        Error::Option {
+            option: "--template",
+            reason: format!(
+                "no kind `{word}`: expected table, {}{}",
+                kinds.join(", "),
+                units::hint(word, kinds.iter().copied())
+            ),
+        }
+    })
+}
+
 fn html(page: &Report, folder: &Path) -> Result<String, Error> {
     report::html(page).map_err(|error| file_fault(&folder.join(REPORT), error))
 }
@@ -106,6 +132,10 @@ fn fault(subject: &Path, error: DiagnosisError) -> Error {
         | DiagnosisError::Case(CaseError::Data(error)) => error.into(),
         DiagnosisError::DataOfACase => Error::Option {
             option: "--data",
+            reason: error.to_string(),
+        },
+        DiagnosisError::ColumnsOfACase => Error::Option {
+            option: "--columns",
             reason: error.to_string(),
         },
         other @ DiagnosisError::Case(_) => file_fault(subject, other),

@@ -160,9 +160,11 @@ fn extended_rig(rig: &RigDiagnosis) -> Section {
             ]
         }));
     };
-    add("nominal model, refitted", &rig.as_described.parameters);
-    for effect in &rig.as_described.effects {
-        add(&effect.effect, &effect.parameters);
+    let confirmed = &rig.confirmed;
+    add("nominal model, refitted", &confirmed.refitted);
+    add("with the effects", &confirmed.parameters);
+    for (effect, parameters) in &confirmed.effects {
+        add(effect, parameters);
     }
     Section {
         heading: "The extended model".into(),

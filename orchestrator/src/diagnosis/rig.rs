@@ -38,7 +38,8 @@ pub(super) fn extend(
     let failed = |error: DescriptionError| fault(&description.path, error.into());
     let rig = description.rig().map_err(failed)?;
     let curves = curves::curves(description, measurement, found).map_err(failed)?;
-    let model = ExtendedRig::from(found)
+    let model = ExtendedRig::new(description, measurement, found)
+        .map_err(failed)?
         .to_toml()
         .map_err(|error| file_fault(&folder.join(EXTENDED_MODEL), error))?;
     results.write_text(EXTENDED_MODEL, &model)?;

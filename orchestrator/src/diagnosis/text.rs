@@ -130,13 +130,8 @@ pub(super) fn remarks(report: &DiagnosisReport) -> Vec<String> {
         Evidence::Rig(evidence) => {
             let rig = &evidence.rig;
             let rivals = rig.as_described.rivals.iter();
-            let only = (!rig.not_confirmed.is_empty()).then(|| {
-                let names = rig.not_confirmed.join(", ");
-                format!("on one part of the data only: {names}")
-            });
             rivals
                 .map(|(rival, against)| format!("{rival} would do nearly as well as {against}"))
-                .chain(only)
                 .collect()
         }
     };
@@ -218,10 +213,32 @@ pub(super) fn parts(rig: &RigDiagnosis) -> Vec<Vec<String>> {
         row.push(format!("{:.0} to {:.0} %", 100.0 * low, 100.0 * high));
         row
     };
+    let confirmed = |name: &str, part: &PartReport, error: f64, fitted: &str| {
+        let mut row = vec![name.to_string()];
+        row.extend(
+            [part.nominal_error, part.refitted_error, error]
+                .map(|error| format!("{:.2} %", 100.0 * error)),
+        );
+        row.push(fitted.to_string());
+        let gone = 1.0 - (error / part.refitted_error).powi(2);
+        row.extend([format!("{:.0} %", 100.0 * gone), String::new()]);
+        row
+    };
+    let own = &rig.confirmed;
+    let mut last = confirmed("named effects only", &rig.as_described, own.error, "");
+    let (low, high) = own.gain_interval;
+    last[6] = format!("{:.0} to {:.0} %", 100.0 * low, 100.0 * high);
     vec![
         heading.map(String::from).to_vec(),
-        row("as described", &rig.as_described),
-        row("parts swapped", &rig.swapped),
+        last,
+        confirmed(
+            "the same, parts swapped",
+            &rig.swapped,
+            own.swapped_error,
+            "",
+        ),
+        row("all that this part asks for", &rig.as_described),
+        row("the same, parts swapped", &rig.swapped),
     ]
 }
 

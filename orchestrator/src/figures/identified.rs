@@ -99,7 +99,7 @@ fn rig() -> Result<Run, Error> {
     let mut prepared = prepare(&request)?;
     prepared.motion = excitation(prepared.motion.dt);
     prepared.samples = prepared.motion.len();
-    let outcome = prepared.run(request.algorithm)?;
+    let outcome = prepared.run(prepared.algorithm)?;
     Ok(Run {
         motion: prepared.motion,
         record: outcome.record,

@@ -42,7 +42,7 @@ pub(super) fn run(
         ..Request::built_in(system)
     };
     let prepared = prepare(&request)?;
-    let outcome = prepared.run(request.algorithm)?;
+    let outcome = prepared.run(prepared.algorithm)?;
     Ok(Run {
         motion: prepared.motion,
         record: outcome.record,

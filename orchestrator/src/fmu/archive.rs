@@ -21,10 +21,29 @@ pub(super) fn file_name(path: &Path) -> String {
     )
 }
 
+/// What an archive is unpacked as: what it is called, and the file that it must have at its top.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sort {
+    /// What is said of a file that is none.
+    pub refusal: &'static str,
+    /// `modelDescription.xml`, or `SystemStructure.ssd`.
+    pub file: &'static str,
+}
+
+/// An FMU.
+pub(super) const FMU: Sort = Sort {
+    refusal: "not an FMU",
+    file: "modelDescription.xml",
+};
+
 /// Unpacks `bytes` (the file at `fmu`) into a new temporary directory.
-pub(super) fn unpack(fmu: &Path, bytes: &[u8]) -> Result<Folder, FmuError> {
+///
+/// # Errors
+/// No archive, a damaged one, or one that would write outside its directory.
+pub(crate) fn unpack(sort: Sort, fmu: &Path, bytes: &[u8]) -> Result<Folder, FmuError> {
     let broken = |reason: String| FmuError::Archive {
         fmu: fmu.to_path_buf(),
+        sort: sort.refusal,
         reason,
     };
     if bytes.is_empty() {
@@ -56,10 +75,11 @@ pub(super) fn unpack(fmu: &Path, bytes: &[u8]) -> Result<Folder, FmuError> {
             LARGEST >> 20
         )));
     }
-    if !names.iter().any(|name| name == "modelDescription.xml") {
-        return Err(broken(
-            "the archive has no modelDescription.xml at its top".to_string(),
-        ));
+    if !names.iter().any(|name| name == sort.file) {
+        return Err(broken(format!(
+            "the archive has no {} at its top",
+            sort.file
+        )));
     }
     let directory = Folder::new()
         .map_err(|error| broken(format!("no temporary directory to unpack it: {error}")))?;

@@ -18,10 +18,12 @@ pub enum FmuError {
         source: std::io::Error,
     },
     /// The file is no zip archive, or a damaged one.
-    #[error("{}: not an FMU: {reason}", fmu.display())]
+    #[error("{}: {sort}: {reason}", fmu.display())]
     Archive {
         /// The file.
         fmu: PathBuf,
+        /// What it is not.
+        sort: &'static str,
         /// What is wrong.
         reason: String,
     },

@@ -14,7 +14,7 @@ const YOUNG: Duration = Duration::from_secs(60);
 
 /// A temporary folder, removed with everything in it.
 #[derive(Debug)]
-pub(super) struct Folder {
+pub(crate) struct Folder {
     // The lock goes first.
     _lock: File,
     directory: tempfile::TempDir,
@@ -25,7 +25,7 @@ impl Folder {
     ///
     /// # Errors
     /// The system's.
-    pub(super) fn new() -> io::Result<Self> {
+    pub(crate) fn new() -> io::Result<Self> {
         static SWEPT: Once = Once::new();
         SWEPT.call_once(|| sweep(&std::env::temp_dir()));
         let directory = tempfile::Builder::new().prefix(PREFIX).tempdir()?;
@@ -38,7 +38,7 @@ impl Folder {
         })
     }
 
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.directory.path()
     }
 }

@@ -13,7 +13,7 @@ pub struct Message {
     pub category: String,
     /// The text; characters that steer a terminal are shown, not carried out.
     pub text: String,
-    /// How often it came in succession.
+    /// How often it came, other lines in between or not.
     pub times: usize,
 }
 
@@ -39,6 +39,8 @@ pub(super) const STATUS: [&str; 6] = ["ok", "warning", "discard", "error", "fata
 impl Messages {
     /// An FMU that logs without end does not fill the memory.
     const KEPT: usize = 1000;
+    /// Among so many of the latest lines the same one is not kept twice.
+    const RECENT: usize = 16;
     /// Nor does one line, bytes.
     const LONGEST: usize = 4096;
 
@@ -70,12 +72,15 @@ impl Sink for Messages {
         };
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let has_room = kept.len() < Self::KEPT;
-        match kept.last_mut() {
-            Some(last) if last.text == message.text && last.status == message.status => {
-                last.times += 1;
-            }
-            _ if has_room => kept.push(message),
-            _ => {}
+        // Lines that take turns are folded, too.
+        let recent = kept.len().saturating_sub(Self::RECENT);
+        let again = kept[recent..]
+            .iter_mut()
+            .find(|last| last.text == message.text && last.status == message.status);
+        match again {
+            Some(last) => last.times += 1,
+            None if has_room => kept.push(message),
+            None => {}
         }
     }
 }

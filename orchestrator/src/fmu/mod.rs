@@ -1,13 +1,13 @@
 //! FMI import: an FMU is unpacked, checked and described before any of its code is loaded, and its
 //! instances look the same whether they are FMI 2.0 or 3.0.
 
-mod archive;
+pub(crate) mod archive;
 mod call;
 mod convert;
 mod datum;
 mod description;
 mod error;
-mod folder;
+pub(crate) mod folder;
 mod instance;
 pub mod isolation;
 mod messages;
@@ -50,6 +50,8 @@ pub struct Fmu {
     pub is_own: bool,
     /// Platforms it has binaries for, as its folders are named.
     pub platforms: Vec<String>,
+    /// Where the file is, which may be called by another path.
+    file: PathBuf,
     unpacked: Arc<folder::Folder>,
 }
 
@@ -61,6 +63,15 @@ impl Fmu {
     /// a description that cannot be used. Nothing of the FMU has been executed by then.
     pub fn open(path: &Path) -> Result<Arc<Self>, FmuError> {
         Ok(Arc::new(Self::read(path)?))
+    }
+
+    /// As [`Fmu::open`], of a file that messages and manifests call by another path: one that lies
+    /// in an archive.
+    ///
+    /// # Errors
+    /// As [`Fmu::open`].
+    pub fn open_within(path: &Path, shown: &Path) -> Result<Arc<Self>, FmuError> {
+        Ok(Arc::new(Self::read_as(path, shown)?))
     }
 
     /// Opens a component of this project that this program has packed itself.
@@ -75,11 +86,15 @@ impl Fmu {
     }
 
     fn read(path: &Path) -> Result<Self, FmuError> {
-        let bytes = std::fs::read(path).map_err(|source| FmuError::Unreadable {
+        Self::read_as(path, path)
+    }
+
+    fn read_as(file: &Path, path: &Path) -> Result<Self, FmuError> {
+        let bytes = std::fs::read(file).map_err(|source| FmuError::Unreadable {
             fmu: path.to_path_buf(),
             source,
         })?;
-        let unpacked = archive::unpack(path, &bytes)?;
+        let unpacked = archive::unpack(archive::FMU, path, &bytes)?;
         let description = {
             let _alone = PARSER.lock().unwrap_or_else(PoisonError::into_inner);
             description::read(path, unpacked.path(), &HashMap::new())?
@@ -87,6 +102,7 @@ impl Fmu {
         let platforms = archive::platforms(unpacked.path());
         Ok(Self {
             path: path.to_path_buf(),
+            file: file.to_path_buf(),
             description,
             sha256: hexadecimal(&Sha256::digest(&bytes)),
             is_own: false,
@@ -121,6 +137,11 @@ impl Fmu {
             variable.dependencies = none.clone();
         }
         fmu
+    }
+
+    /// Where the file is, for as long as the archive that it may lie in is open.
+    pub(crate) fn file(&self) -> &PathBuf {
+        &self.file
     }
 
     /// The file's name, as messages give it.

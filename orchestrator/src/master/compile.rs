@@ -28,8 +28,7 @@ impl Simulation {
         Self::with(system, motion, algorithm, (step, stop), &Options::default())
     }
 
-    /// As [`Simulation::new`], for a run that ends at `stop` seconds, with FMUs run as `options`
-    /// say.
+    /// As [`Simulation::new`], for a run of `stop` seconds, with FMUs run as `options` say.
     ///
     /// # Errors
     /// As [`Simulation::new`].
@@ -48,13 +47,20 @@ impl Simulation {
         let system = &system;
         let ticks_per_row = ticks(motion.dt, step, "the sample time of the motion")?;
         let schedule = system.schedule(algorithm == Algorithm::Iterative)?;
-        let mut reference = Reference::new(motion);
-        for quantity in Quantity::ALL {
+        let mut reference = Reference::new(motion, &system.tables);
+        // A system without a motion has no columns of one.
+        for quantity in Quantity::ALL.into_iter().filter(|_| !motion.is_empty()) {
             reference.tap(quantity, 0);
         }
         for connection in &system.connections {
-            if let Source::Reference { quantity, ahead } = connection.source {
-                reference.tap(quantity, ahead);
+            match connection.source {
+                Source::Reference { quantity, ahead } => {
+                    reference.tap(quantity, ahead);
+                }
+                Source::Table { table, column } => {
+                    reference.tap_table(table, column);
+                }
+                Source::Output { .. } => {}
             }
         }
         let mut plan = Plan::new(system, &mut reference, &schedule.operations);
@@ -114,6 +120,19 @@ impl Simulation {
             let variables = &system.components[part].fmu.description.variables;
             (part, variables[variable].reference)
         });
+        let aliases = system.components.iter().enumerate();
+        let aliases = aliases.flat_map(|(index, part)| {
+            part.all_aliases()
+                .map(move |(alias, output)| (index, format!("{}.{alias}", part.name), output))
+        });
+        let mut alias_signals = Vec::new();
+        let mut alias_names = Vec::new();
+        for (index, name, output) in aliases {
+            if let Some(Place::Number(signal)) = plan.places.get(&(index, output)) {
+                alias_signals.push(*signal);
+                alias_names.push(name);
+            }
+        }
         let (exact_names, exact) = plan.exact.into_iter().unzip();
         let signals = Signals {
             numbers: vec![0.0; plan.names.len()],
@@ -121,6 +140,7 @@ impl Simulation {
         };
         let mut simulation = Self {
             algorithm,
+            begin: system.start,
             step,
             tick: 0,
             ticks_per_row,
@@ -135,10 +155,15 @@ impl Simulation {
             diverted: processes.diverted(),
             actions,
             notes,
+            interrupt: None,
+            keep_every: 1,
+            alias_signals,
+            alias_names,
+            clock: None,
             end,
             stop: guard,
         };
-        start::initialize(&mut simulation, stop)?;
+        start::initialize(&mut simulation, system.start + stop)?;
         Ok(simulation)
     }
 }
@@ -184,15 +209,20 @@ struct Plan<'a> {
 impl<'a> Plan<'a> {
     fn new(system: &'a System, reference: &mut Reference, operations: &[Operation]) -> Self {
         let mut names = vec![String::new(); reference.len()];
-        for quantity in Quantity::ALL {
+        // Those of the motion come first, in this order; the others follow as they are connected.
+        for (name, quantity) in names.iter_mut().zip(Quantity::ALL) {
             let source = Source::Reference { quantity, ahead: 0 };
-            names[reference.tap(quantity, 0)] = system.origin(source).to_string();
+            *name = system.origin(source).to_string();
         }
         let mut incoming = vec![Vec::new(); system.components.len()];
         for connection in &system.connections {
-            if let Source::Reference { quantity, ahead } = connection.source {
-                names[reference.tap(quantity, ahead)] =
-                    system.origin(connection.source).to_string();
+            let tap = match connection.source {
+                Source::Reference { quantity, ahead } => Some(reference.tap(quantity, ahead)),
+                Source::Table { table, column } => Some(reference.tap_table(table, column)),
+                Source::Output { .. } => None,
+            };
+            if let Some(tap) = tap {
+                names[tap] = system.origin(connection.source).to_string();
             }
             incoming[connection.component].push(connection);
         }
@@ -267,6 +297,7 @@ impl<'a> Plan<'a> {
     fn signal(&self, reference: &mut Reference, source: Source) -> Place {
         match source {
             Source::Reference { quantity, ahead } => Place::Number(reference.tap(quantity, ahead)),
+            Source::Table { table, column } => Place::Number(reference.tap_table(table, column)),
             Source::Output {
                 component,
                 variable,
@@ -277,7 +308,7 @@ impl<'a> Plan<'a> {
     /// Whether the source changes between samples.
     fn is_smooth(&self, source: Source) -> bool {
         match source {
-            Source::Reference { .. } => false,
+            Source::Reference { .. } | Source::Table { .. } => false,
             Source::Output {
                 component,
                 variable,
@@ -314,8 +345,7 @@ impl<'a> Plan<'a> {
                 && input.variability == Variability::Continuous;
             let drive = Drive {
                 signal: self.signal(reference, connection.source),
-                factor: connection.factor,
-                offset: connection.offset,
+                passage: connection.passage.clone(),
                 is_smooth,
             };
             let drives = arrays.entry(first).or_insert_with(|| {
@@ -329,7 +359,7 @@ impl<'a> Plan<'a> {
             let elements: Vec<_> = arrays[&first]
                 .iter()
                 .zip(first..)
-                .map(|(drive, position)| (*drive, part.start_value(&given, position)))
+                .map(|(drive, position)| (drive.clone(), part.start_value(&given, position)))
                 .collect();
             inputs.add(&variables[first], &elements);
         }

@@ -36,6 +36,19 @@ pub enum MasterError {
         /// Its value.
         value: f64,
     },
+    /// A table that does not follow at all.
+    #[error(
+        "the run ran away: the table went {error:.3} m from what it was asked for, which is \
+         {peak:.3} m at most, first beyond five times that at {time:.3} s"
+    )]
+    RanAway {
+        /// When the error first was five times the motion's peak, s.
+        time: f64,
+        /// Largest error, m.
+        error: f64,
+        /// Largest displacement asked for, m.
+        peak: f64,
+    },
     /// An iteration that does not settle.
     #[error(
         "the values do not stand still at {time} s after {passes} repetitions: `{variable}` still \

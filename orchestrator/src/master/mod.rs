@@ -6,6 +6,7 @@
 //! holds the outputs at `t_k` together with the commands computed from them.
 
 mod action;
+mod clock;
 mod compile;
 mod error;
 mod gauss_seidel;
@@ -21,8 +22,10 @@ mod transfer;
 
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+pub use clock::RealTime;
 pub use error::MasterError;
 pub use record::Record;
 pub use run::{Ended, Ending, LogLine, Outcome, Pace};
@@ -72,6 +75,8 @@ impl fmt::Display for Algorithm {
 /// A system loaded, connected and initialized, at some tick of its run.
 pub struct Simulation {
     algorithm: Algorithm,
+    /// Time at which it begins, s.
+    begin: f64,
     /// Coupling step, s.
     step: f64,
     tick: usize,
@@ -90,6 +95,15 @@ pub struct Simulation {
     actions: Vec<Action>,
     /// What the user should know of the order of calls.
     notes: Vec<String>,
+    /// Ends the run when it becomes true.
+    interrupt: Option<&'static AtomicBool>,
+    /// One row is kept of so many.
+    keep_every: usize,
+    /// Signals that are recorded under a further name, and those names.
+    alias_signals: Vec<usize>,
+    alias_names: Vec<String>,
+    /// The clock on the wall, where the run keeps pace with it.
+    clock: Option<clock::Clock>,
     /// What ends the run early.
     end: Option<EndSignals>,
     /// The part and input that is set when a sampled component fails.
@@ -189,7 +203,8 @@ impl Simulation {
 
     /// Time of the present tick, s.
     pub fn time(&self) -> f64 {
-        self.tick as f64 * self.step
+        let since = self.tick as f64 * self.step;
+        self.begin + since
     }
 
     /// Coupling step, s.
@@ -212,8 +227,9 @@ impl Simulation {
     /// # Errors
     /// A call that an FMU did not complete, or a loop that does not converge.
     pub fn observe(&mut self) -> Result<(), MasterError> {
+        let (sample, time) = (self.tick / self.ticks_per_row, self.time());
         self.reference
-            .sample(self.tick / self.ticks_per_row, &mut self.signals.numbers);
+            .sample(sample, time, &mut self.signals.numbers);
         match self.algorithm {
             Algorithm::Jacobi => Ok(()),
             Algorithm::GaussSeidel | Algorithm::Iterative => gauss_seidel::observe(self),

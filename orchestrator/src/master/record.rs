@@ -38,6 +38,19 @@ impl Record {
         self.exact.extend_from_slice(exact);
     }
 
+    /// As [`Record::push`], with some signals once more behind.
+    pub(crate) fn push_with(
+        &mut self,
+        time: f64,
+        signals: &[f64],
+        again: &[usize],
+        exact: &[Datum],
+    ) {
+        self.push(time, signals, exact);
+        self.values
+            .extend(again.iter().map(|&signal| signals[signal]));
+    }
+
     /// The values of a row that numbers do not hold, in the order of `exact_columns`.
     pub fn exact(&self, row: usize) -> &[Datum] {
         let width = self.exact_columns.len();

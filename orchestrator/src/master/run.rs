@@ -1,10 +1,12 @@
 //! A run from its first sample to its last.
 
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
 use super::action::Moment;
+use super::clock::{Clock, RealTime};
 use super::{EndSignals, MasterError, Record, Simulation};
 use crate::fmu::{Kind, Message};
 
@@ -21,18 +23,21 @@ pub enum Ending {
     Interlock,
     /// A component asked to end it, as the standard lets it.
     Terminated,
-    /// A component failed.
+    /// A component failed, or the run ran away.
     Failed,
+    /// The user ended it.
+    Interrupted,
 }
 
 impl Ending {
-    /// `complete`, `interlock`, `terminated` or `failed`.
+    /// `complete`, `interlock`, `terminated`, `failed` or `interrupted`.
     pub fn word(self) -> &'static str {
         match self {
             Self::Complete => "complete",
             Self::Interlock => "interlock",
             Self::Terminated => "terminated",
             Self::Failed => "failed",
+            Self::Interrupted => "interrupted",
         }
     }
 }
@@ -67,6 +72,11 @@ pub enum Ended {
         /// When the valve began to be brought to null, s.
         time: f64,
     },
+    /// The user ended it.
+    Interrupted {
+        /// When, s.
+        time: f64,
+    },
 }
 
 impl Ended {
@@ -77,6 +87,7 @@ impl Ended {
             Self::Interlock { .. } => Ending::Interlock,
             Self::Terminated { .. } => Ending::Terminated,
             Self::Failed(_) | Self::Stopped { .. } => Ending::Failed,
+            Self::Interrupted { .. } => Ending::Interrupted,
         }
     }
 
@@ -90,6 +101,7 @@ impl Ended {
         match self {
             Self::Interlock { time, .. }
             | Self::Stopped { time, .. }
+            | Self::Interrupted { time }
             | Self::Terminated { time, .. } => Some(*time),
             Self::Complete | Self::Failed(_) => None,
         }
@@ -120,6 +132,7 @@ impl Ended {
                 "{error}; the interlock was told to stop at {time:.3} s and brought the valve to null"
             ),
             Self::Failed(error) => error.to_string(),
+            Self::Interrupted { time } => format!("interrupted at {time} s"),
         }
     }
 }
@@ -143,6 +156,8 @@ pub struct Outcome {
     pub messages: Vec<LogLine>,
     /// What the user should know of the order of calls.
     pub notes: Vec<String>,
+    /// How the clock on the wall was kept; of a run in real time.
+    pub real_time: Option<RealTime>,
 }
 
 /// A line logged by a component's FMU.
@@ -168,9 +183,17 @@ impl Simulation {
     /// Plays `samples` samples; `progress` is told the number of samples reached now and then.
     /// What was computed is returned however the run ends.
     pub fn run(mut self, samples: usize, pace: Pace, progress: &mut dyn FnMut(usize)) -> Outcome {
-        let mut record = Record::with_capacity(&self.names, samples).beside(&self.exact_names);
+        let rows = samples.div_ceil(self.keep_every);
+        let names: Vec<String> = self
+            .names
+            .iter()
+            .chain(&self.alias_names)
+            .cloned()
+            .collect();
+        let mut record = Record::with_capacity(&names, rows).beside(&self.exact_names);
+        self.clock = (pace == Pace::RealTime).then(|| Clock::new(self.step));
         let begin = Instant::now();
-        let ended = self.play(samples, pace, progress, &mut record);
+        let ended = self.play(samples, progress, &mut record);
         let wall = begin.elapsed().as_secs_f64();
         progress(record.len());
         self.close();
@@ -197,6 +220,7 @@ impl Simulation {
             wall,
             messages: messages.collect(),
             notes,
+            real_time: self.clock.take().map(Clock::statistics),
             ended: match ended {
                 Ok(ended) => ended,
                 Err(error) => Ended::Failed(error),
@@ -207,26 +231,28 @@ impl Simulation {
     fn play(
         &mut self,
         samples: usize,
-        pace: Pace,
         progress: &mut dyn FnMut(usize),
         record: &mut Record,
     ) -> Result<Ended, MasterError> {
-        let begin = Instant::now();
         let mut tripped: Option<Tripped> = None;
         let mut stopped = false;
         while self.tick < samples * self.ticks_per_row {
-            if pace == Pace::RealTime {
-                let ahead = Duration::from_secs_f64(self.time()).saturating_sub(begin.elapsed());
-                std::thread::sleep(ahead);
+            if let Some(clock) = &mut self.clock {
+                clock.wait(self.tick);
+            }
+            if self
+                .interrupt
+                .is_some_and(|asked| asked.load(Ordering::Relaxed))
+            {
+                return Ok(Ended::Interrupted { time: self.time() });
             }
             self.observe()?;
             if self.tick.is_multiple_of(self.ticks_per_row) {
-                record.push(self.time(), &self.signals.numbers, &self.signals.exact);
-                if let Some(tap) = &self.tap {
-                    tap.push(self.time(), &self.signals.numbers);
+                let sample = self.tick / self.ticks_per_row;
+                if sample.is_multiple_of(self.keep_every) {
+                    self.keep(self.time(), record);
                 }
                 self.check_bounds()?;
-                let sample = self.tick / self.ticks_per_row;
                 if sample.is_multiple_of(1024) {
                     progress(sample);
                 }
@@ -296,6 +322,25 @@ impl EndSignals {
 }
 
 impl Simulation {
+    /// Ends the run where it is, with what was computed, when `asked` becomes true.
+    pub fn heed(&mut self, asked: &'static AtomicBool) {
+        self.interrupt = Some(asked);
+    }
+
+    /// Keeps a row in every so many samples only.
+    pub fn keep_every(&mut self, samples: usize) {
+        self.keep_every = samples.max(1);
+    }
+
+    /// Keeps a row.
+    fn keep(&self, time: f64, record: &mut Record) {
+        let (numbers, exact) = (&self.signals.numbers, &self.signals.exact);
+        record.push_with(time, numbers, &self.alias_signals, exact);
+        if let Some(tap) = &self.tap {
+            tap.push(time, numbers);
+        }
+    }
+
     /// Values that no physical quantity has are a run that diverges.
     fn check_bounds(&self) -> Result<(), MasterError> {
         let numbers = &self.signals.numbers;
@@ -330,12 +375,13 @@ impl Simulation {
                 step: self.step,
                 calls: false,
             };
+            let sample = self.tick / self.ticks_per_row;
             self.reference
-                .sample(self.tick / self.ticks_per_row, &mut self.signals.numbers);
+                .sample(sample, time, &mut self.signals.numbers);
             for action in &mut self.actions {
                 action.perform(at, &mut self.parts, &mut self.signals, &self.names)?;
             }
-            record.push(time, &self.signals.numbers, &self.signals.exact);
+            self.keep(time, record);
         }
         Ok(Some(Ended::Terminated { component, time }))
     }

@@ -51,14 +51,15 @@ pub(super) fn prepare(instance: &mut Instance, component: &Component) -> Result<
 /// Initializes all components together.
 pub(super) fn initialize(simulation: &mut Simulation, stop: f64) -> Result<(), MasterError> {
     for part in &mut simulation.parts {
-        part.instance.enter_initialization(0.0, stop)?;
+        part.instance.enter_initialization(simulation.begin, stop)?;
     }
+    let now = simulation.time();
     simulation
         .reference
-        .sample(0, &mut simulation.signals.numbers);
+        .sample(0, now, &mut simulation.signals.numbers);
     let at = Moment {
         tick: 0,
-        time: 0.0,
+        time: now,
         step: simulation.step,
         calls: false,
     };

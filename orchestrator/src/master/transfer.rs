@@ -3,6 +3,7 @@
 
 use super::signals::{Place, Signals};
 use crate::fmu::{CallError, Datum, Instance, Kind, Variability, Variable};
+use crate::system::Passage;
 
 type Outcome = Result<(), Box<CallError>>;
 
@@ -28,8 +29,7 @@ struct InputSource {
     /// Place among the values.
     place: usize,
     signal: Place,
-    factor: f64,
-    offset: f64,
+    passage: Passage,
     /// It changes between samples.
     is_smooth: bool,
 }
@@ -42,11 +42,10 @@ struct ExactGroup {
 }
 
 /// How an input follows a signal.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Drive {
     pub signal: Place,
-    pub factor: f64,
-    pub offset: f64,
+    pub passage: Passage,
     pub is_smooth: bool,
 }
 
@@ -100,8 +99,7 @@ impl Inputs {
                 group.sources.push(InputSource {
                     place: group.values.len(),
                     signal: drive.signal,
-                    factor: drive.factor,
-                    offset: drive.offset,
+                    passage: drive.passage.clone(),
                     is_smooth: drive.is_smooth,
                 });
             }
@@ -137,7 +135,7 @@ impl Inputs {
     pub(super) fn transfer(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
         for group in &mut self.groups {
             for source in &group.sources {
-                group.values[source.place] = source.convert(source.now(signals));
+                group.values[source.place] = source.passage.of(source.now(signals));
             }
             group.set(instance)?;
         }
@@ -158,7 +156,7 @@ impl Inputs {
                 let at = source.now(now);
                 let change = source.now(other) - at;
                 let share = if source.is_smooth { share } else { 0.0 };
-                group.values[source.place] = source.convert(at + share * change);
+                group.values[source.place] = source.passage.of(at + share * change);
             }
             group.set(instance)?;
         }
@@ -201,16 +199,6 @@ impl InputSource {
         match self.signal {
             Place::Number(signal) => signals.numbers[signal],
             Place::Exact(signal) => signals.exact[signal].number(),
-        }
-    }
-
-    fn convert(&self, value: f64) -> f64 {
-        let value = self.factor * value;
-        // A sum with nothing would turn -0 into 0.
-        if self.offset == 0.0 {
-            value
-        } else {
-            value + self.offset
         }
     }
 }

@@ -60,10 +60,11 @@ impl CsvFile {
         };
         let sheet = Sheet::parse(path, text, wanted)?;
         check_header(&sheet, kind)?;
-        let columns = Recording::from_sheet(&sheet, "motion")?;
+        // No cell of a motion may be empty, so this is asked first.
         for (place, head) in sheet.heads().iter().enumerate() {
             sheet.full_column(place, head)?;
         }
+        let columns = Recording::from_sheet(&sheet, "motion")?;
         if let Some(announced) = announced_points(sheet.comments())
             && sheet.len() < announced
         {

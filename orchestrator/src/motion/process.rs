@@ -86,6 +86,13 @@ pub fn process(record: &Record, options: &Options) -> Result<Motion, MotionError
         mean / STANDARD_GRAVITY,
         slope / STANDARD_GRAVITY
     ));
+    // What rounding leaves of a constant is no motion.
+    if peak(&detrended) <= 1e-9 * peak(&record.acceleration) {
+        return Err(fault(
+            "nothing moves: without its mean and trend nothing is left of the acceleration"
+                .to_string(),
+        ));
+    }
     let mut histories = integrate(&detrended, record.dt, samples, quiet as usize, options);
     notes.push(format!(
         "band-limited to {low} to {high} Hz, zero phase (four-pole Butterworth forward and \

@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs::{self, File},
-    io::{self, Read, Write},
+    io::{self, Cursor, Read, Seek, Write},
     path::{Path, PathBuf},
 };
 
@@ -114,7 +114,7 @@ pub(super) fn read_archive(path: &Path) -> Result<Entries, PackError> {
 
 /// Writes an archive unless it is there with the same contents. The same contents give the same
 /// bytes; a reader never sees half an archive.
-pub(super) fn write_archive(path: &Path, entries: &Entries) -> Result<(), PackError> {
+pub(crate) fn write_archive(path: &Path, entries: &Entries) -> Result<(), PackError> {
     let mut sum = Sha256::new();
     for (name, content) in entries {
         sum.update((name.len() as u64).to_le_bytes());
@@ -133,7 +133,7 @@ pub(super) fn write_archive(path: &Path, entries: &Entries) -> Result<(), PackEr
     if old.is_some_and(|archive| archive.comment() == stamp.as_bytes()) {
         return Ok(());
     }
-    let draft = path.with_extension(format!("fmu.{}", std::process::id()));
+    let draft = path.with_extension(format!("draft.{}", std::process::id()));
     let written = write_entries(&draft, entries, stamp);
     let moved = written.and_then(|()| fs::rename(&draft, path));
     if moved.is_err() {
@@ -143,11 +143,20 @@ pub(super) fn write_archive(path: &Path, entries: &Entries) -> Result<(), PackEr
 }
 
 fn write_entries(path: &Path, entries: &Entries, stamp: String) -> io::Result<()> {
+    write_to(File::create(path)?, entries, stamp)?.sync_all()
+}
+
+/// An archive in memory.
+pub(super) fn archive_bytes(entries: &Entries) -> io::Result<Vec<u8>> {
+    Ok(write_to(Cursor::new(Vec::new()), entries, String::new())?.into_inner())
+}
+
+fn write_to<W: Write + Seek>(writer: W, entries: &Entries, stamp: String) -> io::Result<W> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .compression_level(Some(9))
         .last_modified_time(DateTime::default());
-    let mut archive = ZipWriter::new(File::create(path)?);
+    let mut archive = ZipWriter::new(writer);
     archive.set_comment(stamp).map_err(io::Error::from)?;
     for (name, content) in entries {
         if let Some(folder) = name.strip_suffix('/') {
@@ -162,5 +171,5 @@ fn write_entries(path: &Path, entries: &Entries, stamp: String) -> io::Result<()
         archive.start_file(name, options.unix_permissions(mode))?;
         archive.write_all(content)?;
     }
-    archive.finish()?.sync_all()
+    Ok(archive.finish()?)
 }

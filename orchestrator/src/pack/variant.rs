@@ -5,8 +5,8 @@ use std::{ops::Range, path::Path};
 use fmu_kit::resources::{START_VALUES, variant_token};
 use roxmltree::{Document, Node};
 
-use super::archive::{read_archive, write_archive};
-use super::error::PackError;
+use super::archive::{archive_bytes, read_archive, write_archive};
+use super::error::{PackError, file_error};
 
 /// A parameter that starts differently.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +53,20 @@ pub fn write_variant(
     entries.insert("modelDescription.xml".into(), changed.into_bytes());
     entries.insert(resource, table.into_bytes());
     write_archive(out, &entries)
+}
+
+/// The bytes of the FMU `original` with a further file in its resources.
+///
+/// # Errors
+/// When the original cannot be read.
+pub(crate) fn with_resource(
+    original: &Path,
+    name: &str,
+    content: Vec<u8>,
+) -> Result<Vec<u8>, PackError> {
+    let mut entries = read_archive(original)?;
+    entries.insert(format!("resources/{name}"), content);
+    archive_bytes(&entries).map_err(file_error(original))
 }
 
 /// The description with the values of some attributes replaced.

@@ -2,15 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::fmu::{FmiVersion, Options};
 use crate::library::FmuLibrary;
-use crate::master::{Algorithm, MasterError, Outcome, Pace, Simulation};
+use crate::master::{Algorithm, Ended, MasterError, Outcome, Pace, Simulation};
 use crate::motion::{self, Motion, Scaling};
-use crate::system::tuning::{Tuning, Wanted};
-use crate::system::{self, System, SystemFile, built_in};
+use crate::ssp;
+use crate::system::tuning::{self, Tuning, Wanted};
+use crate::system::{
+    self, Between, InputTable, Link, Origin, System, SystemFile, VariableName, built_in,
+};
+use crate::units::hint;
 
 /// What a run is asked to be; a manifest keeps it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -21,6 +26,9 @@ pub struct Request {
     pub plant: String,
     /// Specimen of a built-in system.
     pub specimen: String,
+    /// Computed structure under the specimen of a built-in system.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub structure: Option<String>,
     /// Parameters of a built-in system's controllers; absent: by its plant.
     #[serde(default)]
     pub tuning: Option<Tuning>,
@@ -39,12 +47,16 @@ pub struct Request {
     pub set: Vec<String>,
     /// Version of FMI of the project's own components.
     pub fmi: FmiVersion,
-    /// Order of calls.
-    pub algorithm: Algorithm,
+    /// Order of calls; absent: what the system says, otherwise in the order of dependencies.
+    #[serde(default)]
+    pub algorithm: Option<Algorithm>,
     /// Coupling step, s.
     pub step_s: Option<f64>,
     /// Length played, s.
     pub duration_s: Option<f64>,
+    /// Input tables, whose columns are named as the inputs that they drive.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inputs: Vec<PathBuf>,
 }
 
 /// How large a motion is played.
@@ -63,8 +75,10 @@ pub enum Scale {
 pub struct Prepared {
     /// The system.
     pub system: System,
-    /// The motion.
+    /// The motion; one without samples for a system that follows none.
     pub motion: Motion,
+    /// Order of calls.
+    pub algorithm: Algorithm,
     /// Coupling step, s.
     pub step: f64,
     /// Samples to play.
@@ -80,6 +94,7 @@ impl Request {
             system: system.to_string(),
             plant: built_in::DEFAULT_PLANT.to_string(),
             specimen: built_in::DEFAULT_SPECIMEN.to_string(),
+            structure: None,
             tuning: None,
             control_model: None,
             record: None,
@@ -88,9 +103,10 @@ impl Request {
             scaling: None,
             set: Vec::new(),
             fmi: FmiVersion::V3,
-            algorithm: Algorithm::default(),
+            algorithm: None,
             step_s: None,
             duration_s: None,
+            inputs: Vec::new(),
         }
     }
 }
@@ -111,31 +127,57 @@ impl Prepared {
     /// # Errors
     /// As [`Prepared::simulation`]; a run that ends early is no error.
     pub fn run(&self, algorithm: Algorithm) -> Result<Outcome, MasterError> {
-        Ok(self
+        let mut outcome = self
             .simulation(algorithm)?
-            .run(self.samples, Pace::Fastest, &mut |_| {}))
+            .run(self.samples, Pace::Fastest, &mut |_| {});
+        self.judge(&mut outcome);
+        Ok(outcome)
+    }
+
+    /// A run whose table does not follow at all is no complete one, though every step was made.
+    pub fn judge(&self, outcome: &mut Outcome) {
+        /// An error of so many times the motion's peak is no tracking.
+        const LOST: f64 = 5.0;
+        let column = |name: &str| outcome.record.column(name);
+        let (Some(table), Some(asked), Some(times)) = (
+            column("table.displacement"),
+            column("reference.displacement"),
+            column("time"),
+        ) else {
+            return;
+        };
+        let peak = self.motion.peak_displacement();
+        let errors = table
+            .iter()
+            .zip(&asked)
+            .map(|(x, wanted)| (x - wanted).abs());
+        let errors: Vec<f64> = errors.collect();
+        let first = errors.iter().position(|error| *error > LOST * peak);
+        let Some(first) = first.filter(|_| peak > 0.0 && outcome.ended.is_regular()) else {
+            return;
+        };
+        outcome.ended = Ended::Failed(MasterError::RanAway {
+            time: times[first],
+            error: errors.iter().copied().fold(0.0, f64::max),
+            peak,
+        });
     }
 }
+
+/// The coupling step of a system without a motion for which nothing else is said, s.
+const USUAL_STEP: f64 = 0.002;
+/// More samples than this are mistakes: a record of them would not fit into memory.
+const MOST_SAMPLES: f64 = 1e10;
 
 /// Reads and checks everything that a request names.
 ///
 /// # Errors
 /// Whatever is at fault.
 pub fn prepare(request: &Request) -> Result<Prepared, Error> {
-    let file = if is_file(&request.system) {
-        SystemFile::read(Path::new(&request.system))?
-    } else {
-        built_in::system(
-            &request.system,
-            &request.plant,
-            &request.specimen,
-            Wanted {
-                tuning: request.tuning,
-                model: request.control_model.as_deref(),
-                rules: None,
-            },
-        )?
-    };
+    let mut file = system_file(request)?;
+    if let Some(structure) = &request.structure {
+        built_in::add_structure(&mut file, structure, &request.plant)?;
+    }
     prepare_file(request, &file)
 }
 
@@ -144,28 +186,218 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
 /// # Errors
 /// Whatever is at fault.
 pub fn prepare_file(request: &Request, file: &SystemFile) -> Result<Prepared, Error> {
-    let motion = motion(request, file)?;
-    let mut library = FmuLibrary::new(request.fmi, file.directory.as_deref());
-    let system = system::assemble(file, &request.set, &mut |name| library.find(name))?;
+    let mut file = file.clone();
+    let algorithm = algorithm(request, &file)?;
+    if algorithm == Algorithm::Jacobi {
+        tuning::know_jacobi(&mut file, !is_file(&request.system));
+    }
+    for path in &request.inputs {
+        drive(&mut file, path)?;
+    }
+    let follows = |link: &Link| matches!(link.from, Origin::Reference { .. });
+    let has_motion = request.record.is_some()
+        || request.reference.is_some()
+        || file.experiment.record.is_some()
+        || file.experiment.reference.is_some()
+        || file.connections.iter().any(follows);
+    let mut motion = match has_motion {
+        true => motion(request, &file)?,
+        false => no_motion(),
+    };
+    let mut library = FmuLibrary::of(request.fmi, &file);
+    let mut system = system::assemble(&file, &request.set, &mut |name| library.find(name))?;
+    if motion.is_empty() {
+        motion.dt = rest_step(request, &file, &system)?;
+    }
     let step = request.step_s.or(file.step()?).unwrap_or(motion.dt);
     let mut samples = motion.len();
-    if let Some(duration) = request.duration_s.or(file.duration()?) {
+    let mut duration = request.duration_s.or(file.duration()?);
+    if motion.is_empty() && duration.is_none() {
+        duration = Some(natural_end(&system)?);
+    }
+    if let Some(duration) = duration {
+        let fault = |reason: String| Error::Option {
+            option: "--duration",
+            reason,
+        };
         if !(duration >= motion.dt && duration.is_finite()) {
             let reason = format!("{duration} s is shorter than a sample of {} s", motion.dt);
-            return Err(Error::Option {
-                option: "--duration",
-                reason,
-            });
+            return Err(fault(reason));
         }
-        samples = samples.min((duration / motion.dt).round() as usize);
+        let count = (duration / motion.dt).round();
+        if count > MOST_SAMPLES {
+            return Err(fault(format!(
+                "{duration} s are {count:e} samples, too many"
+            )));
+        }
+        samples = count as usize;
+        if motion.is_empty() {
+            // A row at the end, too.
+            samples += 1;
+        } else if samples > motion.len() {
+            let ends = motion.len() as f64 * motion.dt;
+            let note = format!("the motion ends at {ends:.3} s; the table is asked to rest after");
+            rest_until(&mut motion, samples);
+            motion.notes.push(note.clone());
+            system.notes.push(note);
+        }
     }
     Ok(Prepared {
         system,
         motion,
+        algorithm,
         step,
         samples,
         options: Options::default(),
     })
+}
+
+/// The system that a request names.
+fn system_file(request: &Request) -> Result<SystemFile, Error> {
+    let name = &request.system;
+    if ssp::is_ssp(name) {
+        return Ok(ssp::read(name)?);
+    }
+    if is_fmu(name) {
+        return Ok(SystemFile::of_fmu(Path::new(name)));
+    }
+    if is_file(name) {
+        return Ok(SystemFile::read(Path::new(name))?);
+    }
+    let wanted = Wanted {
+        tuning: request.tuning,
+        model: request.control_model.as_deref(),
+        rules: None,
+    };
+    Ok(built_in::system(
+        name,
+        &request.plant,
+        &request.specimen,
+        wanted,
+    )?)
+}
+
+/// The order of calls: what was asked for, what the system says, or the usual one.
+fn algorithm(request: &Request, file: &SystemFile) -> Result<Algorithm, Error> {
+    if let Some(algorithm) = request.algorithm {
+        return Ok(algorithm);
+    }
+    let Some(name) = &file.experiment.algorithm else {
+        return Ok(Algorithm::default());
+    };
+    Algorithm::from_str(name, true).map_err(|_| {
+        let known: Vec<String> = Algorithm::value_variants()
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        let reason = format!("`{name}` is none of {}", known.join(", "));
+        file.at_fault("experiment.algorithm", reason).into()
+    })
+}
+
+/// Connects the columns of an input table to the inputs that bear their names: of components, as
+/// `component.input`, of a system with inputs of its own, or of a single component.
+fn drive(file: &mut SystemFile, path: &Path) -> Result<(), Error> {
+    let fault = |reason: String| Error::Option {
+        option: "--input",
+        reason,
+    };
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let is_taken = |name: &str| {
+        let own = file.own_tables.iter().any(|table| table.name == name);
+        own || file.components.contains_key(name) || file.tables.contains_key(name)
+    };
+    let mut name = stem.replace('.', "_");
+    while is_taken(&name) || name == "reference" {
+        name += "_";
+    }
+    let table = InputTable::read(&name, path, Between::Linear).map_err(fault)?;
+    let single = match file.components.len() {
+        1 => file.components.keys().next().cloned(),
+        _ => None,
+    };
+    for column in &table.columns {
+        let mut targets: Vec<VariableName> = file
+            .open_inputs
+            .iter()
+            .filter(|(input, _)| input == column)
+            .map(|(_, to)| to.clone())
+            .collect();
+        if targets.is_empty() {
+            let fitting = file.components.keys().filter_map(|component| {
+                let variable = column.strip_prefix(component)?.strip_prefix('.')?;
+                Some(VariableName::new(component, variable))
+            });
+            let longest = fitting.max_by_key(|name| name.component.len());
+            targets.extend(longest.or_else(|| {
+                let single = single.as_ref()?;
+                Some(VariableName::new(single, column))
+            }));
+        }
+        if targets.is_empty() {
+            let known = file.open_inputs.iter().map(|(input, _)| input.as_str());
+            return Err(fault(format!(
+                "{}: the column `{column}` is no input of the system{}; expected \
+                 `component.input`",
+                path.display(),
+                hint(column, known)
+            )));
+        }
+        for to in targets {
+            file.connect(Origin::output(&name, column), to);
+        }
+    }
+    file.own_tables.push(table);
+    Ok(())
+}
+
+/// No motion: without samples.
+fn no_motion() -> Motion {
+    Motion {
+        name: "none".to_string(),
+        dt: USUAL_STEP,
+        displacement: Vec::new(),
+        velocity: Vec::new(),
+        acceleration: Vec::new(),
+        notes: Vec::new(),
+        seed: None,
+    }
+}
+
+/// Time between rows where there is no motion: what was asked for, what the system says, or the
+/// smallest step that its FMUs would like.
+fn rest_step(request: &Request, file: &SystemFile, system: &System) -> Result<f64, Error> {
+    if let Some(step) = file.sampling()?.or(request.step_s).or(file.step()?) {
+        return Ok(step);
+    }
+    let parts = system.components.iter();
+    let wishes = parts.filter_map(|part| part.period.or(part.fmu.description.preferred_step));
+    let least = wishes.reduce(f64::min);
+    Ok(least.unwrap_or(USUAL_STEP))
+}
+
+/// How long a system without a motion runs when nothing is said, s: to the end of its input tables,
+/// or of the latest default experiment of its FMUs.
+fn natural_end(system: &System) -> Result<f64, Error> {
+    let tables = system.tables.iter().map(|table| table.end() - system.start);
+    let parts = system.components.iter();
+    let stops = parts.filter_map(|part| part.fmu.description.default_stop);
+    let end = tables.reduce(f64::max).or(stops.reduce(f64::max));
+    end.filter(|end| end.is_finite() && *end > 0.0)
+        .ok_or_else(|| Error::Option {
+            option: "--duration",
+            reason: "neither the system nor its FMUs say how long it runs; give it, such as \
+                     --duration \"10 s\""
+                .to_string(),
+        })
+}
+
+/// Lets a motion rest from its end until it has so many samples.
+fn rest_until(motion: &mut Motion, samples: usize) {
+    let last = motion.displacement.last().copied().unwrap_or(0.0);
+    motion.displacement.resize(samples, last);
+    motion.velocity.resize(samples, 0.0);
+    motion.acceleration.resize(samples, 0.0);
 }
 
 fn motion(request: &Request, file: &SystemFile) -> Result<Motion, Error> {
@@ -186,6 +418,10 @@ fn motion(request: &Request, file: &SystemFile) -> Result<Motion, Error> {
             .join(path)
     };
     let own = request.record.is_none() && request.reference.is_none();
+    if own && file.experiment.record.is_some() && file.experiment.reference.is_some() {
+        let reason = "record and reference are both given; which one shall be played?".to_string();
+        return Err(file.at_fault("experiment", reason).into());
+    }
     let record = request.record.clone();
     let record = record.or(file.experiment.record.as_ref().filter(|_| own).map(beside));
     let reference = request.reference.clone();
@@ -204,5 +440,11 @@ fn motion(request: &Request, file: &SystemFile) -> Result<Motion, Error> {
 
 /// Whether a system is named by a file.
 pub fn is_file(system: &str) -> bool {
-    system.ends_with(".toml") || system.contains(['/', '\\'])
+    let is_named = system.ends_with(".toml") || is_fmu(system) || ssp::is_ssp(system);
+    is_named || system.contains(['/', '\\'])
+}
+
+/// Whether a system is a single FMU.
+fn is_fmu(system: &str) -> bool {
+    system.to_lowercase().ends_with(".fmu")
 }

@@ -1,15 +1,18 @@
 //! The files of a run.
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use super::experiment::Prepared;
 use super::identity;
 use super::manifest::Manifest;
 use super::signals::{COLUMNS, RESULTS, columns, read_csv, write_columns, write_csv};
-use super::summary::{Summary, Table};
+use super::summary::{Summary, Table, asked};
 use crate::error::Error;
+use crate::fmu::hexadecimal;
 use crate::master::{Outcome, Record};
 use crate::motion::Motion;
 use crate::report::number::significant;
@@ -26,10 +29,20 @@ pub fn write(
     prepared: &Prepared,
     outcome: &Outcome,
     summary: &Summary,
-    manifest: &Manifest,
+    manifest: &mut Manifest,
 ) -> Result<Vec<PathBuf>, Error> {
     let mut results = Results::begin(folder)?;
-    results.write(RESULTS, |file| write_csv(&outcome.record, file))?;
+    let mut sum = Sha256::new();
+    results.write(RESULTS, |file| {
+        let mut both = Hashed {
+            file,
+            sum: &mut sum,
+        };
+        write_csv(&outcome.record, &mut both)
+    })?;
+    manifest.results_sha256 = hexadecimal(&sum.finalize());
+    // A page of an earlier run here would be another run's.
+    results.replaces(&["report.html"]);
     let columns = columns(&prepared.system, &outcome.record);
     results.write(COLUMNS, |file| write_columns(&columns, file))?;
     results.write_text("summary.json", &json(summary))?;
@@ -39,6 +52,24 @@ pub fn write(
         results.write_text("report.html", &page)?;
     }
     Ok(results.finish()?)
+}
+
+/// A file whose checksum is taken on the way.
+struct Hashed<'a, W> {
+    file: W,
+    sum: &'a mut Sha256,
+}
+
+impl<W: Write> Write for Hashed<'_, W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.sum.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 fn json(value: &impl Serialize) -> String {
@@ -54,6 +85,11 @@ fn page(
     record: &Record,
 ) -> Option<String> {
     let table = Table::find(manifest, record)?;
+    let asked = asked(record, motion);
+    let (motion, whole) = match &asked {
+        Some(asked) => (asked, asked.into()),
+        None => (motion, whole),
+    };
     let column = |output| record.column(&table.name(output)).unwrap_or_default();
     let row = |name: &str, value: String| (name.to_string(), Cell::from(value));
     let settings = vec![

@@ -5,11 +5,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::experiment::{Prepared, Request};
+use super::experiment::Prepared;
 use super::manifest::Manifest;
 use crate::error::Error;
-use crate::master::{Ended, Ending, Outcome, Record};
+use crate::master::{Ended, Ending, Outcome, RealTime, Record};
 use crate::metrics::{self, Tracking};
+use crate::motion::Motion;
 use crate::system::Origin;
 use crate::units::{self, INCH, STANDARD_GRAVITY};
 
@@ -48,6 +49,9 @@ pub struct Summary {
     pub tracking: Option<Tracking>,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// How the clock on the wall was kept; of a run in real time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub real_time: Option<RealTime>,
 }
 
 /// What stopped a run.
@@ -64,7 +68,10 @@ impl Trip {
         let cause = match ended {
             Ended::Interlock { cause, signal, .. } => cause.clone().unwrap_or(signal.clone()),
             Ended::Stopped { error, .. } => error.to_string(),
-            Ended::Complete | Ended::Terminated { .. } | Ended::Failed(_) => return None,
+            Ended::Complete
+            | Ended::Terminated { .. }
+            | Ended::Interrupted { .. }
+            | Ended::Failed(_) => return None,
         };
         Some(Self {
             time_s: ended.time()?,
@@ -102,12 +109,7 @@ impl Summary {
     }
 
     /// Measures a run.
-    pub fn new(
-        request: &Request,
-        prepared: &Prepared,
-        outcome: &Outcome,
-        manifest: &Manifest,
-    ) -> Self {
+    pub fn new(prepared: &Prepared, outcome: &Outcome, manifest: &Manifest) -> Self {
         let Prepared { system, motion, .. } = prepared;
         let mut warnings: Vec<String> = outcome
             .messages
@@ -122,10 +124,21 @@ impl Summary {
             .collect();
         let notes = system.notes.iter().chain(&outcome.notes);
         warnings.splice(0..0, notes.cloned());
-        let tracking = Table::find(manifest, &outcome.record).and_then(|table| {
+        let asked = asked(&outcome.record, motion);
+        let wanted = asked.as_ref().unwrap_or(motion);
+        let is_whole = outcome.record.len() < 2 || {
+            let times = outcome.record.column("time").unwrap_or_default();
+            times[1] - times[0] < 1.5 * motion.dt
+        };
+        let table = Table::find(manifest, &outcome.record).filter(|_| !motion.is_empty());
+        let tracking = table.and_then(|table| {
+            if !is_whole {
+                warnings.push("tracking is not measured on a thinned record".to_string());
+                return None;
+            }
             let displacement = outcome.record.column(&table.name("displacement"))?;
             let acceleration = outcome.record.column(&table.name("acceleration"))?;
-            match metrics::tracking(motion, &displacement, &acceleration) {
+            match metrics::tracking(wanted, &displacement, &acceleration) {
                 Ok(tracking) => Some(tracking),
                 Err(error) => {
                     warnings.push(format!("tracking cannot be measured: {error}"));
@@ -162,7 +175,7 @@ impl Summary {
             steps: outcome.steps,
             step_s: outcome.step,
             fmi: versions.join(" and "),
-            algorithm: request.algorithm.to_string(),
+            algorithm: prepared.algorithm.to_string(),
             wall_s: outcome.wall,
             real_time_factor: simulated / outcome.wall,
             ended: outcome.ended.kind(),
@@ -179,8 +192,24 @@ impl Summary {
                 .collect(),
             tracking,
             warnings,
+            real_time: outcome.real_time.clone(),
         }
     }
+}
+
+/// What a table is asked for, where that is not the motion itself: what a component computes that has
+/// the outputs `table_displacement`, `table_velocity` and `table_acceleration`.
+pub fn asked(record: &Record, motion: &Motion) -> Option<Motion> {
+    let mut columns = record.columns.iter();
+    let name = columns.find_map(|column| column.strip_suffix(".table_displacement"))?;
+    let column = |quantity| record.column(&format!("{name}.table_{quantity}"));
+    Some(Motion {
+        name: format!("{} through `{name}`", motion.name),
+        displacement: column("displacement")?,
+        velocity: column("velocity")?,
+        acceleration: column("acceleration")?,
+        ..motion.clone()
+    })
 }
 
 /// The component that is the table: `table`, or the first with a displacement, velocity and

@@ -2,6 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 
 use super::checked::{Component, DEFAULT_PERIOD, End, System};
@@ -11,8 +12,10 @@ use super::file::{ComponentFile, SystemFile};
 use super::link::{Link, Origin, VariableName};
 use super::lookup::{component_index, find, find_settable};
 use super::model;
+use super::table::InputTable;
 use super::value::{self, Setting, Value};
-use crate::fmu::{Causality, Fmu, Kind, Variability, Variable};
+use crate::fmu::{BaseUnit, Causality, Fmu, Kind, Variability, Variable};
+use crate::units::{Unit, hint};
 
 /// Finds the FMU of a component by what the system file calls it.
 pub type Library<'a> = dyn FnMut(&str) -> Result<Arc<Fmu>, Box<dyn std::error::Error>> + 'a;
@@ -32,10 +35,13 @@ pub fn assemble(
     if file.components.is_empty() {
         return Err(at("components".to_string(), "there is none".to_string()));
     }
+    let mut notes = file.notes.clone();
     let mut components = Vec::new();
     for (name, part) in &file.components {
         let place = format!("components.{name}");
-        if name == "reference" || name.is_empty() || name.contains('.') {
+        // Components of archives bear the names of the systems that they stand in before theirs.
+        let has_point = name.contains('.') && file.package.is_none();
+        if name == "reference" || name.is_empty() || has_point {
             let reason = "this name cannot be given to a component (`reference` is the motion, \
                           and `.` stands between component and variable)";
             return Err(at(place, reason.to_string()));
@@ -45,8 +51,9 @@ pub fn assemble(
             component: name.clone(),
             reason: error.to_string(),
         })?;
-        components.push(component(file, name, part, fmu, settings)?);
+        components.push(component(file, name, part, fmu, settings, &mut notes)?);
     }
+    let tables = tables(file)?;
     for setting in settings {
         set(&mut components, setting).map_err(|reason| SystemError::Place {
             origin: "command line".to_string(),
@@ -62,7 +69,7 @@ pub fn assemble(
         .collect();
     for link in &links {
         let wrong = |reason| file.fault(&link.place(), reason);
-        let connection = connect(&components, link).map_err(wrong)?;
+        let connection = connect(&components, &tables, link).map_err(wrong)?;
         let input = (connection.component, connection.input);
         if let Some(first) = driven.insert(input, link) {
             let (to, first) = (&link.to, &first.from);
@@ -70,7 +77,6 @@ pub fn assemble(
         }
         connections.push(connection);
     }
-    let mut notes = Vec::new();
     for (index, part) in components.iter_mut().enumerate() {
         let variables = &part.fmu.description.variables;
         part.inputs
@@ -93,6 +99,8 @@ pub fn assemble(
         description: file.description.clone(),
         components,
         connections,
+        tables,
+        start: file.experiment.start.unwrap_or(0.0),
         end,
         notes,
         stop,
@@ -153,6 +161,7 @@ fn whole_arrays(components: &[Component], link: &Link) -> Vec<Link> {
             let link = |(from, to)| Link {
                 from: Origin::Output(from),
                 to,
+                way: link.way.clone(),
                 line: link.line,
             };
             pairs.map(link).collect()
@@ -198,8 +207,8 @@ fn resized(
     }
     for setting in settings {
         if let Some((variable, text)) = setting.split_once('=')
-            && let Some((component, variable)) = variable.trim().split_once('.')
-            && component == name
+            && let Some(variable) = variable.trim().strip_prefix(name)
+            && let Some(variable) = variable.strip_prefix('.')
             && let Some(position) = structural(variable)
         {
             let variable = &description.variables[position];
@@ -311,23 +320,42 @@ fn component(
     part: &ComponentFile,
     fmu: Arc<Fmu>,
     settings: &[String],
+    notes: &mut Vec<String>,
 ) -> Result<Component, SystemError> {
     let at = |place: &str, reason| file.fault(&format!("components.{name}{place}"), reason);
     let fmu = resized(fmu, name, part, settings).map_err(|reason| at("", reason))?;
+    let fmu = with_units(fmu, part)
+        .map_err(|(variable, reason)| at(&format!(".units.{variable}"), reason))?;
     let description = &fmu.description;
     let mut parameters = Vec::new();
     if let Some(model) = &part.model {
         let set = model::parameters(model, description, file.directory.as_deref());
         parameters = set.map_err(|reason| at(".model", reason))?;
     }
+    let mut inputs = Vec::new();
     for (variable, written) in &part.parameters {
         let place = format!(".parameters.{variable}");
+        let is_known =
+            description.position(variable).is_some() || description.array(variable).is_some();
+        if file.is_lenient && !is_known {
+            let known = description
+                .of(Causality::Parameter)
+                .map(|index| description.variables[index].name.as_str());
+            notes.push(format!(
+                "`{name}` has no variable `{variable}`{}: that parameter is passed over",
+                hint(variable, known)
+            ));
+            continue;
+        }
         let found = find_settable(&fmu, variable).map_err(|reason| at(&place, reason))?;
         let read = values(&fmu, variable, found, written).map_err(|reason| at(&place, reason))?;
-        read.into_iter()
-            .for_each(|(position, value)| put(&mut parameters, position, value));
+        for (position, value) in read {
+            match description.variables[position].causality {
+                Causality::Input => put(&mut inputs, position, value),
+                _ => put(&mut parameters, position, value),
+            }
+        }
     }
-    let mut inputs = Vec::new();
     for (variable, written) in &part.inputs {
         let place = format!(".inputs.{variable}");
         let found = match description.array(variable) {
@@ -346,13 +374,84 @@ fn component(
         Some(written) => Some(value::time(written).map_err(|reason| at(".period", reason))?),
         None => sampled(&fmu).then(|| description.preferred_step.unwrap_or(DEFAULT_PERIOD)),
     };
+    let mut aliases = Vec::new();
+    for (alias, variable) in &part.aliases {
+        let place = format!(".aliases.{alias}");
+        let found = find(&fmu, variable, Causality::Output);
+        let found = found.map_err(|reason| at(&place, reason))?;
+        if description
+            .position(alias)
+            .is_some_and(|known| known != found)
+        {
+            let reason = format!("`{alias}` is a variable of it");
+            return Err(at(&place, reason));
+        }
+        aliases.push((alias.clone(), found));
+    }
     Ok(Component {
         name: name.to_string(),
         fmu,
         period,
         parameters,
         inputs,
+        aliases,
     })
+}
+
+/// The FMU with the units that the file gives to its variables.
+fn with_units(fmu: Arc<Fmu>, part: &ComponentFile) -> Result<Arc<Fmu>, (String, String)> {
+    if part.units.is_empty() {
+        return Ok(fmu);
+    }
+    let mut changed = Fmu::clone(&fmu);
+    for (variable, unit) in &part.units {
+        let fault = |reason: String| (variable.clone(), reason);
+        let found = fmu
+            .description
+            .array(variable)
+            .or_else(|| fmu.description.position(variable).map(|at| at..at + 1));
+        let found = found.ok_or_else(|| {
+            let known = fmu.description.variables.iter();
+            let known = known.map(|variable| variable.name.as_str());
+            fault(format!("no such variable{}", hint(variable, known)))
+        })?;
+        // A unit that only FMUs know is taken by its name.
+        let parsed = Unit::parse(unit).ok().and_then(|unit| unit.base_unit());
+        let base = parsed.map(|base| {
+            let [kg, m, s, a, k, mol, cd, _] = base.exponents;
+            BaseUnit {
+                exponents: [kg, m, s, a, k, mol, cd],
+                factor: base.factor,
+                offset: 0.0,
+            }
+        });
+        for position in found {
+            let variable = &mut changed.description.variables[position];
+            if !matches!(variable.kind, Kind::Float64 | Kind::Float32) {
+                let kind = variable.kind.name();
+                return Err(fault(format!("a {kind} has no unit")));
+            }
+            variable.unit = Some(unit.clone());
+            variable.base_unit = base;
+        }
+    }
+    Ok(Arc::new(changed))
+}
+
+/// The input tables of the file, read.
+fn tables(file: &SystemFile) -> Result<Vec<InputTable>, SystemError> {
+    let mut tables = file.own_tables.clone();
+    for (name, table) in &file.tables {
+        let at = |reason| file.fault(&format!("tables.{name}"), reason);
+        if name == "reference" || name.contains('.') || file.components.contains_key(name) {
+            let reason = "this name belongs to the motion or a component, or has a `.`";
+            return Err(at(reason.to_string()));
+        }
+        let place = file.directory.as_deref().unwrap_or(Path::new(""));
+        let read = InputTable::read(name, &place.join(&table.file), table.between);
+        tables.push(read.map_err(at)?);
+    }
+    Ok(tables)
 }
 
 /// Whether every output that depends directly on inputs changes at samples only: such a component
@@ -380,8 +479,22 @@ fn put(values: &mut Vec<(usize, Value)>, position: usize, value: Value) {
 fn set(components: &mut [Component], setting: &str) -> Result<(), String> {
     let expected = "expected component.variable=VALUE, such as control.valve_limit=\"5 V\"";
     let (name, text) = setting.split_once('=').ok_or(expected)?;
-    let (component, variable) = name.trim().split_once('.').ok_or(expected)?;
-    let index = component_index(components, component)?;
+    let name = name.trim();
+    // Components of archives have points in their names: the longest name that fits counts.
+    let fitting = components.iter().filter_map(|part| {
+        let variable = name.strip_prefix(&part.name)?.strip_prefix('.')?;
+        Some((part.name.as_str(), variable))
+    });
+    let longest = fitting.max_by_key(|(component, _)| component.len());
+    let longest = longest.map(|(component, variable)| (component.to_string(), variable));
+    let (component, variable) = match longest {
+        Some(found) => found,
+        None => {
+            let (component, variable) = name.split_once('.').ok_or(expected)?;
+            (component.to_string(), variable)
+        }
+    };
+    let index = component_index(components, &component)?;
     let part = &mut components[index];
     let fmu = part.fmu.clone();
     if variable == "model" && fmu.description.variable(variable).is_none() {

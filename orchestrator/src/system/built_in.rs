@@ -28,28 +28,37 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 5] = [
+const CONTROLLERS: [Part; 9] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
     part!("", "sliding-mode"),
     part!("", "mpc"),
+    part!("", "three-variable-compensated"),
+    part!("", "mpc-compensated"),
+    part!("", "lqg"),
+    part!("", "preview"),
 ];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [
     part!("plant/", "identified"),
     part!("plant/", "servohydraulic"),
 ];
-/// What stands on the table, with its mass in kg.
-const SPECIMENS: [(Part, fn() -> f64); 2] = [
+/// What controllers may know of a specimen: one storey or nothing.
+type Known = fn() -> Option<YieldingSpecimen>;
+/// What stands on the table.
+const SPECIMENS: [(Part, Known); 3] = [
     (part!("specimen/", "linear"), || {
-        LinearSpecimen::appendix_a().mass
+        Some(LinearSpecimen::appendix_a().into())
     }),
     (part!("specimen/", "yielding"), || {
-        YieldingSpecimen::default().mass
+        Some(YieldingSpecimen::default())
     }),
+    (part!("specimen/", "storeys"), || None),
 ];
-/// No specimen.
+/// Computed structures between the ground and the specimen.
+const STRUCTURES: [Part; 1] = [part!("structure/", "two-storeys")];
+/// No specimen, no structure.
 const NONE: &str = "none";
 
 /// The system run when none is named.
@@ -74,10 +83,50 @@ pub fn specimens() -> impl Iterator<Item = &'static str> {
     std::iter::once(NONE).chain(SPECIMENS.iter().map(|(part, _)| part.name))
 }
 
+/// Names of the computed structures, `none` among them.
+pub fn structures() -> impl Iterator<Item = &'static str> {
+    std::iter::once(NONE).chain(STRUCTURES.iter().map(|part| part.name))
+}
+
+/// Puts the computed structure `name` between the reference, which then is the ground's motion, and
+/// whatever follows it in the built-in system `file`, whose sensors stand where `plant` has them.
+///
+/// # Errors
+/// A name that is unknown.
+pub fn add_structure(file: &mut SystemFile, name: &str, plant: &str) -> Result<(), SystemError> {
+    if name == NONE {
+        return Ok(());
+    }
+    let part = STRUCTURES.iter().find(|part| part.name == name);
+    let mut structure = read("structure", part, name, structures())?;
+    if !file.components.contains_key("specimen") {
+        structure.disconnect("specimen");
+    }
+    structure.redirect(&plant_of(plant)?.instead);
+    file.follow("structure");
+    let adjust = std::mem::take(&mut file.adjust);
+    file.extend(structure);
+    file.extend(SystemFile {
+        adjust,
+        ..SystemFile::default()
+    });
+    file.name = format!("{}-on-{name}", file.name);
+    Ok(())
+}
+
 /// Whether a plant is a file, written as the built-in ones are: components `table` and what belongs to
 /// it, `instead` for what controllers are connected to.
 fn is_plant_file(plant: &str) -> bool {
     plant.ends_with(".toml")
+}
+
+/// The plant of a name or a file.
+fn plant_of(plant: &str) -> Result<SystemFile, SystemError> {
+    if is_plant_file(plant) {
+        return SystemFile::read(Path::new(plant));
+    }
+    let rig = PLANTS.iter().find(|part| part.name == plant);
+    read("plant", rig, plant, plants())
 }
 
 /// A plant's name as it is; a file's path absolute, so that it stays true elsewhere.
@@ -102,14 +151,10 @@ pub fn system(
     let controller = CONTROLLERS.iter().find(|part| part.name == name);
     let mut file = read("system", controller, name, names())?;
     file.origin = format!("{name} (built-in)");
-    let rig = if is_plant_file(plant) {
-        let rig = SystemFile::read(Path::new(plant))?;
+    let rig = plant_of(plant)?;
+    if is_plant_file(plant) {
         file.directory.clone_from(&rig.directory);
-        rig
-    } else {
-        let rig = PLANTS.iter().find(|part| part.name == plant);
-        read("plant", rig, plant, plants())?
-    };
+    }
     let mut on_table = None;
     if specimen != NONE {
         let found = SPECIMENS.iter().find(|(part, _)| part.name == specimen);
@@ -119,18 +164,21 @@ pub fn system(
             specimen,
             specimens(),
         )?;
-        on_table = Some((part, found.map(|found| found.1())));
+        on_table = Some((part, found.and_then(|found| found.1())));
     }
     if on_table.is_none() {
         file.disconnect("specimen");
     }
-    let mass = on_table.as_ref().and_then(|(_, mass)| *mass);
-    tuning::apply(&mut file, &rig, mass, wanted).map_err(|reason| file.fault("tuning", reason))?;
+    let own = on_table.as_ref().and_then(|(_, own)| own.as_ref());
+    tuning::apply(&mut file, &rig, own, wanted).map_err(|reason| file.fault("tuning", reason))?;
     file.redirect(&rig.instead);
     file.extend(rig);
     match on_table {
         None => file.disconnect("specimen"),
-        Some((specimen, _)) => file.extend(specimen),
+        Some((specimen, _)) => {
+            file.adjust.extend(specimen.adjust.clone());
+            file.extend(specimen);
+        }
     }
     file.name = name.to_string();
     Ok(file)

@@ -4,6 +4,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::link::{Link, Origin, Quantity, VariableName};
+use super::passage::{Passage, Way};
+use super::table::InputTable;
 use super::value::Value;
 use crate::fmu::{Datum, Fmu};
 
@@ -21,6 +23,10 @@ pub struct System {
     pub components: Vec<Component>,
     /// The connections.
     pub connections: Vec<Connection>,
+    /// Input tables.
+    pub tables: Vec<InputTable>,
+    /// Time at which it begins, s.
+    pub start: f64,
     /// What ends the run early.
     pub end: Option<End>,
     /// What the user should know of it.
@@ -53,6 +59,8 @@ pub struct Component {
     pub parameters: Vec<(usize, Value)>,
     /// Values of inputs that nothing drives.
     pub inputs: Vec<(usize, Value)>,
+    /// Further names of outputs in the results.
+    pub aliases: Vec<(String, usize)>,
 }
 
 impl Component {
@@ -60,6 +68,12 @@ impl Component {
     pub(crate) fn given(&self) -> HashMap<usize, &Value> {
         let given = self.parameters.iter().chain(&self.inputs);
         given.map(|(position, value)| (*position, value)).collect()
+    }
+
+    /// Further names of outputs: those that the system gives, and those of the FMU.
+    pub(crate) fn all_aliases(&self) -> impl Iterator<Item = (String, usize)> + '_ {
+        let own = self.aliases.iter().cloned();
+        own.chain(self.fmu.description.output_aliases())
     }
 
     /// The value of a variable before the run: what the system gives, or its own start value.
@@ -76,8 +90,8 @@ impl Component {
     }
 }
 
-/// A connection of a [`System`]: an input takes `factor` times the source's value plus `offset`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A connection of a [`System`]: an input takes what comes of the source's value on its way.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Connection {
     /// Where the value comes from.
     pub source: Source,
@@ -85,10 +99,8 @@ pub struct Connection {
     pub component: usize,
     /// Its input.
     pub input: usize,
-    /// Conversion between the units, 1 where they are the same.
-    pub factor: f64,
-    /// Added after the factor, in the input's unit; 0 but for temperatures and the like.
-    pub offset: f64,
+    /// Conversion between the units, and whatever else the system says.
+    pub passage: Passage,
 }
 
 /// Where a connection's value comes from.
@@ -108,6 +120,13 @@ pub enum Source {
         /// Position of the variable.
         variable: usize,
     },
+    /// A column of an input table.
+    Table {
+        /// The table.
+        table: usize,
+        /// The column.
+        column: usize,
+    },
 }
 
 impl System {
@@ -126,6 +145,10 @@ impl System {
                 component,
                 variable,
             } => Origin::Output(self.variable_name(component, variable)),
+            Source::Table { table, column } => {
+                let table = &self.tables[table];
+                Origin::output(&table.name, &table.columns[column])
+            }
         }
     }
 
@@ -134,6 +157,7 @@ impl System {
         self.connections.iter().map(|connection| Link {
             from: self.origin(connection.source),
             to: self.variable_name(connection.component, connection.input),
+            way: Way::default(),
             line: None,
         })
     }

@@ -26,14 +26,18 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::SystemError;
 use super::link::{self, Link, Origin, VariableName};
+use super::passage::{Hop, Transformation, Way};
 use super::rule::Rule;
+use super::table::{InputTable, TableFile};
 use super::value::{self, Setting};
+use crate::ssp::Package;
 
 /// A system by names, before they are looked up in its FMUs.
 #[derive(Debug, Clone, Default)]
@@ -46,6 +50,10 @@ pub struct SystemFile {
     pub connections: Vec<Link>,
     /// The components by name.
     pub components: BTreeMap<String, ComponentFile>,
+    /// Input tables by name; connections come from their columns.
+    pub tables: BTreeMap<String, TableFile>,
+    /// Input tables that are no files.
+    pub own_tables: Vec<InputTable>,
     /// In a plant: what controllers are connected to in place of `table.` and `specimen.`
     /// variables, such as the sensors' readings.
     pub instead: BTreeMap<VariableName, VariableName>,
@@ -59,6 +67,15 @@ pub struct SystemFile {
     pub origin: String,
     /// The file's directory, from which paths in it count.
     pub directory: Option<PathBuf>,
+    /// The archive that it came from, with its components.
+    pub package: Option<Arc<Package>>,
+    /// What the user should know of the file.
+    pub notes: Vec<String>,
+    /// Inputs of the whole system by name, with the inputs of components that they lead to.
+    pub open_inputs: Vec<(String, VariableName)>,
+    /// Whether parameters that a component has not are passed over with a note, as sets of
+    /// parameters for many components want it.
+    pub is_lenient: bool,
 }
 
 /// The TOML of a system.
@@ -69,11 +86,12 @@ struct Written {
     name: String,
     #[serde(default)]
     description: String,
-    /// `"component.output -> component.input"`.
     #[serde(default)]
-    connections: Vec<Spanned<String>>,
+    connections: Vec<Spanned<WrittenLink>>,
     #[serde(default)]
     components: BTreeMap<String, ComponentFile>,
+    #[serde(default)]
+    tables: BTreeMap<String, TableFile>,
     #[serde(default)]
     instead: BTreeMap<VariableName, VariableName>,
     #[serde(default)]
@@ -82,6 +100,67 @@ struct Written {
     commissioned: bool,
     #[serde(default)]
     experiment: ExperimentFile,
+}
+
+/// A connection in a system file.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected \"component.output -> component.input\", or { connect = \"...\", \
+                 factor = 1.0, offset = 0.0, convert_units = true }"
+)]
+enum WrittenLink {
+    /// `"component.output -> component.input"`.
+    Plain(String),
+    /// With what is done to the value.
+    With(LinkWith),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LinkWith {
+    connect: String,
+    #[serde(default = "one")]
+    factor: f64,
+    #[serde(default)]
+    offset: f64,
+    #[serde(default = "yes")]
+    convert_units: bool,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn yes() -> bool {
+    true
+}
+
+impl WrittenLink {
+    fn parts(&self) -> (&str, Way) {
+        match self {
+            Self::Plain(text) => (text, Way::default()),
+            Self::With(with) => {
+                let is_linear = with.factor != 1.0 || with.offset != 0.0;
+                let hop = Hop {
+                    end: None,
+                    suppresses_units: !with.convert_units,
+                    transformation: match is_linear {
+                        true => Transformation::Linear {
+                            factor: with.factor,
+                            offset: with.offset,
+                        },
+                        false => Transformation::None,
+                    },
+                };
+                let way = Way {
+                    start: None,
+                    hops: vec![hop],
+                };
+                (&with.connect, way)
+            }
+        }
+    }
 }
 
 /// A component in a system file.
@@ -107,6 +186,12 @@ pub struct ComponentFile {
     /// Values of inputs that no connection drives.
     #[serde(default)]
     pub inputs: BTreeMap<String, Setting>,
+    /// Units of variables, in place of what the FMU says.
+    #[serde(default)]
+    pub units: BTreeMap<String, String>,
+    /// Further names of outputs in the results, by name: `speed = "shaft.w"`.
+    #[serde(default)]
+    pub aliases: BTreeMap<String, String>,
 }
 
 /// The experiment in a system file; the command line goes before it.
@@ -122,6 +207,12 @@ pub struct ExperimentFile {
     /// How much of the motion is played, such as `"20 s"`.
     #[serde(default)]
     pub duration: Option<Setting>,
+    /// Time at which it begins, s.
+    #[serde(default)]
+    pub start: Option<f64>,
+    /// The order of calls that its parameters are for.
+    #[serde(default)]
+    pub algorithm: Option<String>,
     /// A record, relative to the system file.
     #[serde(default)]
     pub record: Option<String>,
@@ -191,6 +282,33 @@ impl SystemFile {
         }
     }
 
+    /// A system of a single FMU.
+    #[must_use]
+    pub fn of_fmu(path: &Path) -> Self {
+        let stem = path
+            .file_stem()
+            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let mut file = Self::new(&stem);
+        file.origin = path.display().to_string();
+        // A name that a connection can be written with.
+        let letters = stem.chars().map(|c| match c {
+            c if c.is_alphanumeric() || c == '_' || c == '-' => c,
+            _ => '_',
+        });
+        let mut name: String = letters.collect();
+        if name.is_empty() || name == "reference" {
+            name = "model".to_string();
+        }
+        file.add(&name, ComponentFile::new(&path.display().to_string()));
+        file
+    }
+
+    /// An error at a place in this file.
+    #[must_use]
+    pub fn at_fault(&self, place: &str, reason: String) -> SystemError {
+        self.fault(place, reason)
+    }
+
     /// Adds a component, in place of one of the same name.
     pub fn add(&mut self, name: &str, component: ComponentFile) {
         self.components.insert(name.to_string(), component);
@@ -201,6 +319,7 @@ impl SystemFile {
         self.connections.push(Link {
             from,
             to,
+            way: Way::default(),
             line: None,
         });
     }
@@ -217,25 +336,30 @@ impl SystemFile {
         let mut connections = Vec::new();
         for connection in &written.connections {
             let line = 1 + text[..connection.span().start].matches('\n').count();
-            let connection = connection.get_ref();
+            let (connection, way) = connection.get_ref().parts();
             let links = link::parse(connection, line);
-            connections.extend(links.map_err(|reason| SystemError::Place {
+            let links = links.map_err(|reason| SystemError::Place {
                 origin: origin.to_string(),
                 place: format!("connection `{connection}` (line {line})"),
                 reason,
-            })?);
+            })?;
+            connections.extend(links.into_iter().map(|link| Link {
+                way: way.clone(),
+                ..link
+            }));
         }
         Ok(Self {
             name: written.name,
             description: written.description,
             connections,
             components: written.components,
+            tables: written.tables,
             instead: written.instead,
             adjust: written.adjust,
             commissioned: written.commissioned,
             experiment: written.experiment,
             origin: origin.to_string(),
-            directory: None,
+            ..Self::default()
         })
     }
 
@@ -318,10 +442,24 @@ impl SystemFile {
         }
     }
 
+    /// Connects whatever takes the present reference to the motion that the component `structure` asks
+    /// a table for. What takes the reference ahead of time is left open: a structure that reacts to
+    /// what stands on it cannot tell.
+    pub fn follow(&mut self, structure: &str) {
+        self.connections.retain_mut(|link| {
+            if let Origin::Reference { quantity, ahead } = link.from {
+                link.from = Origin::output(structure, &format!("table_{}", quantity.name()));
+                return ahead == 0;
+            }
+            true
+        });
+    }
+
     /// Adds the components, connections and experiment of `part`; what `part` says goes before.
     pub fn extend(&mut self, part: Self) {
         self.connections.extend(part.connections);
         self.components.extend(part.components);
+        self.tables.extend(part.tables);
         for (name, parameters) in part.adjust {
             if let Some(component) = self.components.get_mut(&name) {
                 component.parameters.extend(parameters);
@@ -330,6 +468,8 @@ impl SystemFile {
         let (own, other) = (&mut self.experiment, part.experiment);
         own.sampling = other.sampling.or(own.sampling.take());
         own.step = other.step.or(own.step.take());
+        own.start = other.start.or(own.start.take());
+        own.algorithm = other.algorithm.or(own.algorithm.take());
         own.duration = other.duration.or(own.duration.take());
         own.record = other.record.or(own.record.take());
         own.reference = other.reference.or(own.reference.take());

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use super::passage::Way;
 use crate::fmu::BaseUnit;
 use crate::units::hint;
 
@@ -57,7 +58,7 @@ impl Quantity {
     }
 
     /// Its unit in SI.
-    pub(super) fn base_unit(self) -> BaseUnit {
+    pub(crate) fn base_unit(self) -> BaseUnit {
         let seconds = match self {
             Self::Displacement => 0,
             Self::Velocity => -1,
@@ -81,13 +82,15 @@ impl Quantity {
 }
 
 /// A connection by names, before they are looked up in the FMUs; as text `from -> to`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Link {
     /// Where the value comes from.
     pub from: Origin,
     /// The input that takes it.
     pub to: VariableName,
+    /// What is done to the value on its way, besides conversions between the FMUs' units.
+    pub way: Way,
     /// Line of the file that it stands in.
     pub line: Option<usize>,
 }
@@ -193,6 +196,7 @@ impl TryFrom<String> for Link {
         Ok(Self {
             from: from.parse()?,
             to: to.parse()?,
+            way: Way::default(),
             line: None,
         })
     }
@@ -234,6 +238,7 @@ pub(super) fn parse(text: &str, line: usize) -> Result<Vec<Link>, String> {
         Ok(Link {
             from: from.parse()?,
             to: to.parse()?,
+            way: Way::default(),
             line: Some(line),
         })
     };

@@ -10,10 +10,14 @@ pub enum Rule {
     DisplacementPid,
     /// The gain of force PID under sliding mode.
     ForcePid,
+    /// Model and weights of linear quadratic Gaussian control.
+    LinearQuadraticGaussian,
     /// All coefficients of loop shaping.
     LoopShaping,
     /// Model and weights of model predictive control.
     ModelPredictive,
+    /// Model, friction, specimen and weights of preview control.
+    Preview,
     /// Model and rates of sliding mode.
     SlidingMode,
     /// All gains of three-variable control.

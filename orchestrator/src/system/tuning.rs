@@ -8,13 +8,20 @@
 //! - loop shaping: [`Shaped::fastest`](controllers::synthesis::whole_plant::Shaped::fastest);
 //! - force loop, lambda and K of sliding mode: [`Hierarchy::tuned`](controllers::tuning::sliding_mode::Hierarchy::tuned),
 //!   the largest gain that leaves the whole hierarchy a margin of 6 dB on the model;
+//! - preview control: model, friction, delay and noise, with a feedback that
+//!   keeps a margin of 6 dB ([`preview::Parameters::tuned`]); of the specimen it knows mass and
+//!   damping, its stiffness a fifth too low and its yield force a fifth too high;
 //! - sliding mode and model predictive control have the model as theirs and know the delay; the
 //!   latter also knows the measurements' noise and weighs outputs in units of stroke, 20 in/s and
 //!   1 g.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
 
+use controllers::preview;
+use controllers::preview::feedback::Uncertainty;
+use controllers::preview::model::{Hydraulics, RigModel};
 use controllers::tuning::suite::{Member, Suite};
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +29,9 @@ use super::control_model::ControlModel;
 use super::file::{ComponentFile, SystemFile};
 use super::link::{Link, Origin};
 use super::rule::Rule;
+use super::value::Setting;
 use plant::identified::nominal::shake_table_values;
+use plant::specimens::YieldingSpecimen;
 
 /// Which parameters the controllers of a built-in system have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -45,19 +54,103 @@ pub struct Wanted<'a> {
     pub rules: Option<&'a Rules>,
 }
 
-/// Gives the controllers in `file` the parameters for `plant` with a specimen of that mass (kg).
+/// Tells the controllers in `file` that predict over a delay how many samples a master that steps
+/// all components from the same values adds: one for each sampled component that a value passes
+/// between measurement and valve. What a file says itself stays, but for a built-in system, whose
+/// delay is that of its rig.
+pub fn know_jacobi(file: &mut SystemFile, is_built_in: bool) {
+    let sampled = |name: &String| {
+        file.components
+            .get(name)
+            .is_some_and(|part| part.period.is_some())
+    };
+    let mut next: BTreeMap<&String, Vec<&String>> = BTreeMap::new();
+    for link in &file.connections {
+        if let Origin::Output(from) = &link.from {
+            next.entry(&from.component)
+                .or_default()
+                .push(&link.to.component);
+        }
+    }
+    let mut found: Vec<(String, i64)> = Vec::new();
+    for (name, part) in &file.components {
+        // Sliding mode counts from the measurement, the other from the loop below it.
+        let through = match part.fmu.as_str() {
+            "SlidingMode" => true,
+            "ModelPredictive" => false,
+            _ => continue,
+        };
+        let longest = |start: &String| longest_path(start, &next, &sampled, name, through);
+        let starts = file.components.keys().filter(|name| !sampled(name));
+        let hops = starts.filter_map(longest).max();
+        if let Some(hops) = hops {
+            found.push((name.clone(), hops));
+        }
+    }
+    for (name, hops) in found {
+        let Some(part) = file.components.get_mut(&name) else {
+            continue;
+        };
+        for (parameter, samples) in [("loop_delay_samples", hops), ("command_delay_samples", 1)] {
+            let own = match part.parameters.get(parameter) {
+                Some(Setting::Integer(own)) if is_built_in => *own,
+                Some(_) => continue,
+                None => 0,
+            };
+            part.set(parameter, own + samples);
+        }
+    }
+}
+
+/// Sampled components on the longest way from `at` to a component that is none, through the
+/// component `by` where `through` is set and past it otherwise.
+fn longest_path(
+    at: &String,
+    next: &BTreeMap<&String, Vec<&String>>,
+    sampled: &impl Fn(&String) -> bool,
+    by: &String,
+    through: bool,
+) -> Option<i64> {
+    fn walk<'a>(
+        at: &'a String,
+        next: &BTreeMap<&'a String, Vec<&'a String>>,
+        sampled: &impl Fn(&String) -> bool,
+        seen: &mut Vec<&'a String>,
+        fits: &impl Fn(&[&String]) -> bool,
+    ) -> Option<i64> {
+        let mut most = None;
+        for &to in next.get(at).into_iter().flatten() {
+            if !sampled(to) {
+                if !seen.is_empty() && fits(seen) {
+                    most = most.max(Some(seen.len() as i64));
+                }
+                continue;
+            }
+            if seen.contains(&to) {
+                continue;
+            }
+            seen.push(to);
+            most = most.max(walk(to, next, sampled, seen, fits));
+            seen.pop();
+        }
+        most
+    }
+    let fits = |seen: &[&String]| seen.contains(&by) == through;
+    walk(at, next, sampled, &mut Vec::new(), &fits)
+}
+
+/// Gives the controllers in `file` the parameters for `plant` with a specimen.
 ///
 /// # Errors
 /// A plant for which there is no tuning; a model that cannot be read or that a rule refuses.
 pub(super) fn apply(
     file: &mut SystemFile,
     plant: &SystemFile,
-    specimen_mass: Option<f64>,
+    specimen: Option<&YieldingSpecimen>,
     wanted: Wanted<'_>,
 ) -> Result<(), String> {
     if let Some(rules) = wanted.rules {
-        rules.apply(file, specimen_mass);
-        return Ok(());
+        return rules.apply(file, specimen);
     }
     let own;
     let rules = match (wanted.tuning, wanted.model, plant.commissioned) {
@@ -87,8 +180,7 @@ pub(super) fn apply(
             rules.as_ref().map_err(Clone::clone)?
         }
     };
-    rules.apply(file, specimen_mass);
-    Ok(())
+    rules.apply(file, specimen)
 }
 
 /// The component `name` compares late measurements with the reference of the same time.
@@ -102,11 +194,19 @@ fn delay_references(connections: &mut [Link], name: &str, delay: usize) {
     }
 }
 
+/// Stiffness of the specimen as a controller knows it, over the true one: before a test it is known
+/// within a fifth.
+const KNOWN_STIFFNESS: f64 = 0.8;
+/// As [`KNOWN_STIFFNESS`], for the yield force.
+const KNOWN_YIELD_FORCE: f64 = 1.2;
+
 /// All rules on a model.
 #[derive(Debug, Clone)]
 pub struct Rules {
     model: ControlModel,
     suite: Suite,
+    /// What keeps others from being tuned is no fault of theirs: a sentence then.
+    preview: Result<preview::Parameters, String>,
 }
 
 fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
@@ -122,13 +222,25 @@ impl Rules {
     /// A model for which a rule finds none.
     pub fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
         let suite = model.suite()?;
-        Ok(Self { model, suite })
+        let preview = preview_control(&model)
+            .tuned()
+            .map_err(|error| error.to_string());
+        Ok(Self {
+            model,
+            suite,
+            preview,
+        })
     }
 
-    /// Gives the controllers in `file` their parameters, under a specimen of that mass (kg) where the
+    /// Gives the controllers in `file` their parameters, under a specimen; its mass counts where the
     /// model knows of none.
-    fn apply(&self, file: &mut SystemFile, specimen_mass: Option<f64>) {
-        let specimen_mass = self.model.specimen_mass.or(specimen_mass);
+    fn apply(
+        &self,
+        file: &mut SystemFile,
+        specimen: Option<&YieldingSpecimen>,
+    ) -> Result<(), String> {
+        let mass = specimen.map(|specimen| specimen.mass);
+        let specimen_mass = self.model.specimen_mass.or(mass);
         for (name, component) in &mut file.components {
             match component.tuning {
                 None => {}
@@ -139,11 +251,16 @@ impl Rules {
                     self.model_predictive(component);
                     delay_references(&mut file.connections, name, self.model.delay);
                 }
+                Some(Rule::Preview) => self.preview(component, specimen)?,
+                Some(Rule::LinearQuadraticGaussian) => {
+                    self.linear_quadratic_gaussian(component)?;
+                }
                 Some(Rule::SlidingMode) => self.sliding_mode(component, specimen_mass),
                 Some(Rule::ThreeVariable) => self.named(component, Member::ThreeVariable),
                 Some(Rule::UnderPrediction) => self.under_prediction(component),
             }
         }
+        Ok(())
     }
 
     /// What the suite sets a controller to.
@@ -186,7 +303,106 @@ impl Rules {
         component.set("loop_delay_samples", self.model.delay as i64);
     }
 
+    /// Preview control's model, margins, noise, friction and specimen.
+    fn preview(
+        &self,
+        component: &mut ComponentFile,
+        specimen: Option<&YieldingSpecimen>,
+    ) -> Result<(), String> {
+        self.linear_quadratic_gaussian(component)?;
+        if let Some((own, shape)) = &self.model.hydraulics {
+            set(
+                component,
+                &[
+                    ("seal_friction", own.seal_friction),
+                    ("seal_presliding", shape.presliding),
+                    ("seal_excess", shape.excess),
+                    ("seal_stribeck_velocity", shape.stribeck_velocity),
+                    ("seal_sharpness", shape.sharpness),
+                    ("seal_relaxation", shape.relaxation),
+                ],
+            );
+        }
+        component.set("specimen_known", specimen.is_some());
+        if let Some(specimen) = specimen {
+            let columns = &specimen.columns;
+            let drift = columns.yield_displacement * KNOWN_YIELD_FORCE / KNOWN_STIFFNESS;
+            set(
+                component,
+                &[
+                    ("specimen_mass", specimen.mass),
+                    ("specimen_damping", specimen.damping),
+                    (
+                        "specimen_yield_force",
+                        columns.yield_force * KNOWN_YIELD_FORCE,
+                    ),
+                    ("specimen_yield_displacement", drift),
+                    ("specimen_post_yield_ratio", columns.post_yield_ratio),
+                ],
+            );
+        }
+        Ok(())
+    }
+
+    /// Preview control's model, margins and noise, without friction and specimen.
+    fn linear_quadratic_gaussian(&self, component: &mut ComponentFile) -> Result<(), String> {
+        let tuned = self.preview.as_ref().map_err(Clone::clone)?;
+        let noise = &self.model.noise;
+        self.model(component);
+        if let Some((own, _)) = &self.model.hydraulics {
+            component.set("hydraulics_known", true);
+            set(
+                component,
+                &[
+                    ("spool_lag", own.spool_lag),
+                    ("spool_inertia", own.spool_inertia),
+                    ("force_rate", own.force_rate),
+                    ("oil_stiffness", own.oil_stiffness),
+                    ("leakage_rate", own.leakage_rate),
+                    ("seal_damping", own.seal_damping),
+                ],
+            );
+        }
+        set(
+            component,
+            &[
+                ("command_weight", tuned.command_weight),
+                ("force_step", tuned.uncertainty.force_step),
+                ("displacement_measurement_noise", noise.displacement),
+                ("velocity_measurement_noise", noise.velocity),
+                ("acceleration_measurement_noise", noise.acceleration),
+            ],
+        );
+        component.set("loop_delay_samples", self.model.delay as i64);
+        Ok(())
+    }
+
     fn model(&self, component: &mut ComponentFile) {
         set(component, &shake_table_values(&self.model.rig));
+    }
+}
+
+/// Preview control of a model's rig, not yet tuned.
+fn preview_control(model: &ControlModel) -> preview::Parameters {
+    let usual = preview::Parameters::default();
+    let noise = &model.noise;
+    preview::Parameters {
+        rig: RigModel {
+            shake_table: model.rig,
+            hydraulics: model.hydraulics.map(|(own, _)| Hydraulics {
+                spool_lag: own.spool_lag,
+                spool_inertia: own.spool_inertia,
+                force_rate: own.force_rate,
+                oil_stiffness: own.oil_stiffness,
+                leakage_rate: own.leakage_rate,
+                seal_damping: own.seal_damping,
+            }),
+        },
+        delay: model.delay,
+        uncertainty: Uncertainty {
+            measurement: [noise.displacement, noise.velocity, noise.acceleration],
+            ..usual.uncertainty
+        },
+        ..usual
     }
 }

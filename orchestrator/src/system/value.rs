@@ -5,6 +5,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::passage::{End, Way};
 use crate::fmu::{Datum, Kind, Variable};
 use crate::units;
 
@@ -51,6 +52,18 @@ pub enum Setting {
     Text(String),
     /// Values of an array's elements, row after row.
     List(Vec<Self>),
+    /// A value in a unit that a file declares, with what is done to it on its way.
+    #[serde(skip)]
+    Declared(Box<Declared>),
+}
+
+/// A value of a parameter set, as it stands there, and its way to the variable.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Declared {
+    /// The value.
+    pub value: Setting,
+    /// Its unit and what is done to it.
+    pub way: Way,
 }
 
 impl From<bool> for Setting {
@@ -89,6 +102,10 @@ impl fmt::Display for Setting {
                 let all: Vec<String> = list.iter().map(Self::to_string).collect();
                 write!(f, "[{}]", all.join(", "))
             }
+            Self::Declared(declared) => match &declared.way.start {
+                Some(unit) => write!(f, "{} {}", declared.value, unit.name),
+                None => declared.value.fmt(f),
+            },
         }
     }
 }
@@ -103,7 +120,9 @@ impl Setting {
             Self::Number(number) => Ok(*number),
             Self::Integer(number) => Ok(*number as f64),
             Self::Text(text) => units::value_in(text, unit).map_err(|error| error.to_string()),
-            Self::Boolean(_) | Self::List(_) => Err(format!("`{self}` is no number in {unit}")),
+            Self::Boolean(_) | Self::List(_) | Self::Declared(_) => {
+                Err(format!("`{self}` is no number in {unit}"))
+            }
         }
     }
 }
@@ -120,6 +139,7 @@ pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, Stri
         ))
     };
     match (&variable.kind, written) {
+        (_, Setting::Declared(declared)) => read_declared(variable, declared),
         (Kind::Float64 | Kind::Float32, Setting::Number(number)) if number.is_finite() => {
             Ok(Value::Number(*number))
         }
@@ -180,6 +200,50 @@ pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, Stri
         }
         (Kind::Binary, _) => misfit("bytes in hexadecimal, such as \"00ff\""),
         (_, _) => misfit("nothing: clocks tick by themselves"),
+    }
+}
+
+/// A value of a parameter set: its unit is converted, then it is transformed as the file says.
+fn read_declared(variable: &Variable, declared: &Declared) -> Result<Value, String> {
+    let Declared { value, way } = declared;
+    let end = End {
+        kind: &variable.kind,
+        unit: variable.unit.as_deref(),
+        base: variable.base_unit,
+    };
+    // Without a unit of its own, it is in the variable's.
+    let start = if way.start.is_some() {
+        End {
+            unit: None,
+            base: None,
+            ..end
+        }
+    } else {
+        end
+    };
+    let passage = way.between(start, end)?;
+    let is_plain = passage.factor == 1.0 && passage.offset == 0.0 && passage.map.is_empty();
+    if is_plain {
+        return read(variable, value);
+    }
+    match value {
+        Setting::Number(number) => read(variable, &Setting::Number(passage.of(*number))),
+        Setting::Integer(number) if passage.map.is_empty() => {
+            read(variable, &Setting::Number(passage.of(*number as f64)))
+        }
+        Setting::Integer(number) => {
+            let mapped = passage.of(*number as f64);
+            read(variable, &Setting::Integer(mapped as i64))
+        }
+        Setting::Boolean(truth) => {
+            let mapped = passage.of(f64::from(u8::from(*truth)));
+            read(variable, &Setting::Boolean(mapped != 0.0))
+        }
+        Setting::Text(_) => match read(variable, value)? {
+            Value::Number(number) => Ok(Value::Number(passage.of(number))),
+            other => Ok(other),
+        },
+        Setting::List(_) | Setting::Declared(_) => Err(format!("`{value}` is no single value")),
     }
 }
 

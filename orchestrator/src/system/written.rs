@@ -29,6 +29,11 @@ impl Setting {
             Self::Number(number) => Value::Float(*number),
             Self::Text(text) => Value::String(text.clone()),
             Self::List(list) => Value::Array(list.iter().map(Self::to_toml).collect()),
+            // Its unit goes along as text where it has one.
+            Self::Declared(declared) => match &declared.way.start {
+                Some(_) => Value::String(self.to_string()),
+                None => declared.value.to_toml(),
+            },
         }
     }
 }
@@ -101,6 +106,15 @@ fn written(component: &ComponentFile) -> Table {
             let table: Table = settings
                 .iter()
                 .map(|(name, setting)| (name.clone(), setting.to_toml()))
+                .collect();
+            own.insert(key.into(), Value::Table(table));
+        }
+    }
+    for (key, names) in [("units", &component.units), ("aliases", &component.aliases)] {
+        if !names.is_empty() {
+            let table: Table = names
+                .iter()
+                .map(|(name, other)| (name.clone(), Value::String(other.clone())))
                 .collect();
             own.insert(key.into(), Value::Table(table));
         }

@@ -59,6 +59,13 @@ fn what_cannot_be_benchmarked_is_refused() {
         (["--data", "nowhere"], ["nowhere", "no such folder"]),
         (["--intensity", "-1"], ["--intensity", "positive"]),
         (["--corners", "0"], ["--corners", "standard deviations"]),
+        (
+            ["--hidden", "dealy=1 ms"],
+            ["--hidden", "did you mean `delay`"],
+        ),
+        (["--hidden", "delay"], ["EFFECT=VALUE", "valve_play"]),
+        (["--hidden", "delay=1 mm"], ["--hidden", "delay=1 mm"]),
+        (["--hidden", "valve_play=-1 mm"], ["--hidden", "valve_play"]),
     ] {
         let [option, value] = options;
         let argument = format!("{option}={value}");

@@ -12,9 +12,11 @@ mod diagnosis;
 mod failures;
 mod hostile;
 mod installation;
+mod iteration;
 mod motions;
 mod physical_rig;
 mod reports;
+mod rigs;
 mod systems;
 
 use std::path::Path;

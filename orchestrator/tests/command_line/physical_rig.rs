@@ -69,13 +69,16 @@ fn median(json: &Value, controller: &str) -> f64 {
         .unwrap()
 }
 
-/// No run ends early or leaves the stroke; displacement PID is the worst and model predictive control
-/// far from it.
+/// The controllers of the thesis.
+const THESIS: &str = "displacement-pid,three-variable,loop-shaping,sliding-mode,mpc";
+
+/// No run of `controllers` ends early or leaves the stroke; displacement PID is the worst, model
+/// predictive control far from it and preview control far from that.
 #[track_caller]
-fn holds_its_order(json: &Value, status: i32, said: &str) {
+fn holds_its_order(json: &Value, status: i32, said: &str, controllers: usize) {
     assert_eq!(status, 0, "{said}");
     let rows = json["rows"].as_array().unwrap();
-    assert_eq!(rows.len(), 40);
+    assert_eq!(rows.len(), 8 * controllers);
     for row in rows {
         assert_eq!(row["ended"], "complete", "{row}");
         assert!(
@@ -86,19 +89,23 @@ fn holds_its_order(json: &Value, status: i32, said: &str) {
     let all = ["mpc", "sliding-mode", "three-variable", "loop-shaping"];
     let medians = all.map(|controller| median(json, controller));
     let worst = median(json, "displacement-pid");
+    let best = median(json, "preview");
     println!(
-        "{}: {all:?} {medians:.2?} %, PID {worst:.2} %",
+        "{}: {all:?} {medians:.2?} %, PID {worst:.2} %, preview {best:.2} %",
         json["specimen"]
     );
     assert!(medians.iter().all(|own| *own < worst), "{medians:?}");
     assert!(medians[0] < 0.6 * worst, "{medians:?}");
+    assert!(best < 0.5 * medians[0], "{best}, {medians:?}");
 }
 
 #[test]
 fn with_every_specimen_no_run_ends_early_and_the_order_of_controllers_holds() {
+    let controllers = format!("{THESIS},preview");
     for specimen in ["none", "linear", "yielding"] {
-        let (status, json, said) = compare(&["--specimen", specimen]);
-        holds_its_order(&json, status, &said);
+        let (status, json, said) =
+            compare(&["--specimen", specimen, "--controllers", &controllers]);
+        holds_its_order(&json, status, &said, 6);
         assert_eq!(json["specimen"], specimen);
     }
 }
@@ -123,9 +130,10 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
     let Some(folder) = records() else { return };
     let records = folder.display().to_string();
     let (status, json, said) = compare(&["--specimen", "yielding", "--records", &records]);
-    holds_its_order(&json, status, &said);
-    // Stated in docs/physical-rig.md.
+    holds_its_order(&json, status, &said, 9);
+    // Stated in docs/physical-rig.md and docs/preview-control.md.
     for (controller, largest) in [
+        ("preview", 1.5),
         ("mpc", 5.5),
         ("three-variable", 6.5),
         ("sliding-mode", 7.5),
@@ -137,7 +145,9 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
 
 #[test]
 fn printed_tunings_that_are_unstable_on_this_rig_are_stopped_and_shown_as_stopped() {
-    let (status, json, said) = compare(&["--specimen", "yielding", "--tuning", "printed"]);
+    let arguments = ["--specimen", "yielding", "--tuning", "printed"];
+    let controllers = ["--controllers", THESIS];
+    let (status, json, said) = compare(&[&arguments[..], &controllers].concat());
     assert_eq!(status, 1);
     for controller in ["mpc", "sliding-mode"] {
         assert!(json["medians"][controller]["time_domain_percent"].is_null());

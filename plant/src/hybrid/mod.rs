@@ -11,6 +11,7 @@
 //! to sample k + 1, the plant under the held command, the substructure under the force measured
 //! one sample earlier.
 
+mod extended;
 mod frame;
 mod linear_step;
 mod perturbation;
@@ -18,6 +19,7 @@ mod sensors;
 mod substructure;
 mod transfer_system;
 
+pub use extended::{ExtendedTransferSystem, TransferSystemEffects};
 pub use frame::{BenchmarkCase, Frame, ReferenceFrame};
 pub use perturbation::{Deviation, corners};
 pub use sensors::{Converter, PublishedNoise, SensorNoise};

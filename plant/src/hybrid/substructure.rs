@@ -18,6 +18,7 @@ pub type GroundMotion = [f64; 3];
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NumericalSubstructure {
     order: usize,
+    period: f64,
     /// `2 n` rows of `2 n + 4`: states, force, ground acceleration thrice.
     step: Vec<f64>,
     /// `n` rows of `2 n + 1`: relative acceleration from states and force, without the ground's.
@@ -98,6 +99,7 @@ impl NumericalSubstructure {
         });
         Ok(Self {
             order: n,
+            period,
             step,
             acceleration,
             influence: influence.as_slice().to_vec(),
@@ -112,6 +114,17 @@ impl NumericalSubstructure {
         self.order
     }
 
+    /// Length of a step, s.
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// Goes on from where `other`, a substructure of the same frame, is.
+    pub fn resume(&mut self, other: &Self) {
+        self.state.clone_from(&other.state);
+        self.waiting.clone_from(&other.waiting);
+    }
+
     /// Displacements, m.
     pub fn displacements(&self) -> &[f64] {
         &self.state[..self.order]
@@ -123,11 +136,11 @@ impl NumericalSubstructure {
     }
 
     /// Total acceleration of degree of freedom `i`, m/s², under a ground acceleration of `ground`
-    /// and the force that is about to be fed.
-    pub fn total_acceleration(&self, i: usize, ground: f64) -> f64 {
+    /// and the force that is about to be fed: the oldest that waits, or `force` where none does.
+    pub fn total_acceleration(&self, i: usize, force: f64, ground: f64) -> f64 {
         let width = 2 * self.order + 1;
         let row = &self.acceleration[i * width..(i + 1) * width];
-        let force = self.waiting.first().copied().unwrap_or(0.0);
+        let force = self.waiting.first().copied().unwrap_or(force);
         let relative: f64 = row.iter().zip(&self.state).map(|(a, x)| a * x).sum();
         relative + row[width - 1] * force + (1.0 - self.influence[i]) * ground
     }
@@ -204,7 +217,7 @@ mod tests {
         let mut part = NumericalSubstructure::new(&frame, [0.0; 3], 0, 1, 1.0 / 4096.0).unwrap();
         part.step(1000.0, [0.0; 3]);
         assert_eq!(part.displacements(), [0.0; 3]);
-        assert!((part.total_acceleration(0, 0.0) + 1.0).abs() < 1e-12);
+        assert!((part.total_acceleration(0, 0.0, 0.0) + 1.0).abs() < 1e-12);
         part.step(0.0, [0.0; 3]);
         assert!(part.displacements()[0] < 0.0);
     }
@@ -214,7 +227,7 @@ mod tests {
         let frame = BenchmarkCase::ALL[2].frame();
         let part = NumericalSubstructure::new(&frame, [0.0; 3], 0, 1, 1.0 / 4096.0).unwrap();
         for i in 0..3 {
-            assert!(part.total_acceleration(i, 5.0).abs() < 1e-9);
+            assert!(part.total_acceleration(i, 0.0, 5.0).abs() < 1e-9);
         }
         let heavy = [frame.mass[(0, 0)] + 1.0, 0.0, 0.0];
         assert!(NumericalSubstructure::new(&frame, heavy, 0, 1, 1.0 / 4096.0).is_err());

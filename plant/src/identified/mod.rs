@@ -6,5 +6,6 @@ pub mod effects;
 pub mod extended_table;
 pub mod nominal;
 pub mod rig;
+pub mod seal_shape;
 pub mod shake_table;
 pub mod table;

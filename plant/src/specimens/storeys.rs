@@ -6,7 +6,7 @@ use crate::integration::{self, Dynamics};
 use crate::specimens::hysteresis::Hysteresis;
 
 /// The largest number of storeys.
-pub const MAX_STOREYS: usize = 5;
+pub const MAX_STOREYS: usize = 10;
 
 const STATES: usize = 4 * MAX_STOREYS;
 
@@ -46,7 +46,7 @@ impl Storeys {
             return Err(ModelError::Parameter {
                 name: "storeys",
                 value: self.count as f64,
-                expected: "a number of storeys from 1 to 5",
+                expected: "a number of storeys from 1 to 10",
             });
         }
         self.storey[..self.count]

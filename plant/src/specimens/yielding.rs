@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use crate::ModelError;
 use crate::integration::{self, Dynamics};
 use crate::specimens::hysteresis::{BoucWen, Hysteresis};
+use crate::specimens::linear::LinearSpecimen;
 
 /// A storey that yields: `m (at + d'') + c d' + F(d, z) = 0`, with the force of a [`BoucWen`]
 /// spring.
@@ -93,6 +94,23 @@ impl Default for YieldingSpecimen {
     fn default() -> Self {
         // T = 0.5 s; the damping of the linear specimen of Appendix A, 5 %.
         Self::from_period(BoucWen::default(), 0.5, 0.05)
+    }
+}
+
+/// Columns that never yield.
+impl From<LinearSpecimen> for YieldingSpecimen {
+    fn from(linear: LinearSpecimen) -> Self {
+        const ANY_DRIFT: f64 = 0.1;
+        Self {
+            mass: linear.mass,
+            damping: linear.damping,
+            columns: BoucWen {
+                yield_force: linear.stiffness * ANY_DRIFT,
+                yield_displacement: ANY_DRIFT,
+                post_yield_ratio: 1.0,
+                ..BoucWen::default()
+            },
+        }
     }
 }
 

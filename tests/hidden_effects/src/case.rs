@@ -17,6 +17,7 @@ use crate::outside::Outside;
 use crate::plant::{NOMINAL, Plant};
 use crate::rig::{RATE, Rig};
 use crate::score::{Truth, TruthEffect, TruthValue};
+use crate::world::{Noises, World};
 
 /// What a case hides.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +47,8 @@ pub struct Settings {
     pub noise: f64,
     /// Seconds a record.
     pub duration: f64,
+    /// What disturbs the rig and its sensors.
+    pub world: World,
 }
 
 impl Settings {
@@ -56,6 +59,7 @@ impl Settings {
             mismatch: 0.01,
             noise: 1.0,
             duration: 20.0,
+            world: World::Plain,
         }
     }
 }
@@ -92,12 +96,6 @@ pub struct Case {
     mismatch: f64,
 }
 
-/// Standard deviations of displacement, acceleration, force, specimen acceleration, voltage.
-const NOISE: [f64; 5] = [0.0005, 1.5, 0.3, 1.0, 0.0005];
-/// Unseen voltage beside the command in standard deviations of the recorder's noise, and its
-/// corner in Hz, as the practice records have them.
-const DISTURBANCE: f64 = 8.0;
-const DISTURBANCE_CORNER: f64 = 30.0;
 const HEADER: &str = "time [s],valve_command [V],displacement [in],acceleration [in/s^2],\
     actuator_force [lbf],specimen_acceleration [in/s^2],reference [in]";
 
@@ -120,9 +118,9 @@ impl Case {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = ChaCha8Rng::seed_from_u64(seed ^ 0x9e37_79b9_7f4a_7c15);
         let plant = NOMINAL.perturbed(|| settings.mismatch * gauss(&mut normal));
-        let noise = NOISE.map(|n| n * settings.noise);
+        let noises = Noises::draw(settings.world, settings.noise, seed);
         let mut hidden = Hidden {
-            form: Form::draw(&mut rng),
+            form: Form::draw(&mut rng, settings.world),
             ..Hidden::default()
         };
         let any = |rng: &mut ChaCha8Rng| CATALOGUE[rng.random_range(0..CATALOGUE.len())];
@@ -192,7 +190,7 @@ impl Case {
                 } else {
                     hidden.clone()
                 };
-                let rows = play(&plant, present, reference, &noise, &mut normal);
+                let rows = play(&plant, present, reference, &noises, &mut normal);
                 Record {
                     name,
                     excitation,
@@ -220,7 +218,7 @@ impl Case {
         Self {
             records,
             truth,
-            noise,
+            noise: noises.stated,
             mismatch: settings.mismatch,
         }
     }
@@ -316,7 +314,7 @@ fn resolve_peak_command(hidden: &mut Hidden, plant: &Plant, reference: &[f64]) {
     let mut free = hidden.clone();
     free.effects.remove(i);
     let mut quiet = ChaCha8Rng::seed_from_u64(0);
-    let rows = play(plant, free, reference, &[0.0; 5], &mut quiet);
+    let rows = play(plant, free, reference, &Noises::none(), &mut quiet);
     let peak = rows.iter().fold(0.0f64, |m, row| m.max(row[1].abs()));
     hidden.effects[i].values[0] *= peak;
 }
@@ -325,39 +323,29 @@ fn play(
     plant: &Plant,
     hidden: Hidden,
     reference: &[f64],
-    noise: &[f64; 5],
+    noises: &Noises,
     rng: &mut ChaCha8Rng,
 ) -> Vec<[f64; 7]> {
     let n = reference.len();
     let at = |k: usize| reference[k.min(n - 1)];
     let mut rig = Rig::new(*plant, hidden);
     let mut law = Law::default();
-    // The valve adds a coloured voltage to what it is told, eight times the recorder's noise.
-    let corner = (-std::f64::consts::TAU * DISTURBANCE_CORNER / RATE).exp();
-    let mut disturbance = 0.0;
+    let mut noise = noises.start();
     (0..n)
         .map(|k| {
             let before = at(k.saturating_sub(1));
             let rate = (at(k + 1) - before) * RATE / 2.0;
             let curvature = (at(k + 1) - 2.0 * at(k) + before) * RATE * RATE;
             let true_values = rig.sample();
-            let x = true_values.x + noise[0] * gauss(rng);
-            let a = true_values.a + noise[1] * gauss(rng);
-            let f = true_values.f + noise[2] * gauss(rng);
-            let s = true_values.s + noise[3] * gauss(rng);
+            let x = noise.reading(0, true_values.x, rng);
+            let a = noise.reading(1, true_values.a, rng);
+            let f = noise.reading(2, true_values.f, rng);
+            let s = noise.reading(3, true_values.s, rng);
             let u = law.command([at(k), rate, curvature], x, a);
-            let fresh = DISTURBANCE * noise[4] * (1.0 - corner * corner).sqrt();
-            disturbance = corner * disturbance + fresh * gauss(rng);
-            rig.advance(u, disturbance);
-            [
-                k as f64 / RATE,
-                u + noise[4] * gauss(rng),
-                x,
-                a,
-                f,
-                s,
-                at(k),
-            ]
+            // The valve adds a coloured voltage to what it is told.
+            rig.advance(u, noise.disturbance(rng));
+            let shown = noise.reading(4, u, rng);
+            [k as f64 / RATE, shown, x, a, f, s, at(k)]
         })
         .collect()
 }

@@ -4,6 +4,8 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::world::World;
+
 /// Share of the cases whose forms are not the usual ones.
 pub const SHARE_OF_OTHER_FORMS: f64 = 0.2;
 
@@ -103,8 +105,9 @@ impl Default for Form {
 
 impl Form {
     /// Draws the details: always those that neither the read-me nor the practice records tell,
-    /// those that they do tell with the probability [`SHARE_OF_OTHER_FORMS`].
-    pub fn draw(rng: &mut ChaCha8Rng) -> Self {
+    /// those that they do tell with the probability [`SHARE_OF_OTHER_FORMS`], or always in the open
+    /// world.
+    pub fn draw(rng: &mut ChaCha8Rng, world: World) -> Self {
         let mut between = |low: f64, high: f64| low * (high / low).powf(rng.random_range(0.0..1.0));
         let untold = Self {
             stribeck_velocity: between(0.3, 1.0),
@@ -126,7 +129,7 @@ impl Form {
             foundation_mass: between(10.0, 14.0),
             ..untold
         };
-        let is_other = rng.random_bool(SHARE_OF_OTHER_FORMS);
+        let is_other = rng.random_bool(SHARE_OF_OTHER_FORMS) || world == World::Open;
         let chosen = if is_other { other } else { untold };
         let droops = [Droop::Hyperbola, Droop::Line, Droop::Exponential];
         let degradations = [

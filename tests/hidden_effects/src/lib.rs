@@ -14,6 +14,8 @@ pub mod outside;
 pub mod plant;
 pub mod rig;
 pub mod score;
+pub mod world;
 
 pub use case::{Case, Kind, Settings};
 pub use score::{Outcome, Truth, Verdict};
+pub use world::World;

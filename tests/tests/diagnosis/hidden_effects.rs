@@ -3,6 +3,7 @@
 use std::process::Command;
 
 use acceptance::hidden_suite::{Plan, rates, run_all, table};
+use hidden_effects::World;
 use hidden_effects::catalogue::LATER;
 
 #[test]
@@ -55,6 +56,7 @@ fn hidden_effects_are_found_and_nothing_where_nothing_is() {
         outside: 5,
         mismatch: vec![0.01],
         noise: vec![1.0],
+        world: World::Plain,
         verbose: false,
     };
     let results = run_all(&plan, |_| {});
@@ -88,6 +90,7 @@ fn effects_that_came_later_are_found_too() {
             outside: 0,
             mismatch: vec![0.01],
             noise: vec![1.0],
+            world: World::Plain,
             verbose: false,
         };
         let results = run_all(&plan, |_| {});

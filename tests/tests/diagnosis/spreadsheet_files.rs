@@ -174,7 +174,7 @@ fn every_file_reads_the_same(case: &Path) {
 }
 
 fn verdict(case: &Path) -> String {
-    let subject = Subject::read(case, &[]).unwrap();
+    let subject = Subject::read(case, &[], None).unwrap();
     let diagnosis = diagnose(&subject, Observer::none()).unwrap();
     serde_json::to_string(&diagnosis.report()).unwrap()
 }

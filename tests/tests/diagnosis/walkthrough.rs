@@ -24,7 +24,14 @@ fn figures_of_the_walkthrough_are_those_of_its_command() {
     Case::draw(7, &Settings::new(Kind::This("valve_dead_band")))
         .write(&place)
         .unwrap();
-    let report = diagnose(&place, &[], &folder.path().join("out"), Observer::none()).unwrap();
+    let report = diagnose(
+        &place,
+        &[],
+        None,
+        &folder.path().join("out"),
+        Observer::none(),
+    )
+    .unwrap();
 
     let quoted: Vec<&str> = page
         .lines()

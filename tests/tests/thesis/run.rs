@@ -12,7 +12,7 @@ use shakebench::run::experiment::{Request, prepare};
 
 fn play(request: &Request) -> Record {
     let prepared = prepare(request).unwrap();
-    let outcome = prepared.run(request.algorithm).unwrap();
+    let outcome = prepared.run(prepared.algorithm).unwrap();
     assert!(
         matches!(outcome.ended, Ended::Complete),
         "{}",
@@ -80,7 +80,7 @@ fn the_built_in_motion_is_played_by_every_system() {
 fn each_hop_of_a_jacobi_master_costs_a_sample() {
     let run = |algorithm| {
         play(&Request {
-            algorithm,
+            algorithm: Some(algorithm),
             specimen: "none".to_string(),
             ..Request::built_in("displacement-pid")
         })

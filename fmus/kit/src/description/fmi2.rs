@@ -4,101 +4,87 @@
 //! by their position, which is their value reference, too.
 
 use super::{
-    default_experiment, described, enumerations, initial_unknown, initial_unknowns, items,
-    log_categories, range, root, start, token, unit_definitions, unknown, xml::Element,
+    Interface, default_experiment, described, enumerations, initial_unknown, initial_unknowns,
+    items, log_categories, range, root, start, unit_definitions, unknown, xml::Element,
 };
-use crate::{
-    component::Component,
-    model::Model,
-    variable::{Access, Causality, Variable},
-};
+use crate::variable::{Row, Type};
 
-/// The model description of FMI 2.0.
-pub fn fmi2<C: Component>(model: &Model<C>) -> String {
-    let mut root = root::<C>("2.0", "guid", token(model));
-    if model.offers_model_exchange() {
+/// The model description of FMI 2.0 with a token.
+pub(super) fn text(interface: &Interface, token: &str) -> String {
+    let mut root = root(interface, "2.0", "guid", token);
+    if interface.offers_model_exchange() {
         root = root
-            .attribute("numberOfEventIndicators", C::EVENT_INDICATORS)
+            .attribute("numberOfEventIndicators", interface.event_indicators)
             .child(
-                abilities::<C>("ModelExchange").attribute("completedIntegratorStepNotNeeded", true),
+                abilities(interface, "ModelExchange")
+                    .attribute("completedIntegratorStepNotNeeded", true),
             );
     }
     let mut types = Element::new("TypeDefinitions");
-    for choices in enumerations(model) {
+    for choices in enumerations(&interface.rows) {
         types = types.child(
             Element::new("SimpleType")
                 .attribute("name", choices.name)
                 .child(items(Element::new("Enumeration"), &choices)),
         );
     }
-    root.child(
-        abilities::<C>("CoSimulation")
-            .attribute("canHandleVariableCommunicationStepSize", C::ANY_STEP_SIZE),
-    )
-    .children(unit_definitions(model))
+    let rows = interface.rows.iter().enumerate();
+    let variables = rows.map(|(i, row)| scalar(interface, i, row));
+    root.child(abilities(interface, "CoSimulation").attribute(
+        "canHandleVariableCommunicationStepSize",
+        interface.any_step_size,
+    ))
+    .children(unit_definitions(&interface.rows))
     .children((!types.is_empty()).then_some(types))
     .child(log_categories())
-    .child(default_experiment::<C>())
-    .child(
-        Element::new("ModelVariables").children(
-            model
-                .variables
-                .iter()
-                .enumerate()
-                .map(|(i, v)| scalar(model, i, v)),
-        ),
-    )
-    .child(structure(model))
+    .child(default_experiment(interface))
+    .child(Element::new("ModelVariables").children(variables))
+    .child(structure(interface))
     .document()
 }
 
-fn abilities<C: Component>(name: &str) -> Element {
+fn abilities(interface: &Interface, name: &str) -> Element {
     Element::new(name)
-        .attribute("modelIdentifier", C::NAME)
+        .attribute("modelIdentifier", interface.name)
         .attribute("canNotUseMemoryManagementFunctions", true)
         .attribute("canGetAndSetFMUstate", true)
         .attribute("canSerializeFMUstate", true)
-        .attribute("providesDirectionalDerivative", C::PARTIAL_DERIVATIVES)
+        .attribute(
+            "providesDirectionalDerivative",
+            interface.partial_derivatives,
+        )
 }
 
-fn scalar<C: Component>(model: &Model<C>, index: usize, variable: &Variable<C>) -> Element {
-    let typed = match &variable.access {
-        Access::Real(_) | Access::Within(_) | Access::Element(..) => Element::new("Real")
-            .optional("unit", variable.unit)
-            .optional("displayUnit", variable.display_unit),
-        Access::Integer(_) => Element::new("Integer"),
-        Access::Boolean(_) => Element::new("Boolean"),
-        Access::Text(_) => Element::new("String"),
-        Access::Choice(_, choices) => {
+fn scalar(interface: &Interface, index: usize, row: &Row) -> Element {
+    let typed = match row.kind {
+        Type::Real => Element::new("Real")
+            .optional("unit", row.declaration.unit)
+            .optional("displayUnit", row.declaration.display_unit),
+        Type::Integer => Element::new("Integer"),
+        Type::Boolean => Element::new("Boolean"),
+        Type::Text => Element::new("String"),
+        Type::Choice(choices) => {
             Element::new("Enumeration").attribute("declaredType", choices.name)
         }
     };
-    let state = model.state_of(index).map(|state| state + 1);
-    described("ScalarVariable", index, variable).child(
-        range(variable, typed)
-            .optional("start", start(variable))
-            .optional("derivative", state),
+    described("ScalarVariable", index, row.declaration).child(
+        range(row, typed)
+            .optional("start", start(row))
+            .optional("derivative", interface.state_of(index)),
     )
 }
 
-fn structure<C: Component>(model: &Model<C>) -> Element {
+fn structure(interface: &Interface) -> Element {
     let entry = |index: usize| {
-        unknown(
-            "Unknown",
-            "index",
-            index,
-            model.dependencies[index].iter().copied(),
-        )
+        let on = interface.dependencies[index].iter().copied();
+        unknown("Unknown", "index", index, on)
     };
-    let outputs = (0..model.variables.len())
-        .filter(|i| model.variables[*i].causality == Causality::Output)
-        .map(entry);
-    let derivatives = model.states.iter().map(|s| entry(s.derivative));
-    let initial = initial_unknowns(model)
+    let derivatives = interface.states.iter().map(|s| entry(s.derivative));
+    let initial = initial_unknowns(interface)
         .into_iter()
-        .map(|index| initial_unknown(model, "Unknown", "index", index));
+        .map(|index| initial_unknown(interface, "Unknown", "index", index));
     let lists = [
-        Element::new("Outputs").children(outputs),
+        Element::new("Outputs").children(interface.outputs().map(entry)),
         Element::new("Derivatives").children(derivatives),
         Element::new("InitialUnknowns").children(initial),
     ];

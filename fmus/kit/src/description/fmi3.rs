@@ -1,41 +1,33 @@
 //! `modelDescription.xml` of FMI 3.0.
 
 use super::{
-    default_experiment, described, enumerations, initial_unknown, initial_unknowns, items,
-    log_categories, range, root, start, token, unit_definitions, unknown, xml::Element,
+    Interface, default_experiment, described, enumerations, initial_unknown, initial_unknowns,
+    items, log_categories, range, root, start, unit_definitions, unknown, xml::Element,
 };
-use crate::{
-    component::Component,
-    model::Model,
-    variable::{Access, Causality, Variable},
-};
+use crate::variable::{Row, Type};
 
-/// The model description of FMI 3.0.
-pub fn fmi3<C: Component>(model: &Model<C>) -> String {
-    with_token(model, token(model))
-}
-
-/// The same with any token.
-pub(super) fn with_token<C: Component>(model: &Model<C>, token: &str) -> String {
-    let mut root = root::<C>("3.0", "instantiationToken", token);
-    if model.offers_model_exchange() {
-        root = root.child(abilities::<C>("ModelExchange"));
+/// The model description of FMI 3.0 with a token.
+pub(super) fn text(interface: &Interface, token: &str) -> String {
+    let mut root = root(interface, "3.0", "instantiationToken", token);
+    if interface.offers_model_exchange() {
+        root = root.child(abilities(interface, "ModelExchange"));
     }
     let mut types = Element::new("TypeDefinitions");
-    for choices in enumerations(model) {
+    for choices in enumerations(&interface.rows) {
         types = types.child(items(
             Element::new("EnumerationType").attribute("name", choices.name),
             &choices,
         ));
     }
-    root.child(
-        abilities::<C>("CoSimulation")
-            .attribute("canHandleVariableCommunicationStepSize", C::ANY_STEP_SIZE),
-    )
-    .children(unit_definitions(model))
+    let rows = interface.rows.iter().enumerate();
+    root.child(abilities(interface, "CoSimulation").attribute(
+        "canHandleVariableCommunicationStepSize",
+        interface.any_step_size,
+    ))
+    .children(unit_definitions(&interface.rows))
     .children((!types.is_empty()).then_some(types))
     .child(log_categories())
-    .child(default_experiment::<C>())
+    .child(default_experiment(interface))
     .child(
         Element::new("ModelVariables")
             .child(
@@ -47,63 +39,51 @@ pub(super) fn with_token<C: Component>(model: &Model<C>, token: &str) -> String 
                     .attribute("variability", "continuous")
                     .attribute("unit", "s"),
             )
-            .children(
-                model
-                    .variables
-                    .iter()
-                    .enumerate()
-                    .map(|(i, v)| typed(model, i, v)),
-            ),
+            .children(rows.map(|(i, row)| typed(interface, i, row))),
     )
-    .child(structure(model))
+    .child(structure(interface))
     .document()
 }
 
-fn abilities<C: Component>(name: &str) -> Element {
+fn abilities(interface: &Interface, name: &str) -> Element {
     Element::new(name)
-        .attribute("modelIdentifier", C::NAME)
+        .attribute("modelIdentifier", interface.name)
         .attribute("canGetAndSetFMUState", true)
         .attribute("canSerializeFMUState", true)
-        .attribute("providesDirectionalDerivatives", C::PARTIAL_DERIVATIVES)
-        .attribute("providesAdjointDerivatives", C::PARTIAL_DERIVATIVES)
+        .attribute(
+            "providesDirectionalDerivatives",
+            interface.partial_derivatives,
+        )
+        .attribute("providesAdjointDerivatives", interface.partial_derivatives)
 }
 
-fn typed<C: Component>(model: &Model<C>, index: usize, variable: &Variable<C>) -> Element {
-    let state = model.state_of(index).map(|state| state + 1);
-    let mut element = described(variable.access.type_name(), index, variable)
-        .optional("unit", variable.unit)
-        .optional("displayUnit", variable.display_unit);
-    if let Access::Choice(_, choices) = &variable.access {
+fn typed(interface: &Interface, index: usize, row: &Row) -> Element {
+    let mut element = described(row.kind.name(), index, row.declaration)
+        .optional("unit", row.declaration.unit)
+        .optional("displayUnit", row.declaration.display_unit);
+    if let Type::Choice(choices) = row.kind {
         element = element.attribute("declaredType", choices.name);
     }
-    element = range(variable, element).optional("derivative", state);
-    match (&variable.access, start(variable)) {
-        (Access::Text(_), Some(text)) => {
-            element.child(Element::new("Start").attribute("value", text))
-        }
+    element = range(row, element).optional("derivative", interface.state_of(index));
+    match (row.kind, start(row)) {
+        (Type::Text, Some(text)) => element.child(Element::new("Start").attribute("value", text)),
         (_, start) => element.optional("start", start),
     }
 }
 
-fn structure<C: Component>(model: &Model<C>) -> Element {
+fn structure(interface: &Interface) -> Element {
     let entry = |element: &str, index: usize| {
-        unknown(
-            element,
-            "valueReference",
-            index,
-            model.dependencies[index].iter().copied(),
-        )
+        let on = interface.dependencies[index].iter().copied();
+        unknown(element, "valueReference", index, on)
     };
-    let outputs = (0..model.variables.len())
-        .filter(|i| model.variables[*i].causality == Causality::Output)
-        .map(|i| entry("Output", i));
-    let derivatives = model
+    let outputs = interface.outputs().map(|i| entry("Output", i));
+    let derivatives = interface
         .states
         .iter()
         .map(|s| entry("ContinuousStateDerivative", s.derivative));
-    let initial = initial_unknowns(model)
+    let initial = initial_unknowns(interface)
         .into_iter()
-        .map(|index| initial_unknown(model, "InitialUnknown", "valueReference", index));
+        .map(|index| initial_unknown(interface, "InitialUnknown", "valueReference", index));
     Element::new("ModelStructure")
         .children(outputs)
         .children(derivatives)

@@ -2,30 +2,30 @@
 
 use std::fmt::Write;
 
-use super::{causality, start, variability, xml::escape};
-use crate::{component::Component, model::Model};
+use super::{Interface, causality, start, variability, xml::escape};
 
 /// A page that says what the component is and lists its variables.
-pub fn html<C: Component>(model: &Model<C>) -> String {
+pub(super) fn text(interface: &Interface) -> String {
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
          <style>body{{font:16px/1.5 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}}\
          table{{border-collapse:collapse}}td,th{{border:1px solid #ccc;padding:.2em .6em;\
          text-align:left}}</style>\n</head>\n<body>\n<h1>{name}</h1>\n<p>{about} (version \
          {version})</p>\n",
-        name = escape(C::NAME),
-        about = escape(C::DESCRIPTION),
-        version = escape(C::VERSION),
+        name = escape(interface.name),
+        about = escape(interface.description),
+        version = escape(interface.version),
     );
-    page.push_str(&prose(C::DOCUMENTATION));
+    page.push_str(&prose(interface.documentation));
     page.push_str(
         "<h2>Variables</h2>\n<table>\n<tr><th>Name</th><th>Meaning</th><th>Kind</th><th>Unit</th>\
          <th>Shown in</th><th>Start</th><th>Depends directly on</th></tr>\n",
     );
-    for (index, variable) in model.variables.iter().enumerate() {
-        let on: Vec<_> = model.dependencies[index]
+    for (row, dependencies) in interface.rows.iter().zip(interface.dependencies) {
+        let variable = row.declaration;
+        let on: Vec<_> = dependencies
             .iter()
-            .map(|(on, _)| model.variables[*on].name.as_str())
+            .map(|(on, _)| interface.rows[*on].declaration.name.as_str())
             .collect();
         let cells = [
             variable.name.clone(),
@@ -37,7 +37,7 @@ pub fn html<C: Component>(model: &Model<C>) -> String {
             ),
             variable.unit.unwrap_or_default().into(),
             variable.display_unit.unwrap_or_default().into(),
-            start(variable).unwrap_or_default(),
+            start(row).unwrap_or_default(),
             on.join(", "),
         ];
         page.push_str("<tr>");

@@ -6,18 +6,13 @@ mod html;
 mod terminals;
 mod xml;
 
-pub use fmi2::fmi2;
-pub use fmi3::fmi3;
-pub use html::html;
-pub use terminals::terminals;
-
 use std::collections::BTreeMap;
 
 use crate::{
     checksum::fingerprint,
     component::Component,
-    model::Model,
-    variable::{Access, Causality, Dependency, Enumeration, Variability, Variable},
+    model::{Model, State},
+    variable::{Causality, Declaration, Dependency, Enumeration, Row, Type, Value, Variability},
 };
 use units::{BaseUnit, Unit};
 use xml::Element;
@@ -25,21 +20,91 @@ use xml::Element;
 /// End of the default experiment, s.
 const STOP_TIME: f64 = 10.0;
 
+/// The model description of FMI 2.0.
+pub fn fmi2<C: Component>(model: &Model<C>) -> String {
+    fmi2::text(&Interface::of(model, &mut C::default()), token(model))
+}
+
+/// The model description of FMI 3.0.
+pub fn fmi3<C: Component>(model: &Model<C>) -> String {
+    fmi3::text(&Interface::of(model, &mut C::default()), token(model))
+}
+
+/// A page that says what the component is and lists its variables.
+pub fn html<C: Component>(model: &Model<C>) -> String {
+    html::text(&Interface::of(model, &mut C::default()))
+}
+
+/// `terminalsAndIcons.xml` of FMI 3.0.
+pub fn terminals<C: Component>(_model: &Model<C>) -> String {
+    terminals::text(C::TERMINALS)
+}
+
 /// The instantiation token (FMI 3.0) and GUID (FMI 2.0): a fingerprint of the interface.
 pub fn token<C: Component>(model: &Model<C>) -> &str {
-    model
-        .token
-        .get_or_init(|| fingerprint(&fmi3::with_token(model, "")))
+    let text = || fmi3::text(&Interface::of(model, &mut C::default()), "");
+    model.token.get_or_init(|| fingerprint(&text()))
+}
+
+/// All that is published of a component: its model without the ways to its fields, so that the
+/// descriptions are compiled once and not for every component.
+struct Interface<'a> {
+    name: &'static str,
+    description: &'static str,
+    documentation: &'static str,
+    version: &'static str,
+    step_size: f64,
+    any_step_size: bool,
+    partial_derivatives: bool,
+    event_indicators: usize,
+    rows: Vec<Row<'a>>,
+    dependencies: &'a [Vec<(usize, Dependency)>],
+    initial_dependencies: &'a [Vec<usize>],
+    states: &'a [State],
+}
+
+impl<'a> Interface<'a> {
+    fn of<C: Component>(model: &'a Model<C>, start: &mut C) -> Self {
+        Self {
+            name: C::NAME,
+            description: C::DESCRIPTION,
+            documentation: C::DOCUMENTATION,
+            version: C::VERSION,
+            step_size: C::STEP_SIZE,
+            any_step_size: C::ANY_STEP_SIZE,
+            partial_derivatives: C::PARTIAL_DERIVATIVES,
+            event_indicators: C::EVENT_INDICATORS,
+            rows: model.variables.iter().map(|v| v.row(start)).collect(),
+            dependencies: &model.dependencies,
+            initial_dependencies: &model.initial_dependencies,
+            states: &model.states,
+        }
+    }
+
+    fn offers_model_exchange(&self) -> bool {
+        !self.states.is_empty()
+    }
+
+    /// The value reference of the state whose derivative the variable at `index` is.
+    fn state_of(&self, index: usize) -> Option<usize> {
+        let mut states = self.states.iter();
+        states.find(|s| s.derivative == index).map(|s| s.state + 1)
+    }
+
+    /// Positions of the outputs.
+    fn outputs(&self) -> impl Iterator<Item = usize> {
+        (0..self.rows.len()).filter(|i| self.rows[*i].declaration.causality == Causality::Output)
+    }
 }
 
 /// The description's root, with the attributes that both versions have.
-fn root<C: Component>(version: &str, token_attribute: &str, token: &str) -> Element {
+fn root(interface: &Interface, version: &str, token_attribute: &str, token: &str) -> Element {
     Element::new("fmiModelDescription")
         .attribute("fmiVersion", version)
-        .attribute("modelName", C::NAME)
+        .attribute("modelName", interface.name)
         .attribute(token_attribute, token)
-        .attribute("description", C::DESCRIPTION)
-        .attribute("version", C::VERSION)
+        .attribute("description", interface.description)
+        .attribute("version", interface.version)
         .attribute("license", env!("CARGO_PKG_LICENSE"))
         .attribute(
             "generationTool",
@@ -49,7 +114,7 @@ fn root<C: Component>(version: &str, token_attribute: &str, token: &str) -> Elem
 }
 
 /// A variable's element, with the attributes that both versions have.
-fn described<C>(element: &str, index: usize, variable: &Variable<C>) -> Element {
+fn described(element: &str, index: usize, variable: &Declaration) -> Element {
     Element::new(element)
         .attribute("name", &variable.name)
         .attribute("valueReference", index + 1)
@@ -86,7 +151,7 @@ fn kind(dependency: Dependency) -> &'static str {
 }
 
 /// Attribute `initial`; inputs have none.
-fn initial<C>(variable: &Variable<C>) -> Option<&'static str> {
+fn initial(variable: &Declaration) -> Option<&'static str> {
     match variable.causality {
         Causality::Parameter => Some("exact"),
         Causality::Input => None,
@@ -95,38 +160,36 @@ fn initial<C>(variable: &Variable<C>) -> Option<&'static str> {
 }
 
 /// The start value, for variables that have one.
-fn start<C: Component>(variable: &Variable<C>) -> Option<String> {
-    if variable.is_computed() {
+fn start(row: &Row) -> Option<String> {
+    if row.declaration.is_computed() {
         return None;
     }
-    let mut start = C::default();
-    Some(match &variable.access {
-        Access::Real(field) => field(&mut start).to_string(),
-        Access::Within(place) => place(&mut start).to_string(),
-        Access::Element(field, index) => field(&mut start)[*index].to_string(),
-        Access::Integer(field) | Access::Choice(field, _) => field(&mut start).to_string(),
-        Access::Boolean(field) => field(&mut start).to_string(),
-        Access::Text(field) => field(&mut start).clone(),
-    })
+    match &row.start {
+        Value::Real(value) => Some(value.to_string()),
+        Value::Integer(value) => Some(value.to_string()),
+        Value::Boolean(value) => Some(value.to_string()),
+        Value::Text(value) => Some(value.clone()),
+        Value::Missing => None,
+    }
 }
 
-fn range<C>(variable: &Variable<C>, mut element: Element) -> Element {
+fn range(row: &Row, mut element: Element) -> Element {
     element = element
-        .optional("min", variable.min)
-        .optional("max", variable.max);
-    if variable.access.is_real() {
-        element = element.optional("nominal", variable.nominal);
+        .optional("min", row.declaration.min)
+        .optional("max", row.declaration.max);
+    if row.kind == Type::Real {
+        element = element.optional("nominal", row.declaration.nominal);
     }
     element
 }
 
 /// The units that the table uses, each with the display units that go with it.
-fn unit_definitions<C: Component>(model: &Model<C>) -> Option<Element> {
+fn unit_definitions(rows: &[Row]) -> Option<Element> {
     let mut units: BTreeMap<&str, Vec<&str>> = BTreeMap::from([("s", vec![])]);
-    for variable in &model.variables {
-        if let Some(unit) = variable.unit {
+    for Row { declaration, .. } in rows {
+        if let Some(unit) = declaration.unit {
             let shown = units.entry(unit).or_default();
-            shown.extend(variable.display_unit);
+            shown.extend(declaration.display_unit);
             shown.sort_unstable();
             shown.dedup();
         }
@@ -156,13 +219,13 @@ fn unit_definitions<C: Component>(model: &Model<C>) -> Option<Element> {
 }
 
 /// The distinct enumeration types of the table.
-fn enumerations<C: Component>(model: &Model<C>) -> Vec<Enumeration> {
+fn enumerations(rows: &[Row]) -> Vec<Enumeration> {
     let mut types: Vec<Enumeration> = Vec::new();
-    for variable in &model.variables {
-        if let Access::Choice(_, choices) = &variable.access
+    for row in rows {
+        if let Type::Choice(choices) = row.kind
             && !types.iter().any(|t| t.name == choices.name)
         {
-            types.push(*choices);
+            types.push(choices);
         }
     }
     types
@@ -192,24 +255,21 @@ fn log_categories() -> Element {
     categories
 }
 
-fn default_experiment<C: Component>() -> Element {
+fn default_experiment(interface: &Interface) -> Element {
     Element::new("DefaultExperiment")
         .attribute("startTime", 0)
         .attribute("stopTime", STOP_TIME)
-        .attribute("stepSize", C::STEP_SIZE)
+        .attribute("stepSize", interface.step_size)
 }
 
 /// Positions of the unknowns at initialization: outputs, states, derivatives.
-fn initial_unknowns<C: Component>(model: &Model<C>) -> Vec<usize> {
-    let in_states = |i: usize| {
-        model
-            .states
-            .iter()
-            .any(|s| s.state == i || s.derivative == i)
-    };
-    (0..model.variables.len())
-        .filter(|i| model.variables[*i].causality == Causality::Output || in_states(*i))
-        .collect()
+fn initial_unknowns(interface: &Interface) -> Vec<usize> {
+    let mut unknowns: Vec<usize> = interface.outputs().collect();
+    let states = interface.states.iter();
+    unknowns.extend(states.flat_map(|s| [s.state, s.derivative]));
+    unknowns.sort_unstable();
+    unknowns.dedup();
+    unknowns
 }
 
 /// An unknown with its dependencies; `reference` is the name of the identifying attribute.
@@ -230,13 +290,8 @@ fn unknown(
         .attribute("dependenciesKind", kinds.join(" "))
 }
 
-fn initial_unknown<C: Component>(
-    model: &Model<C>,
-    element: &str,
-    reference: &str,
-    index: usize,
-) -> Element {
-    let on = model.initial_dependencies[index].iter();
+fn initial_unknown(interface: &Interface, element: &str, reference: &str, index: usize) -> Element {
+    let on = interface.initial_dependencies[index].iter();
     unknown(
         element,
         reference,
@@ -286,7 +341,7 @@ mod tests {
         let token = super::token(model());
         assert_eq!(token, super::token(&Model::<Oscillator>::new().unwrap()));
         let mut other = Model::<Oscillator>::new().unwrap();
-        other.variables[0].description += "!";
+        other.variables[0].declaration.description += "!";
         assert_ne!(token, super::token(&other));
         assert_eq!(token.len(), 38);
     }

@@ -1,13 +1,13 @@
 //! `terminalsAndIcons/terminalsAndIcons.xml` of FMI 3.0.
 
 use super::xml::Element;
-use crate::{component::Component, model::Model};
+use crate::terminal::Terminal;
 
 /// Half the side of the square that the icon is drawn in.
 const EXTENT: i32 = 100;
 
-/// The icon's place, and the terminals of the component.
-pub fn terminals<C: Component>(_model: &Model<C>) -> String {
+/// The icon's place, and the terminals of a component.
+pub(super) fn text(terminals: &[Terminal]) -> String {
     let square = |name: &str| {
         Element::new(name)
             .attribute("x1", -EXTENT)
@@ -18,7 +18,7 @@ pub fn terminals<C: Component>(_model: &Model<C>) -> String {
     let picture = Element::new("GraphicalRepresentation")
         .child(square("CoordinateSystem").attribute("suggestedScalingFactorTo_mm", 0.1))
         .child(square("Icon"));
-    let terminals = C::TERMINALS.iter().map(|terminal| {
+    let terminals = terminals.iter().map(|terminal| {
         let members = terminal.members.iter().map(|(member, variable)| {
             Element::new("TerminalMemberVariable")
                 .attribute("variableName", variable)

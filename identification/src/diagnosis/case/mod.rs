@@ -2,9 +2,11 @@
 
 mod checks;
 mod nominal;
+mod template;
 
 pub use checks::{blind_spot, noise_ratios, problems, too_little_excitation};
 pub use nominal::{ControlLaw, Nominal};
+pub use template::template;
 
 use std::path::{Path, PathBuf};
 

@@ -54,6 +54,8 @@ pub struct ControlLaw {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    #[serde(default)]
+    units: Units,
     sample_rate: f64,
     actuator: Actuator,
     table: Oscillator,
@@ -61,6 +63,57 @@ struct File {
     controller: Option<Controller>,
     noise: Noise,
     uncertainty: Uncertainty,
+}
+
+/// Units of all numbers of the file.
+#[derive(Deserialize, Clone, Copy, PartialEq, Default)]
+#[serde(rename_all = "lowercase")]
+enum Units {
+    /// Inch, lbf, s, V.
+    #[default]
+    Laboratory,
+    /// m, N, kg, s, V.
+    Si,
+}
+
+impl File {
+    /// The same in the laboratory's units.
+    fn in_laboratory_units(mut self) -> Self {
+        if self.units == Units::Laboratory {
+            return self;
+        }
+        let in_units = |values: &mut [f64], unit: f64| values.iter_mut().for_each(|v| *v /= unit);
+        in_units(&mut self.actuator.voltage_to_force, LBF);
+        in_units(&mut self.actuator.velocity_to_force, LBF_S_PER_INCH);
+        for body in [Some(&mut self.table), self.specimen.as_mut()]
+            .into_iter()
+            .flatten()
+        {
+            body.mass /= LBF_S2_PER_INCH;
+            body.damping /= LBF_S_PER_INCH;
+            body.stiffness /= LBF_PER_INCH;
+        }
+        if let Some(c) = &mut self.controller {
+            // Volt over a length, here and there.
+            for gain in [
+                &mut c.proportional,
+                &mut c.integral,
+                &mut c.velocity_feedforward,
+                &mut c.acceleration_feedforward,
+                &mut c.velocity_feedback,
+                &mut c.acceleration_feedback,
+            ] {
+                *gain *= INCH;
+            }
+        }
+        let noise = &mut self.noise;
+        noise.displacement /= INCH;
+        noise.acceleration /= INCH;
+        noise.specimen_acceleration /= INCH;
+        noise.actuator_force /= LBF;
+        self.units = Units::Laboratory;
+        self
+    }
 }
 
 #[derive(Deserialize)]
@@ -110,12 +163,14 @@ struct Uncertainty {
 }
 
 impl Nominal {
-    /// Reads the text of a `nominal.toml` in inch, lbf, s, V; a sentence says what is wrong.
+    /// Reads the text of a `nominal.toml`, in inch, lbf, s, V or, where it says `units = "si"`, in SI;
+    /// a sentence says what is wrong.
     ///
     /// # Errors
     /// What is no TOML or has an unknown key, with line and column; values out of range.
     pub fn parse(text: &str) -> Result<Self, String> {
         let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
+        let file = file.in_laboratory_units();
         let lead = file.actuator.denominator[0];
         if lead.is_nan() || lead <= 0.0 {
             return Err("actuator.denominator: the leading coefficient must be positive".into());

@@ -3,53 +3,55 @@
 //!
 //! Forward, one effect a round: the one with which a model fitted to one half of the part predicts
 //! the other half best, both ways, as long as the gain is no chance when correlated samples are
-//! counted once. Backward at the end by the same test.
+//! counted once. Backward at the end by the same test. Every model in every comparison is the
+//! least-squares one ([`super::least_squares`]).
 
-use super::fit::{Fit, Jacobian, evaluate, fit, polish};
-use super::model::{ExtensibleModel, Point};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::least_squares::{
+    Columns, Free, SimulatedModel, Solution, all_errors, deviations, least_squares, solution,
+    squares,
+};
+use super::model::Point;
 use super::progress::{Observer, Progress, Step};
 use super::resampling::correlation_time;
 use super::search::{Selection, search};
-
-/// A model whose residuals are the errors of a simulation over a scale that the fit itself chooses.
-pub trait SimulatedModel: ExtensibleModel {
-    /// Errors (output's unit) at `point` on the samples of `record`.
-    fn errors(&self, point: &Point, record: usize) -> Vec<f64>;
-
-    /// The two records that are the halves of `record`.
-    fn folds(&self, record: usize) -> [usize; 2];
-
-    /// Error that counts as one.
-    fn scale(&self) -> f64;
-
-    /// The same model with another such error.
-    #[must_use]
-    fn with_scale(&self, scale: f64) -> Self
-    where
-        Self: Sized;
-}
 
 /// Standard deviations by which the likelihood of unseen data must rise. A dozen candidates are
 /// tried, so that one in a thousand times would be chance.
 const LEAST_DEVIATE: f64 = 3.0;
 /// Share of the squared error below which an effect is not worth a name.
-const LEAST_GAIN: f64 = 0.01;
+const LEAST_GAIN: f64 = 0.05;
 /// A candidate that gains this share of what the one taken gains is its rival.
 const RIVAL: f64 = 0.9;
+/// And what it leaves is at most so many times what that leaves.
+const LEAVES: f64 = 1.5;
+/// A candidate whose fit gains less than this share of the best one's is not tested on unseen data.
+const WORTH_TESTING: f64 = 0.7;
 /// Effects in one model.
 const MOST_EFFECTS: usize = 8;
 /// Candidates that are fitted to the end in a round.
-const FINALISTS: usize = 4;
+const FINALISTS: usize = 6;
+/// Starts of the nominal model beside the stated values, and how far they lie from these, in stated
+/// standard deviations.
+const OTHER_STARTS: usize = 6;
+const APART: f64 = 2.0;
+/// Seed of those starts.
+pub const STARTS_SEED: u64 = 15;
+/// Steps of a first look, of a fit to the end, and of one that begins near its end.
+const LOOK: usize = 6;
+const TO_THE_END: usize = 40;
+const AGAIN: usize = 12;
 
 /// A model fitted to a part.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct Simulated {
     /// Where.
     pub point: Point,
     /// Sum of squared errors on the part.
     pub squares: f64,
-    /// Independent samples among them.
-    pub samples: f64,
     /// Share of the squared error on unseen data that its last effect takes away.
     gain: f64,
 }
@@ -79,52 +81,97 @@ pub struct Selected {
     pub deviations: Vec<f64>,
 }
 
-fn simulated<M: SimulatedModel>(model: &M, fit: &Fit, record: usize) -> Simulated {
-    let errors = model.errors(&fit.point, record);
-    Simulated {
-        point: fit.point.clone(),
-        squares: squares(&errors),
-        samples: errors.len() as f64 / correlation_time(&errors),
-        gain: 0.0,
+impl From<Solution> for Simulated {
+    fn from(found: Solution) -> Self {
+        Self {
+            squares: squares(&found.errors),
+            point: found.point,
+            gain: 0.0,
+        }
     }
 }
 
-fn squares(errors: &[f64]) -> f64 {
-    errors.iter().map(|e| e * e).sum()
-}
-
-/// Error that counts as one, such that the cost has as many units as there are independent samples.
-fn scale_of(fitted: &Simulated) -> f64 {
-    (fitted.squares / fitted.samples)
-        .sqrt()
-        .max(f64::MIN_POSITIVE)
-}
-
-/// Fits everything from `start`, the error's scale once taken anew.
+/// Fits everything from `start`.
 fn settle<M: SimulatedModel>(
     model: &M,
     start: &Point,
-    scale: f64,
     record: usize,
-    rounds: usize,
+    steps: usize,
 ) -> Option<Simulated> {
-    let mut point = start.clone();
-    let mut scale = scale;
-    let mut settled = None;
-    for _ in 0..2 {
-        let scaled = model.with_scale(scale);
-        let begin = evaluate(&scaled, &point, &[record])?;
-        let fit = polish(&scaled, &begin, &[record], rounds).map_or(begin, |(fit, _)| fit);
-        let fitted = simulated(model, &fit, record);
-        point = fitted.point.clone();
-        let next = scale_of(&fitted);
-        settled = Some(fitted);
-        if (next / scale - 1.0).abs() < 0.2 {
-            break;
+    least_squares(model, start, record, &Free::All, steps).map(Simulated::from)
+}
+
+/// The model with the effects of `start`, fitted to `record` to the end, with the standard deviations
+/// of all coordinates.
+pub fn refit<M: SimulatedModel>(
+    model: &M,
+    start: &Point,
+    record: usize,
+) -> Option<(Simulated, Vec<f64>)> {
+    let found = least_squares(model, start, record, &Free::All, TO_THE_END)?;
+    let deviations = deviations(model, &found, record).unwrap_or_default();
+    Some((found.into(), deviations))
+}
+
+/// The nominal model, from the stated values and from others around them.
+pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated> {
+    let stated = Point {
+        nuisance: vec![0.0; model.nuisance()],
+        effects: Vec::new(),
+    };
+    let mut random = ChaCha8Rng::seed_from_u64(STARTS_SEED);
+    let mut starts = vec![stated.clone()];
+    for _ in 0..OTHER_STARTS {
+        let mut start = stated.clone();
+        for (i, p) in start.nuisance.iter_mut().enumerate() {
+            let off = random.random_range(-APART..APART);
+            // What differs from file to file begins as it is.
+            *p = if model.block_of(i).is_some() {
+                0.0
+            } else {
+                off
+            };
         }
-        scale = next;
+        starts.push(start);
     }
-    settled
+    let screen = model.screen(record);
+    let looked: Vec<Solution> = starts
+        .par_iter()
+        .filter_map(|start| least_squares(model, start, screen, &Free::All, LOOK))
+        .collect();
+    let first = looked.first()?.clone();
+    let best = looked
+        .into_iter()
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    // The look may have been at a part of the record only.
+    let ends: Vec<Simulated> = [first, best]
+        .par_iter()
+        .filter_map(|one| settle(model, &one.point, record, TO_THE_END))
+        .collect();
+    ends.into_iter()
+        .min_by(|a, b| a.squares.total_cmp(&b.squares))
+}
+
+/// `point`, of which the nuisance of a block that `fitted` does not tell is fitted to `tested`: a
+/// transducer's zero and the like belong to a file and not to the rig.
+pub fn completed<M: SimulatedModel>(
+    model: &M,
+    point: &Point,
+    fitted: Option<usize>,
+    tested: usize,
+) -> Point {
+    let open = |i: usize| {
+        let is_held = |block| {
+            model.samples(tested, block) == 0
+                || fitted.is_some_and(|fitted| model.tells(fitted, i, tested))
+        };
+        i < model.nuisance() && model.block_of(i).is_some_and(|block| !is_held(block))
+    };
+    if !(0..model.nuisance()).any(open) {
+        return point.clone();
+    }
+    least_squares(model, point, tested, &Free::Chosen(&open), AGAIN)
+        .map_or_else(|| point.clone(), |found| found.point)
 }
 
 /// What a model fitted to one fold gains on the other, both ways.
@@ -144,7 +191,13 @@ impl Inside {
     }
 }
 
-/// Compares two models by their errors from [`crossed`].
+/// Whether an effect with this `gain` rivals the one `taken`: it takes away nearly as much, and leaves
+/// little more.
+fn rivals(gain: f64, taken: f64) -> bool {
+    gain > RIVAL * taken && 1.0 - gain < LEAVES * (1.0 - taken)
+}
+
+/// Compares two models by their errors from [`CrossValidation::crossed`].
 fn compare(before: &[Vec<f64>; 2], after: &[Vec<f64>; 2]) -> Inside {
     let both = before
         .iter()
@@ -184,54 +237,114 @@ struct CrossValidation<'a, M: SimulatedModel> {
     without: Vec<Simulated>,
 }
 
-impl<M: SimulatedModel> CrossValidation<'_, M> {
+impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
+    fn new(model: &'a M, record: usize, observer: Observer<'a>) -> Self {
+        Self {
+            model,
+            record,
+            observer,
+            rivals: Vec::new(),
+            deviates: Vec::new(),
+            without: Vec::new(),
+        }
+    }
+
+    /// The effects that another search ends with, fitted here and without those that do not pay here.
+    fn end_of(&mut self, mut other: CrossValidation<'_, M>) -> Option<Simulated> {
+        let found = search(&mut other)?.best?;
+        self.rivals.append(&mut other.rivals);
+        let mut current = settle(self.model, &found.point, self.record, TO_THE_END)?;
+        while !current.point.effects.is_empty() {
+            match self.reduced(&current)? {
+                Some(smaller) => current = smaller,
+                None => break,
+            }
+        }
+        let named = !current.point.effects.is_empty() && !self.is_at_bound(&current.point);
+        named.then_some(current)
+    }
+
+    /// Whether `one` predicts each fold from the other better than `two` does.
+    fn predicts_better(&self, one: &Simulated, two: &Simulated) -> bool {
+        let sum = |fitted: &Simulated| {
+            let errors = self.crossed(fitted)?;
+            Some(errors.iter().map(|fold| squares(fold)).sum::<f64>())
+        };
+        matches!((sum(one), sum(two)), (Some(one), Some(two)) if one < two)
+    }
+
     /// Errors of `fitted` on each fold when its parameters are refitted to the other.
     fn crossed(&self, fitted: &Simulated) -> Option<[Vec<f64>; 2]> {
-        let [one, two] = self.model.folds(self.record);
-        let scale = scale_of(fitted);
+        let model = self.model;
+        let [one, two] = model.folds(self.record);
         let on_other = |own: usize, tested: usize| {
-            let refitted = settle(self.model, &fitted.point, scale, own, 2)?;
-            Some(self.model.errors(&refitted.point, tested))
+            let refitted = settle(model, &fitted.point, own, AGAIN)?;
+            let point = completed(model, &refitted.point, Some(own), tested);
+            Some(all_errors(model, &point, tested))
         };
-        Some([on_other(two, one)?, on_other(one, two)?])
+        let (first, second) = rayon::join(|| on_other(two, one), || on_other(one, two));
+        Some([first?, second?])
     }
 
     /// The extensions of `base` by one of `among` that fit best.
     fn fitted(&self, base: &Simulated, among: &[usize]) -> Option<Vec<(usize, Simulated)>> {
-        let record = self.record;
-        let scaled = self.model.with_scale(scale_of(base));
-        let candidates = scaled.candidates();
-        let start = evaluate(&scaled, &base.point, &[record])?;
-        let jacobian = Jacobian::at(&scaled, &start, &[record])?;
-        let mut quick: Vec<(usize, Fit)> = Vec::new();
-        for &effect in among {
-            let candidate = &candidates[effect];
-            let held =
-                |i: usize| i == effect || candidate.look_alikes.contains(&candidates[i].effect);
-            if base.point.effects.iter().any(|(i, _)| held(*i)) {
-                continue;
-            }
-            let best = candidate
-                .starts
-                .iter()
-                .filter_map(|values| {
-                    let mut point = base.point.clone();
-                    point.effects.push((effect, candidate.internal(values)));
-                    fit(&scaled, &point, &[record], &jacobian, 4)
-                })
-                .min_by(|a, b| a.cost.total_cmp(&b.cost));
-            quick.extend(best.map(|best| (effect, best)));
+        let (model, record) = (self.model, self.record);
+        let screen = model.screen(record);
+        let candidates = model.candidates();
+        // A model without an effect bends its parameters towards it: from the stated ones the way to
+        // the right effect may be straighter.
+        let mut stated = base.point.clone();
+        for (i, p) in stated.nuisance.iter_mut().enumerate() {
+            *p = if model.block_of(i).is_some() { *p } else { 0.0 };
         }
+        let bases: Vec<(Point, Columns)> = [base.point.clone(), stated]
+            .into_par_iter()
+            .filter_map(|point| {
+                let start = solution(model, &point, screen)?;
+                Some((point, Columns::at(model, &start, screen)?))
+            })
+            .collect();
+        let in_base = |effect: usize| {
+            let alike = candidates[effect].look_alikes;
+            let held = |i: usize| i == effect || alike.contains(&candidates[i].effect);
+            base.point.effects.iter().any(|(i, _)| held(*i))
+        };
+        let suggested = model.starts(&base.point, screen);
+        let mut quick: Vec<(usize, Solution)> = among
+            .par_iter()
+            .filter(|effect| !in_base(**effect))
+            .filter_map(|&effect| {
+                let candidate = &candidates[effect];
+                let own = suggested.iter().filter(|(i, _)| *i == effect);
+                let own = own.map(|(_, values)| values);
+                let values: Vec<&Vec<f64>> = candidate.starts.iter().chain(own).collect();
+                let starts = bases.iter().flat_map(|(base, frozen)| {
+                    values.iter().filter_map(move |values| {
+                        let mut point = base.clone();
+                        point.effects.push((effect, candidate.internal(values)));
+                        least_squares(model, &point, screen, &Free::Frozen(frozen), LOOK)
+                    })
+                });
+                let best = starts.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+                Some((effect, best))
+            })
+            .collect();
         quick.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-        let finished = quick.into_iter().take(FINALISTS);
-        Some(
-            finished
-                .filter_map(|(effect, quick)| {
-                    let settled = settle(self.model, &quick.point, scaled.scale(), record, 4)?;
-                    Some((effect, settled))
-                })
-                .collect(),
-        )
+        quick.truncate(FINALISTS);
+        let settled = quick.par_iter().filter_map(|(effect, quick)| {
+            let settled = settle(model, &quick.point, record, TO_THE_END)?;
+            Some((*effect, settled))
+        });
+        Some(settled.collect())
+    }
+
+    /// Whether an effect of `point` stands at a bound other than zero.
+    fn is_at_bound(&self, point: &Point) -> bool {
+        let candidates = self.model.candidates();
+        point
+            .effects
+            .iter()
+            .any(|(i, q)| candidates[*i].bound(q).is_some())
     }
 
     /// Whether `rival` in the place of the effect that `without` lacks gains nearly what that gains.
@@ -239,7 +352,7 @@ impl<M: SimulatedModel> CrossValidation<'_, M> {
         let (_, replaced) = self.fitted(without, &[rival])?.pop()?;
         let before = self.crossed(without)?;
         let gain = |fitted: &Simulated| Some(compare(&before, &self.crossed(fitted)?).gain);
-        Some(gain(&replaced)? > RIVAL * gain(current)?)
+        Some(rivals(gain(&replaced)?, gain(current)?))
     }
 
     fn tell(&self, fitted: &Simulated, inside: &Inside) {
@@ -264,14 +377,7 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
     type Hypothesis = Simulated;
 
     fn nominal(&self) -> Option<Simulated> {
-        let origin = Point {
-            nuisance: vec![0.0; self.model.nuisance()],
-            effects: Vec::new(),
-        };
-        let errors = self.model.errors(&origin, self.record);
-        let power = squares(&errors) / errors.len() as f64;
-        let scale = (power * correlation_time(&errors)).sqrt();
-        settle(self.model, &origin, scale, self.record, 6)
+        nominal(self.model, self.record)
     }
 
     fn effects(&self, fitted: &Simulated) -> usize {
@@ -284,9 +390,18 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
 
     fn extensions(&mut self, current: &Simulated, _: &[Simulated]) -> Option<Vec<Simulated>> {
         let all: Vec<usize> = (0..self.model.candidates().len()).collect();
+        let mut fitted = self.fitted(current, &all)?;
+        // What stands at its bound is never named, and stands in for something else.
+        fitted.retain(|(_, one)| !self.is_at_bound(&one.point));
+        let gained = |one: &Simulated| current.squares - one.squares;
+        let best = fitted.iter().map(|(_, one)| gained(one));
+        let best = best.fold(0.0, f64::max);
+        if best < LEAST_GAIN * current.squares {
+            return Some(Vec::new());
+        }
+        fitted.retain(|(_, one)| gained(one) > WORTH_TESTING * best);
         let before = self.crossed(current)?;
-        let mut tried: Vec<(Inside, Simulated)> = self
-            .fitted(current, &all)?
+        let mut tried: Vec<(Inside, Simulated)> = fitted
             .into_iter()
             .filter_map(|(_, mut fitted)| {
                 let inside = compare(&before, &self.crossed(&fitted)?);
@@ -305,7 +420,7 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
 
     fn round(&mut self, taken: &Simulated, lost: &[Simulated]) {
         let newest = |fitted: &Simulated| fitted.point.effects.last().map(|(i, _)| *i);
-        let near = lost.iter().filter(|one| one.gain > RIVAL * taken.gain);
+        let near = lost.iter().filter(|one| rivals(one.gain, taken.gain));
         self.rivals.extend(near.filter_map(|rival| {
             Some(Rival {
                 effect: newest(rival)?,
@@ -316,15 +431,17 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
 
     fn reduced(&mut self, current: &Simulated) -> Option<Option<Simulated>> {
         let after = self.crossed(current)?;
-        let mut compared = Vec::new();
-        self.without.clear();
-        for i in 0..current.point.effects.len() {
-            let mut point = current.point.clone();
-            point.effects.remove(i);
-            let smaller = settle(self.model, &point, scale_of(current), self.record, 3)?;
-            compared.push(compare(&self.crossed(&smaller)?, &after));
-            self.without.push(smaller);
-        }
+        let places = 0..current.point.effects.len();
+        let all: Option<Vec<(Inside, Simulated)>> = places
+            .map(|i| {
+                let mut point = current.point.clone();
+                point.effects.remove(i);
+                let smaller = settle(self.model, &point, self.record, TO_THE_END)?;
+                Some((compare(&self.crossed(&smaller)?, &after), smaller))
+            })
+            .collect();
+        let (compared, without): (Vec<Inside>, Vec<Simulated>) = all?.into_iter().unzip();
+        self.without = without;
         self.deviates = compared.iter().map(|inside| inside.deviate).collect();
         let least = (0..compared.len())
             .min_by(|&a, &b| compared[a].gain.total_cmp(&compared[b].gain))
@@ -339,15 +456,24 @@ pub fn select<M: SimulatedModel>(
     record: usize,
     observer: Observer<'_>,
 ) -> Option<Selected> {
-    let mut selection = CrossValidation {
-        model,
-        record,
-        observer,
-        rivals: Vec::new(),
-        deviates: Vec::new(),
-        without: Vec::new(),
-    };
-    let found = search(&mut selection)?;
+    let mut selection = CrossValidation::new(model, record, observer);
+    let mut found = search(&mut selection)?;
+    if model.is_cheap() {
+        // Free parameters may bend to stand in for an effect, and the first effects that are taken to
+        // straighten them again. With parameters held near what was stated the way is another; the
+        // end is fitted and judged as ever.
+        let held = model.held();
+        let begun = CrossValidation::new(&held, record, observer);
+        if let Some(other) = selection.end_of(begun)
+            && selection.predicts_better(&other, found.best.as_ref().unwrap_or(&found.nominal))
+        {
+            found.best = Some(other);
+        }
+        // What the last look backward left behind belongs to the one that was chosen.
+        if let Some(best) = &found.best {
+            selection.reduced(best)?;
+        }
+    }
     let nominal = found.nominal;
     let extended = found.best.unwrap_or_else(|| nominal.clone());
     // What came near while other effects were still missing may be far behind at the end.
@@ -365,11 +491,8 @@ pub fn select<M: SimulatedModel>(
             .unwrap_or(false),
         _ => false,
     });
-    let scaled = model.with_scale(scale_of(&extended));
-    let last = evaluate(&scaled, &extended.point, &[record])?;
-    let deviations = Jacobian::at(&scaled, &last, &[record])
-        .and_then(|jacobian| jacobian.deviations(&scaled, &last))
-        .unwrap_or_default();
+    let last = solution(model, &extended.point, record)?;
+    let deviations = deviations(model, &last, record).unwrap_or_default();
     Some(Selected {
         nominal,
         extended,

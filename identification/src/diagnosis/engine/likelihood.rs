@@ -79,17 +79,10 @@ fn price(candidates: &[Candidate], point: &Point) -> f64 {
 pub fn matters(candidates: &[Candidate], point: &Point) -> bool {
     point.effects.iter().all(|(i, internal)| {
         let candidate = &candidates[*i];
-        // Of an effect that holds another, only what it adds tells it from that one.
-        let held = candidate.contains;
-        let held = held.and_then(|name| candidates.iter().find(|c| c.effect == name));
-        let adds = |name: &str| {
-            held.is_none_or(|held| held.parameters.iter().all(|other| other.name != name))
-        };
         let mut sizes = candidate
             .parameters
             .iter()
             .zip(internal)
-            .filter(|(p, _)| adds(p.name))
             .filter_map(|(p, &q)| {
                 let Role::Size { weak } = p.role else {
                     return None;
@@ -360,16 +353,23 @@ impl<M: ExtensibleModel> Selection for PenalisedLikelihood<'_, M> {
     }
 
     fn reduced(&mut self, current: &Hypothesis) -> Option<Option<Hypothesis>> {
-        if self.effects(current) < 2 {
-            return Some(None);
+        let candidates = self.model.candidates();
+        let point = &current.fit.point;
+        let mut simpler: Vec<Point> = (0..point.effects.len())
+            .filter_map(|i| special_case(candidates, point, i))
+            .collect();
+        if point.effects.len() > 1 {
+            simpler.extend((0..point.effects.len()).map(|i| {
+                let mut without = point.clone();
+                without.effects.remove(i);
+                without
+            }));
         }
-        let without = (0..self.effects(current)).filter_map(|i| {
-            let mut point = current.fit.point.clone();
-            point.effects.remove(i);
-            let start = evaluate(self.model, &point, &self.records)?;
+        let simpler = simpler.iter().filter_map(|point| {
+            let start = evaluate(self.model, point, &self.records)?;
             self.hypothesis(&start)
         });
-        let smaller = without
+        let smaller = simpler
             .min_by(|a, b| a.score.total_cmp(&b.score))
             .filter(|smaller| smaller.score <= current.score);
         if let Some(smaller) = &smaller {
@@ -377,4 +377,27 @@ impl<M: ExtensibleModel> Selection for PenalisedLikelihood<'_, M> {
         }
         Some(smaller)
     }
+}
+
+/// `point` with its effect at `place` become the special case that it contains, if it does: what was
+/// taken first for a trace of another effect need not hold once that one is there.
+fn special_case(candidates: &[Candidate], point: &Point, place: usize) -> Option<Point> {
+    let (index, internal) = &point.effects[place];
+    let general = &candidates[*index];
+    let contained = general.contains?;
+    let special = candidates.iter().position(|c| c.effect == contained)?;
+    if point.effects.iter().any(|(i, _)| *i == special) {
+        return None;
+    }
+    let mut values = candidates[special].starts.first()?.clone();
+    for (value, parameter) in values.iter_mut().zip(&candidates[special].parameters) {
+        let pairs = general.parameters.iter().zip(general.values(internal));
+        let mut same = pairs.filter(|(own, _)| own.name == parameter.name);
+        if let Some((_, shared)) = same.next_back() {
+            *value = shared;
+        }
+    }
+    let mut simpler = point.clone();
+    simpler.effects[place] = (special, candidates[special].internal(&values));
+    Some(simpler)
 }

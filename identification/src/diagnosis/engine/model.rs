@@ -52,6 +52,9 @@ pub trait ExtensibleModel: Sync {
     ) -> bool;
 }
 
+/// Share of its range within which a parameter is at its bound.
+const AT_BOUND: f64 = 1e-3;
+
 /// Values of everything that can be estimated.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Point {
@@ -190,6 +193,22 @@ impl Candidate {
                 move |share| if shrinks { share * full } else { full }
             })
             .collect()
+    }
+
+    /// The first size among internal coordinates that stands at a bound other than zero.
+    pub fn bound(&self, internal: &[f64]) -> Option<&EffectParameter> {
+        let mut pairs = self.parameters.iter().zip(internal);
+        let found = pairs.find(|(parameter, q)| {
+            if matches!(parameter.role, Role::Shape { .. }) {
+                return false;
+            }
+            let [a, b] = [parameter.bounds.0, parameter.bounds.1]
+                .map(|value| parameter.scale.to_internal(value));
+            let near = AT_BOUND * (b - a).abs();
+            let at = |end: f64| end != 0.0 && (*q - end).abs() < near.max(1e-9 * end.abs());
+            at(a) || at(b)
+        });
+        found.map(|(parameter, _)| parameter)
     }
 
     /// Brings internal coordinates into the parameters' bounds.

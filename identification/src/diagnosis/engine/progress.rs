@@ -27,7 +27,7 @@ pub enum Step {
     Screened,
     /// It has one more effect.
     Extended,
-    /// It lacks an effect that no longer pays.
+    /// It lacks an effect, or what one has beyond its special case, that no longer pays.
     Reduced,
 }
 
@@ -47,14 +47,12 @@ impl fmt::Display for Progress {
                     Step::Reduced => "  reduced",
                 })?;
                 for (i, (effect, values)) in effects.iter().enumerate() {
-                    write!(
-                        f,
-                        "{} {effect} {values:.4?}",
-                        if i == 0 { ":" } else { " +" }
-                    )?;
+                    let values: Vec<String> = values.iter().map(|v| format!("{v:.4e}")).collect();
+                    let sign = if i == 0 { ":" } else { " +" };
+                    write!(f, "{sign} {effect} [{}]", values.join(", "))?;
                 }
                 for (i, (name, value)) in figures.iter().enumerate() {
-                    write!(f, "{} {name} {value:.5}", if i == 0 { ";" } else { "," })?;
+                    write!(f, "{} {name} {value:.4e}", if i == 0 { ";" } else { "," })?;
                 }
                 Ok(())
             }

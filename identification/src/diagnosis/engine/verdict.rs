@@ -3,7 +3,7 @@
 use super::adequacy::{self, Test};
 use super::fit::{Fit, Jacobian, evaluate, fit as refit, polish_to};
 use super::likelihood::{Hypothesis, PenalisedLikelihood, RIVAL_WITHIN, ROUNDS, SETTLED};
-use super::model::{ExtensibleModel, Point, Role};
+use super::model::{Candidate, ExtensibleModel, Point, Role};
 use super::progress::Observer;
 use super::search::{Found, search};
 use serde::{Deserialize, Serialize};
@@ -89,17 +89,13 @@ pub struct Judgement {
 
 /// Estimates of the effects at `point`, with `deviations` of all coordinates, nuisance first; not a
 /// number where they are unknown.
-pub fn estimates<M: ExtensibleModel>(
-    model: &M,
-    point: &Point,
-    deviations: &[f64],
-) -> Vec<NamedEffect> {
+pub fn estimates(candidates: &[Candidate], point: &Point, deviations: &[f64]) -> Vec<NamedEffect> {
     let mut deviations = deviations.iter().skip(point.nuisance.len());
     point
         .effects
         .iter()
         .map(|(i, internal)| {
-            let candidate = &model.candidates()[*i];
+            let candidate = &candidates[*i];
             let pairs = candidate.parameters.iter().zip(internal);
             NamedEffect {
                 effect: candidate.effect,
@@ -280,7 +276,7 @@ fn weigh<M: ExtensibleModel>(
         None => (best.fit.clone(), best.jacobian),
     };
     let deviations = jacobian.deviations(model, &all).unwrap_or_default();
-    let mut effects = estimates(model, &all.point, &deviations);
+    let mut effects = estimates(model.candidates(), &all.point, &deviations);
     let mut nuisance_errors = deviations;
     nuisance_errors.truncate(all.point.nuisance.len());
     for effect in &mut effects {

@@ -1,10 +1,13 @@
 //! Servo-hydraulic actuator in a closed displacement loop: command to displacement.
 //!
 //! Nominal: `τ u' = g r + o - u`, `e = u - x`, `x' = K e` (Merritt, Hydraulic Control Systems,
-//! 1967: a valve-controlled cylinder integrates, the loop closes it to one pole).
+//! 1967: a valve-controlled cylinder integrates, the loop closes it to one pole). The command runs
+//! evenly from sample to sample; the equations are integrated by the classical Runge-Kutta method.
+//!
+//! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
 
-use super::table::{effects, nominal_parameters, size};
-use super::{Equations, RigRecording};
+use super::table::{effects, nominal_parameters, session_parameters, size};
+use super::{Equations, Natural, RigRecording};
 use crate::data::Channel;
 
 /// The rig.
@@ -15,24 +18,35 @@ const COMMAND: Channel = Channel::Other {
     unit: "m",
 };
 
-const STEPS: usize = 1;
+/// The fastest pole times a step at most, and the most steps of a sample.
+const STIFFNESS: f64 = 0.5;
+const MOST_STEPS: f64 = 64.0;
 
 nominal_parameters! {
+    /// K: speed over position error.
     loop_gain: "1/s",
+    /// τ: lag of the command before the loop.
     command_lag: "s",
-    scale: "1",
-    offset: "m",
+    /// g: steady displacement over command.
+    scale: "1" = 1.0,
+    /// o: shift of the command.
+    offset: "m" = 0.0,
+}
+
+session_parameters! {
+    /// Of the displacement's transducer; of the first file the offset tells it.
+    zero: "m" within 0.05 as AgainstFirst,
 }
 
 effects! {
     /// r(t - T): conversion, computation and valve electronics.
     delay: Delay {
-        delay: size("s", 1e-3, (0.0, 0.05)),
-    } from [[2e-3], [6e-3]], like ["valve_lag"];
+        delay: size("s", 0.05, (0.0, 5.0)),
+    } from [[0.1], [0.3], [1.0]], like ["valve_lag"];
     /// Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
     dead_band: DeadBand {
-        half_width: size("m", 5e-6, (0.0, 1e-3)),
-    } from [[3e-5], [2e-4]];
+        half_width: size("m", 3e-3, (0.0, 3.0)),
+    } from [[0.02], [0.15]];
     /// Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
     /// of Hydraulic Servosystems, 1980).
     asymmetric_gain: AsymmetricGain {
@@ -40,20 +54,20 @@ effects! {
     } from [[0.03], [-0.03]];
     /// Spool: T w' = K e - w, x' = w.
     valve_lag: ValveLag {
-        time_constant: size("s", 1e-3, (0.0, 0.02)),
-    } from [[2e-3]], like ["delay"];
+        time_constant: size("s", 0.05, (0.0, 1.0)),
+    } from [[0.1], [0.3]], like ["delay"];
     /// Flow falls with speed as the load pressure rises: x' = w / (1 + |w| / s).
     flow_saturation: FlowSaturation {
-        compression: size("s/m", 0.2, (0.0, 50.0)),
-    } from [[1.0]];
+        compression: size("s/m", 0.01, (0.0, 5.0)),
+    } from [[0.05]];
     /// Transducer: y = x (1 + c x).
     sensor_curvature: SensorCurvature {
-        curvature: size("1/m", 2.0, (-200.0, 200.0)),
-    } from [[3.0], [-3.0]];
+        curvature: size("1/m", 3e-3, (-0.3, 0.3)),
+    } from [[5e-3], [-5e-3]];
     /// Transducer linkage: y follows x only beyond a gap.
     free_play: FreePlay {
-        gap: size("m", 1e-5, (0.0, 1e-3)),
-    } from [[4e-5]];
+        gap: size("m", 5e-3, (0.0, 1.0)),
+    } from [[0.03]];
     /// Disturbance n that command and output share in the recorder: the loop gets r - n, the
     /// record y = x + c n; n is what a median of five samples takes out of the command.
     shared_disturbance: SharedDisturbance {
@@ -65,14 +79,24 @@ impl Equations for ClosedLoopActuator {
     const KIND: &'static str = "closed_loop_actuator";
     type Nominal = Nominal;
     type Effects = Effects;
+    type Session = Session;
     const INPUTS: &'static [Channel] = &[COMMAND];
     const OUTPUT: Channel = Channel::Displacement;
+    const IS_SCALED: bool = true;
+
+    fn natural(nominal: &Nominal, channels: Natural) -> Natural {
+        Natural {
+            time: 1.0 / nominal.loop_gain,
+            ..channels
+        }
+    }
 
     fn simulate(
         &self,
         recording: &RigRecording,
         nominal: &Nominal,
         effects: &Effects,
+        session: &Session,
         out: &mut [f64],
     ) {
         let Nominal {
@@ -101,35 +125,107 @@ impl Equations for ClosedLoopActuator {
         let Some(&first) = loop_input.first() else {
             return;
         };
-        let h = recording.period() / STEPS as f64;
-        let keep = |time: f64| if time > 1e-5 { (-h / time).exp() } else { 0.0 };
-        let (keep_command, keep_valve) = (keep(lag), keep(valve));
-        let mut u = scale * first + offset;
-        let mut x = u;
-        let mut speed = 0.0;
-        let mut shown = x;
+        let sample = recording.period();
+        // A lag that the finest step does not see is none.
+        let shortest = sample / MOST_STEPS / STIFFNESS;
+        let pole = |time: f64| if time > shortest { 1.0 / time } else { 0.0 };
+        let (command_pole, valve_pole) = (pole(lag), pole(valve));
+        let fastest = (gain * (1.0 + asymmetry.abs()))
+            .max(command_pole)
+            .max(valve_pole);
+        let steps = (sample * fastest / STIFFNESS).ceil().clamp(1.0, MOST_STEPS);
+        let h = sample / steps;
         let last = loop_input.len() - 1;
+        let at = |place: f64| {
+            let place = (place - delay / sample).max(0.0);
+            let before = (place as usize).min(last);
+            let share = (place - before as f64).min(1.0);
+            let after = (before + 1).min(last);
+            scale * (loop_input[before] * (1.0 - share) + loop_input[after] * share) + offset
+        };
+        // Lagging command, displacement, flow of the valve.
+        let slope = |[u, x, w]: [f64; 3], r: f64| {
+            let u_now = if command_pole > 0.0 { u } else { r };
+            let error = u_now - x;
+            let open = (error.abs() - dead_band).max(0.0).copysign(error);
+            let flow = gain * (open + asymmetry * open.abs());
+            let flow = flow / (1.0 + compression * flow.abs());
+            let moving = if valve_pole > 0.0 { w } else { flow };
+            [command_pole * (r - u), moving, valve_pole * (flow - w)]
+        };
+        let mut state = [scale * first + offset, scale * first + offset, 0.0];
+        let mut shown = state[1];
         for (k, y) in out.iter_mut().enumerate() {
-            shown = shown.clamp(x - 0.5 * gap, x + 0.5 * gap);
-            *y = shown * (1.0 + curvature * shown);
+            let x = state[1];
+            // Not `clamp`, which panics where a model has left the finite.
+            shown = shown.max(x - 0.5 * gap).min(x + 0.5 * gap);
+            *y = shown * (1.0 + curvature * shown) + session.zero;
             if coupling != 0.0 {
                 *y += coupling * (command[k] - clean[k]);
             }
-            for step in 0..STEPS {
-                let place =
-                    k as f64 + (step as f64 + 0.5) / STEPS as f64 - delay / recording.period();
-                let place = place.max(0.0);
-                let before = (place as usize).min(last);
-                let share = place - before as f64;
-                let after = (before + 1).min(last);
-                let r = loop_input[before] * (1.0 - share) + loop_input[after] * share;
-                u = keep_command * u + (1.0 - keep_command) * (scale * r + offset);
-                let error = u - x;
-                let open = (error.abs() - dead_band).max(0.0).copysign(error);
-                let flow = gain * (open + asymmetry * open.abs());
-                let flow = flow / (1.0 + compression * flow.abs());
-                speed = keep_valve * speed + (1.0 - keep_valve) * flow;
-                x += h * speed;
+            for step in 0..steps as usize {
+                let place = k as f64 + step as f64 / steps;
+                let ends = [0.0, 0.5, 1.0].map(|part| at(place + part / steps));
+                state = runge_kutta(state, h, ends, slope);
+            }
+        }
+    }
+}
+
+/// One step of the classical Runge-Kutta method with the input at begin, middle and end.
+fn runge_kutta(
+    state: [f64; 3],
+    h: f64,
+    input: [f64; 3],
+    slope: impl Fn([f64; 3], f64) -> [f64; 3],
+) -> [f64; 3] {
+    let ahead = |by: f64, d: [f64; 3]| [0, 1, 2].map(|i| state[i] + by * d[i]);
+    let a = slope(state, input[0]);
+    let b = slope(ahead(0.5 * h, a), input[1]);
+    let c = slope(ahead(0.5 * h, b), input[1]);
+    let d = slope(ahead(h, c), input[2]);
+    [0, 1, 2].map(|i| state[i] + h / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::EffectTable;
+    use super::*;
+    use crate::data::Recording;
+
+    #[test]
+    fn a_step_is_the_closed_form_at_any_rate() {
+        // 1 / ((1 + τ s)(1 + s / K)) at 1 kHz and at 25 Hz, where K h = 2.
+        let (gain, lag) = (50.0, 0.005);
+        for rate in [1000.0, 100.0, 25.0] {
+            let n = 200;
+            let ramp: Vec<f64> = (0..n).map(|k| f64::from(k) / rate).collect();
+            let channels = vec![
+                (COMMAND, ramp),
+                (Channel::Displacement, vec![0.0; n as usize]),
+            ];
+            let recording = Recording::new("ramp", 1.0 / rate, channels).unwrap();
+            let recording =
+                RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
+            let nominal = Nominal {
+                loop_gain: gain,
+                command_lag: lag,
+                scale: 1.0,
+                offset: 0.0,
+            };
+            let mut out = vec![0.0; n as usize];
+            let off = Effects::off().unwrap();
+            let session = Session::default();
+            ClosedLoopActuator.simulate(&recording, &nominal, &off, &session, &mut out);
+            let slow = 1.0 / gain;
+            for (k, y) in out.iter().enumerate() {
+                let t = k as f64 / rate;
+                let fading = |time: f64| time * time * (-t / time).exp();
+                let exact = t - slow - lag + (fading(slow) - fading(lag)) / (slow - lag);
+                assert!(
+                    (y - exact).abs() < 2e-4 * slow,
+                    "{rate} Hz, {k}: {y} {exact}"
+                );
             }
         }
     }

@@ -3,10 +3,10 @@
 use std::io::{Read, Write};
 
 use super::diagnosis::RigDiagnosis;
-use super::measured::Measured;
+use super::measured::{EVERYTHING, Measured};
 use super::{Description, DescriptionError, Measurement, RigRecording};
 use crate::data::Channel;
-use crate::diagnosis::engine::{ExtensibleModel, Point};
+use crate::diagnosis::engine::completed;
 
 /// Curves of one record, a sample a row, SI.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,10 +47,7 @@ pub fn curves(
     let rig = description.rig()?;
     let nominal = description.nominal(rig)?;
     let measured = Measured::new(rig, measurement, nominal);
-    let origin = Point {
-        nuisance: vec![0.0; measured.nuisance()],
-        effects: Vec::new(),
-    };
+    let origin = completed(&measured, &measured.origin(), None, EVERYTHING);
     let is_timed = description.columns.contains_key("time");
     let step = |one: &RigRecording| if is_timed { one.period() } else { 1.0 };
     let input = description.rig()?.inputs().first().copied();
@@ -65,7 +62,7 @@ pub fn curves(
             input: input.map_or_else(Vec::new, |input| one.input(input).to_vec()),
             measured: one.output().to_vec(),
             nominal: measured.simulate(&origin, s),
-            extended: measured.simulate(&found.as_described.point, s),
+            extended: measured.simulate(&found.confirmed.point, s),
             left_out: one.left_out.clone(),
         });
     Ok(all.collect())

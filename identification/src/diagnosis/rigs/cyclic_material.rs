@@ -3,8 +3,11 @@
 //! Nominal: `σ' = E (ε' - ε_p')`, yield at `|σ - Σα| = σ_y + R`, `α_i' = C_i ε_p' - γ_i α_i |ε_p'|`
 //! with one backstress (Armstrong and Frederick 1966; Chaboche, Int. J. Plasticity 2, 1986).
 //!
-//! The strain may be sampled so coarsely that turns of a test of known amplitude lie between two
-//! samples; it then ran on to `strain_amplitude` (0: not known, the samples are all there is).
+//! The strain may be sampled so coarsely that turns lie between two samples. It then ran on, either to
+//! the `strain_amplitude` of the whole test where that is known, or as far as the share `turn_speed`
+//! of the steps between neighbouring samples leaves room: a strain that keeps its speed (1) covers
+//! between two samples what it covers before and behind, there and back. With both at zero the samples
+//! are all there is.
 
 use super::table::{effects, nominal_parameters, shape, size};
 use super::{Equations, RigRecording};
@@ -26,11 +29,18 @@ const STRESS: Channel = Channel::Other {
 const SUBSTEP: f64 = 5e-5;
 
 nominal_parameters! {
+    /// E: Young's.
     modulus: "Pa",
+    /// σ_y: at first yield.
     yield_stress: "Pa",
+    /// C: of the backstress.
     hardening: "Pa",
+    /// γ: of the backstress.
     recovery: "1",
-    strain_amplitude: "1",
+    /// Of the test where turns lie between samples; 0 where the samples are all there is.
+    strain_amplitude: "1" = 0.0,
+    /// Share of its speed that the strain keeps where it turns; 0 where no turn lies between samples.
+    turn_speed: "1" = 0.0,
 }
 
 effects! {
@@ -48,12 +58,12 @@ effects! {
     isotropic_hardening: IsotropicHardening {
         saturation: size("Pa", 5e6, (-3e8, 1e9)),
         rate: shape("1", 10.0, 1.0),
-    } from [[5e7, 10.0], [-3e7, 10.0]];
+    } from [[5e7, 10.0], [-3e7, 10.0]], like ["lasting_hardening"];
     /// R goes on with the plastic path, H p, where the first term is full (Voce 1948 as
     /// extended by Palm, Trans. ASME 71, 1949).
     lasting_hardening: LastingHardening {
         slope: size("Pa", 3e6, (-1e9, 1e9)),
-    } from [[1e7], [-1e7]];
+    } from [[1e7], [-1e7]], like ["isotropic_hardening"];
     /// Yield plateau: a further R that falls within the first strain (Q < 0).
     initial_softening: InitialSoftening {
         drop: size("Pa", 5e6, (0.0, 4e8)),
@@ -85,15 +95,18 @@ impl Equations for CyclicMaterial {
     const KIND: &'static str = "cyclic_material";
     type Nominal = Nominal;
     type Effects = Effects;
+    type Session = ();
     const INPUTS: &'static [Channel] = &[STRAIN];
     const OUTPUT: Channel = STRESS;
     const IS_HYSTERETIC: bool = true;
+    const IS_PATH: bool = true;
 
     fn simulate(
         &self,
         recording: &RigRecording,
         nominal: &Nominal,
         effects: &Effects,
+        (): &(),
         out: &mut [f64],
     ) {
         let Nominal {
@@ -102,6 +115,7 @@ impl Equations for CyclicMaterial {
             hardening,
             recovery,
             strain_amplitude: amplitude,
+            turn_speed,
         } = *nominal;
         let Effects {
             second_backstress: second,
@@ -143,22 +157,36 @@ impl Equations for CyclicMaterial {
             back: [0.0; 3],
             path: 0.0,
         };
-        let last = strain.len() - 1;
+        let last = strain.len().min(out.len()).saturating_sub(1);
         let mut now = first;
         let mut direction = 0.0f64;
+        let mut stride = 0.0;
         let mut k = 0;
         while k <= last {
             // Where the strain was interpolated, only the reading behind it is known.
-            let interpolated = recording.between.get(k) == Some(&true);
+            let interpolated = recording.between.get(k) == Some(&true) && k < last;
             let reading = if interpolated { k + 1 } else { k };
             let next = strain[reading];
             if next != now {
                 let turn = (next - now).signum();
-                let peak = direction * amplitude;
+                let peak = if amplitude > 0.0 {
+                    direction * amplitude
+                } else {
+                    // There and back is the path of neighbouring steps, if less of it.
+                    let behind = strain.get(reading + 1).map_or(0.0, |s| (s - next).abs());
+                    let behind = if interpolated {
+                        strain.get(reading + 2).map_or(behind, |s| (s - next).abs())
+                    } else {
+                        behind
+                    };
+                    let path = turn_speed * 0.5 * (stride + behind);
+                    now + direction * 0.5 * (path - (next - now).abs()).max(0.0)
+                };
                 // Only a sample near the amplitude is a turn of the test.
                 let missed = turn * direction < 0.0
                     && (peak - now) * direction > 0.0
                     && now * direction > 0.5 * amplitude;
+                stride = (next - now).abs();
                 let legs = [if missed { peak } else { now }, next];
                 if interpolated {
                     let mut ahead = state;
@@ -288,9 +316,10 @@ mod tests {
             hardening: 0.0,
             recovery: 1.0,
             strain_amplitude: amplitude,
+            turn_speed: 0.0,
         };
         let mut out = vec![0.0; strain.len()];
-        CyclicMaterial.simulate(&recording, &nominal, &effects, &mut out);
+        CyclicMaterial.simulate(&recording, &nominal, &effects, &(), &mut out);
         out
     }
 

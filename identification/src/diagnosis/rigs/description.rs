@@ -33,7 +33,7 @@ pub struct Description {
 }
 
 /// A column of the data.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
     /// Its name in the header.
@@ -91,6 +91,70 @@ pub enum DescriptionError {
     Data(#[from] DataError),
 }
 
+/// A column as a map names it: by its header, or with a unit of its own.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Renamed {
+    Header(String),
+    Column(Column),
+}
+
+/// `columns` with the names that the file `map` gives them: `channel = "header"` or
+/// `channel = { column = "header", unit = "mm" }` a line.
+///
+/// # Errors
+/// A file that cannot be read or is no such map; a channel without a unit, by name.
+pub fn renamed(
+    columns: &BTreeMap<String, Column>,
+    map: &Path,
+) -> Result<BTreeMap<String, Column>, DescriptionError> {
+    let text = std::fs::read_to_string(map).map_err(|source| DescriptionError::Read {
+        path: map.to_owned(),
+        source,
+    })?;
+    let wrong = |what: String| DescriptionError::Description {
+        path: map.to_owned(),
+        what,
+    };
+    let names: BTreeMap<String, Renamed> = toml::from_str(&text).map_err(|error| {
+        wrong(format!(
+            "expected `channel = \"header\"` or `channel = {{ column = \"header\", unit = \"mm\" \
+             }}`: {error}"
+        ))
+    })?;
+    let mut all = columns.clone();
+    for (channel, name) in names {
+        let column = match name {
+            Renamed::Column(column) => column,
+            Renamed::Header(header) => {
+                let known = columns.get(&channel).ok_or_else(|| {
+                    let names: Vec<&str> = columns.keys().map(String::as_str).collect();
+                    wrong(format!(
+                        "`{channel}` is no channel of the description, which has {}; a new one \
+                         needs its unit",
+                        listed(&names)
+                    ))
+                })?;
+                Column {
+                    column: header,
+                    unit: known.unit.clone(),
+                }
+            }
+        };
+        all.insert(channel, column);
+    }
+    Ok(all)
+}
+
+/// Names for a message.
+pub(super) fn listed(names: &[&str]) -> String {
+    if names.is_empty() {
+        "none".to_owned()
+    } else {
+        names.join(", ")
+    }
+}
+
 impl Description {
     /// Reads a description.
     ///
@@ -102,12 +166,20 @@ impl Description {
             path: path.to_owned(),
             source,
         })?;
+        Self::parse(path, &text)
+    }
+
+    /// Reads the text of a description; `path` is where it stands.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, DescriptionError> {
         let wrong = |what: String| DescriptionError::Description {
             path: path.to_owned(),
             what,
         };
         let mut description: Self =
-            toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+            toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
         description.path = path.to_owned();
         description.rig()?;
         Ok(description)
@@ -165,16 +237,27 @@ impl Description {
         {
             let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
             return Err(self.wrong(format!(
-                "`nominal.{extra}` is unknown: expected {}",
-                names.join(", ")
+                "`nominal.{extra}` is unknown: expected {}{}",
+                names.join(", "),
+                units::hint(extra, names.iter().copied())
             )));
         }
         known
             .iter()
-            .map(|(name, si)| match self.nominal.get(*name) {
-                Some(quantity) => self.si(&format!("nominal.{name}"), quantity, si),
-                None => Err(self.wrong(format!("`nominal.{name}` is missing: a value in {si}"))),
-            })
+            .zip(rig.defaults())
+            .map(
+                |((name, si), default)| match (self.nominal.get(*name), default) {
+                    (Some(quantity), _) => self.si(&format!("nominal.{name}"), quantity, si),
+                    (None, Some(default)) => Ok((*default, 0.0)),
+                    (None, None) => {
+                        let found: Vec<&str> = self.nominal.keys().map(String::as_str).collect();
+                        Err(self.wrong(format!(
+                            "`nominal.{name}` is missing: a value in {si}; found {}",
+                            listed(&found)
+                        )))
+                    }
+                },
+            )
             .collect()
     }
 }

@@ -3,11 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::super::report::{ends_or_not_a_number, or_not_a_number};
+use super::confirmed::{Confirmed, Refused, confirm, parameters, unfit};
 use super::measured::{Measured, Part};
 use super::{Description, DescriptionError, Measurement};
 use crate::diagnosis::engine::resampling::gain_interval;
 use crate::diagnosis::engine::{
-    ExtensibleModel, Observer, Point, Progress, Selected, SimulatedModel, Verdict, estimates,
+    Observer, Point, Progress, Selected, SimulatedModel, Verdict, all_errors, completed, estimates,
     select,
 };
 
@@ -37,6 +38,10 @@ pub struct PartEffect {
     /// By how much the squared error on the data not fitted grows without it (all else refitted),
     /// as a share of the nominal model's.
     pub share: f64,
+    /// Why it is not to be named all the same: at its bound, its interval holds zero, or the other
+    /// part is predicted worse with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub objection: Option<String>,
 }
 
 /// What one part of the data says, tested on the other.
@@ -87,8 +92,25 @@ pub struct RigDiagnosis {
     pub as_described: PartReport,
     /// Fitted on what is left out, tested on the rest.
     pub swapped: PartReport,
-    /// Share of the squared error on the data left out that stays unexplained.
+    /// What was found and is not named, with the reason.
+    #[serde(default)]
+    pub set_aside: Vec<SetAside>,
+    /// Parameters that differ between parts of the data or from what was stated.
+    #[serde(default)]
+    pub findings: Vec<String>,
+    /// The model with the named effects alone.
+    pub confirmed: Confirmed,
+    /// Share of the squared error on the data left out that the confirmed model leaves.
     pub unexplained: f64,
+}
+
+/// An effect that pays on a part of the data and is not named.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SetAside {
+    /// The effect.
+    pub effect: String,
+    /// Why.
+    pub reason: String,
 }
 
 /// Diagnoses a rig on its measurements.
@@ -106,11 +128,7 @@ pub fn diagnose(
     let part = |fitted: Part| -> Result<PartReport, DescriptionError> {
         let record = fitted as usize;
         observer.tell(|| Progress::Fitting(measured.record_name(record).to_owned()));
-        let selected =
-            select(&measured, record, observer).ok_or_else(|| DescriptionError::Description {
-                path: description.path.clone(),
-                what: "the nominal model gives no finite output on these data".to_owned(),
-            })?;
+        let selected = select(&measured, record, observer).ok_or_else(|| no_output(description))?;
         Ok(part_report(&measured, fitted, &selected))
     };
     let as_described = part(Part::Fitted)?;
@@ -131,24 +149,72 @@ pub fn diagnose(
                 .any(|c| c.effect == name && c.look_alikes.contains(&other))
     };
     let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
-    let named: Vec<String> = here
-        .iter()
-        .filter(|name| in_both(name, &there))
-        .map(|name| match there.iter().find(|other| alike(name, other)) {
-            Some(other) if other != name => format!("{name} or {other}"),
-            _ => name.clone(),
-        })
-        .collect();
     let only = here.iter().filter(|name| !in_both(name, &there));
     let not_confirmed: Vec<String> = only
         .chain(there.iter().filter(|name| !in_both(name, &here)))
         .cloned()
         .collect();
-    let pays = as_described.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
+    let mut set_aside: Vec<SetAside> = not_confirmed
+        .iter()
+        .map(|effect| SetAside {
+            effect: effect.clone(),
+            reason: "one part of the data asks for it and the other does not".to_owned(),
+        })
+        .collect();
+    // Of what both parts ask for, what either part gives a reason against is not named.
+    let index = |name: &str| {
+        let mut all = measured.candidates().iter();
+        all.position(|c| c.effect == name).unwrap_or(usize::MAX)
+    };
+    let mut refused: Vec<Refused> = Vec::new();
+    for (part, others) in [(&as_described, &swapped), (&swapped, &as_described)] {
+        for effect in &part.effects {
+            let other = others
+                .effects
+                .iter()
+                .find(|o| alike(&effect.effect, &o.effect));
+            let Some(other) = other else { continue };
+            let reasons = [effect, other]
+                .into_iter()
+                .filter_map(|one| one.objection.clone());
+            if let Some(reason) = reasons.into_iter().next() {
+                refused.push((index(&effect.effect), reason));
+            }
+        }
+    }
+    let mut start = as_described.point.clone();
+    start.effects.retain(|(i, _)| {
+        let name = measured.candidates()[*i].effect.to_owned();
+        in_both(&name, &there) && refused.iter().all(|(known, _)| known != i)
+    });
+    let mut findings = Vec::new();
+    let confirmed = confirm(&measured, &start, &mut refused, &mut findings)
+        .ok_or_else(|| no_output(description))?;
+    for (i, reason) in refused {
+        let effect = measured.candidates().get(i).map_or("", |c| c.effect);
+        if set_aside.iter().all(|known| known.effect != effect) {
+            set_aside.push(SetAside {
+                effect: effect.to_owned(),
+                reason,
+            });
+        }
+    }
+    let named: Vec<String> = confirmed
+        .effects
+        .iter()
+        .map(
+            |(name, _)| match there.iter().find(|other| alike(name, other)) {
+                Some(other) if other != name => format!("{name} or {other}"),
+                _ => name.clone(),
+            },
+        )
+        .collect();
+    let pays = confirmed.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
+    let is_named = |effect: &str| confirmed.effects.iter().any(|(name, _)| name == effect);
     let rivalled = as_described
         .rivals
         .iter()
-        .any(|(rival, against)| named.contains(against) && !alike(against, rival));
+        .any(|(rival, against)| is_named(against) && !alike(against, rival));
     let verdict = match (
         here.is_empty() && there.is_empty(),
         named.is_empty() || !pays,
@@ -166,30 +232,49 @@ pub fn diagnose(
         verdict,
         named,
         not_confirmed,
-        unexplained: 1.0 - as_described.explained,
+        set_aside,
+        findings,
+        unexplained: (confirmed.error / as_described.nominal_error).powi(2),
+        confirmed,
         as_described,
         swapped,
     })
 }
 
+fn no_output(description: &Description) -> DescriptionError {
+    DescriptionError::Description {
+        path: description.path.clone(),
+        what: "the nominal model gives no finite output on these data".to_owned(),
+    }
+}
+
 fn part_report(measured: &Measured<'_>, fitted: Part, selected: &Selected) -> PartReport {
-    let tested = fitted.other() as usize;
+    let (own, tested) = (fitted as usize, fitted.other() as usize);
     let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
-    let origin = Point {
-        nuisance: vec![0.0; measured.nuisance()],
-        effects: Vec::new(),
-    };
-    let before = squares(&measured.errors(&origin, tested));
-    let refitted = measured.errors(&selected.nominal.point, tested);
-    let extended = measured.errors(&selected.extended.point, tested);
+    // What belongs to a file and not to the rig is fitted there, for every model alike.
+    let on_tested = |point: &Point| completed(measured, point, Some(own), tested);
+    let origin = completed(measured, &measured.origin(), None, tested);
+    let before = squares(&all_errors(measured, &origin, tested));
+    let nominal = on_tested(&selected.nominal.point);
+    let point = on_tested(&selected.extended.point);
+    let refitted = all_errors(measured, &nominal, tested);
+    let extended = all_errors(measured, &point, tested);
     let after = squares(&extended);
-    let point = &selected.extended.point;
+    let found = &selected.extended.point;
+    let objections = unfit(measured, found, &selected.deviations);
     let mut effects = Vec::new();
-    for (i, named) in estimates(measured, point, &selected.deviations)
+    for (i, named) in estimates(measured.candidates(), found, &selected.deviations)
         .into_iter()
         .enumerate()
     {
-        let without = squares(&measured.errors(&selected.without[i].point, tested));
+        let without = on_tested(&selected.without[i].point);
+        let without = squares(&all_errors(measured, &without, tested));
+        let share = (without - after) / before;
+        let objection = objections
+            .iter()
+            .find(|(index, _)| *index == found.effects[i].0)
+            .map(|(_, reason)| reason.clone());
+        let negative = || "the other part is predicted better without it".to_owned();
         effects.push(PartEffect {
             effect: named.effect.to_owned(),
             parameters: named
@@ -203,17 +288,18 @@ fn part_report(measured: &Measured<'_>, fitted: Part, selected: &Selected) -> Pa
                 })
                 .collect(),
             confidence: normal(selected.deviates[i]),
-            share: (without - after) / before,
+            share,
+            objection: objection.or_else(|| (share <= 0.0).then(negative)),
         });
     }
     let name = |i: usize| measured.candidates()[i].effect.to_owned();
     PartReport {
         nominal_error: measured.normalised_error(&origin, tested),
-        refitted_error: measured.normalised_error(&selected.nominal.point, tested),
-        extended_error: measured.normalised_error(point, tested),
-        fitted_error: measured.normalised_error(point, fitted as usize),
+        refitted_error: measured.normalised_error(&nominal, tested),
+        extended_error: measured.normalised_error(&point, tested),
+        fitted_error: measured.normalised_error(found, own),
         gain_interval: gain_interval(&refitted, &extended),
-        parameters: parameters(measured, point, &selected.deviations),
+        parameters: parameters(measured, found, &selected.deviations),
         effects,
         explained: 1.0 - after / before,
         rivals: selected
@@ -221,7 +307,7 @@ fn part_report(measured: &Measured<'_>, fitted: Part, selected: &Selected) -> Pa
             .iter()
             .map(|r| (name(r.effect), name(r.against)))
             .collect(),
-        point: point.clone(),
+        point: found.clone(),
     }
 }
 
@@ -242,28 +328,14 @@ fn normal(deviate: f64) -> f64 {
     if deviate < 0.0 { above } else { 1.0 - above }
 }
 
-fn parameters(measured: &Measured<'_>, point: &Point, deviations: &[f64]) -> Vec<NamedValue> {
-    let values = measured.nominal_values(point);
-    let names = measured.uncertain_names();
-    let known = measured.rig.parameters();
-    names
-        .iter()
-        .enumerate()
-        .filter_map(|(i, name)| {
-            let place = known.iter().position(|(k, _)| k == name)?;
-            let mut moved = point.clone();
-            moved.nuisance[i] += deviations.get(i).copied().unwrap_or(0.0);
-            Some(NamedValue {
-                name: (*name).to_owned(),
-                value: values[place],
-                unit: known[place].1.to_owned(),
-                standard_error: (measured.nominal_values(&moved)[place] - values[place]).abs(),
-            })
-        })
-        .collect()
-}
-
 impl RigDiagnosis {
+    /// What the reader should know beside the verdict, a sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        let aside = self.set_aside.iter();
+        let aside = aside.map(|one| format!("`{}` is not named: {}", one.effect, one.reason));
+        aside.chain(self.findings.iter().cloned()).collect()
+    }
+
     /// What was found, in a sentence.
     pub fn sentence(&self) -> String {
         let listed = |names: &[String]| names.join(", ").replace('_', " ");
@@ -272,7 +344,7 @@ impl RigDiagnosis {
             "the error of {} on the data left out falls from {:.1} to {:.1} %",
             self.output,
             100.0 * part.nominal_error,
-            100.0 * part.extended_error
+            100.0 * self.confirmed.error
         );
         let name = &self.name;
         match self.verdict {

@@ -2,10 +2,15 @@
 //!
 //! Nominal: elastic up to a Coulomb force, `f' = k v (1 - (f / F)^n sgn v)` with n → ∞ (Dahl 1968;
 //! n = 1 is his curve, n between is Bouc and Wen's with no post-yield stiffness).
+//!
+//! Effects are counted in natural units: the standard deviation of the displacement, the Coulomb
+//! force, and the time in which the displacement passes at its mean speed.
 
-use super::table::{effects, nominal_parameters, shape, size};
-use super::{Equations, RigRecording};
-use crate::data::Channel;
+use realfft::RealFftPlanner;
+
+use super::table::{effects, nominal_parameters, session_parameters, shape, size};
+use super::{Equations, Natural, RigRecording};
+use crate::data::{Channel, mean_and_deviation};
 
 /// The rig.
 pub struct HystereticDevice;
@@ -15,9 +20,19 @@ const FORCE: Channel = Channel::Other {
     unit: "N",
 };
 
+/// A device whose first force is less than this share of its friction stands in its gap.
+const HELD: f64 = 0.05;
+
 nominal_parameters! {
+    /// F: force at which it slides.
     coulomb_force: "N",
+    /// k: of the device before it slides.
     stiffness: "N/m",
+}
+
+session_parameters! {
+    /// Part of a gap that was travelled before the test, less one half.
+    gap_travelled: "1" within 0.2 as Start,
 }
 
 effects! {
@@ -28,8 +43,8 @@ effects! {
     /// After the force has gone to zero, the device moves through a gap before it takes
     /// hold on the other side.
     free_play: FreePlay {
-        gap: size("m", 2e-4, (0.0, 0.05)),
-    } from [[2e-3], [6e-3]];
+        gap: size("m", 0.01, (0.0, 3.0)),
+    } from [[0.1], [0.3]];
     /// Stiffness while the force falls is (1 + s) k: a band that wraps on gives way more
     /// softly than it lets go.
     stiffer_unloading: StifferUnloading {
@@ -42,8 +57,8 @@ effects! {
     /// Asymmetry a e^{-c X}, X the greatest excursion so far: a surface, like the rubber of
     /// Mullins (Rubber Chem. Technol. 42, 1969), remembers how far it was driven.
     excursion_memory: ExcursionMemory {
-        decay: size("1/m", 5.0, (-100.0, 500.0)),
-    } from [[20.0], [-10.0]];
+        decay: size("1/m", 0.1, (-2.0, 10.0)),
+    } from [[0.4], [-0.2]];
     /// k (1 + h |f| / F): contact that stiffens as more of it bears (Popov, Contact Mechanics
     /// and Friction, 2010, chapter 5).
     hardening_stiffness: HardeningStiffness {
@@ -62,40 +77,51 @@ effects! {
     /// F (1 + s e^{-|v| / v_s}) (Stribeck).
     stribeck: Stribeck {
         excess: size("1", 0.03, (-0.9, 2.0)),
-        speed: shape("m/s", 0.03, 1.0),
-    } from [[0.2, 0.03], [-0.2, 0.03]];
+        speed: shape("m/s", 0.25, 1.0),
+    } from [[0.2, 0.25], [-0.2, 0.25]];
     /// F (1 + s |v| / (1 m/s)).
     rate_dependence: RateDependence {
-        slope: size("s/m", 0.2, (-5.0, 20.0)),
-    } from [[0.5], [-0.5]];
+        slope: size("s/m", 0.02, (-0.5, 2.0)),
+    } from [[0.05], [-0.05]];
     /// c v beside the friction.
     viscous: Viscous {
-        damping: size("N s/m", 300.0, (-1e6, 1e6)),
-    } from [[3e3], [-3e3]];
-    /// y follows the force through (2π f)² / (s² + 2 ζ (2π f) s + (2π f)²), ζ = 0.1: mass and
-    /// spring between device and load cell.
+        damping: size("N s/m", 2e-3, (-10.0, 10.0)),
+    } from [[0.02], [-0.02]];
+    /// y follows the force through ω² / (s² + 2 ζ ω s + ω²): mass and spring between device and
+    /// load cell.
     load_path_resonance: LoadPathResonance {
-        frequency: shape("rad/s", 150.0, 0.7).off_at(0.0),
-    } from [[80.0], [110.0], [200.0]];
+        frequency: shape("rad/s", 50.0, 1.5).off_at(0.0),
+        damping_ratio: shape("1", 0.1, 1.0),
+    } from [[12.0, 0.1], [25.0, 0.1], [50.0, 0.1], [100.0, 0.1]];
     /// Displacement or force late.
     delay: Delay {
-        delay: size("s", 1e-3, (0.0, 0.2)),
-    } from [[5e-3], [2e-2]];
+        delay: size("s", 6e-3, (0.0, 1.2)),
+    } from [[0.03], [0.12]];
 }
 
 impl Equations for HystereticDevice {
     const KIND: &'static str = "hysteretic_device";
     type Nominal = Nominal;
     type Effects = Effects;
+    type Session = Session;
     const INPUTS: &'static [Channel] = &[Channel::Displacement, Channel::Velocity];
     const OUTPUT: Channel = FORCE;
     const IS_HYSTERETIC: bool = true;
+    const IS_SCALED: bool = true;
+
+    fn natural(nominal: &Nominal, channels: Natural) -> Natural {
+        Natural {
+            force: nominal.coulomb_force,
+            ..channels
+        }
+    }
 
     fn simulate(
         &self,
         recording: &RigRecording,
         nominal: &Nominal,
         effects: &Effects,
+        session: &Session,
         out: &mut [f64],
     ) {
         let Nominal {
@@ -127,6 +153,7 @@ impl Equations for HystereticDevice {
             load_path_resonance:
                 LoadPathResonance {
                     frequency: resonance,
+                    damping_ratio,
                 },
             delay: Delay { delay },
         } = *effects;
@@ -134,14 +161,24 @@ impl Equations for HystereticDevice {
             recording.input(Channel::Displacement),
             recording.input(Channel::Velocity),
         );
-        // The device begins as it was left: where in the gap, the first measured force tells.
-        let mut force = recording
-            .output()
-            .first()
-            .map_or(0.0, |f| f.clamp(-coulomb, coulomb));
+        // The device begins as it was left: under the first measured force, or somewhere in the gap.
+        let first = recording.output().first().copied().unwrap_or(f64::NAN);
+        let is_held = first.abs() > HELD * coulomb;
+        let mut force = if is_held {
+            first.max(-coulomb).min(coulomb)
+        } else {
+            0.0
+        };
         // Travelled part of the gap, 0 at its negative end.
-        let mut travelled = if force > 0.0 { gap } else { 0.0 };
-        let (mut shown, mut shown_rate) = (0.0, 0.0);
+        let mut travelled = if is_held {
+            if force > 0.0 { gap } else { 0.0 }
+        } else {
+            gap * (0.5 + session.gap_travelled).clamp(0.0, 1.0)
+        };
+        let (mut shown, mut shown_rate) = (force, 0.0);
+        // Twelve steps a radian of the load path at least, sixty-four a sample at most.
+        let radians = resonance * recording.period();
+        let steps = (12.0 * radians).ceil().clamp(1.0, 64.0);
         let late = delay / recording.period();
         let at = |values: &[f64], k: usize| {
             let place = (k as f64 - late).max(0.0);
@@ -217,9 +254,10 @@ impl Equations for HystereticDevice {
             }
             let total = force + damping * speed;
             if resonance > 0.0 {
-                let h = recording.period() / 8.0;
-                for _ in 0..8 {
-                    shown_rate += h * resonance * (resonance * (total - shown) - 0.2 * shown_rate);
+                let h = recording.period() / steps;
+                for _ in 0..steps as usize {
+                    let pull = resonance * (total - shown) - 2.0 * damping_ratio * shown_rate;
+                    shown_rate += h * resonance * pull;
                     shown += h * shown_rate;
                 }
                 *y = shown;
@@ -228,6 +266,53 @@ impl Equations for HystereticDevice {
             }
         }
     }
+
+    fn starts(
+        &self,
+        recording: &RigRecording,
+        _nominal: &Nominal,
+        errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)> {
+        let displacement = recording.input(Channel::Displacement);
+        let found = ringing(displacement, errors, recording.period());
+        let start = found.map(|omega| ("load_path_resonance", vec![omega, 0.1]));
+        start.into_iter().collect()
+    }
+}
+
+/// Angular frequency at which a record rings: where the spectrum of its errors, times the square of
+/// the frequency, is highest above ten times the main frequency of the motion.
+fn ringing(displacement: &[f64], errors: &[f64], period: f64) -> Option<f64> {
+    let n = errors.len();
+    let spectrum = |values: &[f64]| -> Option<Vec<f64>> {
+        let (mean, _) = mean_and_deviation(values);
+        let mut real: Vec<f64> = values.iter().map(|v| v - mean).collect();
+        let plan = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+        let mut bins = plan.make_output_vec();
+        plan.process(&mut real, &mut bins).ok()?;
+        Some(bins.iter().map(|b| b.norm_sqr()).collect())
+    };
+    let motion = spectrum(displacement)?;
+    let main = (1..motion.len()).max_by(|&a, &b| motion[a].total_cmp(&motion[b]))?;
+    let known: Vec<f64> = errors
+        .iter()
+        .map(|e| if e.is_finite() { *e } else { 0.0 })
+        .collect();
+    let left = spectrum(&known)?;
+    // A tenth of an octave is one look.
+    let mut best: Option<(f64, f64)> = None;
+    let mut low = 10.0 * main as f64;
+    while low * 1.07 < 0.9 * left.len() as f64 {
+        let band = low as usize..(low * 1.07) as usize + 1;
+        let middle = 1.035 * low;
+        let count = band.len() as f64;
+        let power = left[band].iter().sum::<f64>() / count * middle * middle;
+        if best.is_none_or(|(most, _)| power > most) {
+            best = Some((power, middle));
+        }
+        low *= 1.07;
+    }
+    best.map(|(_, bin)| std::f64::consts::TAU * bin / (n as f64 * period))
 }
 
 #[cfg(test)]
@@ -264,7 +349,13 @@ mod tests {
             stiffness: 1e8,
         };
         let mut out = vec![0.0; n];
-        HystereticDevice.simulate(&recording, &nominal, &effects, &mut out);
+        HystereticDevice.simulate(
+            &recording,
+            &nominal,
+            &effects,
+            &Session::default(),
+            &mut out,
+        );
         let fade = |excursion: f64| 0.3 * (-50.0 * excursion).exp();
         for (place, force) in [
             (500, 1e4 * (1.0 - fade(0.005))),

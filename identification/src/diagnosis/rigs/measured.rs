@@ -1,10 +1,15 @@
 //! A rig with its measurements, as the engine of the diagnosis sees it.
 
-use super::{Effect, Measurement, Rig};
-use crate::diagnosis::engine::{Candidate, ExtensibleModel, Point, SimulatedModel};
+use super::{Effect, Measurement, Natural, Rig, SessionRole, Values};
+use crate::diagnosis::engine::{Candidate, Point, SimulatedModel, WEAK, all_errors};
 
 /// Runs into which a part is cut for the check inside it.
 const RUNS: usize = 16;
+/// Share of the output's variation that a first look must see.
+const SEEN: f64 = 0.3;
+
+/// Samples up to which more may be tried.
+const CHEAP: usize = 40_000;
 
 /// The selections of samples that can be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,7 +30,14 @@ impl Part {
     }
 }
 
-/// Records 0 and 1 are the two parts of the data, 2 to 5 the folds inside each.
+/// Width of the priors that hold: nothing moves.
+const HELD: f64 = 1e-3;
+
+/// The record of all samples.
+pub const EVERYTHING: usize = 8;
+
+/// Records 0 and 1 are the two parts of the data, 2 to 5 the folds inside each, 6 and 7 the begin of
+/// each, [`EVERYTHING`] both; then follows a record for each file.
 pub struct Measured<'a> {
     /// Its equations.
     pub rig: &'a dyn Rig,
@@ -35,64 +47,93 @@ pub struct Measured<'a> {
     nominal: Vec<(f64, f64)>,
     /// Which of them are uncertain.
     uncertain: Vec<usize>,
+    /// One standard deviation of each parameter of a file, SI.
+    session: Vec<f64>,
     effects: Vec<Effect>,
     candidates: Vec<Candidate>,
-    channel: [&'static str; 1],
     /// Per record and recording, the places of its samples.
     places: Vec<Vec<Vec<usize>>>,
-    /// Error that counts as one.
-    scale: f64,
+    /// Whether the first file is the one that others are told against.
+    holds_first: bool,
+    /// How much wider than stated the priors of nominal parameters count.
+    width: f64,
 }
 
-const NAMES: [&str; 6] = [
+const NAMES: [&str; 9] = [
     "fitted",
     "left out",
     "fitted, fold 1",
     "fitted, fold 2",
     "left out, fold 1",
     "left out, fold 2",
+    "fitted, first look",
+    "left out, first look",
+    "everything",
 ];
+
+/// The record of file `recording` alone.
+pub fn file(recording: usize) -> usize {
+    NAMES.len() + recording
+}
 
 impl<'a> Measured<'a> {
     /// The rig with nominal values and standard deviations in its order.
     pub fn new(rig: &'a dyn Rig, measurement: &'a Measurement, nominal: Vec<(f64, f64)>) -> Self {
-        let mut places = vec![vec![Vec::new(); measurement.recordings.len()]; NAMES.len()];
-        for part in 0..2 {
-            let in_part = |out: &bool| usize::from(*out) == part;
-            let count: usize = measurement
-                .recordings
-                .iter()
-                .flat_map(|one| &one.left_out)
-                .filter(|o| in_part(o))
-                .count();
-            let mut seen = 0;
-            for (s, recording) in measurement.recordings.iter().enumerate() {
-                for (k, _) in recording
-                    .left_out
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, o)| in_part(o))
-                {
-                    places[part][s].push(k);
-                    places[2 + 2 * part + (seen * RUNS / count) % 2][s].push(k);
-                    seen += 1;
+        let values: Vec<f64> = nominal.iter().map(|(value, _)| *value).collect();
+        let natural: Natural = rig.natural(&values, &measurement.recordings);
+        let has = |channel| {
+            let mut all = measurement.recordings.iter();
+            all.all(|one| !one.input(channel).is_empty())
+        };
+        let effects: Vec<Effect> = rig
+            .effects()
+            .into_iter()
+            .map(|effect| {
+                let mut effect = if rig.is_scaled() {
+                    effect.scaled(&natural)
+                } else {
+                    effect
+                };
+                let needs = |names: &[&str]| names.contains(&effect.candidate.effect);
+                let mut optional = rig.optional().iter();
+                if optional.any(|(channel, names)| needs(names) && !has(*channel)) {
+                    // Without a start it is not tried.
+                    effect.candidate.starts.clear();
                 }
-            }
-        }
-        let effects = rig.effects();
+                effect
+            })
+            .collect();
         Self {
             uncertain: (0..nominal.len()).filter(|&i| nominal[i].1 > 0.0).collect(),
+            session: rig
+                .session()
+                .iter()
+                .map(|own| own.spread * natural.unit(own.unit))
+                .collect(),
             candidates: effects
                 .iter()
                 .map(|effect| effect.candidate.clone())
                 .collect(),
             effects,
-            channel: [rig.output().name()],
+            places: places(measurement, rig.screened()),
+            holds_first: true,
+            width: WEAK,
             rig,
             measurement,
             nominal,
-            places,
-            scale: 1.0,
+        }
+    }
+
+    /// Number of uncertain nominal parameters, which come first in the nuisance.
+    pub fn uncertain(&self) -> usize {
+        self.uncertain.len()
+    }
+
+    /// The stated values.
+    pub fn origin(&self) -> Point {
+        Point {
+            nuisance: vec![0.0; SimulatedModel::nuisance(self)],
+            effects: Vec::new(),
         }
     }
 
@@ -109,6 +150,11 @@ impl<'a> Measured<'a> {
             };
         }
         values
+    }
+
+    /// Stated value and standard deviation of the uncertain parameter `i`.
+    pub fn stated(&self, i: usize) -> (f64, f64) {
+        self.nominal[self.uncertain[i]]
     }
 
     /// Names of the uncertain nominal parameters, in the order of the nuisance.
@@ -130,18 +176,72 @@ impl<'a> Measured<'a> {
         values
     }
 
+    /// Parameters of a file at `point`, SI.
+    pub fn session_values(&self, point: &Point, recording: usize) -> Vec<f64> {
+        let first = self.uncertain.len() + recording * self.session.len();
+        let own = point.nuisance.iter().skip(first);
+        let is_first = recording == 0 && self.holds_first;
+        let table = self.rig.session().iter();
+        own.zip(&self.session)
+            .zip(table)
+            .map(|((p, one), of)| match of.role {
+                SessionRole::AgainstFirst if is_first => 0.0,
+                _ => p * one,
+            })
+            .collect()
+    }
+
+    /// The same where the first file is none of those that the model was fitted to.
+    #[must_use]
+    pub fn of_later_files(mut self) -> Self {
+        self.holds_first = false;
+        self
+    }
+
+    /// Puts the same parameters of a file into every one.
+    pub fn set_session(&self, point: &mut Point, values: &[f64]) {
+        let own = point.nuisance.iter_mut().skip(self.uncertain.len());
+        let all = values.iter().zip(&self.session).cycle();
+        for (p, (value, one)) in own.zip(all) {
+            *p = value / one;
+        }
+    }
+
+    /// Root mean square of the errors on `record`.
+    pub fn root_mean_square(&self, point: &Point, record: usize) -> f64 {
+        let errors = all_errors(self, point, record);
+        (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+    }
+
+    /// Everything that the equations read for `recording`, SI.
+    pub fn values(&self, point: &Point, recording: usize) -> Values {
+        Values {
+            nominal: self.nominal_values(point),
+            effects: self.effect_values(point),
+            session: self.session_values(point, recording),
+        }
+    }
+
     /// Simulated output of one recording.
     pub fn simulate(&self, point: &Point, recording: usize) -> Vec<f64> {
+        self.simulate_to(
+            point,
+            recording,
+            self.measurement.recordings[recording].len(),
+        )
+    }
+
+    fn simulate_to(&self, point: &Point, recording: usize, samples: usize) -> Vec<f64> {
+        let mut out = vec![0.0; samples];
+        let values = self.values(point, recording);
         let recording = &self.measurement.recordings[recording];
-        let mut out = vec![0.0; recording.len()];
-        let (nominal, effects) = (self.nominal_values(point), self.effect_values(point));
-        self.rig.simulate(recording, &nominal, &effects, &mut out);
+        self.rig.simulate(recording, &values, &mut out);
         out
     }
 
     /// `||y - m|| / ||m - mean||` on the samples of `record`, the mean taken in each recording.
     pub fn normalised_error(&self, point: &Point, record: usize) -> f64 {
-        let errors = self.errors(point, record);
+        let errors = all_errors(self, point, record);
         let mut size = 0.0;
         for (s, places) in self.places[record].iter().enumerate() {
             let measured = self.measurement.recordings[s].output();
@@ -156,94 +256,150 @@ impl<'a> Measured<'a> {
     }
 }
 
-impl ExtensibleModel for Measured<'_> {
-    type Predictor = ();
+/// Places of the samples of every record that were measured.
+fn places(measurement: &Measurement, screened: usize) -> Vec<Vec<Vec<usize>>> {
+    let recordings = &measurement.recordings;
+    let mut places = vec![vec![Vec::new(); recordings.len()]; NAMES.len() + recordings.len()];
+    let is_measured =
+        |one: &super::RigRecording, k: usize| one.output().get(k).is_some_and(|y| y.is_finite());
+    for part in 0..2 {
+        let mut mine = Vec::new();
+        for (s, one) in recordings.iter().enumerate() {
+            let own = one.left_out.iter().enumerate();
+            let in_part = own.filter(|(k, out)| usize::from(**out) == part && is_measured(one, *k));
+            mine.extend(in_part.map(|(k, _)| (s, k)));
+        }
+        let output = |(s, k): &(usize, usize)| recordings[*s].output()[*k];
+        let mean = mine.iter().map(output).sum::<f64>() / mine.len().max(1) as f64;
+        let total: f64 = mine.iter().map(|own| (output(own) - mean).powi(2)).sum();
+        let mut seen = 0.0;
+        for (i, &(s, k)) in mine.iter().enumerate() {
+            places[part][s].push(k);
+            places[2 + 2 * part + (i * RUNS / mine.len()) % 2][s].push(k);
+            places[EVERYTHING][s].push(k);
+            places[file(s)][s].push(k);
+            if i < screened || seen < SEEN * total {
+                places[6 + part][s].push(k);
+            }
+            seen += (output(&(s, k)) - mean).powi(2);
+        }
+    }
+    // The parts may alternate in a file.
+    for own in places.iter_mut().flatten() {
+        own.sort_unstable();
+    }
+    places
+}
 
+impl SimulatedModel for Measured<'_> {
     fn nuisance(&self) -> usize {
-        self.uncertain.len()
+        self.uncertain.len() + self.measurement.recordings.len() * self.session.len()
     }
 
     fn candidates(&self) -> &[Candidate] {
         &self.candidates
     }
 
-    fn records(&self) -> usize {
-        self.places.len()
+    fn blocks(&self) -> usize {
+        self.measurement.recordings.len()
     }
 
-    fn record_name(&self, record: usize) -> &str {
-        NAMES[record]
+    fn block_of(&self, i: usize) -> Option<usize> {
+        let own = i.checked_sub(self.uncertain.len())?;
+        own.checked_div(self.session.len())
     }
 
-    fn channels(&self) -> &[&'static str] {
-        &self.channel
+    fn tells(&self, fitted: usize, i: usize, tested: usize) -> bool {
+        let Some(own) = i.checked_sub(self.uncertain.len()) else {
+            return true;
+        };
+        let (block, place) = (own / self.session.len(), own % self.session.len());
+        let [fitted, tested] = [fitted, tested].map(|record| &self.places[record][block]);
+        // How a file begins has died away where a later part of it was fitted.
+        let is_start = self.rig.session()[place].role == SessionRole::Start;
+        !fitted.is_empty() && (!is_start || tested.first() >= fitted.first())
     }
 
-    fn regressors(&self, _record: usize) -> Vec<(String, Vec<f64>)> {
-        Vec::new()
+    fn samples(&self, record: usize, block: usize) -> usize {
+        self.places[record][block].len()
     }
 
-    fn disturbed(&self, factor: f64) -> Self {
-        self.with_scale(self.scale * factor)
-    }
-
-    fn residual_count(&self, record: usize) -> usize {
-        self.places[record].iter().map(Vec::len).sum()
-    }
-
-    fn sample_count(&self, record: usize) -> usize {
-        self.residual_count(record)
-    }
-
-    fn predictor(&self, _point: &Point) -> Option<()> {
-        Some(())
-    }
-
-    fn log_determinant(&self, (): &()) -> f64 {
-        0.0
-    }
-
-    fn residuals(&self, (): &(), point: &Point, record: usize, out: &mut [f64]) -> bool {
-        let errors = self.errors(point, record);
-        for (o, e) in out.iter_mut().zip(&errors) {
-            *o = e / self.scale;
-        }
-        errors.len() == out.len() && out.iter().all(|r| r.is_finite())
-    }
-}
-
-impl SimulatedModel for Measured<'_> {
-    fn errors(&self, point: &Point, record: usize) -> Vec<f64> {
-        let mut errors = Vec::with_capacity(self.residual_count(record));
-        for (s, places) in self.places[record].iter().enumerate() {
-            if !places.is_empty() {
-                let simulated = self.simulate(point, s);
-                let measured = self.measurement.recordings[s].output();
-                errors.extend(places.iter().map(|&k| measured[k] - simulated[k]));
-            }
-        }
-        errors
+    fn errors(&self, point: &Point, record: usize, block: usize) -> Vec<f64> {
+        let places = &self.places[record][block];
+        let length = places.last().map_or(0, |last| last + 1);
+        let simulated = self.simulate_to(point, block, length);
+        let measured = self.measurement.recordings[block].output();
+        places.iter().map(|&k| measured[k] - simulated[k]).collect()
     }
 
     fn folds(&self, record: usize) -> [usize; 2] {
-        [2 + 2 * record, 3 + 2 * record]
+        match record {
+            0 | 1 => [2 + 2 * record, 3 + 2 * record],
+            // All data are judged by their parts.
+            _ => [0, 1],
+        }
     }
 
-    fn scale(&self) -> f64 {
-        self.scale
+    fn screen(&self, record: usize) -> usize {
+        if record < 2 { 6 + record } else { record }
     }
 
-    fn with_scale(&self, scale: f64) -> Self {
+    fn prior_width(&self) -> f64 {
+        self.width
+    }
+
+    fn held(&self) -> Self {
         Self {
             rig: self.rig,
             measurement: self.measurement,
             nominal: self.nominal.clone(),
             uncertain: self.uncertain.clone(),
+            session: self.session.clone(),
             effects: self.effects.clone(),
             candidates: self.candidates.clone(),
-            channel: self.channel,
             places: self.places.clone(),
-            scale,
+            holds_first: self.holds_first,
+            width: HELD,
         }
+    }
+
+    fn is_cheap(&self) -> bool {
+        let all = self.places[EVERYTHING].iter();
+        self.rig.screened() == usize::MAX && all.map(Vec::len).sum::<usize>() < CHEAP
+    }
+
+    fn record_name(&self, record: usize) -> &str {
+        let of_file = || {
+            Some(
+                self.measurement
+                    .recordings
+                    .get(record.checked_sub(NAMES.len())?)?
+                    .name(),
+            )
+        };
+        NAMES
+            .get(record)
+            .copied()
+            .or_else(of_file)
+            .unwrap_or("none")
+    }
+
+    fn starts(&self, base: &Point, record: usize) -> Vec<(usize, Vec<f64>)> {
+        let Some(block) = (0..self.blocks()).max_by_key(|&b| self.samples(record, b)) else {
+            return Vec::new();
+        };
+        let recording = &self.measurement.recordings[block];
+        let mut errors = vec![f64::NAN; recording.len()];
+        let own = self.errors(base, record, block);
+        for (&place, error) in self.places[record][block].iter().zip(own) {
+            errors[place] = error;
+        }
+        let nominal = self.nominal_values(base);
+        let starts = self.rig.starts(recording, &nominal, &errors).into_iter();
+        let place = |name: &str| self.candidates.iter().position(|c| c.effect == name);
+        starts
+            .filter_map(|(name, values)| Some((place(name)?, values)))
+            .filter(|(i, _)| !self.candidates[*i].starts.is_empty())
+            .collect()
     }
 }

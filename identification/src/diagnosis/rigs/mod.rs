@@ -5,26 +5,36 @@
 //! on data not fitted and that is found on each part of the data.
 
 mod closed_loop_actuator;
+mod confirmed;
+mod controlled_damper;
 pub mod curves;
 mod cyclic_material;
 mod description;
 mod diagnosis;
 mod extended;
+mod hybrid_actuator;
 mod hysteretic_device;
 mod measured;
+mod natural;
+mod oscillator;
 mod positioning_drive;
 mod reading;
 mod recording;
 pub mod shake_table;
 mod table;
+mod template;
 
-pub use description::{Column, Description, DescriptionError, LeftOut, Quantity};
-pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, diagnose};
-pub use extended::ExtendedRig;
+pub use confirmed::Confirmed;
+pub use description::{Column, Description, DescriptionError, LeftOut, Quantity, renamed};
+pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
+pub use extended::{ExtendedRig, FileErrors, Prediction};
 
+pub use hybrid_actuator::TransferSystemRig;
+pub use natural::Natural;
 pub use reading::Measurement;
 pub use recording::RigRecording;
-pub use table::{Effect, EffectTable, NominalTable};
+pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole, SessionTable};
+pub use template::template;
 
 use crate::data::Channel;
 
@@ -40,13 +50,23 @@ pub trait Equations: Sync {
     type Nominal: NominalTable;
     /// The effects that it may have.
     type Effects: EffectTable;
+    /// What every file has for itself: the zero of a transducer, where a test began.
+    type Session: SessionTable;
 
     /// What the data must hold beside the output.
     const INPUTS: &'static [Channel];
+    /// What they may hold; an effect that needs it is not looked for without it.
+    const OPTIONAL: &'static [(Channel, &'static [&'static str])] = &[];
     /// What is simulated and compared.
     const OUTPUT: Channel;
     /// True where the output depends on the input's path, which a loop shows best.
     const IS_HYSTERETIC: bool = false;
+    /// True where a row without a time is a point of a path and no sample.
+    const IS_PATH: bool = false;
+    /// True where the table of effects is in natural units.
+    const IS_SCALED: bool = false;
+    /// Samples that are enough for a first look at candidates, where a simulation is costly.
+    const SCREENED: usize = usize::MAX;
 
     /// Output for the inputs of `recording` alone.
     fn simulate(
@@ -54,8 +74,25 @@ pub trait Equations: Sync {
         recording: &RigRecording,
         nominal: &Self::Nominal,
         effects: &Self::Effects,
+        session: &Self::Session,
         out: &mut [f64],
     );
+
+    /// Natural units, from those of the channels.
+    fn natural(_nominal: &Self::Nominal, channels: Natural) -> Natural {
+        channels
+    }
+
+    /// Further starts of effects, read from the `errors` (not a number where there is none) of a
+    /// model without them.
+    fn starts(
+        &self,
+        _recording: &RigRecording,
+        _nominal: &Self::Nominal,
+        _errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)> {
+        Vec::new()
+    }
 }
 
 /// [`Equations`] of any kind.
@@ -66,21 +103,63 @@ pub trait Rig: Sync {
     /// What the data must hold beside the output.
     fn inputs(&self) -> &'static [Channel];
 
+    /// What they may hold, with the effects that need it.
+    fn optional(&self) -> &'static [(Channel, &'static [&'static str])];
+
     /// What is simulated and compared.
     fn output(&self) -> Channel;
 
     /// Whether the output depends on the input's path.
     fn is_hysteretic(&self) -> bool;
 
+    /// Whether a row without a time is a point of a path and no sample.
+    fn is_path(&self) -> bool;
+
     /// Parameters of the nominal model.
     fn parameters(&self) -> &'static [Named];
 
-    /// The effects.
+    /// What each of them is.
+    fn about_parameters(&self) -> &'static [&'static str];
+
+    /// Their values where a description leaves them out.
+    fn defaults(&self) -> &'static [Option<f64>];
+
+    /// The effects, in natural units where [`Self::is_scaled`].
     fn effects(&self) -> Vec<Effect>;
 
-    /// Output for the inputs of `recording` alone, with values in the order of [`Self::parameters`] and
-    /// of all parameters of [`Self::effects`], SI; not a number where their count is another.
-    fn simulate(&self, recording: &RigRecording, nominal: &[f64], effects: &[f64], out: &mut [f64]);
+    /// Whether the table of effects is in natural units.
+    fn is_scaled(&self) -> bool;
+
+    /// What every file has for itself.
+    fn session(&self) -> &'static [SessionParameter];
+
+    /// Samples that are enough for a first look at candidates.
+    fn screened(&self) -> usize;
+
+    /// Natural units of `recordings`; `nominal` in the order of [`Self::parameters`].
+    fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural;
+
+    /// As [`Equations::starts`].
+    fn starts(
+        &self,
+        recording: &RigRecording,
+        nominal: &[f64],
+        errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)>;
+
+    /// Output for the inputs of `recording` alone, SI; not a number where a count is wrong.
+    fn simulate(&self, recording: &RigRecording, values: &Values, out: &mut [f64]);
+}
+
+/// Values of everything that a rig's equations read, SI.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Values {
+    /// In the order of [`Rig::parameters`].
+    pub nominal: Vec<f64>,
+    /// Of all parameters of [`Rig::effects`].
+    pub effects: Vec<f64>,
+    /// In the order of [`Rig::session`].
+    pub session: Vec<f64>,
 }
 
 impl<E: Equations> Rig for E {
@@ -92,6 +171,10 @@ impl<E: Equations> Rig for E {
         E::INPUTS
     }
 
+    fn optional(&self) -> &'static [(Channel, &'static [&'static str])] {
+        E::OPTIONAL
+    }
+
     fn output(&self) -> Channel {
         E::OUTPUT
     }
@@ -100,27 +183,67 @@ impl<E: Equations> Rig for E {
         E::IS_HYSTERETIC
     }
 
+    fn is_path(&self) -> bool {
+        E::IS_PATH
+    }
+
     fn parameters(&self) -> &'static [Named] {
         E::Nominal::TABLE
+    }
+
+    fn about_parameters(&self) -> &'static [&'static str] {
+        E::Nominal::ABOUT
+    }
+
+    fn defaults(&self) -> &'static [Option<f64>] {
+        E::Nominal::DEFAULTS
     }
 
     fn effects(&self) -> Vec<Effect> {
         E::Effects::table()
     }
 
-    fn simulate(
+    fn is_scaled(&self) -> bool {
+        E::IS_SCALED
+    }
+
+    fn session(&self) -> &'static [SessionParameter] {
+        E::Session::TABLE
+    }
+
+    fn screened(&self) -> usize {
+        E::SCREENED
+    }
+
+    fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural {
+        let channels: Vec<Channel> = [E::OUTPUT]
+            .into_iter()
+            .chain(E::INPUTS.iter().copied())
+            .chain(E::OPTIONAL.iter().map(|(channel, _)| *channel))
+            .collect();
+        let natural = Natural::of(recordings, &channels);
+        E::Nominal::from_values(nominal).map_or(natural, |nominal| E::natural(&nominal, natural))
+    }
+
+    fn starts(
         &self,
         recording: &RigRecording,
         nominal: &[f64],
-        effects: &[f64],
-        out: &mut [f64],
-    ) {
+        errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)> {
+        E::Nominal::from_values(nominal).map_or_else(Vec::new, |nominal| {
+            Equations::starts(self, recording, &nominal, errors)
+        })
+    }
+
+    fn simulate(&self, recording: &RigRecording, values: &Values, out: &mut [f64]) {
         match (
-            E::Nominal::from_values(nominal),
-            E::Effects::from_values(effects),
+            E::Nominal::from_values(&values.nominal),
+            E::Effects::from_values(&values.effects),
+            E::Session::from_values(&values.session),
         ) {
-            (Some(nominal), Some(effects)) => {
-                Equations::simulate(self, recording, &nominal, &effects, out);
+            (Some(nominal), Some(effects), Some(session)) => {
+                Equations::simulate(self, recording, &nominal, &effects, &session, out);
             }
             _ => out.fill(f64::NAN),
         }
@@ -128,12 +251,23 @@ impl<E: Equations> Rig for E {
 }
 
 /// Every kind of rig.
-pub static KINDS: [&dyn Rig; 4] = [
+pub static KINDS: [&dyn Rig; 7] = [
     &closed_loop_actuator::ClosedLoopActuator,
     &positioning_drive::PositioningDrive,
     &hysteretic_device::HystereticDevice,
     &cyclic_material::CyclicMaterial,
+    &hybrid_actuator::HybridActuator,
+    &oscillator::Oscillator,
+    &controlled_damper::ControlledDamper,
 ];
+
+/// The only rig whose kind holds `word`, such as `actuator` or `hysteretic device`.
+pub fn like(word: &str) -> Option<&'static dyn Rig> {
+    let word = word.trim().to_lowercase().replace([' ', '-'], "_");
+    let mut all = KINDS.into_iter().filter(|rig| rig.kind().contains(&word));
+    let found = all.next()?;
+    (all.next().is_none() && !word.is_empty()).then_some(found)
+}
 
 /// The rig of a kind.
 pub fn of_kind(kind: &str) -> Option<&'static dyn Rig> {
@@ -153,11 +287,18 @@ mod tests {
             let channels = channels.into_iter().map(|c| (c, vec![0.0; 16])).collect();
             let recording = Recording::new("none", 1.0, channels).unwrap();
             let recording = RigRecording::new(recording, rig.inputs(), rig.output());
-            let nominal = vec![1.0; rig.parameters().len()];
-            let effects: Vec<f64> = rig.effects().into_iter().flat_map(|e| e.off).collect();
-            for (nominal, effects) in [(&nominal[1..], &effects[..]), (&nominal, &effects[1..])] {
+            let values = Values {
+                nominal: vec![1.0; rig.parameters().len()],
+                effects: rig.effects().into_iter().flat_map(|e| e.off).collect(),
+                session: vec![0.0; rig.session().len()],
+            };
+            let mut short = [values.clone(), values.clone(), values];
+            short[0].nominal.pop();
+            short[1].effects.pop();
+            short[2].session.push(0.0);
+            for values in short {
                 let mut out = vec![0.0; 16];
-                rig.simulate(&recording, nominal, effects, &mut out);
+                rig.simulate(&recording, &values, &mut out);
                 assert!(out.iter().all(|y| y.is_nan()), "{}", rig.kind());
             }
         }

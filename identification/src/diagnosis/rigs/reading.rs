@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::description::{Description, DescriptionError, LeftOut};
+use super::description::{Description, DescriptionError, LeftOut, listed};
 use super::{Rig, RigRecording};
-use crate::data::{Channel, DataError, Pick, Recording, RoundedStamps, Sheet, Wanted};
+use crate::IdentificationError;
+use crate::data::{Channel, DataError, Pick, Recording, RoundedStamps, Sheet, TimeBase, Wanted};
 
 /// Samples that a file must have at least.
 const SHORTEST: usize = 128;
@@ -35,8 +36,8 @@ impl Description {
         }
         let mut recordings = files
             .iter()
-            .map(|file| self.recording(file, rig))
-            .collect::<Result<Vec<_>, _>>()?;
+            .map(|file| Ok(self.recording(file, rig, false)?.0))
+            .collect::<Result<Vec<_>, DescriptionError>>()?;
         self.leave_out(&mut recordings, files)?;
         Ok(Measurement { recordings })
     }
@@ -97,17 +98,41 @@ impl Description {
         Ok(())
     }
 
-    fn recording(&self, path: &Path, rig: &dyn Rig) -> Result<RigRecording, DescriptionError> {
-        let is_timed = self.columns.contains_key(Channel::Time.name());
+    /// What the file columns of channels are called, each with the channel.
+    fn picks(&self, rig: &dyn Rig) -> Result<Vec<Pick<'_>>, DescriptionError> {
+        let optional = rig.optional().iter().map(|(channel, _)| *channel);
         let mut wanted = rig.inputs().to_vec();
         wanted.push(rig.output());
-        wanted.extend(is_timed.then_some(Channel::Time));
-        let picks = wanted
+        let known: Vec<Channel> = wanted
+            .iter()
+            .copied()
+            .chain(optional.clone())
+            .chain([Channel::Time])
+            .collect();
+        let names: Vec<&str> = known.iter().map(|channel| channel.name()).collect();
+        if let Some(extra) = self
+            .columns
+            .keys()
+            .find(|key| !names.contains(&key.as_str()))
+        {
+            return Err(self.wrong(format!(
+                "`columns.{extra}` is unknown: expected {}{}",
+                names.join(", "),
+                units::hint(extra, names.iter().copied())
+            )));
+        }
+        let given = |channel: &Channel| self.columns.contains_key(channel.name());
+        wanted.extend(optional.chain([Channel::Time]).filter(given));
+        wanted
             .into_iter()
             .map(|channel| {
                 let (name, si) = (channel.name(), channel.unit());
                 let column = self.columns.get(name).ok_or_else(|| {
-                    self.wrong(format!("`columns.{name}` is missing: a column in {si}"))
+                    let found: Vec<&str> = self.columns.keys().map(String::as_str).collect();
+                    self.wrong(format!(
+                        "`columns.{name}` is missing: a column in {si}; found {}",
+                        listed(&found)
+                    ))
                 })?;
                 units::convert(1.0, &column.unit, si)
                     .map_err(|why| self.wrong(format!("`columns.{name}`: {why}")))?;
@@ -117,7 +142,19 @@ impl Description {
                     unit: &column.unit,
                 })
             })
-            .collect::<Result<Vec<_>, DescriptionError>>()?;
+            .collect()
+    }
+
+    /// Reads one file, and tells which sample each of its rows is. The output `may_lack` samples,
+    /// which are then not a number.
+    pub(super) fn recording(
+        &self,
+        path: &Path,
+        rig: &dyn Rig,
+        may_lack: bool,
+    ) -> Result<(RigRecording, Vec<usize>), DescriptionError> {
+        let is_timed = self.columns.contains_key(Channel::Time.name());
+        let picks = self.picks(rig)?;
         let heads: Vec<&str> = picks.iter().map(|pick| pick.head).collect();
         let sheet = Sheet::read(
             path,
@@ -138,6 +175,9 @@ impl Description {
             .iter()
             .map(|(channel, values)| (*channel, &values[..]));
         for (channel, values) in all.chain(read.stamps().map(|t| (Channel::Time, t))) {
+            if may_lack && channel == rig.output() {
+                continue;
+            }
             if let Some(row) = values.iter().position(|value| !value.is_finite()) {
                 let what = format!(
                     "`{}` has no number, expected one in every row",
@@ -146,12 +186,15 @@ impl Description {
                 return Err(DataError::line(path, sheet.line(row), what).into());
             }
         }
-        if !is_timed {
-            read_repeats_once(&mut channels);
-        }
+        let rows = if is_timed || !rig.is_path() {
+            (0..sheet.len()).collect()
+        } else {
+            read_repeats_once(&mut channels)
+        };
         let samples = channels.first().map_or(0, |(_, values)| values.len());
-        if samples < SHORTEST {
-            let what = format!("{samples} samples: expected at least {SHORTEST}");
+        let least = if may_lack { 2 } else { SHORTEST };
+        if samples < least {
+            let what = format!("{samples} samples: expected at least {least}");
             return Err(DataError::file(path, what).into());
         }
         let period = match (read.stamps(), &self.time_step) {
@@ -165,9 +208,15 @@ impl Description {
                 );
             }
         };
-        let recording = Recording::new(&name, period, channels)
-            .map_err(|error| DataError::file(path, error.to_string()))?;
-        Ok(RigRecording::new(recording, rig.inputs(), rig.output()))
+        let at_fault = |error: IdentificationError| DataError::file(path, error.to_string());
+        let recording = if may_lack {
+            let even = TimeBase::Even { start: 0.0, period };
+            Recording::measured(&name, even, channels).map_err(at_fault)?
+        } else {
+            Recording::new(&name, period, channels).map_err(at_fault)?
+        };
+        let recording = RigRecording::new(recording, rig.inputs(), rig.output());
+        Ok((recording, rows))
     }
 }
 
@@ -186,8 +235,8 @@ fn period(stamps: &[f64]) -> Result<f64, usize> {
 }
 
 /// Rows without a time are points of a path, where a row that repeats the one before to rounding
-/// says nothing new.
-fn read_repeats_once(channels: &mut [(Channel, Vec<f64>)]) {
+/// says nothing new. Tells which sample each row is.
+fn read_repeats_once(channels: &mut [(Channel, Vec<f64>)]) -> Vec<usize> {
     let rows = channels.first().map_or(0, |(_, values)| values.len());
     let near: Vec<f64> = channels
         .iter()
@@ -203,6 +252,11 @@ fn read_repeats_once(channels: &mut [(Channel, Vec<f64>)]) {
         let mut keep = new.iter();
         values.retain(|_| keep.next() == Some(&true));
     }
+    let kept = new.iter().scan(0usize, |kept, is_new| {
+        *kept += usize::from(*is_new);
+        Some(kept.saturating_sub(1))
+    });
+    kept.collect()
 }
 
 #[cfg(test)]
@@ -218,7 +272,8 @@ mod tests {
             ),
             (Channel::Velocity, vec![0.0, 5.0, 5.0, 6.0, 7.0, 7.0]),
         ];
-        read_repeats_once(&mut channels);
+        let rows = read_repeats_once(&mut channels);
+        assert_eq!(rows, [0, 1, 1, 2, 3, 3]);
         assert_eq!(channels[0].1, [0.0, 1.0, 1.0, 2.0]);
         assert_eq!(channels[1].1, [0.0, 5.0, 6.0, 7.0]);
     }

@@ -1,7 +1,10 @@
 //! One recording of a rig as its equations read it.
 
+use std::sync::OnceLock;
+
 use crate::IdentificationError;
 use crate::data::{Channel, Recording};
+use crate::estimation::interpolation::band_limited;
 
 /// A recording on an even base, with what equations ask of it beside its channels.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +22,14 @@ pub struct RigRecording {
     pub middle: f64,
     /// True where a sample is left out of the fit.
     pub left_out: Vec<bool>,
+    /// Whether the record is one period of a motion that goes on.
+    pub is_periodic: bool,
+    /// The first input between its samples.
+    between_samples: OnceLock<Vec<f64>>,
 }
+
+/// Places in which [`RigRecording::between_samples`] parts a sample.
+pub const PLACES: usize = 16;
 
 impl RigRecording {
     /// A recording of which nothing is left out; `inputs` are the rig's.
@@ -34,6 +44,8 @@ impl RigRecording {
             between: half_way(first, high - low),
             middle: 0.5 * (low + high),
             left_out: vec![false; recording.len()],
+            is_periodic: false,
+            between_samples: OnceLock::new(),
             output,
             recording,
         }
@@ -64,7 +76,14 @@ impl RigRecording {
         self.recording.samples(channel)
     }
 
-    /// The measured output, SI.
+    /// `first` (the first input) as the band-limited signal through its samples, at [`PLACES`]
+    /// places a sample.
+    pub fn between_samples(&self, first: Channel) -> &[f64] {
+        self.between_samples
+            .get_or_init(|| band_limited(self.input(first), PLACES, self.is_periodic))
+    }
+
+    /// The measured output, SI; not a number where a sample is missing.
     pub fn output(&self) -> &[f64] {
         self.recording.samples(self.output)
     }

@@ -9,6 +9,10 @@ pub struct Histories {
     pub displacement: Vec<f64>,
     /// Displacements of the numerical substructure, floors 1 to 3, m; the first is the desired one.
     pub numerical: [Vec<f64>; 3],
+    /// Command to the actuator, m.
+    pub command: Vec<f64>,
+    /// Measured force, N.
+    pub force: Vec<f64>,
     /// Largest magnitude of the specimen's force, N.
     pub peak_force: f64,
 }

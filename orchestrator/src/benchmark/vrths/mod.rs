@@ -2,6 +2,7 @@
 //! tracking laws on the same plants, motions and noise, scored as the benchmark scores them.
 
 pub mod criteria;
+pub mod hidden;
 pub mod motions;
 pub mod outcome;
 pub mod page;

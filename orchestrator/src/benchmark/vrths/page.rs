@@ -13,7 +13,7 @@ use crate::report::{
 use super::criteria::Histories;
 use super::outcome::Outcome;
 use super::roster::BEST;
-use super::simulation::{Setting, independent_noise, run};
+use super::simulation::{NO_EFFECTS, Setting, independent_noise, run};
 use super::study::Study;
 
 /// A run for the pictures.
@@ -40,6 +40,7 @@ pub fn pictures(study: &Study) -> Result<Vec<Picture>, ModelError> {
             let setting = Setting {
                 frame: &frame,
                 plant: &TransferSystemParameters::default(),
+                effects: &NO_EFFECTS,
                 form: study.form,
                 ground: &motion.ground,
                 noise: &noise,

@@ -1,6 +1,7 @@
 //! The tracking laws that the benchmark compares.
 
 use controllers::hybrid::adaptive_inverse::AdaptiveInverse;
+use controllers::hybrid::compensation::Compensated;
 use controllers::hybrid::extrapolation::Extrapolation;
 use controllers::hybrid::gradient_inverse::GradientInverse;
 use controllers::hybrid::linear_quadratic::{LinearQuadraticDesign, LinearQuadraticTracking};
@@ -9,7 +10,7 @@ use controllers::hybrid::phase_lead_pi::PhaseLeadPi;
 use controllers::hybrid::robust_tracking::RobustTracking;
 use controllers::hybrid::sliding_mode::TrackingSlidingMode;
 use plant::ModelError;
-use plant::hybrid::{PERIOD, TransferSystemParameters};
+use plant::hybrid::{PERIOD, TransferSystemEffects, TransferSystemParameters};
 
 use super::simulation::TrackingLaw;
 
@@ -22,16 +23,54 @@ pub struct Entry {
     pub about: &'static str,
     /// Whether the converters sit inside the law.
     pub own_converters: bool,
-    make: fn() -> Result<Box<TrackingLaw>, ModelError>,
+    make: Make,
+}
+
+/// How a law is made.
+#[derive(Clone, Copy)]
+enum Make {
+    /// From constants of its own.
+    AsPublished(fn() -> Result<Box<TrackingLaw>, ModelError>),
+    /// From a model of the plant.
+    From(fn(&TransferSystemParameters) -> Result<Box<TrackingLaw>, ModelError>),
 }
 
 impl Entry {
-    /// A new law.
+    /// A new law, designed on the nominal plant where it is designed on one.
     ///
     /// # Errors
     /// A design that has no solution.
     pub fn make(&self) -> Result<Box<TrackingLaw>, ModelError> {
-        (self.make)()
+        match self.make {
+            Make::AsPublished(make) => make(),
+            Make::From(design) => design(&TransferSystemParameters::default()),
+        }
+    }
+
+    /// Whether it is designed on a model of the plant.
+    #[must_use]
+    pub fn is_designed(&self) -> bool {
+        matches!(self.make, Make::From(_))
+    }
+
+    /// A new law designed on `plant`, and compensated for `effects` where there are any; laws that
+    /// are not designed on a model stay as they are.
+    ///
+    /// # Errors
+    /// A design that has no solution, a plant that cannot be.
+    pub fn design(
+        &self,
+        plant: &TransferSystemParameters,
+        effects: &TransferSystemEffects,
+    ) -> Result<Box<TrackingLaw>, ModelError> {
+        let Make::From(design) = self.make else {
+            return self.make();
+        };
+        let law = design(plant)?;
+        if !effects.is_active() {
+            return Ok(law);
+        }
+        Ok(Box::new(Compensated::new(law, *plant, *effects, PERIOD)?))
     }
 }
 
@@ -51,76 +90,74 @@ pub const ALL: [Entry; 9] = [
         name: SAMPLE,
         about: "the benchmark's sample controller: PI with phase lead",
         own_converters: true,
-        make: || Ok(Box::new(PhaseLeadPi::default())),
+        make: Make::AsPublished(|| Ok(Box::new(PhaseLeadPi::default()))),
     },
     Entry {
         name: "inverse-without-specimen",
         about: "inverse of the transfer system without its specimen, third order",
         own_converters: false,
-        make: || {
+        make: Make::AsPublished(|| {
             let law = ModelInverse::of(&ModelInverse::without_specimen(), 3)?;
             Ok(Box::new(law))
-        },
+        }),
     },
     Entry {
         name: "inverse",
         about: "inverse of the nominal plant",
         own_converters: false,
-        make: || Ok(Box::new(smooth_inverse(0.0)?)),
+        make: Make::From(|plant| Ok(Box::new(smooth_inverse(plant, 0.0)?))),
     },
     Entry {
         name: "inverse-pi",
         about: "the same with PI, target led by 1.5 samples",
         own_converters: false,
-        make: || {
+        make: Make::From(|plant| {
             Ok(Box::new(ModelInverse {
                 proportional: 2.0,
                 integral: 95.0,
-                ..smooth_inverse(LEAD)?
+                ..smooth_inverse(plant, LEAD)?
             }))
-        },
+        }),
     },
     Entry {
         name: "robust",
         about: "the same with synthesised loop shaping instead of PI",
         own_converters: false,
-        make: || {
-            let plant = TransferSystemParameters::default();
-            let law = RobustTracking::synthesise(&plant, 60.0, 50.0, LEAD, PERIOD)?;
+        make: Make::From(|plant| {
+            let law = RobustTracking::synthesise(plant, 60.0, 50.0, LEAD, PERIOD)?;
             Ok(Box::new(law))
-        },
+        }),
     },
     Entry {
         name: "linear-quadratic",
         about: "inverse, state feedback and Kalman filter with a disturbance at the command",
         own_converters: false,
-        make: || {
+        make: Make::From(|plant| {
             let design = LinearQuadraticDesign {
                 lead: LEAD,
                 ..LinearQuadraticDesign::default()
             };
-            let plant = TransferSystemParameters::default();
-            let law = LinearQuadraticTracking::design(&plant, &design, PERIOD)?;
+            let law = LinearQuadraticTracking::design(plant, &design, PERIOD)?;
             Ok(Box::new(law))
-        },
+        }),
     },
     Entry {
         name: "sliding-mode",
         about: "published: Li et al. 2021",
         own_converters: false,
-        make: || Ok(Box::new(TrackingSlidingMode::published()?)),
+        make: Make::AsPublished(|| Ok(Box::new(TrackingSlidingMode::published()?))),
     },
     Entry {
         name: "gradient-inverse",
         about: "published: adaptive inverse of Gálmez and Fermandois 2022",
         own_converters: false,
-        make: || Ok(Box::new(GradientInverse::default())),
+        make: Make::AsPublished(|| Ok(Box::new(GradientInverse::default()))),
     },
     Entry {
         name: BEST,
         about: "inverse estimated by instrumental variables, target led by 1.5 samples",
         own_converters: false,
-        make: || Ok(Box::new(AdaptiveInverse::benchmark(PERIOD)?)),
+        make: Make::From(|plant| Ok(Box::new(AdaptiveInverse::around(plant, PERIOD)?))),
     },
 ];
 
@@ -130,12 +167,11 @@ pub fn entry(name: &str) -> Option<Entry> {
     ALL.into_iter().find(|entry| entry.name == name)
 }
 
-/// The nominal inverse with all derivatives; the hold of the command is led by half a sample.
-fn smooth_inverse(lead: f64) -> Result<ModelInverse, ModelError> {
-    let plant = TransferSystemParameters::default();
+/// The inverse of a plant with all derivatives; the hold of the command is led by half a sample.
+fn smooth_inverse(plant: &TransferSystemParameters, lead: f64) -> Result<ModelInverse, ModelError> {
     Ok(ModelInverse {
         desired: Extrapolation::new(5, 16, lead + 0.5)?,
-        ..ModelInverse::of(&plant, 5)?
+        ..ModelInverse::of(plant, 5)?
     })
 }
 

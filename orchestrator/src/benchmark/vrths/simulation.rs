@@ -1,18 +1,18 @@
 //! One run of the loop, natively: plant, sensors, numerical substructure and a tracking law.
 
-use controllers::Controller;
 use controllers::hybrid::TrackingInput;
+use controllers::hybrid::compensation::AnyTrackingLaw;
 use plant::ModelError;
 use plant::hybrid::{
-    Converter, Frame, InteractionForm, NumericalSubstructure, PERIOD, RATE, ReferenceFrame,
-    SensorNoise, TransferSystem, TransferSystemParameters,
+    Converter, ExtendedTransferSystem, Frame, InteractionForm, NumericalSubstructure, PERIOD, RATE,
+    ReferenceFrame, SensorNoise, TransferSystem, TransferSystemEffects, TransferSystemParameters,
 };
 use plant::sensors::channel::Noise;
 
 use super::criteria::{Histories, Reference};
 
 /// A tracking law of any kind.
-pub type TrackingLaw = dyn Controller<Input = TrackingInput, Output = f64> + Send;
+pub type TrackingLaw = AnyTrackingLaw;
 
 /// A ground acceleration at every half step of the benchmark, linear between a record's samples.
 #[derive(Debug, Clone)]
@@ -110,6 +110,9 @@ pub fn published_noise(samples: usize) -> [Vec<f64>; 2] {
     [size.displacement, size.force].map(|deviation| draws.iter().map(|z| deviation * z).collect())
 }
 
+/// Of a plant that is as its linear equations say.
+pub const NO_EFFECTS: TransferSystemEffects = TransferSystemEffects::NONE;
+
 /// What a run takes place on.
 #[derive(Debug, Clone, Copy)]
 pub struct Setting<'a> {
@@ -117,6 +120,8 @@ pub struct Setting<'a> {
     pub frame: &'a Frame,
     /// The transfer system with its specimen.
     pub plant: &'a TransferSystemParameters,
+    /// What it does besides; where anything is on, its derivatives follow its equations.
+    pub effects: &'a TransferSystemEffects,
     /// How its derivatives are formed.
     pub form: InteractionForm,
     /// The ground.
@@ -125,6 +130,44 @@ pub struct Setting<'a> {
     pub noise: &'a [Vec<f64>; 2],
     /// Whether the law has converters of its own.
     pub own_converters: bool,
+}
+
+/// A plant with or without effects.
+enum AnyPlant {
+    Linear(Box<TransferSystem>),
+    Extended(Box<ExtendedTransferSystem>),
+}
+
+impl AnyPlant {
+    fn new(setting: &Setting<'_>) -> Result<Self, ModelError> {
+        let (parameters, effects) = (*setting.plant, *setting.effects);
+        Ok(if effects.is_active() {
+            Self::Extended(Box::new(ExtendedTransferSystem::new(
+                parameters, effects, PERIOD,
+            )?))
+        } else {
+            Self::Linear(Box::new(TransferSystem::new(
+                parameters,
+                setting.form,
+                PERIOD,
+            )?))
+        })
+    }
+
+    /// Displacement (m) and force (N).
+    fn outputs(&self) -> (f64, f64) {
+        match self {
+            Self::Linear(plant) => (plant.state.displacement, plant.force()),
+            Self::Extended(plant) => (plant.state.displacement, plant.force()),
+        }
+    }
+
+    fn step(&mut self, command: f64) {
+        match self {
+            Self::Linear(plant) => plant.step(command),
+            Self::Extended(plant) => plant.step(command),
+        }
+    }
 }
 
 /// Displacement beyond which a run counts as unstable and ends, m: ten times the stroke.
@@ -141,12 +184,14 @@ pub fn run(setting: &Setting<'_>, law: &mut TrackingLaw) -> Result<Histories, Mo
     let p = setting.plant;
     let specimen = [p.specimen_mass, p.specimen_damping(), p.specimen_stiffness];
     let mut substructure = NumericalSubstructure::new(setting.frame, specimen, 0, 1, PERIOD)?;
-    let mut plant = TransferSystem::new(*p, setting.form, PERIOD)?;
+    let mut plant = AnyPlant::new(setting)?;
     let converter = Converter::default();
     let n = setting.ground.samples();
     let mut histories = Histories {
         measured: Vec::with_capacity(n),
         displacement: Vec::with_capacity(n),
+        command: Vec::with_capacity(n),
+        force: Vec::with_capacity(n),
         numerical: std::array::from_fn(|_| Vec::with_capacity(n)),
         peak_force: 0.0,
     };
@@ -155,7 +200,7 @@ pub fn run(setting: &Setting<'_>, law: &mut TrackingLaw) -> Result<Histories, Mo
         for (history, floor) in histories.numerical.iter_mut().zip(floors) {
             history.push(*floor);
         }
-        let (x, force) = (plant.state.displacement, plant.force());
+        let (x, force) = plant.outputs();
         histories.peak_force = histories.peak_force.max(force.abs());
         let measured = x + setting.noise[0][k];
         let measured_force = force + setting.noise[1][k];
@@ -176,6 +221,8 @@ pub fn run(setting: &Setting<'_>, law: &mut TrackingLaw) -> Result<Histories, Mo
         if !(command.is_finite() && x.abs() < RUNAWAY && floors[0].abs() < RUNAWAY) {
             break;
         }
+        histories.command.push(command);
+        histories.force.push(measured_force);
         if k + 1 < n {
             plant.step(command);
             substructure.step(measured_force, setting.ground.over_step(k));

@@ -13,7 +13,9 @@ use serde::Serialize;
 use super::criteria::{Reference, criteria, normalised_deviation};
 use super::motions::Motion;
 use super::roster::{Entry, SAMPLE, entry};
-use super::simulation::{Setting, independent_noise, published_noise, reference, run};
+use super::simulation::{
+    NO_EFFECTS, Setting, TrackingLaw, independent_noise, published_noise, reference, run,
+};
 
 /// Which plants a study runs on.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -108,11 +110,68 @@ pub struct Spread {
 pub type Scores = BTreeMap<&'static str, ControllerScore>;
 
 /// A case under a motion.
-struct Scene<'a> {
-    case: BenchmarkCase,
+pub(super) struct Scene<'a> {
+    pub(super) case: BenchmarkCase,
     place: usize,
-    motion: &'a Motion,
+    pub(super) motion: &'a Motion,
     reference: Reference,
+}
+
+impl<'a> Scene<'a> {
+    /// Every case under every motion.
+    pub(super) fn all(
+        cases: &[BenchmarkCase],
+        motions: &'a [Motion],
+    ) -> Result<Vec<Self>, ModelError> {
+        let pairs = cases
+            .iter()
+            .flat_map(|case| motions.iter().enumerate().map(move |pair| (*case, pair)));
+        pairs
+            .map(|(case, (place, motion))| {
+                Ok(Self {
+                    case,
+                    place,
+                    motion,
+                    reference: reference(&case.frame(), &motion.ground)?,
+                })
+            })
+            .collect()
+    }
+
+    /// Noise of the run on plant `number`.
+    pub(super) fn noise(&self, seed: u64, number: usize) -> [Vec<f64>; 2] {
+        independent_noise(seed, stream(self, number), self.motion.ground.samples())
+    }
+
+    /// Runs `law` on plant `number` as `setting` has it.
+    pub(super) fn score(
+        &self,
+        number: usize,
+        setting: &Setting<'_>,
+        law: &mut TrackingLaw,
+    ) -> Result<RunScore, ModelError> {
+        let histories = run(setting, law)?;
+        let stable = histories.measured.len() == setting.ground.samples();
+        let peak = |values: &[f64]| values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+        Ok(RunScore {
+            case: self.case.number(),
+            motion: self.motion.name.clone(),
+            plant: number,
+            stable,
+            criteria: if stable {
+                criteria(&histories, &self.reference, PERIOD)
+            } else {
+                [f64::NAN; 9]
+            },
+            true_tracking_percent: if stable {
+                100.0 * normalised_deviation(&histories.displacement, &histories.numerical[0])
+            } else {
+                f64::NAN
+            },
+            peak_force_n: histories.peak_force,
+            peak_displacement_m: peak(&histories.displacement),
+        })
+    }
 }
 
 impl Study {
@@ -158,17 +217,7 @@ impl Study {
     /// # Errors
     /// A plant, frame or controller that cannot be simulated.
     pub fn run(&self, done: impl Fn() + Sync) -> Result<Scores, ModelError> {
-        let mut scenes = Vec::new();
-        for case in &self.cases {
-            for (place, motion) in self.motions.iter().enumerate() {
-                scenes.push(Scene {
-                    case: *case,
-                    place,
-                    motion,
-                    reference: reference(&case.frame(), &motion.ground)?,
-                });
-            }
-        }
+        let scenes = Scene::all(&self.cases, &self.motions)?;
         let jobs: Vec<_> = scenes
             .iter()
             .flat_map(|scene| {
@@ -208,40 +257,20 @@ impl Study {
     ) -> Result<Vec<RunScore>, ModelError> {
         let frame = scene.case.frame();
         let ground = &scene.motion.ground;
-        let noise = independent_noise(self.seed, stream(scene, number), ground.samples());
+        let noise = scene.noise(self.seed, number);
         self.controllers
             .iter()
             .map(|entry| {
                 let setting = Setting {
                     frame: &frame,
                     plant,
+                    effects: &NO_EFFECTS,
                     form: self.form,
                     ground,
                     noise: &noise,
                     own_converters: entry.own_converters,
                 };
-                let histories = run(&setting, entry.make()?.as_mut())?;
-                let stable = histories.measured.len() == ground.samples();
-                let peak = |values: &[f64]| values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
-                Ok(RunScore {
-                    case: scene.case.number(),
-                    motion: scene.motion.name.clone(),
-                    plant: number,
-                    stable,
-                    criteria: if stable {
-                        criteria(&histories, &scene.reference, PERIOD)
-                    } else {
-                        [f64::NAN; 9]
-                    },
-                    true_tracking_percent: if stable {
-                        100.0
-                            * normalised_deviation(&histories.displacement, &histories.numerical[0])
-                    } else {
-                        f64::NAN
-                    },
-                    peak_force_n: histories.peak_force,
-                    peak_displacement_m: peak(&histories.displacement),
-                })
+                scene.score(number, &setting, entry.make()?.as_mut())
             })
             .collect()
     }
@@ -254,7 +283,7 @@ fn stream(scene: &Scene<'_>, plant: usize) -> u64 {
 }
 
 impl ControllerScore {
-    fn of(all: Vec<RunScore>) -> Self {
+    pub(super) fn of(all: Vec<RunScore>) -> Self {
         let stable: Vec<&RunScore> = all.iter().filter(|run| run.stable).collect();
         let count = stable.len() as f64;
         let mean = |value: &dyn Fn(&RunScore) -> f64| {
@@ -307,6 +336,7 @@ pub fn sample_table(el_centro: &Motion) -> Result<[[f64; 9]; 4], ModelError> {
             let setting = Setting {
                 frame: &frame,
                 plant: &TransferSystemParameters::default(),
+                effects: &NO_EFFECTS,
                 form: InteractionForm::DerivativeBlocks,
                 ground,
                 noise: &noise,

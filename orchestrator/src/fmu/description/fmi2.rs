@@ -7,7 +7,7 @@ use fmi_rs::model_description::fmi2;
 use super::structure::Dependencies;
 use super::{
     BaseUnit, Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable,
-    preferred_step,
+    default_stop, preferred_step,
 };
 
 /// Reads the text.
@@ -150,6 +150,7 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
         event_indicators: file.numberOfEventIndicators as usize,
         states: file.derivatives.len(),
         preferred_step: preferred_step(file.defaultExperiment.as_ref()),
+        default_stop: default_stop(file.defaultExperiment.as_ref()),
         remarks,
         model_name: file.modelName,
         token: file.guid,

@@ -7,7 +7,7 @@ use fmi_rs::model_description::fmi3;
 use super::structure::{Dependencies, MOST_ELEMENTS, element_names};
 use super::{
     BaseUnit, Causality, Description, FmiVersion, Interface, Item, Kind, Sizes, Variability,
-    Variable, preferred_step,
+    Variable, default_stop, preferred_step,
 };
 
 /// Reads the text; structural parameters have the values in `sizes` where there are some.
@@ -123,6 +123,7 @@ pub(super) fn read(text: &str, sizes: &Sizes) -> Result<Description, String> {
         event_indicators: file.eventIndicators.len(),
         states: file.derivatives.len(),
         preferred_step: preferred_step(file.defaultExperiment.as_ref()),
+        default_stop: default_stop(file.defaultExperiment.as_ref()),
         remarks,
         model_name: file.modelName,
         token: file.instantiationToken,

@@ -173,6 +173,8 @@ pub struct Description {
     pub event_indicators: usize,
     /// Step size that it would like, s.
     pub preferred_step: Option<f64>,
+    /// Length of its default experiment, s.
+    pub default_stop: Option<f64>,
     /// Whether the step size may differ from call to call.
     pub variable_step: bool,
     /// The variables, in the order of the file.
@@ -198,6 +200,21 @@ impl Description {
     /// The variable of that name.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.position(name).map(|index| &self.variables[index])
+    }
+
+    /// Aliases of outputs, in alphabetical order, with their positions.
+    pub fn output_aliases(&self) -> impl Iterator<Item = (String, usize)> + '_ {
+        let mut all: Vec<(String, usize)> = self
+            .positions
+            .iter()
+            .filter(|(name, index)| {
+                let variable = &self.variables[**index];
+                variable.causality == Causality::Output && variable.name != **name
+            })
+            .map(|(name, index)| (name.clone(), *index))
+            .collect();
+        all.sort();
+        all.into_iter()
     }
 
     /// Positions of the variables of one causality.
@@ -261,4 +278,15 @@ fn preferred_step(
 ) -> Option<f64> {
     let step = experiment?.stepSize.as_ref()?.parse().ok()?;
     (step > 0.0).then_some(step)
+}
+
+fn default_stop(experiment: Option<&fmi_rs::model_description::DefaultExperiment>) -> Option<f64> {
+    let experiment = experiment?;
+    let stop: f64 = experiment.stopTime.as_ref()?.parse().ok()?;
+    let start = experiment
+        .startTime
+        .as_ref()
+        .and_then(|text| text.parse().ok());
+    let length = stop - start.unwrap_or(0.0);
+    (length > 0.0 && length.is_finite()).then_some(length)
 }

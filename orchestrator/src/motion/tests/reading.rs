@@ -180,8 +180,7 @@ fn faults_of_csv_files_are_named() {
     assert_eq!(say("t_s,a_g\n"), "a.csv: a header and no data");
     assert_eq!(
         say("# x\nt_s,a_g\n0,1\n0.01,one\n"),
-        "a.csv, line 4, column 2 (`a`): \"one\" is not a finite number; expected a number, or \
-         nothing for a missing sample"
+        "a.csv, line 4, column 2 (`a_g`): \"one\" is not a finite number; expected one in every cell"
     );
     assert_eq!(
         say("t_s,a_g\n0,1\n0.01\n"),

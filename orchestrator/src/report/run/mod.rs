@@ -124,6 +124,11 @@ pub fn run(run: &Run) -> Report {
                  little."
                     .into(),
             ],
+            tables: run
+                .tracking
+                .and_then(|tracking| tracking.laboratory.as_ref())
+                .map(|own| vec![tables::bands(own), tables::strong_part(own)])
+                .unwrap_or_default(),
             ..section("In frequency", panels::frequency(run))
         },
     ];

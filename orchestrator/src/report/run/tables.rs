@@ -2,6 +2,7 @@
 
 use super::{Run, Whole};
 use crate::metrics::Tracking;
+use crate::metrics::laboratory::Laboratory;
 use crate::report::{Cell, Table, Units};
 
 fn columns<const N: usize>(names: [&str; N]) -> Vec<String> {
@@ -46,6 +47,63 @@ pub(super) fn tracking(whole: Whole, tracking: &Tracking) -> Table {
                 none(),
                 none(),
             ],
+        ],
+    }
+}
+
+/// Response spectra and transfer function, a row for each band.
+pub(super) fn bands(own: &Laboratory) -> Table {
+    let percent = |value| Cell::Quantity(value, Units::PERCENT, 3);
+    let rows = own.response_spectrum_percent.iter().enumerate();
+    Table {
+        caption: "Response spectrum at 5 % damping: how far the table's is from the reference's. \
+                  Transfer function from the reference's to the table's acceleration, each frequency \
+                  weighted by the reference's power."
+            .to_string(),
+        columns: columns([
+            "band, Hz",
+            "spectrum, largest",
+            "spectrum, mean",
+            "gain",
+            "delay, ms",
+            "coherence",
+        ]),
+        rows: rows
+            .map(|(n, spectrum)| {
+                let [from, to] = spectrum.band_hz;
+                let band = own.coherence.as_ref().map(|bands| &bands[n]);
+                let number = |value: Option<f64>, digits| {
+                    value.map_or("-".into(), |value| Cell::Number(value, digits))
+                };
+                vec![
+                    format!("{from} to {to}").into(),
+                    percent(spectrum.largest),
+                    percent(spectrum.mean),
+                    number(band.map(|band| band.gain), 4),
+                    number(band.map(|band| 1e3 * band.delay_s), 3),
+                    number(band.map(|band| band.coherence), 4),
+                ]
+            })
+            .collect(),
+    }
+}
+
+/// The strong part of the motion and its energy.
+pub(super) fn strong_part(own: &Laboratory) -> Table {
+    Table {
+        caption: "Significant duration: from 5 to 95 % of the reference's Arias intensity.".into(),
+        columns: columns(["", "value"]),
+        rows: vec![
+            vec![
+                "significant duration".into(),
+                Cell::Quantity(own.significant_duration_s, Units::TIME, 3),
+            ],
+            vec![
+                "normalised RMS acceleration error over it".into(),
+                Cell::Quantity(own.significant_duration_percent, Units::PERCENT, 3),
+            ],
+            vec!["peak ratio".into(), Cell::Number(own.peak_ratio, 4)],
+            vec!["Arias ratio".into(), Cell::Number(own.arias_ratio, 4)],
         ],
     }
 }

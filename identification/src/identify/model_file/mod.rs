@@ -6,7 +6,8 @@
 //! A diagnosis adds the effects it found, `[effects.valve_dead_band]`, always in SI.
 //! Tables that are not known here are left alone.
 
-use std::collections::BTreeMap;
+mod sections;
+
 use std::path::Path;
 
 use plant::identified::actuator::IdentifiedActuator;
@@ -14,18 +15,16 @@ use plant::identified::shake_table::ShakeTable;
 use plant::identified::table::Table;
 use plant::specimens::linear::LinearSpecimen;
 use serde::{Deserialize, Serialize};
-use units::constants::{INCH, LBF};
 
 use crate::IdentificationError;
-use crate::closed_loop::model_section::{CovarianceSection, HydraulicSection, UncertaintySection};
 use crate::data::OUTPUT_NAMES;
 use crate::identify::identified::RigIdentification;
 use crate::identify::parameters::Physical;
 
-/// The name of the thesis's units, and the default of a file that names none.
-pub const INCH_POUND: &str = "inch, lbf, second, volt";
-/// The name of SI units.
-pub const SI: &str = "metre, newton, second, volt";
+pub use sections::{
+    ActuatorSection, BodySection, CovarianceSection, EffectSections, HydraulicSection, INCH_POUND,
+    SI, StandardErrors, UncertaintySection, Units,
+};
 
 /// A rig's parameters with their standard errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -70,88 +69,6 @@ pub struct ModelFile {
 
 fn inch_pound() -> String {
     INCH_POUND.to_string()
-}
-
-/// Parameters by effect and name.
-pub type EffectSections = BTreeMap<String, BTreeMap<String, f64>>;
-
-/// `F = G1(s) u + G2(s) dx/dt`, coefficients in descending powers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ActuatorSection {
-    /// `[1, a2, a1, a0]`.
-    pub denominator: Vec<f64>,
-    /// `[b2, b1, b0]` of G1.
-    pub voltage_to_force: Vec<f64>,
-    /// `[e2, e1, e0]` of G2.
-    pub velocity_to_force: Vec<f64>,
-}
-
-/// Mass, damping and stiffness.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BodySection {
-    /// Mass.
-    pub mass: f64,
-    /// Damping.
-    pub damping: f64,
-    /// Stiffness.
-    pub stiffness: f64,
-}
-
-/// Standard errors, laid out as the parameters are.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StandardErrors {
-    /// The actuator's; the leading 1 of the denominator has none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub actuator: Option<ActuatorSection>,
-    /// The table's.
-    pub table: BodySection,
-    /// The specimen's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub specimen: Option<BodySection>,
-    /// The delay's, s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub command_delay: Option<f64>,
-    /// The effects', SI.
-    #[serde(default, skip_serializing_if = "EffectSections::is_empty")]
-    pub effects: EffectSections,
-}
-
-/// Factors from a file's units to SI.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Units {
-    /// Metres in the unit of length.
-    pub length: f64,
-    /// Newtons in the unit of force.
-    pub force: f64,
-}
-
-impl Units {
-    /// Inch and pound-force.
-    pub const INCH_POUND: Self = Self {
-        length: INCH,
-        force: LBF,
-    };
-    /// SI.
-    pub const SI: Self = Self {
-        length: 1.0,
-        force: 1.0,
-    };
-
-    /// The set of a name; `file` is what messages call the file.
-    ///
-    /// # Errors
-    /// Names other than the two known sets.
-    pub fn named(units: &str, file: &str) -> Result<Self, IdentificationError> {
-        match units {
-            INCH_POUND => Ok(Self::INCH_POUND),
-            SI | "SI" => Ok(Self::SI),
-            other => Err(IdentificationError::ModelFile {
-                path: file.to_string(),
-                what: format!("units = \"{other}\""),
-                expected: "\"inch, lbf, second, volt\" or \"metre, newton, second, volt\"",
-            }),
-        }
-    }
 }
 
 impl ModelFile {

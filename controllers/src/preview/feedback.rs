@@ -1,0 +1,289 @@
+//! Linear quadratic Gaussian feedback on what is left (Eq 5-1 to 5-4): states by a Kalman filter from
+//! late measurements, with a force on the table and an offset of the valve as disturbances.
+
+use nalgebra::{DMatrix, DVector, RowSVector, SMatrix, SVector};
+use plant::linear::discrete_riccati;
+
+use super::model::{OUTPUTS, STATES, SampledRig};
+use crate::ModelError;
+use crate::mpc::kalman::SteadyStateKalmanFilter;
+
+/// Most samples by which measurements may be late.
+pub const MAXIMUM_DELAY: usize = 4;
+/// Disturbances: force on the table (N), offset of the valve (V).
+pub const DISTURBANCES: usize = 2;
+/// What is estimated.
+const ALL: usize = STATES + DISTURBANCES;
+/// Part of the unknown force that is left after a sample: what lasts for seconds is the valve's, from
+/// which a constant force cannot be told.
+const FORCE_LEFT: f64 = 0.999;
+/// Largest command of the valve where margins are found, as a factor: a gain margin of 6 dB.
+const MARGIN: f64 = 2.0;
+
+/// What the filter takes to be uncertain: one standard deviation each.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Uncertainty {
+    /// Displacement (m), velocity (m/s) and acceleration (m/s²) as measured.
+    pub measurement: [f64; OUTPUTS],
+    /// White noise on the valve command, V.
+    pub valve: f64,
+    /// White noise of the force on the table, N.
+    pub force: f64,
+    /// Step of the unknown force a sample, N.
+    pub force_step: f64,
+    /// Step of the valve's offset a sample, V.
+    pub offset_step: f64,
+}
+
+/// Feedback of the states' distance from where they should be, and the filter that gives them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Feedback {
+    gain: RowSVector<f64, STATES>,
+    /// States and command with which a disturbance leaves the displacement where it is.
+    target: SMatrix<f64, STATES, DISTURBANCES>,
+    target_command: RowSVector<f64, DISTURBANCES>,
+    transition: SMatrix<f64, ALL, ALL>,
+    output: SMatrix<f64, OUTPUTS, ALL>,
+    correction: SMatrix<f64, ALL, OUTPUTS>,
+    delay: usize,
+}
+
+/// What the feedback remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct FeedbackState {
+    /// States and disturbances at the sample that is measured now, before it is.
+    prediction: [f64; ALL],
+    /// Commands since then, the oldest first, V.
+    commands: [f64; MAXIMUM_DELAY],
+    /// Known forces from then to now, N.
+    forces: [f64; MAXIMUM_DELAY + 1],
+}
+
+impl Feedback {
+    /// Minimises the sum of `|W y|²` and `(w u)²` for measurements `delay` samples late.
+    ///
+    /// # Errors
+    /// A Riccati equation without a stabilising solution; a rig whose displacement no command holds.
+    pub fn new(
+        rig: &SampledRig,
+        weights: &SVector<f64, OUTPUTS>,
+        command_weight: f64,
+        uncertainty: &Uncertainty,
+        delay: usize,
+    ) -> Result<Self, ModelError> {
+        let a = DMatrix::from_fn(STATES, STATES, |i, j| rig.a[(i, j)]);
+        let b = DMatrix::from_fn(STATES, 1, |i, _| rig.b[i]);
+        let c = SMatrix::<f64, OUTPUTS, OUTPUTS>::from_diagonal(weights) * rig.c;
+        let square = c.transpose() * c;
+        let q = DMatrix::from_fn(STATES, STATES, |i, j| square[(i, j)]);
+        let r = DMatrix::from_element(1, 1, command_weight * command_weight);
+        let p = discrete_riccati(&a, &b, &q, &r)?;
+        let weighted = b.transpose() * &p;
+        let gain = &weighted * &a / (r[(0, 0)] + (&weighted * &b)[(0, 0)]);
+
+        let force = rig.from + rig.to;
+        let mut transition = SMatrix::<f64, ALL, ALL>::identity();
+        transition
+            .fixed_view_mut::<STATES, STATES>(0, 0)
+            .copy_from(&rig.a);
+        transition
+            .fixed_view_mut::<STATES, 1>(0, STATES)
+            .copy_from(&force);
+        transition
+            .fixed_view_mut::<STATES, 1>(0, STATES + 1)
+            .copy_from(&rig.b);
+        transition[(STATES, STATES)] = FORCE_LEFT;
+        let mut output = SMatrix::<f64, OUTPUTS, ALL>::zeros();
+        output
+            .fixed_view_mut::<OUTPUTS, STATES>(0, 0)
+            .copy_from(&rig.c);
+        output
+            .fixed_view_mut::<OUTPUTS, 1>(0, STATES)
+            .copy_from(&rig.d);
+
+        let mut noise = rig.b * rig.b.transpose() * uncertainty.valve.powi(2);
+        noise += force * force.transpose() * uncertainty.force.powi(2);
+        let mut q = DMatrix::zeros(ALL, ALL);
+        q.view_mut((0, 0), (STATES, STATES)).copy_from(&noise);
+        q[(STATES, STATES)] = uncertainty.force_step.powi(2);
+        q[(STATES + 1, STATES + 1)] = uncertainty.offset_step.powi(2);
+        let r = DMatrix::from_diagonal(&DVector::from_fn(OUTPUTS, |i, _| {
+            uncertainty.measurement[i].powi(2)
+        }));
+        let filter = SteadyStateKalmanFilter::new(
+            &DMatrix::from_fn(ALL, ALL, |i, j| transition[(i, j)]),
+            &DMatrix::from_fn(OUTPUTS, ALL, |i, j| output[(i, j)]),
+            &q,
+            &r,
+        )?;
+        let (target, target_command) = targets(rig)?;
+        Ok(Self {
+            gain: RowSVector::from_fn(|_, j| gain[(0, j)]),
+            target,
+            target_command,
+            transition,
+            output,
+            correction: SMatrix::from_fn(|i, j| filter.gain[(i, j)]),
+            delay: delay.min(MAXIMUM_DELAY),
+        })
+    }
+
+    /// Command (V) that brings the rig to the model's state `x` under the model's `command`, from
+    /// what is `measured` now; `force` is the known one now (N).
+    pub fn command(
+        &self,
+        state: &mut FeedbackState,
+        rig: &SampledRig,
+        x: &SVector<f64, STATES>,
+        command: f64,
+        measured: &SVector<f64, OUTPUTS>,
+        force: f64,
+    ) -> f64 {
+        state.forces[self.delay] = force;
+        let mut estimate = SVector::<f64, ALL>::from(state.prediction);
+        let innovation = measured - self.output * estimate - rig.d * state.forces[0];
+        estimate += self.correction * innovation;
+        state.prediction = estimate.into();
+        for (i, sent) in state.commands[..self.delay].iter().enumerate() {
+            estimate = self.advance(
+                rig,
+                &estimate,
+                *sent,
+                [state.forces[i], state.forces[i + 1]],
+            );
+        }
+        let own = estimate.fixed_rows::<STATES>(0);
+        let disturbances = estimate.fixed_rows::<DISTURBANCES>(STATES);
+        let wanted = x + self.target * disturbances;
+        command + (self.target_command * disturbances)[0] + (self.gain * (wanted - own))[0]
+    }
+
+    /// Takes note of the command (V) that was sent and of the known force at the next sample (N).
+    pub fn sent(&self, state: &mut FeedbackState, rig: &SampledRig, command: f64, force: f64) {
+        let second = if self.delay == 0 {
+            force
+        } else {
+            state.forces[1]
+        };
+        let oldest = if self.delay == 0 {
+            command
+        } else {
+            state.commands[0]
+        };
+        let estimate = SVector::from(state.prediction);
+        state.prediction = self
+            .advance(rig, &estimate, oldest, [state.forces[0], second])
+            .into();
+        if self.delay > 0 {
+            state.commands.rotate_left(1);
+            state.commands[self.delay - 1] = command;
+            state.forces.rotate_left(1);
+        }
+        state.forces[self.delay] = force;
+    }
+
+    fn advance(
+        &self,
+        rig: &SampledRig,
+        estimate: &SVector<f64, ALL>,
+        command: f64,
+        [from, to]: [f64; 2],
+    ) -> SVector<f64, ALL> {
+        let mut next = self.transition * estimate;
+        let mut own = next.fixed_rows_mut::<STATES>(0);
+        own += rig.b * command + rig.from * from + rig.to * to;
+        next
+    }
+
+    /// Whether `rig` comes to rest under this feedback with its commands times `gain` and the
+    /// measurements `late` samples late.
+    pub fn holds(&self, rig: &SampledRig, gain: f64, late: usize) -> bool {
+        // The loop is linear: its transition, one basis vector after the other.
+        const LINE: usize = MAXIMUM_DELAY + 1;
+        let order = STATES * (late.min(LINE) + 1) + ALL + self.delay;
+        let late = late.min(LINE);
+        let mut transition = DMatrix::from_columns(
+            &(0..order)
+                .map(|basis| {
+                    let at = |i: usize| if i == basis { 1.0 } else { 0.0 };
+                    let mut place = 0;
+                    let mut take = |many: usize| {
+                        place += many;
+                        place - many
+                    };
+                    let line: Vec<SVector<f64, STATES>> = (0..=late)
+                        .map(|_| {
+                            let first = take(STATES);
+                            SVector::from_fn(|i, _| at(first + i))
+                        })
+                        .collect();
+                    let mut state = FeedbackState::default();
+                    let first = take(ALL);
+                    state.prediction = std::array::from_fn(|i| at(first + i));
+                    let first = take(self.delay);
+                    for i in 0..self.delay {
+                        state.commands[i] = at(first + i);
+                    }
+                    let measured = rig.c * line[late];
+                    let rest = SVector::zeros();
+                    let u = self.command(&mut state, rig, &rest, 0.0, &measured, 0.0);
+                    self.sent(&mut state, rig, u, 0.0);
+                    let mut next = vec![rig.advance(&line[0], gain * u, [0.0; 2])];
+                    next.extend(&line[..late]);
+                    let mut column: Vec<f64> = next.iter().flatten().copied().collect();
+                    column.extend(state.prediction);
+                    column.extend(&state.commands[..self.delay]);
+                    DVector::from_vec(column)
+                })
+                .collect::<Vec<_>>(),
+        );
+        // The states differ by orders of magnitude, and the slowest poles lie next to one.
+        nalgebra::linalg::balancing::balance_parlett_reinsch(&mut transition);
+        transition
+            .complex_eigenvalues()
+            .iter()
+            .all(|pole| pole.norm() < 1.0)
+    }
+
+    /// Whether the loop keeps a gain margin of 6 dB up and down, and bears measurements that are one
+    /// sample later than it knows.
+    pub fn is_robust(&self, rig: &SampledRig) -> bool {
+        [1.0 / MARGIN, 1.0, MARGIN]
+            .iter()
+            .all(|gain| self.holds(rig, *gain, self.delay))
+            && self.holds(rig, 1.0, self.delay + 1)
+    }
+}
+
+/// States and command at which the displacement stays zero while a disturbance lasts or fades (the
+/// regulator equation `X S = A X + B U + E`, `C X = 0`), per disturbance.
+fn targets(
+    rig: &SampledRig,
+) -> Result<
+    (
+        SMatrix<f64, STATES, DISTURBANCES>,
+        RowSVector<f64, DISTURBANCES>,
+    ),
+    ModelError,
+> {
+    let mut m = SMatrix::<f64, { STATES + 1 }, { STATES + 1 }>::zeros();
+    m.fixed_view_mut::<STATES, STATES>(0, 0)
+        .copy_from(&(SMatrix::<f64, STATES, STATES>::identity() * FORCE_LEFT - rig.a));
+    m.fixed_view_mut::<STATES, 1>(0, STATES).copy_from(&-rig.b);
+    m.fixed_view_mut::<1, STATES>(STATES, 0)
+        .copy_from(&rig.c.row(0));
+    let mut right = SMatrix::<f64, { STATES + 1 }, 1>::zeros();
+    right
+        .fixed_rows_mut::<STATES>(0)
+        .copy_from(&(rig.from + rig.to));
+    let solution = m.lu().solve(&right).ok_or(ModelError::NoSolution {
+        equation: "the rig at rest under a force",
+        reason: "no valve command holds the displacement".into(),
+    })?;
+    let mut states = SMatrix::<f64, STATES, DISTURBANCES>::zeros();
+    states
+        .fixed_view_mut::<STATES, 1>(0, 0)
+        .copy_from(&solution.fixed_rows::<STATES>(0));
+    // An offset of the valve is taken off the command.
+    Ok((states, RowSVector::from([[solution[STATES]], [-1.0]])))
+}

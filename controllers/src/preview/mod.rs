@@ -1,0 +1,305 @@
+//! Preview control: the valve command of a model that follows the motion known ahead, and linear
+//! quadratic Gaussian feedback of what is left.
+//!
+//! Every sample:
+//!
+//! 1. The forces that act on the table along the wanted motion, dry friction of the seals with its
+//!    presliding and the specimen's reaction, are computed as far ahead as the motion is known
+//!    ([`load`]).
+//! 2. A model of the rig is driven along the motion against these forces by optimal preview, its
+//!    command within the valve's limit ([`feedforward`]). Without noise or delay it can be as quick as
+//!    the valve.
+//! 3. The rig is brought to the model's state; what the forces were not, and the valve's offset, is
+//!    estimated and taken off ([`feedback`]). Measurements may be late.
+//!
+//! The first two with a table that stands still make a compensation of friction and specimen that
+//! any other controller can have ([`Role::Compensation`]).
+
+pub mod feedback;
+pub mod feedforward;
+pub mod load;
+pub mod model;
+
+use nalgebra::SVector;
+use units::constants::{INCH, LBF, SAMPLING_PERIOD};
+
+use self::feedback::{Feedback, FeedbackState, MAXIMUM_DELAY, Uncertainty};
+use self::feedforward::{Feedforward, PREVIEW};
+use self::load::{KnownLoad, LoadState};
+use self::model::{OUTPUTS, RigModel, STATES, SampledRig};
+use crate::pid::VALVE_LIMIT;
+use crate::{Controller, ModelError, Motion};
+use plant::identified::seal_shape::SealShape;
+
+/// What the law does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Drives the valve.
+    #[default]
+    Control,
+    /// Adds to another controller's command what keeps a table that stands still unmoved under the
+    /// forces along the wanted motion: to that controller the rig has neither friction nor specimen.
+    Compensation,
+}
+
+/// What preview control is built from.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Parameters {
+    /// What it does.
+    pub role: Role,
+    /// The rig.
+    pub rig: RigModel,
+    /// Forces on its table.
+    pub load: KnownLoad,
+    /// Whether the motion ahead is known; else it is extrapolated.
+    pub preview: bool,
+    /// Samples by which measurements are late.
+    pub delay: usize,
+    /// Weights of the feedforward: displacement (1/m), velocity (s/m), acceleration (s²/m).
+    pub tracking_weights: [f64; OUTPUTS],
+    /// Weight of the feedforward's change of command a sample, 1/V.
+    pub move_weight: f64,
+    /// Weights of the feedback: displacement (1/m), velocity (s/m), acceleration (s²/m).
+    pub feedback_weights: [f64; OUTPUTS],
+    /// Weight of the feedback's command, 1/V.
+    pub command_weight: f64,
+    /// What the estimates take to be uncertain.
+    pub uncertainty: Uncertainty,
+    /// Largest magnitude of the valve command, V.
+    pub limit: f64,
+    /// Sampling period, s.
+    pub period: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            role: Role::Control,
+            rig: RigModel::default(),
+            load: KnownLoad {
+                friction: 0.0,
+                shape: SealShape {
+                    presliding: 1e-3 * INCH,
+                    excess: 0.25,
+                    stribeck_velocity: 0.1 * INCH,
+                    sharpness: 3.0,
+                    relaxation: 0.0,
+                },
+                specimen: None,
+            },
+            preview: true,
+            delay: 0,
+            tracking_weights: [100.0, 14.0, 1.0],
+            move_weight: 0.05,
+            feedback_weights: [100.0, 14.0, 1.0],
+            command_weight: 6.0,
+            uncertainty: Uncertainty {
+                measurement: [5e-4 * INCH, 0.2 * INCH, 1.5 * INCH],
+                valve: 0.01,
+                force: 0.1 * LBF,
+                force_step: 0.0125 * LBF,
+                offset_step: 1e-3,
+            },
+            limit: VALVE_LIMIT,
+            period: SAMPLING_PERIOD,
+        }
+    }
+}
+
+impl Parameters {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first with which the law cannot run.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        self.rig.validate()?;
+        self.load.validate()?;
+        if self.delay > MAXIMUM_DELAY {
+            return Err(ModelError::Parameter {
+                name: "loop_delay_samples",
+                value: self.delay as f64,
+                expected: "at most 4",
+            });
+        }
+        const TRACKING: [&str; OUTPUTS] = [
+            "tracking_displacement_weight",
+            "tracking_velocity_weight",
+            "tracking_acceleration_weight",
+        ];
+        const FEEDBACK: [&str; OUTPUTS] = [
+            "feedback_displacement_weight",
+            "feedback_velocity_weight",
+            "feedback_acceleration_weight",
+        ];
+        const MEASURED: [&str; OUTPUTS] = [
+            "displacement_measurement_noise",
+            "velocity_measurement_noise",
+            "acceleration_measurement_noise",
+        ];
+        for i in 0..OUTPUTS {
+            ModelError::require_positive(TRACKING[i], self.tracking_weights[i])?;
+            ModelError::require_positive(FEEDBACK[i], self.feedback_weights[i])?;
+            ModelError::require_positive(MEASURED[i], self.uncertainty.measurement[i])?;
+        }
+        let own = &self.uncertainty;
+        ModelError::require_positive("move_weight", self.move_weight)?;
+        ModelError::require_positive("command_weight", self.command_weight)?;
+        ModelError::require_non_negative("valve_noise", own.valve)?;
+        ModelError::require_non_negative("force_noise", own.force)?;
+        ModelError::require_positive("force_step", own.force_step)?;
+        ModelError::require_positive("offset_step", own.offset_step)?;
+        ModelError::require_positive("valve_limit", self.limit)?;
+        ModelError::require_positive("period", self.period)
+    }
+}
+
+/// What preview control is told.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PreviewInput {
+    /// Wanted motion: now, then sample by sample ahead. Without preview only the first counts.
+    pub reference: [Motion; PREVIEW + 1],
+    /// Measured motion.
+    pub measured: Motion,
+    /// Another controller's command, V; for [`Role::Compensation`] alone.
+    pub command: f64,
+}
+
+/// What preview control remembers: plain data.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Memory {
+    /// The model's state.
+    model: [f64; STATES],
+    /// The model's latest command, V.
+    command: f64,
+    feedback: FeedbackState,
+    /// The load at the furthest sample known.
+    load: LoadState,
+    /// Known forces now and ahead, N.
+    forces: [f64; PREVIEW + 1],
+    /// The motion at the furthest sample known; absent before the first.
+    last: Option<Motion>,
+}
+
+/// Preview control: what it was built from, what follows from that, and what it remembers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PreviewControl {
+    parameters: Parameters,
+    rig: SampledRig,
+    feedforward: Feedforward,
+    feedback: Feedback,
+    /// The controller's memory.
+    pub memory: Memory,
+}
+
+impl PreviewControl {
+    /// Designs feedforward, feedback and filter.
+    ///
+    /// # Errors
+    /// What [`Parameters::validate`] refuses; a Riccati equation without a stabilising solution.
+    pub fn new(parameters: Parameters) -> Result<Self, ModelError> {
+        parameters.validate()?;
+        let p = &parameters;
+        let rig = p.rig.sample(p.period);
+        let ahead = if p.preview { PREVIEW } else { 0 };
+        let weights = SVector::from(p.tracking_weights);
+        let feedforward = Feedforward::new(&rig, &weights, p.move_weight, ahead, p.period)?;
+        let weights = SVector::from(p.feedback_weights);
+        let feedback = Feedback::new(&rig, &weights, p.command_weight, &p.uncertainty, p.delay)?;
+        Ok(Self {
+            rig,
+            feedforward,
+            feedback,
+            memory: Memory::default(),
+            parameters,
+        })
+    }
+
+    /// What it was built from.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// The rig it knows.
+    pub fn rig(&self) -> &SampledRig {
+        &self.rig
+    }
+
+    /// Its feedback.
+    pub fn feedback(&self) -> &Feedback {
+        &self.feedback
+    }
+
+    /// Brings the known forces up to the furthest sample known.
+    fn look_ahead(&mut self, reference: &[Motion; PREVIEW + 1]) {
+        let p = &self.parameters;
+        let memory = &mut self.memory;
+        let furthest = if p.preview { PREVIEW } else { 0 };
+        let first = if memory.last.is_none() { 0 } else { furthest };
+        memory.forces.rotate_left(1);
+        for slot in first..=furthest {
+            let to = reference[slot];
+            let from = memory.last.unwrap_or(to);
+            memory.load = p.load.advance(&memory.load, [&from, &to], p.period);
+            memory.last = Some(to);
+            memory.forces[slot] = p.load.force(&memory.load, &to);
+        }
+        let beyond = memory.forces[furthest];
+        memory.forces[furthest..].fill(beyond);
+    }
+}
+
+fn vector(motion: &Motion) -> SVector<f64, OUTPUTS> {
+    SVector::from([motion.displacement, motion.velocity, motion.acceleration])
+}
+
+impl Controller for PreviewControl {
+    type Input = PreviewInput;
+    /// Valve command, V.
+    type Output = f64;
+
+    fn validate(&self) -> Result<(), ModelError> {
+        self.parameters.validate()
+    }
+
+    fn step(&mut self, input: &PreviewInput, _period: f64) -> f64 {
+        self.look_ahead(&input.reference);
+        let limit = self.parameters.limit;
+        let compensates = self.parameters.role == Role::Compensation;
+        let wanted: [_; PREVIEW + 1] = std::array::from_fn(|j| {
+            if compensates {
+                return SVector::zeros();
+            }
+            vector(&input.reference[if self.parameters.preview { j } else { 0 }])
+        });
+        let memory = &mut self.memory;
+        let x = SVector::from(memory.model);
+        let own = self
+            .feedforward
+            .command(&x, memory.command, &wanted, &memory.forces)
+            .clamp(-limit, limit);
+        let forces = [memory.forces[0], memory.forces[1]];
+        let command = if compensates {
+            (input.command + own).clamp(-limit, limit)
+        } else {
+            let measured = vector(&input.measured);
+            let state = &mut memory.feedback;
+            let command = self
+                .feedback
+                .command(state, &self.rig, &x, own, &measured, forces[0])
+                .clamp(-limit, limit);
+            self.feedback.sent(state, &self.rig, command, forces[1]);
+            command
+        };
+        memory.model = self.rig.advance(&x, own, forces).into();
+        memory.command = own;
+        command
+    }
+
+    fn reset(&mut self) {
+        self.memory = Memory::default();
+    }
+}
+
+#[cfg(test)]
+mod tests;

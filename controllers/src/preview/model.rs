@@ -1,0 +1,179 @@
+//! The rig as preview control knows it, sampled.
+
+use nalgebra::{DMatrix, SMatrix, SVector};
+use plant::identified::shake_table::ShakeTable;
+
+use crate::ModelError;
+
+/// States of the rig: three of the actuator, displacement, velocity.
+pub const STATES: usize = 5;
+/// What is measured: displacement (m), velocity (m/s), acceleration (m/s²).
+pub const OUTPUTS: usize = 3;
+
+/// Valve and oil of an actuator, as recordings give them: `y + l dy/dt + j d²y/dt² = u`,
+/// `dP/dt = g y - K v - p P`, `F = P - c v` less dry friction.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Hydraulics {
+    /// `l`, s.
+    pub spool_lag: f64,
+    /// `j`, s².
+    pub spool_inertia: f64,
+    /// `g`, N/(V s).
+    pub force_rate: f64,
+    /// `K`, N/m.
+    pub oil_stiffness: f64,
+    /// `p`, 1/s.
+    pub leakage_rate: f64,
+    /// `c`, viscous damping of the seals, N s/m.
+    pub seal_damping: f64,
+}
+
+/// Actuator and table: the form of Eq 2-4, or valve and oil in place of its actuator.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct RigModel {
+    /// The table, and the actuator unless `hydraulics` stand for it.
+    pub shake_table: ShakeTable,
+    /// Valve and oil, where they were identified.
+    pub hydraulics: Option<Hydraulics>,
+}
+
+impl RigModel {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        let Some(own) = &self.hydraulics else {
+            return self.shake_table.validate();
+        };
+        for (name, value) in [
+            ("spool_lag", own.spool_lag),
+            ("spool_inertia", own.spool_inertia),
+            ("force_rate", own.force_rate),
+            ("oil_stiffness", own.oil_stiffness),
+        ] {
+            ModelError::require_positive(name, value)?;
+        }
+        ModelError::require_non_negative("leakage_rate", own.leakage_rate)?;
+        ModelError::require_non_negative("seal_damping", own.seal_damping)?;
+        self.shake_table.table.validate()
+    }
+
+    /// `(A, B)` of `dx/dt = A x + B [u, f]`: valve command (V) and force on the table (N). The last
+    /// two states are displacement and velocity.
+    pub fn dynamics(&self) -> (SMatrix<f64, STATES, STATES>, SMatrix<f64, STATES, 2>) {
+        let Some(own) = &self.hydraulics else {
+            return self.shake_table.dynamics();
+        };
+        let table = &self.shake_table.table;
+        let mut a = SMatrix::<f64, STATES, STATES>::zeros();
+        let mut b = SMatrix::<f64, STATES, 2>::zeros();
+        a[(0, 1)] = 1.0;
+        a[(1, 0)] = -1.0 / own.spool_inertia;
+        a[(1, 1)] = -own.spool_lag / own.spool_inertia;
+        b[(1, 0)] = 1.0 / own.spool_inertia;
+        a[(2, 0)] = own.force_rate;
+        a[(2, 2)] = -own.leakage_rate;
+        a[(2, 4)] = -own.oil_stiffness;
+        a[(3, 4)] = 1.0;
+        a[(4, 2)] = 1.0 / table.mass;
+        a[(4, 3)] = -table.stiffness / table.mass;
+        a[(4, 4)] = -(table.damping + own.seal_damping) / table.mass;
+        b[(4, 1)] = 1.0 / table.mass;
+        (a, b)
+    }
+
+    /// The rig sampled with `period` (s).
+    pub fn sample(&self, period: f64) -> SampledRig {
+        // The command is held, the force goes evenly from one sample's to the next's.
+        let (a, b) = self.dynamics();
+        const ALL: usize = STATES + 3;
+        let mut block = DMatrix::zeros(ALL, ALL);
+        block
+            .view_mut((0, 0), (STATES, STATES))
+            .copy_from(&(a * period));
+        block
+            .view_mut((0, STATES), (STATES, 2))
+            .copy_from(&(b * period));
+        block[(STATES + 1, STATES + 2)] = 1.0;
+        let block = block.exp();
+        let column = |j: usize| SVector::from_fn(|i, _| block[(i, j)]);
+        let change: SVector<f64, STATES> = column(STATES + 2);
+        let mut c = SMatrix::<f64, OUTPUTS, STATES>::zeros();
+        c[(0, 3)] = 1.0;
+        c[(1, 4)] = 1.0;
+        c.row_mut(2).copy_from(&a.row(4));
+        SampledRig {
+            a: SMatrix::from_fn(|i, j| block[(i, j)]),
+            b: column(STATES),
+            from: column(STATES + 1) - change,
+            to: change,
+            c,
+            d: SVector::from([0.0, 0.0, b[(4, 1)]]),
+        }
+    }
+}
+
+/// `x[k+1] = A x[k] + B u[k] + E0 f[k] + E1 f[k+1]`, `y[k] = C x[k] + D f[k]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampledRig {
+    /// Transition.
+    pub a: SMatrix<f64, STATES, STATES>,
+    /// Valve command, held.
+    pub b: SVector<f64, STATES>,
+    /// `E0`, force at the beginning of the step.
+    pub from: SVector<f64, STATES>,
+    /// `E1`, force at its end.
+    pub to: SVector<f64, STATES>,
+    /// Measured motion.
+    pub c: SMatrix<f64, OUTPUTS, STATES>,
+    /// Direct effect of the force.
+    pub d: SVector<f64, OUTPUTS>,
+}
+
+impl SampledRig {
+    /// The state a sample later under `command` (V) and `forces` (N) at both ends.
+    pub fn advance(
+        &self,
+        x: &SVector<f64, STATES>,
+        command: f64,
+        [from, to]: [f64; 2],
+    ) -> SVector<f64, STATES> {
+        self.a * x + self.b * command + self.from * from + self.to * to
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A force that rises evenly, integrated in small steps that hold it.
+    #[test]
+    fn an_even_force_is_sampled_exactly() {
+        let rig = RigModel {
+            shake_table: ShakeTable::default(),
+            hydraulics: Some(Hydraulics {
+                spool_lag: 0.005,
+                spool_inertia: 8e-6,
+                force_rate: 2e4,
+                oil_stiffness: 2e5,
+                leakage_rate: 3.0,
+                seal_damping: 900.0,
+            }),
+        };
+        let (coarse, fine) = (rig.sample(0.002), rig.sample(0.002 / 500.0));
+        let start = SVector::from([0.5, 10.0, 20.0, 0.01, -0.1]);
+        let expected = (0..500).fold(start, |x, i| {
+            let at = |i: usize| 5.0 + 3.0 * i as f64 / 500.0;
+            let held = 0.5 * (at(i) + at(i + 1));
+            fine.advance(&x, 1.5, [held, held])
+        });
+        let got = coarse.advance(&start, 1.5, [5.0, 8.0]);
+        for (got, expected) in got.iter().zip(&expected) {
+            assert!(
+                (got - expected).abs() < 1e-5 * expected.abs().max(0.1),
+                "{got} {expected}"
+            );
+        }
+    }
+}

@@ -1,0 +1,211 @@
+#![allow(non_snake_case, reason = "an FMU is named in camel case")]
+//! Preview control as an FMU.
+
+mod settings;
+
+use controllers::preview::feedforward::PREVIEW;
+use controllers::preview::{Memory, PreviewControl as Law, PreviewInput};
+use controllers::{Controller, Motion};
+use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Variable};
+use serde::{Deserialize, Serialize};
+
+use settings::{ROLES, Settings};
+
+/// Preview control from reference and measured motion to valve command.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct PreviewControl {
+    settings: Settings,
+    reference: Motion,
+    displacement_ahead: [f64; PREVIEW],
+    velocity_ahead: [f64; PREVIEW],
+    acceleration_ahead: [f64; PREVIEW],
+    measured: Motion,
+    command: f64,
+    memory: Memory,
+    valve_command: f64,
+    #[serde(skip)]
+    built: Built,
+}
+
+/// What follows from the settings alone. A copy builds its own at its next step.
+#[derive(Default)]
+struct Built(Option<Box<(Settings, Law)>>);
+
+impl Clone for Built {
+    fn clone(&self) -> Self {
+        Self(None)
+    }
+
+    fn clone_from(&mut self, _source: &Self) {}
+}
+
+impl std::fmt::Debug for Built {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Built").field(&self.0.is_some()).finish()
+    }
+}
+
+impl Built {
+    /// The controller for these settings, built if it isn't yet.
+    fn controller(&mut self, settings: &Settings) -> Result<&mut Law, plant::ModelError> {
+        if self.0.as_ref().is_some_and(|built| built.0 != *settings) {
+            self.0 = None;
+        }
+        let built = match self.0.take() {
+            Some(built) => built,
+            None => Box::new((
+                *settings,
+                Law::new(settings.parameters(PreviewControl::STEP_SIZE)?)?,
+            )),
+        };
+        Ok(&mut self.0.insert(built).1)
+    }
+}
+
+const NOW: [&str; 7] = [
+    "reference_displacement",
+    "reference_velocity",
+    "reference_acceleration",
+    "measured_displacement",
+    "measured_velocity",
+    "measured_acceleration",
+    "controller_command",
+];
+
+fn ahead() -> Vec<Variable<PreviewControl>> {
+    let array = |name, about: &str, unit, shown, nominal, field| {
+        let elements = Variable::<PreviewControl>::array(name, Causality::Input, PREVIEW, field);
+        elements
+            .into_iter()
+            .enumerate()
+            .map(|(i, element)| {
+                element
+                    .about(&format!("{about} {} samples ahead, for `preview`", i + 1))
+                    .unit(unit)
+                    .shown_in(shown)
+                    .nominal(nominal)
+            })
+            .collect::<Vec<_>>()
+    };
+    let mut all = array(
+        "reference_displacement",
+        "Wanted displacement",
+        "m",
+        "in",
+        0.0381,
+        |s| &mut s.displacement_ahead,
+    );
+    all.extend(array(
+        "reference_velocity",
+        "Wanted velocity",
+        "m/s",
+        "in/s",
+        0.5,
+        |s| &mut s.velocity_ahead,
+    ));
+    all.extend(array(
+        "reference_acceleration",
+        "Wanted acceleration",
+        "m/s2",
+        "g",
+        10.0,
+        |s| &mut s.acceleration_ahead,
+    ));
+    all
+}
+
+impl Component for PreviewControl {
+    const NAME: &'static str = "PreviewControl";
+    const DESCRIPTION: &'static str =
+        "Preview control of a shake table with friction and specimen in its model";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const ANY_STEP_SIZE: bool = false;
+
+    fn variables() -> Vec<Variable<Self>> {
+        let mut variables = fmu_kit::table! { Self, s:
+            input("reference_displacement", s.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input("reference_velocity", s.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
+            input("reference_acceleration", s.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
+            input("measured_displacement", s.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+            input("controller_command", s.command, "Another controller's command, where this compensates", "V").nominal(10.0);
+            input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
+        };
+        let ahead = ahead();
+        let inputs: Vec<String> = NOW
+            .iter()
+            .map(|name| name.to_string())
+            .chain(ahead.iter().map(|variable| variable.name.clone()))
+            .collect();
+        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+        variables.extend(ahead);
+        let outputs = fmu_kit::table! { Self, s:
+            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0).depends_on(&inputs, Dependent);
+        };
+        variables.extend(outputs);
+        variables.extend(settings::variables());
+        variables.push(
+            Variable::choice("role", ROLES, |s: &mut Self| &mut s.settings.role)
+                .about("What the law does"),
+        );
+        variables
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        self.built.controller(&self.settings)?;
+        self.memory = Memory::default();
+        self.valve_command = 0.0;
+        Ok(())
+    }
+
+    fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        let control = self.built.controller(&self.settings)?;
+        control.memory = self.memory;
+        let input = PreviewInput {
+            reference: std::array::from_fn(|i| match i.checked_sub(1) {
+                None => self.reference,
+                Some(i) => Motion {
+                    displacement: self.displacement_ahead[i],
+                    velocity: self.velocity_ahead[i],
+                    acceleration: self.acceleration_ahead[i],
+                },
+            }),
+            measured: self.measured,
+            command: self.command,
+        };
+        self.valve_command = control.step(&input, step_size);
+        self.memory = control.memory;
+        Ok(())
+    }
+}
+
+fmu_kit::export!(PreviewControl);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_controller_is_built_from_is_refused_by_name() {
+        for (name, value) in [
+            ("move_weight", 0.0),
+            ("command_weight", -1.0),
+            ("force_step", 0.0),
+            ("valve_limit", 0.0),
+            ("table_mass", 0.0),
+            ("loop_delay_samples", 9.0),
+        ] {
+            let mut component = PreviewControl::default();
+            let variables = PreviewControl::variables();
+            let variable = variables.iter().find(|v| v.name == name).unwrap();
+            match &variable.access {
+                fmu_kit::variable::Access::Real(field) => *field(&mut component) = value,
+                fmu_kit::variable::Access::Integer(field) => *field(&mut component) = value as i32,
+                _ => panic!("{name} is no number"),
+            }
+            let error = component.initialize().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{name}`")), "{name}: {error}");
+        }
+    }
+}

@@ -1,0 +1,234 @@
+#![allow(non_snake_case, reason = "an FMU is named in camel case")]
+//! Specimen of several storeys on the table as an FMU.
+
+use fmu_kit::{Causality, Component, ComponentResult, Variable};
+use plant::ModelError;
+use plant::specimens::hysteresis::BoucWen;
+use plant::specimens::{MAX_STOREYS, Storeys, StoreysState, YieldingSpecimen};
+use serde::{Deserialize, Serialize};
+
+/// A value of each storey, the lowest first.
+type EachStorey = [f64; MAX_STOREYS];
+
+/// A shear building between the table's acceleration and its force on the table.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct StoreysSpecimen {
+    storeys: i32,
+    mass: EachStorey,
+    damping: EachStorey,
+    yield_force: EachStorey,
+    yield_displacement: EachStorey,
+    post_yield_ratio: EachStorey,
+    state: StoreysState,
+    table_acceleration: f64,
+    force: f64,
+    acceleration: f64,
+    floor_acceleration: EachStorey,
+    drift: EachStorey,
+}
+
+impl Default for StoreysSpecimen {
+    fn default() -> Self {
+        // Three storeys of 100 lbf together, first period 0.5 s, stiffness-proportional damping of 5 %
+        // there; strength falls with height as the shear does.
+        const LOWEST: [f64; 3] = [26.7, 22.2, 13.3];
+        const STIFFNESS: f64 = 12_050.0;
+        let strength: EachStorey = std::array::from_fn(|i| LOWEST[i.min(2)]);
+        Self {
+            storeys: 3,
+            mass: [15.11; MAX_STOREYS],
+            damping: [2.0 * 0.05 * STIFFNESS / 12.57; MAX_STOREYS],
+            yield_force: strength,
+            yield_displacement: strength.map(|force| force / STIFFNESS),
+            post_yield_ratio: [0.05; MAX_STOREYS],
+            state: StoreysState::default(),
+            table_acceleration: 0.0,
+            force: 0.0,
+            acceleration: 0.0,
+            floor_acceleration: [0.0; MAX_STOREYS],
+            drift: [0.0; MAX_STOREYS],
+        }
+    }
+}
+
+impl StoreysSpecimen {
+    fn building(&self) -> Result<Storeys, ModelError> {
+        let storey = |i: usize| YieldingSpecimen {
+            mass: self.mass[i],
+            damping: self.damping[i],
+            columns: BoucWen {
+                yield_force: self.yield_force[i],
+                yield_displacement: self.yield_displacement[i],
+                post_yield_ratio: self.post_yield_ratio[i],
+                ..BoucWen::default()
+            },
+        };
+        let count = usize::try_from(self.storeys).unwrap_or(0);
+        let building = Storeys {
+            storey: std::array::from_fn(storey),
+            count,
+        };
+        building.validate()?;
+        Ok(building)
+    }
+}
+
+fn each(
+    name: &str,
+    causality: Causality,
+    about: &str,
+    [unit, shown]: [&'static str; 2],
+    field: fn(&mut StoreysSpecimen) -> &mut [f64],
+) -> Vec<Variable<StoreysSpecimen>> {
+    let elements = Variable::array(name, causality, MAX_STOREYS, field).into_iter();
+    let named = elements.enumerate().map(|(i, element)| {
+        let element = element.about(&format!("{about} {}", i + 1));
+        if unit.is_empty() {
+            element
+        } else {
+            element.unit(unit).shown_in(shown)
+        }
+    });
+    named.collect()
+}
+
+impl Component for StoreysSpecimen {
+    const NAME: &'static str = "StoreysSpecimen";
+    const DESCRIPTION: &'static str = "Specimen of several yielding storeys on a shake table";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+
+    fn variables() -> Vec<Variable<Self>> {
+        let mut variables = fmu_kit::table! { Self, s:
+            input("table_acceleration", s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g")
+                .nominal(10.0);
+            output("force", s.force, "Force on the table", "N" => "lbf").nominal(400.0);
+            output("acceleration", s.acceleration, "Acceleration that times the whole mass is the force", "m/s2" => "g")
+                .nominal(10.0);
+            parameter("storeys", s.storeys, "Number of storeys").min(1.0).max(10.0);
+        };
+        let mut add = |more: Vec<Variable<Self>>| variables.extend(more);
+        let (output, parameter) = (Causality::Output, Causality::Parameter);
+        add(each(
+            "floor_acceleration",
+            output,
+            "Absolute acceleration of floor",
+            ["m/s2", "g"],
+            |s| &mut s.floor_acceleration,
+        ));
+        add(each("drift", output, "Drift of storey", ["m", "in"], |s| {
+            &mut s.drift
+        }));
+        add(each(
+            "mass",
+            parameter,
+            "Mass of storey",
+            ["kg", "lbf.s2/in"],
+            |s| &mut s.mass,
+        ));
+        add(each(
+            "damping",
+            parameter,
+            "Viscous damping of storey",
+            ["N.s/m", "lbf.s/in"],
+            |s| &mut s.damping,
+        ));
+        add(each(
+            "yield_force",
+            parameter,
+            "Yield force of storey",
+            ["N", "lbf"],
+            |s| &mut s.yield_force,
+        ));
+        add(each(
+            "yield_displacement",
+            parameter,
+            "Yield displacement of storey",
+            ["m", "in"],
+            |s| &mut s.yield_displacement,
+        ));
+        add(each(
+            "post_yield_ratio",
+            parameter,
+            "Stiffness after yielding over that before, 1 elastic, of storey",
+            ["", ""],
+            |s| &mut s.post_yield_ratio,
+        ));
+        variables
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        self.building()?;
+        self.state = StoreysState::default();
+        Ok(())
+    }
+
+    fn update_outputs(&mut self, _time: f64) {
+        // Parameters that make no building were refused at the start.
+        let Ok(building) = self.building() else {
+            return;
+        };
+        let whole: f64 = self.mass[..building.count].iter().sum();
+        self.force = building.force(&self.state);
+        self.acceleration = -self.force / whole;
+        self.floor_acceleration = building.accelerations(&self.state);
+        self.drift = self.state.storey.map(|storey| storey.drift);
+    }
+
+    fn step(&mut self, time: f64, step_size: f64) -> ComponentResult {
+        let building = self.building()?;
+        self.state = building.advance(&self.state, self.table_acceleration, step_size);
+        let finite = |storey: &plant::specimens::YieldingState| storey.drift.is_finite();
+        if self.state.storey.iter().all(finite) {
+            return Ok(());
+        }
+        Err(format!(
+            "a drift is no longer finite after t = {} s",
+            time + step_size
+        )
+        .into())
+    }
+}
+
+fmu_kit::export!(StoreysSpecimen);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{PI, TAU};
+
+    #[test]
+    fn the_default_building_has_its_first_period() {
+        let mut component = StoreysSpecimen {
+            damping: [0.0; MAX_STOREYS],
+            post_yield_ratio: [1.0; MAX_STOREYS],
+            ..StoreysSpecimen::default()
+        };
+        component.initialize().unwrap();
+        // Resonance in the first mode: free vibration after a push counts its zero crossings.
+        component.table_acceleration = 0.1;
+        component.step(0.0, 0.25).unwrap();
+        component.table_acceleration = 0.0;
+        let mut drifts = Vec::new();
+        for k in 0..5000 {
+            component.step(0.002 * f64::from(k), 0.002).unwrap();
+            component.update_outputs(0.0);
+            drifts.push(component.drift.iter().sum::<f64>());
+        }
+        let crossings = drifts.windows(2).filter(|d| d[0] * d[1] < 0.0).count();
+        let frequency = crossings as f64 / 2.0 / 10.0;
+        // Closed form for equal storeys: 2 w0 sin(pi/14).
+        let omega = 2.0 * (12_050.0_f64 / 15.11).sqrt() * (PI / 14.0).sin();
+        assert!((frequency - omega / TAU).abs() < 0.06, "{frequency}");
+        assert!((frequency - 2.0).abs() < 0.06, "{frequency}");
+    }
+
+    #[test]
+    fn no_storeys_are_refused_by_name() {
+        let mut component = StoreysSpecimen {
+            storeys: 11,
+            ..StoreysSpecimen::default()
+        };
+        let said = component.initialize().unwrap_err().to_string();
+        assert!(said.contains("storeys"), "{said}");
+    }
+}

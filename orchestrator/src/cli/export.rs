@@ -1,0 +1,134 @@
+//! `shakebench export`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+
+use super::rig::RigArguments;
+use crate::error::Error;
+use crate::fmu::FmiVersion;
+use crate::master::Algorithm;
+use crate::results::Results;
+use crate::run::experiment::{Request, is_file, prepare};
+use crate::ssp::export::{Experiment, write};
+use crate::units;
+
+/// Options of `shakebench export`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    shakebench export mpc --ssp mpc.ssp\n  \
+    shakebench export my-rig.toml --ssp rig.ssp --record NGA/RSN1633_MANJIL_ABBAR--L.AT2")]
+pub struct Arguments {
+    /// Built-in system, .toml file or .ssp archive
+    #[arg(value_name = "SYSTEM")]
+    system: String,
+    /// Archive to write (System Structure and Parameterization)
+    #[arg(long, value_name = "FILE")]
+    ssp: PathBuf,
+    /// Ground motion that goes into the archive
+    #[arg(long, value_name = "FILE", conflicts_with = "reference")]
+    record: Option<PathBuf>,
+    /// Reference that goes into the archive
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    #[command(flatten)]
+    rig: RigArguments,
+    /// Parameter, such as control.valve_limit="5 V"; may be given several times
+    #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
+    set: Vec<String>,
+    /// Version of FMI of the components: 2 for an archive of SSP 1.0, 3 for one of SSP 2.0
+    #[arg(long, value_enum, default_value_t = Version::Two)]
+    fmi: Version,
+    /// Order of calls that the parameters are for; programs that read SSP mostly step all
+    /// components from the same values
+    #[arg(long, value_enum, default_value_t = Algorithm::Jacobi)]
+    algorithm: Algorithm,
+    /// How much of the motion goes into the archive, such as "10 s"
+    #[arg(long, value_name = "T")]
+    duration: Option<String>,
+}
+
+/// Version of FMI of an archive's components.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Version {
+    /// FMI 2.0
+    #[value(name = "2")]
+    Two,
+    /// FMI 3.0
+    #[value(name = "3")]
+    Three,
+}
+
+/// Writes a system as an SSP archive.
+///
+/// # Errors
+/// Input at fault; nothing is written then.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let fmi = match arguments.fmi {
+        Version::Two => FmiVersion::V2,
+        Version::Three => FmiVersion::V3,
+    };
+    let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
+    let duration = arguments.duration.as_deref().map(|text| {
+        units::value_in(text, "s").map_err(|error| Error::Option {
+            option: "--duration",
+            reason: error.to_string(),
+        })
+    });
+    if is_file(&arguments.system) {
+        let given = [
+            ("--plant", arguments.rig.plant.is_some()),
+            ("--specimen", arguments.rig.specimen.is_some()),
+        ];
+        if let Some((option, _)) = given.into_iter().find(|(_, given)| *given) {
+            let reason = format!(
+                "{} is a file and has its own; edit it instead",
+                arguments.system
+            );
+            return Err(Error::Option { option, reason });
+        }
+    }
+    let request = Request {
+        plant: arguments.rig.plant(),
+        specimen: arguments.rig.specimen(),
+        tuning: arguments.rig.tuning,
+        control_model: arguments.rig.control_model.as_ref().map(absolute),
+        record: arguments.record.as_ref().map(absolute),
+        reference: arguments.reference.as_ref().map(absolute),
+        set: arguments.set.clone(),
+        fmi,
+        algorithm: Some(arguments.algorithm),
+        duration_s: duration.transpose()?,
+        ..Request::built_in(&arguments.system)
+    };
+    let prepared = prepare(&request)?;
+    let parent = arguments
+        .ssp
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty());
+    Results::check(parent.unwrap_or(Path::new(".")))?;
+    if let Some(parent) = parent {
+        std::fs::create_dir_all(parent).map_err(|error| Error::File {
+            path: parent.to_path_buf(),
+            reason: error.to_string(),
+        })?;
+    }
+    let motion = (!prepared.motion.is_empty()).then_some(&prepared.motion);
+    let experiment = Experiment {
+        motion,
+        step: prepared.step,
+        duration: prepared.samples as f64 * prepared.motion.dt,
+        algorithm: prepared.algorithm.to_string(),
+        fmi,
+    };
+    let mut notes = write(&prepared.system, &experiment, &arguments.ssp)?;
+    if motion.is_none() {
+        notes.push("the system follows no motion, so none is in the archive".to_string());
+    }
+    for note in notes {
+        eprintln!("note: {note}");
+    }
+    println!("{}", arguments.ssp.display());
+    Ok(ExitCode::SUCCESS)
+}
