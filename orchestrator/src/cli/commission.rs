@@ -1,5 +1,6 @@
 //! `shakebench commission`
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -83,7 +84,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         fmi: arguments.fmi.into(),
     };
     Results::check(&arguments.out)?;
-    let mut done = commission::commission(&request, &|step| eprintln!("{step}"))?;
+    let tell = |step: &str| {
+        if std::io::stderr().is_terminal() {
+            eprintln!("{step}");
+        }
+    };
+    let mut done = commission::commission(&request, &tell)?;
     done.write(&arguments.out)?;
     if arguments.json {
         let mut json = serde_json::json!(done);

@@ -25,11 +25,11 @@ pub struct Rig {
 }
 
 /// Noise of the sensors of the built-in rig, by the names of their parameters, SI.
-const NOISE: [(&str, f64); 4] = [
-    ("displacement_noise", 5e-4 * INCH),
-    ("acceleration_noise", 1.5 * INCH),
-    ("actuator_force_noise", 0.3 * LBF),
-    ("specimen_acceleration_noise", INCH),
+const NOISE: [(&str, f64, &str); 4] = [
+    ("displacement_noise", 5e-4 * INCH, "m"),
+    ("acceleration_noise", 1.5 * INCH, "m/s2"),
+    ("actuator_force_noise", 0.3 * LBF, "N"),
+    ("specimen_acceleration_noise", INCH, "m/s2"),
 ];
 
 impl Rig {
@@ -61,24 +61,32 @@ impl Rig {
     pub fn settings(&self) -> Vec<String> {
         let nominal = ServoHydraulicTable::default();
         let table = [
-            ("added_payload", self.payload * nominal.table.mass),
+            ("added_payload", self.payload * nominal.table.mass, "kg"),
             (
                 "bulk_modulus",
                 self.oil_stiffness * nominal.cylinder.bulk_modulus,
+                "Pa",
             ),
             (
                 "flow_coefficient",
                 self.valve_gain * nominal.valve.flow_coefficient,
+                "",
             ),
-            ("coulomb_friction", self.friction * nominal.friction.coulomb),
+            (
+                "coulomb_friction",
+                self.friction * nominal.friction.coulomb,
+                "N",
+            ),
             (
                 "static_friction",
                 self.friction * nominal.friction.static_force,
+                "N",
             ),
-            ("pump_pressure", self.supply * nominal.supply.pressure),
+            ("pump_pressure", self.supply * nominal.supply.pressure, "Pa"),
         ];
-        let table = table.map(|(name, value)| format!("table.{name}={value:e}"));
-        let noise = NOISE.map(|(name, value)| format!("sensors.{name}={:e}", self.noise * value));
+        let table = table.map(|(name, value, unit)| format!("table.{name}={value} {unit}"));
+        let noise = NOISE
+            .map(|(name, value, unit)| format!("sensors.{name}={} {unit}", self.noise * value));
         let seed = format!("sensors.seed={}", 1 + self.number);
         table.into_iter().chain(noise).chain([seed]).collect()
     }

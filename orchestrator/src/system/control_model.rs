@@ -165,7 +165,9 @@ impl ControlModel {
                     let change = factor * z;
                     let moved = HydraulicRig::from(std::array::from_fn(|i| own[i] + change[i]));
                     let late = moved.command_delay.max(0.0);
-                    let rig = moved.is_sound().then(|| moved.shake_table()).flatten()?;
+                    let spool = moved.spool_lag > 0.0 && moved.spool_inertia > 0.0;
+                    let sound = spool && moved.is_sound();
+                    let rig = sound.then(|| moved.shake_table()).flatten()?;
                     Some(Draw { rig, late })
                 }
                 (Uncertainty::Coefficients(errors), _) => {
@@ -199,9 +201,20 @@ impl Uncertainty {
     fn of(file: &ModelFile, units: Units) -> Self {
         let covariance = file.covariance.as_ref().and_then(|own| own.ordered());
         if let (Some(covariance), Some(_)) = (covariance, &file.hydraulics) {
-            let eigen = covariance.symmetric_eigen();
+            // Variances range over twenty decades: factored as correlations.
+            let size = covariance.diagonal().map(|value| value.max(0.0).sqrt());
+            let correlation = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
+                let both = size[i] * size[j];
+                if both > 0.0 {
+                    covariance[(i, j)] / both
+                } else {
+                    0.0
+                }
+            });
+            let eigen = correlation.symmetric_eigen();
             let sizes = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
-            return Self::Hydraulic(eigen.eigenvectors * DMatrix::from_diagonal(&sizes));
+            let factor = eigen.eigenvectors * DMatrix::from_diagonal(&sizes);
+            return Self::Hydraulic(DMatrix::from_diagonal(&size) * factor);
         }
         let Some(errors) = &file.standard_errors else {
             return Self::Unknown;

@@ -86,9 +86,9 @@ fn a_rig_changed_behind_the_controllers_backs_changes_recordings_only() {
     let changed = [
         "table.added_payload=10 kg",
         "table.flow_coefficient=1e-8",
-        "table.bulk_modulus=2e8",
-        "table.coulomb_friction=30",
-        "sensors.acceleration_noise=0.1",
+        "table.bulk_modulus=2e8 Pa",
+        "table.coulomb_friction=12 N",
+        "sensors.acceleration_noise=0.1 m/s2",
     ]
     .map(String::from);
     for controller in built_in::names() {
