@@ -299,7 +299,7 @@ fn find_inverse(plan: &Plan, late: usize, crossover: f64) -> Result<Inverse, Err
     if let Some(mass) = plan.dummy_mass {
         request.specimen = "none".into();
         request.set.retain(|set| !set.starts_with("specimen."));
-        request.set.push(format!("table.added_payload={mass}"));
+        request.set.push(format!("table.added_payload={mass} kg"));
     }
     let prepared = prepare(&request)?;
     let options = motion::Options {

@@ -334,7 +334,7 @@ fn the_data_of_a_rig_may_be_spelt_as_a_spreadsheet_does() {
     let folder = folder.path();
     press(folder, 6, BLOCKS);
     let diagnosed = |description: &str| -> Value {
-        let arguments = ["diagnose", description, "--json", "--out", "out"];
+        let arguments = ["diagnose", description, "--json", "--force", "--out", "out"];
         let output = shakebench(folder, &arguments);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         serde_json::from_str(&stdout(&output)).unwrap()

@@ -252,7 +252,7 @@ fn check(folder: &Path, arguments: &[&str], healthy: &Results, expected: &Expect
         words,
         within,
     } = *expected;
-    let all = [arguments, &["--out", "out", "--json"]].concat();
+    let all = [arguments, &["--out", "out", "--force", "--json"]].concat();
     let output = shakebench(folder, &all);
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{name}: {said}");
@@ -405,7 +405,10 @@ fn a_failing_controller_lets_the_interlock_bring_the_valve_to_null() {
         let packed = pack::build_component("tests/importers/faulty", &out, &[version]).unwrap();
         let fmu = packed[0].path.display().to_string();
         write(failing_controller(&fmu, "none"));
-        let output = shakebench(folder.path(), &["run", "rig.toml", "--out", "healthy"]);
+        let output = shakebench(
+            folder.path(),
+            &["run", "rig.toml", "--force", "--out", "healthy"],
+        );
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         let healthy = Results::read(&folder.path().join("healthy"));
         for (fault, words) in [

@@ -12,7 +12,6 @@ mod cyclic_material;
 mod description;
 mod diagnosis;
 mod extended;
-mod hybrid_actuator;
 mod hysteretic_device;
 mod measured;
 mod natural;
@@ -23,18 +22,19 @@ mod recording;
 pub mod shake_table;
 mod table;
 mod template;
+mod transfer_system;
 
 pub use confirmed::Confirmed;
 pub use description::{Column, Description, DescriptionError, LeftOut, Quantity, renamed};
 pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
 pub use extended::{ExtendedRig, FileErrors, Prediction};
 
-pub use hybrid_actuator::TransferSystemRig;
 pub use natural::Natural;
 pub use reading::Measurement;
 pub use recording::RigRecording;
 pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole, SessionTable};
 pub use template::template;
+pub use transfer_system::TransferSystemRig;
 
 use crate::data::Channel;
 
@@ -256,7 +256,7 @@ pub static KINDS: [&dyn Rig; 7] = [
     &positioning_drive::PositioningDrive,
     &hysteretic_device::HystereticDevice,
     &cyclic_material::CyclicMaterial,
-    &hybrid_actuator::HybridActuator,
+    &transfer_system::TransferSystemKind,
     &oscillator::Oscillator,
     &controlled_damper::ControlledDamper,
 ];

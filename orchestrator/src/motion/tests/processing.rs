@@ -207,7 +207,7 @@ fn a_record_without_motion_is_refused() {
         process(&still, &Options::default())
             .unwrap_err()
             .to_string(),
-        "still: nothing moves: the acceleration is zero throughout"
+        "still: nothing moves: without its mean and trend nothing is left of the acceleration"
     );
     let short = record("short.csv", &burst(100, 0.01)).unwrap();
     assert_eq!(

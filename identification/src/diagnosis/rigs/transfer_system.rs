@@ -15,7 +15,7 @@ use crate::IdentificationError;
 use crate::data::{Channel, Recording};
 
 /// The rig.
-pub struct HybridActuator;
+pub struct TransferSystemKind;
 
 const COMMAND: Channel = Channel::Other {
     name: "command",
@@ -118,8 +118,8 @@ fn plant_of(
     (parameters, beyond)
 }
 
-impl Equations for HybridActuator {
-    const KIND: &'static str = "hybrid_actuator";
+impl Equations for TransferSystemKind {
+    const KIND: &'static str = "transfer_system";
     type Nominal = Nominal;
     type Effects = Effects;
     type Session = ();
@@ -161,9 +161,9 @@ impl TransferSystemRig {
     /// # Errors
     /// None.
     pub fn benchmark() -> Result<Self, DescriptionError> {
-        let text = include_str!("../../../rigs/hybrid_actuator.toml");
-        let description = Description::parse("hybrid_actuator.toml".as_ref(), text)?;
-        let nominal = description.nominal(&HybridActuator)?;
+        let text = include_str!("../../../rigs/transfer_system.toml");
+        let description = Description::parse("transfer_system.toml".as_ref(), text)?;
+        let nominal = description.nominal(&TransferSystemKind)?;
         Ok(Self {
             description,
             nominal: nominal.into_iter().map(|(value, _)| value).collect(),
@@ -194,9 +194,9 @@ impl TransferSystemRig {
         command: Vec<f64>,
         force: Vec<f64>,
     ) -> Result<RigRecording, IdentificationError> {
-        let channels = vec![(COMMAND, command), (HybridActuator::OUTPUT, force)];
+        let channels = vec![(COMMAND, command), (TransferSystemKind::OUTPUT, force)];
         let recording = Recording::new(name, PERIOD, channels)?;
-        let (inputs, output) = (HybridActuator::INPUTS, HybridActuator::OUTPUT);
+        let (inputs, output) = (TransferSystemKind::INPUTS, TransferSystemKind::OUTPUT);
         let mut recording = RigRecording::new(recording, inputs, output);
         let half = recording.len() / 2;
         recording.left_out[half..].fill(true);
