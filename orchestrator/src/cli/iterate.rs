@@ -17,7 +17,7 @@ use crate::results::{Results, unused};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     shakebench iterate three-variable --plant servohydraulic --specimen yielding --record NGA/RSN1633_MANJIL_ABBAR--L.AT2\n  \
-    shakebench iterate mpc --plant servohydraulic --dummy-mass \"100 lbm\" --exposure 3\n  \
+    shakebench iterate mpc --plant servohydraulic --dummy-mass \"25 lbm\" --exposure 3\n  \
     shakebench iterate three-variable --drive shakebench-results/iteration-three-variable-synthetic-1/drive.csv --iterations 0")]
 pub struct Arguments {
     /// Built-in system or .toml file [default: three-variable]
@@ -66,7 +66,7 @@ pub struct Arguments {
     /// Lateness of the measurements, such as "2 ms" [default: that of the model for tuning]
     #[arg(long, value_name = "T")]
     measurement_delay: Option<String>,
-    /// Rigid mass in place of the specimen while the transfer function is found, such as "100 lbm"
+    /// Rigid mass in place of the specimen while the transfer function is found, such as "25 lbm"
     #[arg(long, value_name = "MASS")]
     dummy_mass: Option<String>,
     /// Drive to begin with: the drive.csv of an earlier iteration

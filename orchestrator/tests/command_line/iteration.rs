@@ -21,7 +21,7 @@ fn three_corrections_make_the_error_smaller_and_the_drive_is_written_and_read() 
     let folder = tempfile::tempdir().unwrap();
     let arguments = [
         &RIG[..],
-        &["--dummy-mass", "100 lbm", "--out", "out", "--json"],
+        &["--dummy-mass", "25 lbm", "--out", "out", "--json"],
     ]
     .concat();
     let output = shakebench(folder.path(), &arguments);

@@ -76,7 +76,7 @@ impl RigRecording {
         self.recording.samples(channel)
     }
 
-    /// `first` (the first input) as the band-limited signal through its samples, at [`PLACES`]
+    /// `first` (the first input) as the band-limited signal through its samples, at `PLACES`
     /// places a sample.
     pub fn between_samples(&self, first: Channel) -> &[f64] {
         self.between_samples
