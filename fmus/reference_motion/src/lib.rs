@@ -61,7 +61,8 @@ fn histories(
     all.into_iter()
         .map(|variable| {
             let shown = variable.unit(unit).shown_in(shown).nominal(nominal);
-            shown.depends_on(&["scale"], Dependency::Dependent)
+            let shown = shown.depends_on(&["scale"], Dependency::Dependent);
+            shown.initially_depends_on(&["scale", "sine_amplitude", "sine_frequency"])
         })
         .collect()
 }
