@@ -3,12 +3,14 @@
 //! One law, one file; every law meets [`Controller`]. Laws are sampled: they are called once a
 //! period with what the sensors gave, and the command they return is held until the next call.
 
+pub mod acceleration_tracking;
 pub mod allocation;
 pub mod hierarchy;
 pub mod hybrid;
 pub mod interlock;
 pub mod loop_shaping;
 pub mod loops;
+pub mod minimal_control_synthesis;
 pub mod mpc;
 pub mod pid;
 pub mod prediction_over_delay;

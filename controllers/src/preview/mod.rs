@@ -12,6 +12,11 @@
 //! 3. The rig is brought to the model's state; what the forces were not, and the valve's offset, is
 //!    estimated and taken off ([`feedback`]). Measurements may be late.
 //!
+//! [`Role::MultiMetric`] is model-based multi-metric control (B. M. Phillips, N. E. Wierschem and B. F.
+//! Spencer, Earthquake Engineering and Structural Dynamics 43, 2014): the inverse of the rig shapes the command,
+//! and the same feedback acts on what is left of displacement, velocity and acceleration against the
+//! motion itself.
+//!
 //! The first two with a table that stands still make a compensation of friction and specimen that
 //! any other controller can have ([`Role::Compensation`]).
 
@@ -27,6 +32,7 @@ use self::feedback::{Feedback, FeedbackState, MAXIMUM_DELAY, Uncertainty};
 use self::feedforward::{Feedforward, PREVIEW};
 use self::load::{KnownLoad, LoadState};
 use self::model::{OUTPUTS, RigModel, STATES, SampledRig};
+use crate::acceleration_tracking::{SHAPES, SHAPING};
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};
 use plant::identified::seal_shape::SealShape;
@@ -41,6 +47,9 @@ pub enum Role {
     /// Adds to another controller's command what keeps a table that stands still unmoved under the
     /// forces along the wanted motion: to that controller the rig has neither friction nor specimen.
     Compensation,
+    /// Drives the valve by the rig's inverse, a polynomial of the motion ahead, and feeds back what the
+    /// measurements differ from the motion: no model is driven along, and no force is known.
+    MultiMetric,
 }
 
 /// What preview control is built from.
@@ -56,6 +65,10 @@ pub struct Parameters {
     pub preview: bool,
     /// Samples by which measurements are late.
     pub delay: usize,
+    /// The rig's inverse for [`Role::MultiMetric`]: V/m, V s/m, V s²/m, V s³/m.
+    pub shaping: [f64; SHAPING],
+    /// Samples by which the motion is ahead that it shapes, at most [`PREVIEW`].
+    pub shaping_lead: usize,
     /// Weights of the feedforward: displacement (1/m), velocity (s/m), acceleration (s²/m).
     pub tracking_weights: [f64; OUTPUTS],
     /// Weight of the feedforward's change of command a sample, 1/V.
@@ -90,6 +103,8 @@ impl Default for Parameters {
             },
             preview: true,
             delay: 0,
+            shaping: [0.0; SHAPING],
+            shaping_lead: 0,
             tracking_weights: [100.0, 14.0, 1.0],
             move_weight: 0.05,
             feedback_weights: [100.0, 14.0, 1.0],
@@ -121,6 +136,16 @@ impl Parameters {
                 value: self.delay as f64,
                 expected: "at most 4",
             });
+        }
+        if self.shaping_lead > PREVIEW {
+            return Err(ModelError::Parameter {
+                name: "shaping_lead_samples",
+                value: self.shaping_lead as f64,
+                expected: "at most 20",
+            });
+        }
+        for (name, value) in SHAPES.into_iter().zip(self.shaping) {
+            ModelError::require_finite(name, value)?;
         }
         const TRACKING: [&str; OUTPUTS] = [
             "tracking_displacement_weight",
@@ -179,6 +204,10 @@ pub struct Memory {
     forces: [f64; PREVIEW + 1],
     /// The motion at the furthest sample known; absent before the first.
     last: Option<Motion>,
+    /// The wanted motions up to now, the present one first.
+    past: [Motion; MAXIMUM_DELAY + 1],
+    /// The shaped acceleration of the sample before, m/s²; absent before the first.
+    shaped: Option<f64>,
 }
 
 /// Preview control: what it was built from, what follows from that, and what it remembers.
@@ -230,6 +259,30 @@ impl PreviewControl {
         &self.feedback
     }
 
+    /// A sample of [`Role::MultiMetric`].
+    fn multi_metric(&mut self, input: &PreviewInput) -> f64 {
+        let p = &self.parameters;
+        let memory = &mut self.memory;
+        let ahead = &input.reference[p.shaping_lead];
+        let before = memory.shaped.replace(ahead.acceleration);
+        let jerk = (ahead.acceleration - before.unwrap_or(ahead.acceleration)) / p.period;
+        let parts = [ahead.displacement, ahead.velocity, ahead.acceleration, jerk];
+        let shaped: f64 = p.shaping.iter().zip(parts).map(|(f, r)| f * r).sum();
+        let shaped = shaped.clamp(-p.limit, p.limit);
+        memory.past.rotate_right(1);
+        memory.past[0] = input.reference[0];
+        let left = vector(&input.measured) - vector(&memory.past[p.delay]);
+        let state = &mut memory.feedback;
+        let rest = SVector::zeros();
+        let command = shaped
+            + self
+                .feedback
+                .command(state, &self.rig, &rest, 0.0, &left, 0.0);
+        let command = command.clamp(-p.limit, p.limit);
+        self.feedback.sent(state, &self.rig, command - shaped, 0.0);
+        command
+    }
+
     /// Brings the known forces up to the furthest sample known.
     fn look_ahead(&mut self, reference: &[Motion; PREVIEW + 1]) {
         let p = &self.parameters;
@@ -263,6 +316,9 @@ impl Controller for PreviewControl {
     }
 
     fn step(&mut self, input: &PreviewInput, _period: f64) -> f64 {
+        if self.parameters.role == Role::MultiMetric {
+            return self.multi_metric(input);
+        }
         self.look_ahead(&input.reference);
         let limit = self.parameters.limit;
         let compensates = self.parameters.role == Role::Compensation;

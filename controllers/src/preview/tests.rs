@@ -98,9 +98,8 @@ fn on_its_own_model_the_motion_is_followed() {
     assert!(extrapolated > 3.0 * known, "{extrapolated}");
 }
 
-#[test]
-fn a_constant_force_and_a_valve_off_its_null_leave_no_offset() {
-    let parameters = hydraulic();
+/// Displacement (m) that is left after 20 s under a constant force and a valve off its null.
+fn offset_left(parameters: Parameters) -> f64 {
     let mut control = PreviewControl::new(parameters).unwrap();
     let rig = *control.rig();
     let mut x = SVector::<f64, STATES>::zeros();
@@ -119,8 +118,14 @@ fn a_constant_force_and_a_valve_off_its_null_leave_no_offset() {
         let u = control.step(&input, parameters.period) + 0.3;
         x = rig.advance(&x, u, [20.0; 2]);
     }
+    x[3].abs()
+}
+
+#[test]
+fn a_constant_force_and_a_valve_off_its_null_leave_no_offset() {
     // What the filter takes to fade is what is left of the displacement.
-    assert!(x[3].abs() < 2e-6, "{}", x[3]);
+    let left = offset_left(hydraulic());
+    assert!(left < 2e-6, "{left}");
 }
 
 /// A controller with friction `law` on a rig whose friction is `seals`: rms of the error of
@@ -239,4 +244,31 @@ fn compensation_holds_a_table_still_under_the_loads_of_a_motion() {
     }
     println!("left alone {:.3}, held {:.4} m/s2", largest[0], largest[1]);
     assert!(largest[1] < 0.2 * largest[0], "{largest:?}");
+}
+
+/// Multi-metric control on the rig of its model.
+#[test]
+fn multi_metric_control_brings_the_rig_to_the_motion_itself() {
+    let mut parameters = hydraulic();
+    parameters.load = Parameters::default().load;
+    let rig = parameters
+        .rig
+        .sample(parameters.period)
+        .driven(parameters.period);
+    let fit = crate::tuning::acceleration_tracking::Shaping::fitted(parameters.period, |at| {
+        let z = nalgebra::Complex::new(0.0, at * parameters.period).exp();
+        let one = nalgebra::Complex::new(1.0, 0.0);
+        (rig.evaluate(z).unwrap()[(0, 0)], one)
+    })
+    .unwrap();
+    assert!(fit.left < 0.02, "{fit:?}");
+    parameters.role = Role::MultiMetric;
+    parameters.shaping = fit.gains;
+    parameters.shaping_lead = fit.lead;
+    let own = error(parameters, 0.0, 0.0);
+    println!("{own:.3} %");
+    assert!(own < 0.5, "{own}");
+    // The inverse alone has nothing that brings the table back.
+    let left = offset_left(parameters);
+    assert!(left < 2e-6, "{left}");
 }

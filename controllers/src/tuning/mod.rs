@@ -1,7 +1,9 @@
 //! Gains from a model, by stated rules.
 
+pub mod acceleration_tracking;
 #[cfg(test)]
 mod known_rig;
+mod minimal_control_synthesis;
 pub mod preview;
 pub mod sliding_mode;
 pub mod suite;

@@ -25,6 +25,11 @@ pub const ROLES: Enumeration = Enumeration {
             value: 2,
             description: "Adds to controller_command what friction and specimen take",
         },
+        Item {
+            name: "multi-metric",
+            value: 3,
+            description: "Drives the valve by command shaping and feedback of what is left",
+        },
     ],
 };
 
@@ -39,6 +44,7 @@ pub struct Settings {
     specimen_known: bool,
     pub(crate) role: i32,
     loop_delay_samples: i32,
+    shaping_lead_samples: i32,
 }
 
 impl Default for Settings {
@@ -60,6 +66,7 @@ impl Default for Settings {
             specimen_known: false,
             role: 1,
             loop_delay_samples: 0,
+            shaping_lead_samples: 0,
         }
     }
 }
@@ -67,17 +74,18 @@ impl Default for Settings {
 impl Settings {
     /// What the controller is built from; refuses a negative count by name.
     pub fn parameters(&self, period: f64) -> Result<Parameters, ModelError> {
-        let delay =
-            usize::try_from(self.loop_delay_samples).map_err(|_| ModelError::Parameter {
-                name: "loop_delay_samples",
-                value: f64::from(self.loop_delay_samples),
+        let count = |name, samples: i32| {
+            usize::try_from(samples).map_err(|_| ModelError::Parameter {
+                name,
+                value: f64::from(samples),
                 expected: "zero or a positive number",
-            })?;
+            })
+        };
         Ok(Parameters {
-            role: if self.role == 2 {
-                Role::Compensation
-            } else {
-                Role::Control
+            role: match self.role {
+                2 => Role::Compensation,
+                3 => Role::MultiMetric,
+                _ => Role::Control,
             },
             rig: RigModel {
                 shake_table: self.shake_table,
@@ -87,7 +95,8 @@ impl Settings {
                 specimen: self.specimen_known.then_some(self.specimen),
                 ..self.law.load
             },
-            delay,
+            delay: count("loop_delay_samples", self.loop_delay_samples)?,
+            shaping_lead: count("shaping_lead_samples", self.shaping_lead_samples)?,
             period,
             ..self.law
         })
@@ -100,6 +109,11 @@ pub fn variables() -> Vec<Variable<PreviewControl>> {
         parameter("preview", s.settings.law.preview, "Whether the reference ahead is connected; else it is extrapolated");
         parameter("loop_delay_samples", s.settings.loop_delay_samples, "Samples by which measurements are late").min(0.0).max(4.0);
         parameter("valve_limit", s.settings.law.limit, "Largest magnitude of the valve command", "V");
+        parameter("displacement_shaping", s.settings.law.shaping[0], "Multi-metric: command per displacement of the motion ahead", "V/m" => "V/in");
+        parameter("velocity_shaping", s.settings.law.shaping[1], "Multi-metric: command per velocity", "V.s/m" => "V.s/in");
+        parameter("acceleration_shaping", s.settings.law.shaping[2], "Multi-metric: command per acceleration", "V.s2/m" => "V.s2/in");
+        parameter("jerk_shaping", s.settings.law.shaping[3], "Multi-metric: command per jerk, a difference of two samples", "V.s3/m" => "V.s3/in");
+        parameter("shaping_lead_samples", s.settings.shaping_lead_samples, "Multi-metric: samples by which the motion shaped is ahead").min(0.0).max(20.0);
         parameter("tracking_displacement_weight", s.settings.law.tracking_weights[0], "Feedforward: weight of the displacement's error", "1/m");
         parameter("tracking_velocity_weight", s.settings.law.tracking_weights[1], "Feedforward: weight of the velocity's error", "s/m");
         parameter("tracking_acceleration_weight", s.settings.law.tracking_weights[2], "Feedforward: weight of the acceleration's error", "s2/m");

@@ -28,7 +28,7 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 9] = [
+const CONTROLLERS: [Part; 13] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
@@ -38,6 +38,10 @@ const CONTROLLERS: [Part; 9] = [
     part!("", "mpc-compensated"),
     part!("", "lqg"),
     part!("", "preview"),
+    part!("", "acceleration-tracking"),
+    part!("", "dual-loop"),
+    part!("", "multi-metric"),
+    part!("", "minimal-control-synthesis"),
 ];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [

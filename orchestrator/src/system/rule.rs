@@ -6,6 +6,8 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
+    /// All gains of the dual loop of acceleration and force.
+    DualLoop,
     /// The gain of displacement PID.
     DisplacementPid,
     /// The gain of force PID under sliding mode.
@@ -14,14 +16,20 @@ pub enum Rule {
     LinearQuadraticGaussian,
     /// All coefficients of loop shaping.
     LoopShaping,
+    /// Start and rates of adaptation of minimal control synthesis.
+    MinimalControlSynthesis,
     /// Model and weights of model predictive control.
     ModelPredictive,
+    /// Model, weights and inverse of multi-metric control.
+    MultiMetric,
     /// Model, friction, specimen and weights of preview control.
     Preview,
     /// Model and rates of sliding mode.
     SlidingMode,
     /// All gains of three-variable control.
     ThreeVariable,
+    /// Shaping, filter and gain of acceleration trajectory tracking.
+    TrajectoryTracking,
     /// The gains of three-variable control under model predictive control.
     UnderPrediction,
 }

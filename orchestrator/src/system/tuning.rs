@@ -12,6 +12,10 @@
 //!   keeps a margin of 6 dB, bare and under the specimen ([`preview::Parameters::tuned`]); of the
 //!   specimen it knows mass and damping, its stiffness a fifth too low and its yield force a fifth too
 //!   high;
+//! - acceleration trajectory tracking, dual loop:
+//!   [`AccelerationTracking::trajectory`], [`AccelerationTracking::dual_loop`]; multi-metric control:
+//!   the feedback of preview control and [`Shaping::inverse`];
+//! - minimal control synthesis: [`MinimalControlSynthesis::tuned`];
 //! - sliding mode and model predictive control have the model as theirs and know the delay; the
 //!   latter also knows the measurements' noise and weighs outputs in units of stroke, 20 in/s and
 //!   1 g.
@@ -20,9 +24,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
 
+use controllers::acceleration_tracking::{AccelerationTracking, SHAPES};
+use controllers::minimal_control_synthesis::MinimalControlSynthesis;
 use controllers::preview;
 use controllers::preview::feedback::Uncertainty;
 use controllers::preview::model::{Hydraulics, RigModel};
+use controllers::tuning::acceleration_tracking::{AccelerationTuning, Shaping};
 use controllers::tuning::suite::{Member, Suite};
 use serde::{Deserialize, Serialize};
 
@@ -188,6 +195,23 @@ pub(super) fn apply(
     rules.apply(file, specimen)
 }
 
+/// The references that go to `inputs` of the component `name` are those `ahead` samples ahead.
+fn place_references(
+    connections: &mut [Link],
+    name: &str,
+    inputs: impl Fn(&str) -> bool,
+    samples: isize,
+) {
+    for link in connections {
+        if let Origin::Reference { ahead, .. } = &mut link.from
+            && link.to.component == name
+            && inputs(&link.to.variable)
+        {
+            *ahead = samples;
+        }
+    }
+}
+
 /// The component `name` compares late measurements with the reference of the same time.
 fn delay_references(connections: &mut [Link], name: &str, delay: usize) {
     for link in connections {
@@ -260,6 +284,27 @@ impl Rules {
                 Rule::LinearQuadraticGaussian => {
                     self.linear_quadratic_gaussian(component, specimen)?;
                 }
+                Rule::MultiMetric => self.multi_metric(component, specimen)?,
+                Rule::TrajectoryTracking => {
+                    let tuning = AccelerationTracking::trajectory;
+                    let own = tuning(&self.model.rig, &self.model.measurements());
+                    let own = own.map_err(|error| error.to_string())?;
+                    self.acceleration_tracking(component, name, &own, &mut file.connections);
+                }
+                Rule::DualLoop => {
+                    let tuning = AccelerationTracking::dual_loop;
+                    let own = tuning(&self.model.rig, &self.model.measurements());
+                    let own = own.map_err(|error| error.to_string())?;
+                    self.acceleration_tracking(component, name, &own, &mut file.connections);
+                }
+                Rule::MinimalControlSynthesis => {
+                    let own =
+                        MinimalControlSynthesis::tuned(&self.model.rig, &self.model.measurements());
+                    set(component, &own.map_err(|error| error.to_string())?.named());
+                    let wanted = |variable: &str| variable == "wanted_displacement";
+                    let delay = self.model.delay as isize;
+                    place_references(&mut file.connections, name, wanted, -delay);
+                }
                 _ => {}
             }
             let Some(suite) = &self.suite else {
@@ -292,12 +337,48 @@ impl Rules {
                     set(component, &suite.mpc.low_level.gains.named());
                     continue;
                 }
-                Rule::Preview | Rule::LinearQuadraticGaussian => continue,
+                Rule::Preview
+                | Rule::LinearQuadraticGaussian
+                | Rule::MultiMetric
+                | Rule::TrajectoryTracking
+                | Rule::DualLoop
+                | Rule::MinimalControlSynthesis => continue,
             };
             for (parameter, value) in suite.named(member) {
                 component.set(&parameter, value);
             }
         }
+        Ok(())
+    }
+
+    /// Gains, the lead of the shaped motion, and the lateness of the one that is compared.
+    fn acceleration_tracking(
+        &self,
+        component: &mut ComponentFile,
+        name: &str,
+        tuning: &AccelerationTuning,
+        connections: &mut [Link],
+    ) {
+        set(component, &tuning.law.named());
+        let ahead = |variable: &str| variable.starts_with("ahead_");
+        place_references(connections, name, ahead, tuning.lead as isize);
+        let compared = |variable: &str| variable.starts_with("reference_");
+        place_references(connections, name, compared, -(self.model.delay as isize));
+    }
+
+    /// The feedback of preview control, and the rig's inverse.
+    fn multi_metric(
+        &self,
+        component: &mut ComponentFile,
+        specimen: Option<&YieldingSpecimen>,
+    ) -> Result<(), String> {
+        self.linear_quadratic_gaussian(component, specimen)?;
+        let period = self.model.measurements().period;
+        let shaping = Shaping::inverse(&self.model.rig, period).map_err(|e| e.to_string())?;
+        for (name, gain) in SHAPES.into_iter().zip(shaping.gains) {
+            component.set(name, gain);
+        }
+        component.set("shaping_lead_samples", shaping.lead as i64);
         Ok(())
     }
 
