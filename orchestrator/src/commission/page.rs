@@ -1,27 +1,13 @@
 //! The report of a commissioned rig.
 
 use super::Commissioned;
-use crate::error::Error;
 use crate::identify::{EQUATION_COLUMNS, Form, PARAMETER_COLUMNS};
 use crate::report::number::significant;
-use crate::report::{
-    self, Abscissa, Axis, Cell, Fact, Panel, Report, Section, Series, Table, Units,
-};
+use crate::report::{Abscissa, Axis, Cell, Fact, Panel, Report, Section, Series, Table, Units};
 use crate::units::STANDARD_GRAVITY;
 use identification::data::Channel;
 
-/// The page.
-///
-/// # Errors
-/// A report that cannot be rendered.
-pub(super) fn page(own: &Commissioned) -> Result<String, Error> {
-    report::html(&report(own)).map_err(|error| Error::File {
-        path: "report.html".into(),
-        reason: error.to_string(),
-    })
-}
-
-fn report(own: &Commissioned) -> Report {
+pub(super) fn report(own: &Commissioned) -> Report {
     let robust = own.design.loops.iter().filter(|one| one.robust).count();
     let worst = own.predictions.iter().map(|p| p.largest_percent);
     let worst = worst.fold(f64::NAN, f64::max);

@@ -19,17 +19,17 @@ pub const COMPARISON: &str = "comparison.json";
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(comparison: &Comparison, folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let page = page(comparison, folder)?;
+    let page = report::render(&page(comparison), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text("report.html", &page)?;
+    results.write_text(report::FILE, &page)?;
     results.write_text(COMPARISON, &serde_json::json!(comparison).to_string())?;
     results.write_text(errors::FILE, &errors::written(&comparison.rows))?;
     Ok(results.finish()?)
 }
 
-fn page(comparison: &Comparison, folder: &Path) -> Result<String, Error> {
+fn page(comparison: &Comparison) -> Report {
     let rows = &comparison.rows;
-    let report = Report {
+    Report {
         title: "Comparison of controllers".into(),
         summary: summary(comparison),
         identity: vec![
@@ -56,18 +56,14 @@ fn page(comparison: &Comparison, folder: &Path) -> Result<String, Error> {
         }],
         footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
         ..Report::default()
-    };
-    report::html(&report).map_err(|error| Error::File {
-        path: folder.to_path_buf(),
-        reason: error.to_string(),
-    })
+    }
 }
 
 /// The report of the comparison whose files lie in `folder`; without `errors.csv` it has no plots.
 ///
 /// # Errors
 /// A file that cannot be read or is none of a comparison.
-pub fn page_again(folder: &Path) -> Result<String, Error> {
+pub fn page_again(folder: &Path) -> Result<Report, Error> {
     let path = folder.join(COMPARISON);
     let fault = |reason: String| Error::File {
         path: path.clone(),
@@ -87,7 +83,7 @@ pub fn page_again(folder: &Path) -> Result<String, Error> {
             }
         }
     }
-    page(&comparison, folder)
+    Ok(page(&comparison))
 }
 
 fn motions(rows: &[Row]) -> Vec<&str> {

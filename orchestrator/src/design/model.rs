@@ -17,7 +17,6 @@ use crate::report::number::significant;
 use crate::report::{
     self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units,
 };
-use crate::results::Results;
 use crate::system::control_model::ControlModel;
 
 /// Least margins that a controller must keep on 95 of 100 rigs that the model's uncertainty allows;
@@ -332,15 +331,7 @@ impl ModelDesign {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<PathBuf, Error> {
-        const REPORT: &str = "report.html";
-        let page = report::html(&self.report()).map_err(|error| Error::File {
-            path: folder.join(REPORT),
-            reason: error.to_string(),
-        })?;
-        let mut results = Results::begin(folder)?;
-        results.write_text(REPORT, &page)?;
-        results.finish()?;
-        Ok(folder.join(REPORT))
+        report::write(&self.report(), folder)
     }
 
     /// The sections of the report, for a page of its own or a part of another.

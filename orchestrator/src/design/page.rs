@@ -21,9 +21,7 @@ use crate::figures::Figure;
 use crate::report::{
     self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units, identity,
 };
-use crate::results::Results;
 
-const REPORT: &str = "report.html";
 const POINTS: usize = 600;
 /// Drawn from 0.01 Hz to the Nyquist frequency.
 const FIRST_HZ: f64 = 0.01;
@@ -33,14 +31,7 @@ const FIRST_HZ: f64 = 0.01;
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(design: &Design, folder: &Path) -> Result<PathBuf, Error> {
-    let page = report::html(&report(design)).map_err(|error| Error::File {
-        path: folder.join(REPORT),
-        reason: error.to_string(),
-    })?;
-    let mut results = Results::begin(folder)?;
-    results.write_text(REPORT, &page)?;
-    results.finish()?;
-    Ok(folder.join(REPORT))
+    report::write(&report(design), folder)
 }
 
 fn report(design: &Design) -> Report {

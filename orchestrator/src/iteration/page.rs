@@ -17,12 +17,9 @@ const DRIVE: &str = "drive.csv";
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(iteration: &Iteration, folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let page = report::html(&page(iteration)).map_err(|error| Error::File {
-        path: folder.to_path_buf(),
-        reason: error.to_string(),
-    })?;
+    let page = report::render(&page(iteration), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text("report.html", &page)?;
+    results.write_text(report::FILE, &page)?;
     results.write_text(
         ITERATION,
         &(serde_json::json!(iteration).to_string() + "\n"),

@@ -1,7 +1,7 @@
 //! Reports: figures, tables and plots in one HTML file that opens without a network, and single
 //! plots as SVG.
 //!
-//! A [`Report`] is plain data; [`html`] renders it, [`svg`] renders one [`Panel`]. [`run`] makes
+//! A [`Report`] is plain data; [`render`] makes its page, [`svg`] renders one [`Panel`]. [`run`] makes
 //! the report of a run; comparisons, designs, identification and diagnosis fill the same data.
 
 mod bars;
@@ -10,6 +10,7 @@ pub(crate) mod columns;
 mod html;
 pub mod identity;
 pub(crate) mod number;
+mod page;
 mod run;
 mod svg;
 pub(crate) mod units;
@@ -18,6 +19,7 @@ use std::sync::Arc;
 
 pub use bars::{Bar, BarGroup, Bars};
 pub use html::html;
+pub use page::{FILE, render, write};
 pub use run::{Changed, Component, Run, SpecimenHistory, Whole, run};
 pub use svg::svg;
 pub use units::{UnitSystem, Units};

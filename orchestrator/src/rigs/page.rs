@@ -1,9 +1,8 @@
 //! The study as a table and as a page.
 
 use super::{DesignedOn, Study};
-use crate::error::Error;
 use crate::report::number::significant;
-use crate::report::{self, Bar, BarGroup, Bars, Cell, Report, Section, Table};
+use crate::report::{Bar, BarGroup, Bars, Cell, Report, Section, Table};
 
 fn word(design: DesignedOn) -> &'static str {
     match design {
@@ -61,10 +60,7 @@ pub(super) fn ranking(study: &Study) -> Vec<String> {
 }
 
 /// The page.
-///
-/// # Errors
-/// A report that cannot be rendered.
-pub(super) fn page(study: &Study) -> Result<String, Error> {
+pub(super) fn page(study: &Study) -> Report {
     let mut rows = table(study).into_iter();
     let columns = rows.next().unwrap_or_default();
     let mut groups: Vec<BarGroup> = Vec::new();
@@ -104,7 +100,7 @@ pub(super) fn page(study: &Study) -> Result<String, Error> {
             Some(format!("rig {}: {reason}", row.rig.number))
         })
         .collect();
-    let report = Report {
+    Report {
         title: format!("{} rigs", study.rows.len()),
         summary: ranking(study).first().cloned().unwrap_or_default(),
         sections: vec![
@@ -148,9 +144,5 @@ pub(super) fn page(study: &Study) -> Result<String, Error> {
             study.seed
         ),
         ..Report::default()
-    };
-    report::html(&report).map_err(|error| Error::File {
-        path: "report.html".into(),
-        reason: error.to_string(),
-    })
+    }
 }

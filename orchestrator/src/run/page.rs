@@ -16,7 +16,7 @@ use crate::fmu::hexadecimal;
 use crate::master::{Outcome, Record};
 use crate::motion::Motion;
 use crate::report::number::significant;
-use crate::report::{self, Cell, Component, SpecimenHistory, Whole};
+use crate::report::{self, Cell, Component, Report, SpecimenHistory, Whole};
 use crate::results::Results;
 use crate::units::STANDARD_GRAVITY;
 
@@ -42,14 +42,15 @@ pub fn write(
     })?;
     manifest.results_sha256 = hexadecimal(&sum.finalize());
     // A page of an earlier run here would be another run's.
-    results.replaces(&["report.html"]);
+    results.replaces(&[report::FILE]);
     let columns = columns(&prepared.system, &outcome.record);
     results.write(COLUMNS, |file| write_columns(&columns, file))?;
     results.write_text("summary.json", &json(summary))?;
     results.write_text("manifest.json", &json(manifest))?;
     let motion = &prepared.motion;
     if let Some(page) = page(summary, manifest, motion, motion.into(), &outcome.record) {
-        results.write_text("report.html", &page)?;
+        let page = report::render(&page, &folder.join(report::FILE))?;
+        results.write_text(report::FILE, &page)?;
     }
     Ok(results.finish()?)
 }
@@ -83,7 +84,7 @@ fn page(
     motion: &Motion,
     whole: Whole,
     record: &Record,
-) -> Option<String> {
+) -> Option<Report> {
     let table = Table::find(manifest, record)?;
     let asked = asked(record, motion);
     let (motion, whole) = match &asked {
@@ -137,7 +138,7 @@ fn page(
             manifest.shakebench
         ),
     };
-    report::html(&report::run(&run)).ok()
+    Some(report::run(&run))
 }
 
 /// The limit of the component that gives the first command.
@@ -181,7 +182,7 @@ fn components(manifest: &Manifest, summary: &Summary) -> Vec<Component> {
 ///
 /// # Errors
 /// A file that is missing or is none of a run.
-pub fn page_again(folder: &Path) -> Result<String, Error> {
+pub fn page_again(folder: &Path) -> Result<Report, Error> {
     let manifest = Manifest::read(&folder.join("manifest.json"))?;
     let summary = Summary::read(&folder.join("summary.json"))?;
     let place = folder.join(RESULTS);
