@@ -19,7 +19,7 @@ use super::{Design, bode};
 use crate::error::Error;
 use crate::figures::Figure;
 use crate::report::{
-    self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units, identity,
+    self, Abscissa, Axis, Panel, Report, Section, Series, Style, Table, Units, identity,
 };
 
 const POINTS: usize = 600;
@@ -36,23 +36,7 @@ pub fn write(design: &Design, folder: &Path) -> Result<PathBuf, Error> {
 
 fn report(design: &Design) -> Report {
     let loops = &design.drawn;
-    let table = table(&design.loops);
-    let mut heads = table.iter().take(2);
-    let (names, units) = (heads.next(), heads.next());
-    let columns = names.into_iter().flatten().zip(units.into_iter().flatten());
-    let columns = columns.map(|(name, unit)| match unit.as_str() {
-        "" => name.clone(),
-        unit => format!("{name} ({unit})"),
-    });
-    let figures = Table {
-        caption: "Margins".into(),
-        columns: columns.collect(),
-        rows: table
-            .iter()
-            .skip(2)
-            .map(|row| row.iter().cloned().map(Cell::Text).collect())
-            .collect(),
-    };
+    let figures = Table::headed_with_units("Margins", table(&design.loops));
     let mut sections = vec![Section {
         heading: "Loops".into(),
         text: vec![

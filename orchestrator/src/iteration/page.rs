@@ -35,7 +35,7 @@ fn page(iteration: &Iteration) -> Report {
         value.map_or("-".into(), |value| Cell::Quantity(value, Units::PERCENT, 3))
     };
     let rows = iteration.runs.iter().map(|run| {
-        vec![
+        [
             Cell::Number(run.iteration as f64, 2),
             percent(run.measured_percent),
             percent(run.time_domain_percent),
@@ -77,12 +77,12 @@ fn page(iteration: &Iteration) -> Report {
                  energy of all runs on the specimen over that of the motion played once."
                     .into(),
             ],
-            tables: vec![Table {
-                caption: format!(
+            tables: vec![Table::of(
+                &format!(
                     "The best run is {}; its drive is in {DRIVE}.",
                     iteration.best
                 ),
-                columns: [
+                [
                     "corrections",
                     "measured error",
                     "RMS acceleration error",
@@ -90,11 +90,9 @@ fn page(iteration: &Iteration) -> Report {
                     "response spectrum",
                     "exposure",
                     "ended",
-                ]
-                .map(str::to_string)
-                .to_vec(),
-                rows: rows.collect(),
-            }],
+                ],
+                rows,
+            )],
             panels: errors.collect(),
             ..Section::default()
         }],

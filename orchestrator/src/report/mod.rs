@@ -80,6 +80,52 @@ pub struct Table {
     pub rows: Vec<Vec<Cell>>,
 }
 
+impl Table {
+    /// Of cells in columns of these headings.
+    #[must_use]
+    pub fn of<const N: usize, C: Into<Cell>>(
+        caption: &str,
+        columns: [&str; N],
+        rows: impl IntoIterator<Item = [C; N]>,
+    ) -> Self {
+        Self {
+            caption: caption.to_string(),
+            columns: columns.map(str::to_string).to_vec(),
+            rows: rows
+                .into_iter()
+                .map(|row| row.map(Into::into).to_vec())
+                .collect(),
+        }
+    }
+
+    /// Of rows as a terminal shows them too: the first are the headings.
+    #[must_use]
+    pub fn headed<C: Into<Cell>>(caption: &str, rows: Vec<Vec<C>>) -> Self {
+        let mut rows = rows.into_iter();
+        let heads = rows.next().unwrap_or_default().into_iter();
+        Self {
+            caption: caption.to_string(),
+            columns: heads.map(|head| head.into().text(UnitSystem::Us)).collect(),
+            rows: rows
+                .map(|row| row.into_iter().map(Into::into).collect())
+                .collect(),
+        }
+    }
+
+    /// As [`Table::headed`], with the units of the columns, or nothing, in the second row.
+    #[must_use]
+    pub fn headed_with_units(caption: &str, mut rows: Vec<Vec<String>>) -> Self {
+        if rows.len() > 1 {
+            let units = rows.remove(1);
+            let heads = rows[0].iter_mut().zip(units);
+            heads
+                .filter(|(_, unit)| !unit.is_empty())
+                .for_each(|(name, unit)| *name += &format!(" ({unit})"));
+        }
+        Self::headed(caption, rows)
+    }
+}
+
 /// One cell of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {

@@ -2,7 +2,7 @@
 
 use super::{DesignedOn, Study};
 use crate::report::number::significant;
-use crate::report::{Bar, BarGroup, Bars, Cell, Report, Section, Table};
+use crate::report::{Bar, BarGroup, Bars, Report, Section, Table};
 
 fn word(design: DesignedOn) -> &'static str {
     match design {
@@ -61,8 +61,6 @@ pub(super) fn ranking(study: &Study) -> Vec<String> {
 
 /// The page.
 pub(super) fn page(study: &Study) -> Report {
-    let mut rows = table(study).into_iter();
-    let columns = rows.next().unwrap_or_default();
     let mut groups: Vec<BarGroup> = Vec::new();
     for own in &study.standings {
         let Some(middle) = own.error_percent.p50 else {
@@ -118,13 +116,7 @@ pub(super) fn page(study: &Study) -> Report {
                     groups,
                     mark: None,
                 }],
-                tables: vec![Table {
-                    caption: "Standings".into(),
-                    columns,
-                    rows: rows
-                        .map(|row| row.into_iter().map(Cell::Text).collect())
-                        .collect(),
-                }],
+                tables: vec![Table::headed("Standings", table(study))],
                 ..Section::default()
             },
             Section {
