@@ -393,8 +393,7 @@ impl Commissioned {
         self.files = files;
         let page = report::render(&page::report(self), &folder.join(report::FILE))?;
         results.write_text(report::FILE, &page)?;
-        let json = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
-        results.write_text("commission.json", &json)?;
+        results.write_json("commission.json", self)?;
         results.finish()?;
         Ok(())
     }

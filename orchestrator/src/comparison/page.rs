@@ -6,6 +6,7 @@ use super::errors;
 use super::result::{Comparison, History, Row};
 use super::tables::{ErrorTable, tables};
 use crate::error::Error;
+use crate::json;
 use crate::report::{
     self, Axis, Bar, BarGroup, Bars, Panel, Report, Section, Series, Units, identity,
 };
@@ -65,13 +66,7 @@ fn page(comparison: &Comparison) -> Report {
 /// A file that cannot be read or is none of a comparison.
 pub fn page_again(folder: &Path) -> Result<Report, Error> {
     let path = folder.join(COMPARISON);
-    let fault = |reason: String| Error::File {
-        path: path.clone(),
-        reason,
-    };
-    let text = std::fs::read_to_string(&path).map_err(|error| fault(error.to_string()))?;
-    let mut comparison: Comparison = serde_json::from_str(&text)
-        .map_err(|error| fault(format!("not the JSON of a comparison: {error}")))?;
+    let mut comparison: Comparison = json::read(&path, "the JSON of a comparison")?;
     let plots = folder.join(errors::FILE);
     if plots.is_file() {
         let controllers = comparison.controllers().into_iter().map(String::from);

@@ -22,6 +22,7 @@ use identification::diagnosis::{
 };
 
 use crate::error::Error;
+use crate::json;
 use crate::report::{self, Report};
 use crate::results::Results;
 
@@ -144,9 +145,7 @@ fn fault(subject: &Path, error: DiagnosisError) -> Error {
 /// A file that cannot be read or is none of a diagnosis; a report with pictures that would be lost.
 pub fn page_again(folder: &Path) -> Result<Report, Error> {
     let path = folder.join(DIAGNOSIS);
-    let text = std::fs::read_to_string(&path).map_err(|error| file_fault(&path, error))?;
-    let found: DiagnosisReport = serde_json::from_str(&text)
-        .map_err(|error| file_fault(&path, format!("not the JSON of a diagnosis: {error}")))?;
+    let found: DiagnosisReport = json::read(&path, "the JSON of a diagnosis")?;
     let curves = match &found.evidence {
         Evidence::Rig(_) => rig::curves_again(folder)?,
         Evidence::ShakeTable(_) => None,

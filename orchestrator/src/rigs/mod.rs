@@ -250,8 +250,7 @@ impl Study {
         let page = report::render(&page::page(self), &folder.join(report::FILE))?;
         let mut results = Results::begin(folder)?;
         results.write_text(report::FILE, &page)?;
-        let json = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
-        results.write_text("rigs.json", &json)?;
+        results.write_json("rigs.json", self)?;
         Ok(results.finish()?)
     }
 

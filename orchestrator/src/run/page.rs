@@ -3,7 +3,6 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::experiment::Prepared;
@@ -45,8 +44,8 @@ pub fn write(
     results.replaces(&[report::FILE]);
     let columns = columns(&prepared.system, &outcome.record);
     results.write(COLUMNS, |file| write_columns(&columns, file))?;
-    results.write_text("summary.json", &json(summary))?;
-    results.write_text("manifest.json", &json(manifest))?;
+    results.write_json("summary.json", summary)?;
+    results.write_json("manifest.json", manifest)?;
     let motion = &prepared.motion;
     if let Some(page) = page(summary, manifest, motion, motion.into(), &outcome.record) {
         let page = report::render(&page, &folder.join(report::FILE))?;
@@ -71,10 +70,6 @@ impl<W: Write> Write for Hashed<'_, W> {
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
     }
-}
-
-fn json(value: &impl Serialize) -> String {
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
 }
 
 /// The report; none where there is no table.

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::experiment::Prepared;
 use super::manifest::Manifest;
 use crate::error::Error;
+use crate::json;
 use crate::master::{Ended, Ending, Outcome, RealTime, Record};
 use crate::metrics::{self, Tracking};
 use crate::motion::Motion;
@@ -99,13 +100,7 @@ impl Summary {
     /// # Errors
     /// A file that cannot be read or is none.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let fault = |reason: String| Error::File {
-            path: path.to_path_buf(),
-            reason,
-        };
-        let text = std::fs::read_to_string(path).map_err(|error| fault(error.to_string()))?;
-        serde_json::from_str(&text)
-            .map_err(|error| fault(format!("not the summary of a run: {error}")))
+        json::read(path, "the summary of a run")
     }
 
     /// Measures a run.
