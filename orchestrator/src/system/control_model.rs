@@ -163,11 +163,6 @@ impl ControlModel {
         Suite::new(&self.rig, &self.measurements())
     }
 
-    /// Whether the model says how uncertain it is.
-    pub fn knows_its_errors(&self) -> bool {
-        self.uncertainty != Uncertainty::Unknown
-    }
-
     /// Rigs as likely as the model's errors make them; draws that are no rig are left out. Without
     /// errors, none.
     pub fn draws(&self, count: u64, seed: u64) -> Vec<Draw> {
