@@ -177,6 +177,8 @@ pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned
             fit_part: 0.75,
             specimen: None,
             hydraulic_first: true,
+            columns: None,
+            one_input: false,
         },
     )?;
     warnings.splice(0..0, identified.summary.warnings.iter().cloned());
