@@ -1,13 +1,15 @@
 //! Recordings of the identified rig under a displacement loop: what `identify` writes of it when it was
 //! well is the nominal model of a diagnosis as it stands; noise on the recorded command is told.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use std::f64::consts::TAU;
 
 use identification::data::{Channel, Recording, mean_and_deviation};
 use identification::diagnosis::case::{Case, Nominal};
 use identification::diagnosis::engine::{Observer, Verdict};
 use identification::diagnosis::rigs::shake_table::{Diagnosis, diagnose};
-use identification::identify::instrument::instrument_test;
+use identification::identify::instrument::{command_noise, instrument_test};
 use identification::identify::model_file::ModelFile;
 use identification::identify::parameters::Physical;
 use identification::identify::rig::{Options, identify};
@@ -149,7 +151,8 @@ fn noise_on_the_recorded_command_is_told_where_it_biases() {
             .replace(Channel::ValveCommand, noisy.collect())
             .unwrap();
         let found = identify(std::slice::from_ref(&recording), Options::default()).unwrap();
-        println!("{:?}", instrument_test(&found, &[recording]));
+        let noise = command_noise(&found, std::slice::from_ref(&recording)).unwrap();
+        println!("{noise:?}\n{:?}", instrument_test(&found, &[recording]));
         let relative = found.physical[Physical::B1] / truth - 1.0;
         let claimed = found.standard_error[Physical::B1] / truth;
         let told = found

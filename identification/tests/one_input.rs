@@ -1,11 +1,13 @@
 //! Command to displacement of rigs that are integrated here step by step, whose numbers are known.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use identification::data::{Channel, Recording, mean_and_deviation};
 use identification::one_input::{OneInput, identify};
 use plant::sensors::channel::Noise;
 
 const PERIOD: f64 = 0.002;
-const SAMPLES: usize = 30_000;
+const SAMPLES: usize = 20_000;
 /// Steps of a sample.
 const STEPS: usize = 40;
 
@@ -110,7 +112,7 @@ fn a_valve_driven_rig_is_found_in_closed_loop() {
 
 #[test]
 fn noise_on_the_recorded_command_leaves_no_bias_or_is_told() {
-    for part in [0.01, 0.02, 0.05] {
+    for part in [0.01, 0.05] {
         let clean = valve_driven(0.0, true);
         let (_, size) = mean_and_deviation(clean.samples(Channel::ValveCommand));
         let found = identify(&[valve_driven(part * size, true)], 0.75).unwrap();

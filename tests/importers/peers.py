@@ -6,8 +6,8 @@ of a press (servohydraulic_press/chirp_0A.csv) and of a drive (positioning_drive
 
 On the simulated rig and on the drive every model is fitted to command and displacement of one
 recording and predicts the displacement of others (the other half) in closed loop, under the same law
-and from the reference alone. On the press each half is predicted from its command by models of the
-other half. Ours are `identify --one-input`, with exactly these two columns and the reference; and,
+and from the reference alone. On the press, a sweep, the last and the first quarter are predicted from the command
+by models of the rest. Ours are `identify --one-input`, with exactly these two columns and the reference; and,
 where other channels are there, what `commission` found from all of them. Prints a table: errors in
 per cent of the signal's root mean square, and each peer's over ours.
 """
@@ -278,10 +278,10 @@ def press(program, record):
     data = np.loadtxt(record, delimiter=",", skiprows=1)
     period = 1e-3
     u, y = data[:, 1] * 1e-3, data[:, 2] * 1e-3
-    half = len(u) // 2
-    halves = [slice(0, half), slice(half, len(u))]
-    for fitted, judged, name in [(0, 1, "second half"), (1, 0, "first half")]:
-        own, other = halves[fitted], halves[judged]
+    quarter = len(u) // 4
+    first, rest = slice(0, quarter), slice(quarter, len(u))
+    last, before = slice(3 * quarter, len(u)), slice(0, 3 * quarter)
+    for own, other, name in [(before, last, "last quarter"), (rest, first, "first quarter")]:
         columns = {"reference [m]": u[own], "displacement [m]": y[own]}
         models = fit_all(program, False, columns, u[own], y[own], period)
         errors = {"commission": float("nan")}

@@ -1,8 +1,13 @@
-//! Whether noise on the recorded command biased a result: the reference as instrument says so.
+//! Whether noise on the recorded command biased a result.
 //!
 //! A predictor that is driven by the recorded command takes its noise for voltage that acted, and
-//! finds too small a gain (errors in variables). What the reference explains of command,
-//! displacement and force is free of that noise ([`crate::closed_loop::bands`]): the actuator's
+//! finds too small a gain (errors in variables): by the noise's share of what is new in the command
+//! at a sample. What is new is what the past of all channels leaves of it; noise is what their
+//! present and the reference leave besides, for a command that a computer makes is a function of
+//! those.
+//!
+//! Where the reference was recorded it is an instrument, too: what it explains of command,
+//! displacement and force is free of that noise ([`crate::closed_loop::bands`]), and the actuator's
 //! equation `F = G1 u + G2 dx/dt` between these parts must hold with the coefficients found.
 
 use nalgebra::{Complex, DMatrix, DVector};
@@ -11,6 +16,7 @@ use super::identified::RigIdentification;
 use super::parameters::{Physical, PhysicalValues};
 use crate::closed_loop::bands::{Band, Bands};
 use crate::data::{Channel, Recording};
+use crate::estimation::least_squares::reduce;
 
 /// Frequencies between which the equation is looked at, Hz: above what drift makes, where force and
 /// velocity stand clear of their noise.
@@ -43,9 +49,8 @@ impl InstrumentTest {
         self.is_bias().then(|| {
             format!(
                 "the part of the recordings that the reference explains asks for other coefficients of \
-                 the actuator (chi-square {:.0}, expected {:.0}; {} by {:.1} %): noise on the recorded \
-                 command biases this result by more than its standard errors; record the command as \
-                 the computer holds it",
+                 the actuator (chi-square {:.0}, expected {:.0}; {} by {:.1} %): this result is biased by \
+                 more than its standard errors, as noise on the recorded command does it",
                 self.statistic,
                 self.expected,
                 self.moved.0,
@@ -53,6 +58,98 @@ impl InstrumentTest {
             )
         })
     }
+}
+
+/// Noise on the recorded command and what it does to the gain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommandNoise {
+    /// One standard deviation, V.
+    pub deviation: f64,
+    /// By which share the gain from command to force comes out too small at most: that of a fit to
+    /// what is new alone. A predictor that sees further back loses less (between a half and a tenth
+    /// of it on the identified rig).
+    pub attenuation: f64,
+    /// Relative standard error of that gain.
+    pub claimed: f64,
+}
+
+impl CommandNoise {
+    /// Whether the bias is more than the standard error.
+    pub fn is_bias(&self) -> bool {
+        const LESS: f64 = 3.0;
+        self.attenuation > LESS * self.claimed
+    }
+
+    /// What a reader should know, where there is a bias.
+    pub fn warning(&self) -> Option<String> {
+        self.is_bias().then(|| {
+            format!(
+                "noise on the recorded command ({:.1e} V, which neither the other channels nor the \
+                 reference explain) makes the gain from command to force up to {:.1} % too small, its \
+                 standard error being {:.2} %: record the command as the computer holds it, or the \
+                 reference besides if it is missing",
+                self.deviation,
+                100.0 * self.attenuation,
+                100.0 * self.claimed
+            )
+        })
+    }
+}
+
+/// Estimates the noise on the commands of `recordings`, of which `found` was identified; the
+/// recording that suffers most.
+pub fn command_noise(found: &RigIdentification, recordings: &[Recording]) -> Option<CommandNoise> {
+    let claimed = found.standard_error[Physical::B1] / found.physical[Physical::B1].abs();
+    let all = recordings.iter().filter_map(noise_and_news);
+    let worst = all.max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
+    found.identifiable.then(|| CommandNoise {
+        deviation: worst.0.sqrt(),
+        attenuation: worst.0 / worst.1,
+        claimed,
+    })
+}
+
+/// Variances (V²) of what past, present and reference leave of the command, and of what the past
+/// alone leaves.
+fn noise_and_news(recording: &Recording) -> Option<(f64, f64)> {
+    // Enough for a law of some states, and to extrapolate a reference that was not recorded.
+    const LAGS: usize = 6;
+    let command = recording.channel(Channel::ValveCommand)?;
+    let outputs: Vec<&[f64]> = Channel::OUTPUTS
+        .into_iter()
+        .filter_map(|channel| recording.channel(channel))
+        .collect();
+    let reference = recording.channel(Channel::Reference);
+    let past = 1 + LAGS * (1 + outputs.len());
+    let present = outputs.len() + if reference.is_some() { LAGS } else { 0 };
+    let count = command.len().checked_sub(LAGS)?;
+    if count < 20 * (past + present) {
+        return None;
+    }
+    let reduced = reduce(count, past + present, 1, |k, row| {
+        let k = k + LAGS;
+        let mut values = Vec::with_capacity(row.len());
+        values.push(1.0);
+        values.extend((1..=LAGS).map(|back| command[k - back]));
+        for output in &outputs {
+            values.extend((1..=LAGS).map(|back| output[k - back]));
+        }
+        values.extend(outputs.iter().map(|output| output[k]));
+        if let Some(reference) = reference {
+            values.extend((0..LAGS).map(|back| reference[k - back]));
+        }
+        values.push(command[k]);
+        row.copy_from_slice(&values);
+    });
+    let of = |columns: usize| reduced.left(columns) / count as f64;
+    let (noise, news) = (of(past + present), of(past));
+    (news > 0.0).then_some((noise, news))
+}
+
+/// What speaks for a bias by noise on the recorded command, if anything.
+pub fn bias(found: &RigIdentification, recordings: &[Recording]) -> Option<String> {
+    let noise = command_noise(found, recordings).and_then(|own| own.warning());
+    noise.or_else(|| instrument_test(found, recordings)?.warning())
 }
 
 /// The coefficients that the test may move: those of the actuator but its slow pole and zero.

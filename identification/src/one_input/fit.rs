@@ -12,6 +12,10 @@ use crate::estimation::state_variable_filter::Between;
 const DELAYS: [f64; 5] = [0.0, 2e-3, 5e-3, 12e-3, 30e-3];
 /// Longest delay, s.
 const LONGEST: f64 = 0.2;
+/// Starts that are refined, the best of them.
+const STARTS: usize = 2;
+/// Fastest growth of a pole of a rig that is driven by a valve, 1/s.
+const GROWTH: f64 = 5.0;
 /// Regressions, each weighted with the denominator of the one before (Sanathanan and Koerner 1963).
 const REGRESSIONS: usize = 8;
 
@@ -118,13 +122,24 @@ pub(super) fn fit(structure: Structure, between: Between, bands: &[Own]) -> Opti
         structure,
         scale: (middles.sum::<f64>() / bands.len() as f64).exp(),
         between,
+        growth: match between {
+            Between::Held => GROWTH,
+            Between::Straight => 0.0,
+        },
     };
+    let weigh = |start: Vec<f64>| {
+        let model = coefficients.model(&start)?;
+        let cost = squares(&model, bands).iter().sum::<f64>();
+        cost.is_finite().then_some((cost, start))
+    };
+    let mut starts: Vec<(f64, Vec<f64>)> = DELAYS
+        .iter()
+        .filter_map(|delay| weigh(regress(&coefficients, bands, *delay)?))
+        .collect();
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Option<Optimum> = None;
-    for delay in DELAYS {
-        let Some(start) = regress(&coefficients, bands, delay) else {
-            continue;
-        };
-        if let Some(found) = approach(&coefficients, bands, &start)
+    for (_, start) in starts.iter().take(STARTS) {
+        if let Some(found) = approach(&coefficients, bands, start)
             && best.as_ref().is_none_or(|own| found.cost < own.cost)
         {
             best = Some(found);
@@ -139,7 +154,7 @@ pub(super) fn fit(structure: Structure, between: Between, bands: &[Own]) -> Opti
     })
 }
 
-/// Fits with the deviations held where the fit before ended, then going with the model.
+/// Fits with the deviations held at the start, then going with the model.
 fn approach(coefficients: &Coefficients, bands: &[Own], start: &[f64]) -> Option<Optimum> {
     let mut values = start.to_vec();
     let coordinates = |values: &[f64]| -> Vec<Coordinate> {
@@ -166,10 +181,8 @@ fn approach(coefficients: &Coefficients, bands: &[Own], start: &[f64]) -> Option
         coefficients,
         held: None,
     };
-    for _ in 0..2 {
-        fit.held = Some(values.clone());
-        values = minimise(&fit, &coordinates(&values))?.values;
-    }
+    fit.held = Some(values.clone());
+    values = minimise(&fit, &coordinates(&values))?.values;
     fit.held = None;
     minimise(&fit, &coordinates(&values))
 }
@@ -240,5 +253,9 @@ fn regress(coefficients: &Coefficients, bands: &[Own], delay: f64) -> Option<Vec
             }
         }
     }
-    Some(coefficients.stable(&values))
+    // A start that may be refined as it stands is not moved.
+    Some(match coefficients.model(&values) {
+        Some(_) => values,
+        None => coefficients.stable(&values),
+    })
 }

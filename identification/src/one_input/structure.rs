@@ -26,14 +26,15 @@ impl Structure {
 
     /// Those that are tried, the simplest first.
     pub fn candidates(may_integrate: bool) -> Vec<Self> {
-        const POLES: usize = 4;
         const ZEROS: usize = 2;
         let mut all = Vec::new();
         for integrates in [true, false] {
             if integrates && !may_integrate {
                 continue;
             }
-            for poles in 1..=POLES {
+            // A pole at zero counts.
+            let most = if may_integrate && !integrates { 5 } else { 4 };
+            for poles in 1..=most {
                 for zeros in 0..=ZEROS.min(poles - 1) {
                     all.push(Self {
                         poles,
@@ -204,11 +205,13 @@ pub(super) struct Coefficients {
     /// rad/s.
     pub scale: f64,
     pub between: Between,
+    /// The fastest growth of a pole, 1/s: a valve-driven rig may drift off without its loop.
+    pub growth: f64,
 }
 
 impl Coefficients {
     /// The model of these values: denominator without its 1, numerator, delay; `None` where a pole
-    /// lies right of the imaginary axis.
+    /// grows faster than [`Self::growth`].
     pub fn model(&self, values: &[f64]) -> Option<DelayedTransferFunction> {
         let Structure {
             poles,
@@ -220,7 +223,7 @@ impl Coefficients {
         let power = |i: usize| self.scale.powi(i as i32);
         let mut denominator = vec![1.0];
         denominator.extend(own.iter().enumerate().map(|(i, c)| c * power(i + 1)));
-        if !is_stable(&denominator) {
+        if !grows_less(&denominator, self.growth) {
             return None;
         }
         let order = poles + usize::from(integrates);
@@ -249,14 +252,14 @@ impl Coefficients {
     }
 }
 
-/// Whether all roots of a monic polynomial lie left of the imaginary axis.
-fn is_stable(denominator: &[f64]) -> bool {
-    denominator.iter().all(|c| c.is_finite())
-        && TransferFunction {
+/// Whether all roots of a monic polynomial have a real part below `growth`.
+fn grows_less(denominator: &[f64], growth: f64) -> bool {
+    let poles = || {
+        TransferFunction {
             numerator: vec![1.0],
             denominator: denominator.to_vec(),
         }
         .poles()
-        .iter()
-        .all(|pole| pole.re < 0.0)
+    };
+    denominator.iter().all(|c| c.is_finite()) && poles().iter().all(|pole| pole.re < growth)
 }

@@ -16,7 +16,7 @@ use std::time::Instant;
 use identification::IdentificationError;
 use identification::data::{Channel, Recording};
 use identification::identify::identified::RigIdentification;
-use identification::identify::instrument::instrument_test;
+use identification::identify::instrument::bias;
 use identification::identify::model_file::ModelFile;
 use identification::identify::rig::{self, Options};
 use identification::identify::specimen_file;
@@ -194,7 +194,7 @@ fn form(
     let general = match rig::identify(recordings, options) {
         Ok(found)
             if found.residuals.iter().all(|(_, _, test)| test.is_white())
-                && instrument_test(&found, recordings).is_none_or(|own| !own.is_bias()) =>
+                && bias(&found, recordings).is_none() =>
         {
             return Ok(Form::General(Box::new(found)));
         }

@@ -169,8 +169,8 @@ impl OneInputIdentification {
                     heading: "Validation".into(),
                     text: vec![
                         "Simulated from the command alone on the part of each recording that was not \
-                         fitted; where the table stood at its first sample, and the drift of a valve \
-                         that is not quite at null, are fitted."
+                         fitted, over stretches of 2 s where a valve drives the rig: it drifts off \
+                         without its loop. The free motion from each first sample is fitted."
                             .into(),
                     ],
                     panels: found.rest.iter().map(validation).collect(),

@@ -98,6 +98,14 @@ impl ModelFile {
             what,
             expected,
         };
+        let is_one_input = toml::from_str::<toml::Table>(text)
+            .is_ok_and(|all| all.contains_key("transfer_function") && !all.contains_key("table"));
+        if is_one_input {
+            return Err(wrong(
+                "[transfer_function] alone, which says nothing of mass and force".into(),
+                "a model that was identified from acceleration and actuator_force besides",
+            ));
+        }
         let file: Self = toml::from_str(text).map_err(|error| {
             let line = error
                 .span()
@@ -392,6 +400,8 @@ mod tests {
             error.contains("[table]: parameter `table_mass` is -21"),
             "{error}"
         );
+        let error = message("[transfer_function]\ndelay = 0.0\n");
+        assert!(error.contains("nothing of mass and force"), "{error}");
         let error = message(&format!("units = \"furlong\"\n{NOMINAL}"));
         assert!(error.contains("units = \"furlong\""), "{error}");
         let without = format!("[table]{}", NOMINAL.split("[table]").nth(1).unwrap());
