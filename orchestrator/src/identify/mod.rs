@@ -262,10 +262,7 @@ impl Identified {
 fn write(summary: &Summary, model: &str, page: &Report) -> Result<(), Error> {
     let path = &summary.model;
     let beside = path.with_extension("html");
-    let page = report::html(page).map_err(|error| Error::File {
-        path: beside.clone(),
-        reason: error.to_string(),
-    })?;
+    let page = report::render(page, &beside)?;
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

@@ -160,8 +160,8 @@ impl OneInputIdentification {
                     notes: summary.warnings.clone(),
                     panels,
                     tables: vec![
-                        table("Parameters", ONE_INPUT_COLUMNS, self.parameters()),
-                        table("Structures tried", CANDIDATE_COLUMNS, self.candidates()),
+                        Table::of("Parameters", ONE_INPUT_COLUMNS, self.parameters()),
+                        Table::of("Structures tried", CANDIDATE_COLUMNS, self.candidates()),
                     ],
                     ..Section::default()
                 },
@@ -256,14 +256,5 @@ fn validation(rest: &one_input::Rest) -> Panel {
             Series::line("measured", at(), rest.measured.clone()).coloured(0),
             Series::line("simulated", at(), rest.simulated.clone()).styled(Style::Dashed),
         ],
-    }
-}
-
-fn table(caption: &str, columns: [&str; 4], rows: Vec<[String; 4]>) -> Table {
-    let rows = rows.into_iter();
-    Table {
-        caption: caption.into(),
-        columns: columns.map(String::from).to_vec(),
-        rows: rows.map(|row| row.map(Cell::from).to_vec()).collect(),
     }
 }
