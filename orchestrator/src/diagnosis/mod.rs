@@ -3,6 +3,7 @@
 
 mod case;
 pub mod co_simulation;
+pub mod foreign;
 pub mod model;
 mod page;
 mod pictures;
@@ -14,6 +15,7 @@ use std::time::Instant;
 
 use identification::diagnosis::case::{CaseError, template as case_template};
 use identification::diagnosis::engine::Observer;
+use identification::diagnosis::rigs::foreign::KIND;
 use identification::diagnosis::rigs::{
     DescriptionError, KINDS, Rig, like, template as rig_template,
 };
@@ -81,8 +83,12 @@ pub fn files(report: &DiagnosisReport, folder: &Path) -> Vec<PathBuf> {
     let mut files = [REPORT, DIAGNOSIS, EXTENDED_MODEL]
         .map(|name| folder.join(name))
         .to_vec();
-    if matches!(report.evidence, Evidence::Rig(_)) {
-        files.extend(rig::FILES.map(|name| folder.join(name)));
+    if let Evidence::Rig(evidence) = &report.evidence {
+        let own = match evidence.rig.kind.as_str() {
+            KIND => &foreign::FILES[..],
+            _ => &rig::FILES[..],
+        };
+        files.extend(own.iter().map(|name| folder.join(name)));
     }
     files.extend(report.extended_fmus.iter().cloned());
     files

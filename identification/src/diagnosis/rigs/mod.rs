@@ -32,7 +32,7 @@ pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, 
 pub use extended::{ExtendedRig, FileErrors, Prediction};
 
 pub use natural::Natural;
-pub use reading::Measurement;
+pub use reading::{Measurement, even_period};
 pub use recording::RigRecording;
 pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole, SessionTable};
 pub use template::template;
