@@ -88,7 +88,8 @@ pub fn files(report: &DiagnosisReport, folder: &Path) -> Vec<PathBuf> {
             KIND => &foreign::FILES[..],
             _ => &rig::FILES[..],
         };
-        files.extend(own.iter().map(|name| folder.join(name)));
+        let own = own.iter().map(|name| folder.join(name));
+        files.extend(own.filter(|file| file.is_file()));
     }
     files.extend(report.extended_fmus.iter().cloned());
     files

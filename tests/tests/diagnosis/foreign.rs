@@ -222,10 +222,11 @@ fn our_own_specimen_and_the_system_around_it() {
     let prepared = prepare(&request).unwrap();
     let outcome = prepared.run(Algorithm::GaussSeidel).unwrap();
     assert!(outcome.ended.is_regular(), "{}", outcome.ended.message());
-    let mut traces = csv::Reader::from_path(folder.path().join("out/traces.csv")).unwrap();
+    let traces = fs::read_to_string(folder.path().join("out/traces.csv")).unwrap();
     let extended: Vec<f64> = traces
-        .records()
-        .map(|row| row.unwrap()[5].parse().unwrap())
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').nth(5).unwrap().parse().unwrap())
         .collect();
     let columns = &outcome.record.columns;
     let name = columns

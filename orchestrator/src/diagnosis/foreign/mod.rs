@@ -15,10 +15,9 @@ use identification::diagnosis::rigs::foreign::{self, ForeignDiagnosis, ForeignMo
 
 use super::{DIAGNOSIS, EXTENDED_MODEL, REPORT, file_fault, html, page};
 use crate::error::Error;
-use crate::fmu::Fmu;
 use crate::results::Results;
 use map::Map;
-use simulator::{Alone, Mapped, mapped};
+use simulator::{Alone, Mapped, mapped, open};
 
 /// Files beside those of every diagnosis.
 pub(super) const FILES: [&str; 2] = [written::TRACES, written::INPUTS];
@@ -93,7 +92,9 @@ pub fn diagnose(
         EXTENDED_MODEL,
         &written::system(&alone, model, &subject, &found)?,
     )?;
-    results.write(written::INPUTS, |file| written::inputs(&subject, file))?;
+    if !subject.inputs.is_empty() {
+        results.write(written::INPUTS, |file| written::inputs(&subject, file))?;
+    }
     results.write(written::TRACES, |file| {
         written::traces(&subject, &found, file)
     })?;
@@ -111,7 +112,7 @@ pub fn diagnose(
 /// # Errors
 /// An FMU that cannot be read.
 pub fn template(model: &Path) -> Result<String, Error> {
-    Ok(map::template(&*Fmu::open(model)?))
+    Ok(map::template(&*open(model)?))
 }
 
 /// Simulates the nominal model on every record; what is told of the runs.

@@ -1,6 +1,7 @@
 //! An FMU by itself, simulated again and again with other inputs and parameters.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use identification::diagnosis::rigs::foreign::{Parameter, Signal, Simulator};
 
@@ -80,6 +81,29 @@ fn real<'a>(fmu: &'a Fmu, name: &str, causality: Causality) -> Result<&'a Variab
     }
 }
 
+/// The FMU in a file, or the component of this project of that name.
+///
+/// # Errors
+/// No such file or component; an FMU that cannot be read.
+pub(super) fn open(path: &Path) -> Result<Arc<Fmu>, Error> {
+    if is_file(path) {
+        return Ok(Fmu::open(path)?);
+    }
+    let mut library = FmuLibrary::new(FmiVersion::V3, None);
+    library
+        .find(&path.display().to_string())
+        .map_err(|error| Error::Option {
+            option: "--fmu",
+            reason: error.to_string(),
+        })
+}
+
+/// Whether it is a file, and no name of a component.
+pub(super) fn is_file(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("fmu"))
+}
+
 /// The model in the file `path` with what `map`, which stands in the file `place`, says of it.
 ///
 /// # Errors
@@ -87,10 +111,7 @@ fn real<'a>(fmu: &'a Fmu, name: &str, causality: Causality) -> Result<&'a Variab
 pub(super) fn mapped(path: &Path, map: &Map, place: &Path) -> Result<Mapped, Error> {
     let wrong = |at: String, reason: String| file_fault(place, format!("`{at}`: {reason}"));
     let mut file = SystemFile::of_fmu(path);
-    let mut library = FmuLibrary::new(FmiVersion::V3, None);
-    let fmu = library
-        .find(&path.display().to_string())
-        .map_err(|error| file_fault(path, error))?;
+    let fmu = open(path)?;
     let signals = |names: &mut dyn Iterator<Item = &String>, causality, table: &str| {
         let own = names.map(|name| {
             let variable = real(&fmu, name, causality);

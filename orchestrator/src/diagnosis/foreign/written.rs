@@ -9,7 +9,7 @@ use plant::signal_path::SignalEffects;
 use toml::{Table, Value};
 
 use super::file_fault;
-use super::simulator::Alone;
+use super::simulator::{Alone, is_file};
 use crate::error::Error;
 use crate::units::Unit;
 
@@ -92,7 +92,10 @@ pub(super) fn system(
     file.description = found.found.named.join(", ");
     file.own_tables.clear();
     file.connections.clear();
-    let absolute = std::path::absolute(model).map_err(|error| file_fault(model, error))?;
+    let absolute = match is_file(model) {
+        true => std::path::absolute(model).map_err(|error| file_fault(model, error))?,
+        false => model.to_path_buf(),
+    };
     if let Some(own) = file.components.get_mut(&alone.component) {
         own.fmu = absolute.display().to_string();
         for (place, value) in &found.extension.parameters {

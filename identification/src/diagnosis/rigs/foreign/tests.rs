@@ -14,7 +14,7 @@ struct Oscillator {
     cubic: f64,
 }
 
-const FINE: usize = 20;
+const FINE: usize = 8;
 const NOMINAL: [f64; 3] = [1.0, 2.0, 400.0];
 
 impl Simulator for Oscillator {
