@@ -74,7 +74,7 @@ impl Channel {
             Self::Acceleration => (
                 "acceleration",
                 "m/s^2",
-                &["a", "accel", "table_acceleration"],
+                &["a", "acc", "accel", "table_acceleration"],
             ),
             Self::ActuatorForce => ("actuator_force", "N", &["f", "force", "load_cell"]),
             Self::SpecimenAcceleration => {

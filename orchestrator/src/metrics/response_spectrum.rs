@@ -16,59 +16,74 @@ pub fn pseudo_acceleration(
     frequencies: &[f64],
     damping: f64,
 ) -> Vec<f64> {
-    let largest = |frequency: &f64| {
-        let omega = TAU * frequency;
-        let oscillator = Oscillator::new(omega, damping, dt);
-        let (mut x, mut v, mut largest) = (0.0, 0.0, 0.0_f64);
-        for pair in acceleration.windows(2) {
-            (x, v) = oscillator.step(x, v, pair[0], pair[1]);
-            largest = largest.max(x.abs());
+    let mut oscillators: Vec<Oscillator> = frequencies
+        .iter()
+        .map(|frequency| Oscillator::new(TAU * frequency, damping, dt))
+        .collect();
+    for pair in acceleration.windows(2) {
+        // All of them a sample on: a step waits for no other's.
+        for oscillator in &mut oscillators {
+            oscillator.step(pair[0], pair[1]);
         }
-        omega * omega * largest
+    }
+    let spectral = |(oscillator, frequency): (&Oscillator, &f64)| {
+        (TAU * frequency).powi(2) * oscillator.largest
     };
-    frequencies.iter().map(largest).collect()
+    oscillators.iter().zip(frequencies).map(spectral).collect()
 }
 
-/// One step of `x'' + 2 zeta omega x' + omega² x = -a`, `a` linear over the step.
+/// `x'' + 2 zeta omega x' + omega² x = -a`, `a` linear over a step: displacement and velocity after it
+/// are the recurrence's rows times displacement, velocity, and the load at either end.
 struct Oscillator {
-    omega: f64,
-    zeta: f64,
-    dt: f64,
-    decay: f64,
-    sine: f64,
-    cosine: f64,
-    damped: f64,
+    displacement: [f64; 4],
+    velocity: [f64; 4],
+    x: f64,
+    v: f64,
+    largest: f64,
 }
 
 impl Oscillator {
-    fn new(omega: f64, zeta: f64, dt: f64) -> Self {
-        let damped = omega * (1.0 - zeta * zeta).sqrt();
-        let (sine, cosine) = (damped * dt).sin_cos();
+    fn new(omega: f64, damping: f64, dt: f64) -> Self {
+        let mut unit = [[0.0; 4]; 4];
+        for (n, row) in unit.iter_mut().enumerate() {
+            row[n] = 1.0;
+        }
+        let columns = unit.map(|state| closed_form(omega, damping, dt, state));
         Self {
-            omega,
-            zeta,
-            dt,
-            decay: (-zeta * omega * dt).exp(),
-            sine,
-            cosine,
-            damped,
+            displacement: columns.map(|[x, _]| x),
+            velocity: columns.map(|[_, v]| v),
+            x: 0.0,
+            v: 0.0,
+            largest: 0.0,
         }
     }
 
-    fn step(&self, x: f64, v: f64, from: f64, to: f64) -> (f64, f64) {
-        // Particular solution p + q t of the linear load, then the free decay of the rest.
-        let Self { omega, zeta, .. } = *self;
-        let slope = (to - from) / self.dt;
-        let q = -slope / (omega * omega);
-        let p = -from / (omega * omega) + 2.0 * zeta * slope / omega.powi(3);
-        let (a, b) = (x - p, (v - q + zeta * omega * (x - p)) / self.damped);
-        let free = self.decay * (a * self.cosine + b * self.sine);
-        let turned = self.decay * (b * self.cosine - a * self.sine);
-        (
-            free + p + q * self.dt,
-            -zeta * omega * free + self.damped * turned + q,
-        )
+    fn step(&mut self, from: f64, to: f64) {
+        let state = [self.x, self.v, from, to];
+        let times = |row: &[f64; 4]| {
+            (row[0] * state[0] + row[1] * state[1]) + (row[2] * state[2] + row[3] * state[3])
+        };
+        (self.x, self.v) = (times(&self.displacement), times(&self.velocity));
+        self.largest = self.largest.max(self.x.abs());
     }
+}
+
+/// Displacement and velocity after a step from displacement, velocity and the load at either end.
+fn closed_form(omega: f64, zeta: f64, dt: f64, [x, v, from, to]: [f64; 4]) -> [f64; 2] {
+    let damped = omega * (1.0 - zeta * zeta).sqrt();
+    let (sine, cosine) = (damped * dt).sin_cos();
+    let decay = (-zeta * omega * dt).exp();
+    // Particular solution p + q t of the linear load, then the free decay of the rest.
+    let slope = (to - from) / dt;
+    let q = -slope / (omega * omega);
+    let p = -from / (omega * omega) + 2.0 * zeta * slope / omega.powi(3);
+    let (a, b) = (x - p, (v - q + zeta * omega * (x - p)) / damped);
+    let free = decay * (a * cosine + b * sine);
+    let turned = decay * (b * cosine - a * sine);
+    [
+        free + p + q * dt,
+        -zeta * omega * free + damped * turned + q,
+    ]
 }
 
 #[cfg(test)]

@@ -138,8 +138,10 @@ fn unit_of_header(path: &Path, header: &[&str]) -> Result<f64, DataError> {
         let Some((_, unit)) = upper.split_once("UNITS OF ") else {
             continue;
         };
-        let unit = unit.trim();
-        if unit == "G" || unit.starts_with("G ") || unit.starts_with("G,") {
+        // What follows is prose: `UNITS OF G. FILTER POINTS: HP=0.1 Hz LP=46.0 Hz`.
+        let word = unit.split_whitespace().next().unwrap_or("");
+        let unit = word.trim_end_matches(['.', ',', ';', ':']);
+        if unit == "G" {
             return Ok(STANDARD_GRAVITY);
         }
         let text = unit

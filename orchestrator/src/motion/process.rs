@@ -19,6 +19,7 @@
 //! all three are zero in the first and the last one. No quiet time is added: the motion spans
 //! the record.
 
+use std::array;
 use std::f64::consts::TAU;
 
 use realfft::RealFftPlanner;
@@ -37,6 +38,8 @@ const POLES: i32 = 4;
 const BAND_END: f64 = 2.5;
 /// Quiet periods of the lower corner on either side while filtering.
 const QUIET_PERIODS: f64 = 4.0;
+/// Harmonics evaluated at a time: each sum waits for its own last term alone.
+const TOGETHER: usize = 8;
 /// Largest number of samples of a motion with its quiet time.
 const MOST_SAMPLES: f64 = 2e7;
 
@@ -177,19 +180,22 @@ fn integrate(
     let mut planner = RealFftPlanner::<f64>::new();
     let inverse = planner.plan_fft_inverse(period);
     let [mut x, mut v, mut a] = [0, 1, 2].map(|_| inverse.make_input_vec());
-    let lines = x.iter_mut().zip(&mut v).zip(&mut a).enumerate();
-    for (k, ((x, v), a)) in lines.take(last + 1).skip(1) {
-        let frequency = k as f64 * step;
-        let gain = 1.0
-            / (1.0 + (low / frequency).powi(2 * POLES))
-            / (1.0 + (frequency / high).powi(2 * POLES));
-        // The sum over samples approximates the integral: times dt, over the period.
-        let scale = gain * dt * step;
-        let line = spectrum_at(acceleration, TAU * frequency * dt) * scale;
-        let rate = Complex64::new(0.0, TAU * frequency);
-        *x = line / (rate * rate);
-        *v = line / rate;
-        *a = line;
+    for first in (1..=last).step_by(TOGETHER) {
+        let frequencies: [f64; TOGETHER] = array::from_fn(|lane| (first + lane) as f64 * step);
+        let angles = frequencies.map(|frequency| TAU * frequency * dt);
+        let sums = spectrum_at(acceleration, angles);
+        for (k, (frequency, sum)) in (first..=last).zip(frequencies.into_iter().zip(sums)) {
+            let gain = 1.0
+                / (1.0 + (low / frequency).powi(2 * POLES))
+                / (1.0 + (frequency / high).powi(2 * POLES));
+            // The sum over samples approximates the integral: times dt, over the period.
+            let scale = gain * dt * step;
+            let line = sum * scale;
+            let rate = Complex64::new(0.0, TAU * frequency);
+            x[k] = line / (rate * rate);
+            v[k] = line / rate;
+            a[k] = line;
+        }
     }
     [x, v, a].map(|mut spectrum| {
         let mut history = inverse.make_output_vec();
@@ -201,13 +207,16 @@ fn integrate(
     })
 }
 
-/// Sum of `values[n] exp(-i angle n)`, by Horner's rule from the last value down.
-fn spectrum_at(values: &[f64], angle: f64) -> Complex64 {
-    let turn = Complex64::from_polar(1.0, -angle);
-    values
-        .iter()
-        .rev()
-        .fold(Complex64::ZERO, |sum, value| sum * turn + value)
+/// Sums of `values[n] exp(-i angle n)` for each angle, by Horner's rule from the last value down.
+fn spectrum_at(values: &[f64], angles: [f64; TOGETHER]) -> [Complex64; TOGETHER] {
+    let turns = angles.map(|angle| Complex64::from_polar(1.0, -angle));
+    let mut sums = [Complex64::ZERO; TOGETHER];
+    for value in values.iter().rev() {
+        for (sum, turn) in sums.iter_mut().zip(&turns) {
+            *sum = *sum * turn + value;
+        }
+    }
+    sums
 }
 
 /// Windows the displacement by the product rule; `length` in s at either end.

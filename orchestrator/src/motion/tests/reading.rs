@@ -96,6 +96,9 @@ fn both_headers_of_at2_are_read() {
         assert_eq!((record.dt, record.acceleration.len()), (0.01, 20), "{line}");
         assert_eq!(record.acceleration[1], -0.002 * STANDARD_GRAVITY);
     }
+    let filtered = top.replace("OF G", "OF G. FILTER POINTS: HP=0.1 Hz LP=46.0 Hz");
+    let found = record("a.AT2", &format!("{filtered}20 .01 NPTS, DT\n{numbers}")).unwrap();
+    assert_eq!(found.acceleration[1], -0.002 * STANDARD_GRAVITY);
     let metric = top.replace("OF G", "OF CM/SEC/SEC");
     let record = record("a.at2", &format!("{metric}20 .01 NPTS, DT\n{numbers}")).unwrap();
     assert!((record.acceleration[2] - 0.005).abs() < 1e-15);
@@ -199,8 +202,8 @@ fn faults_of_csv_files_are_named() {
         format!("a.csv, line 1: dt is missing: no column of time; expected {columns}")
     );
     assert_eq!(
-        say("t_s,acc\n0,1\n"),
-        format!("a.csv, line 1: unknown column `acc` (column 2); expected {columns}")
+        say("t_s,heave\n0,1\n"),
+        format!("a.csv, line 1: unknown column `heave` (column 2); expected {columns}")
     );
     assert_eq!(
         say("time [s],accelration [g]\n0,1\n"),
