@@ -327,6 +327,11 @@ impl SimulatedModel for Bordered<'_> {
         false
     }
 
+    fn rivals_leave(&self) -> f64 {
+        // What a right one leaves is noise, or the verdict is none.
+        1.1
+    }
+
     fn record_name(&self, record: usize) -> &str {
         let of_file = || {
             let trial = self.model.trials.get(record.checked_sub(NAMES.len())?);
