@@ -33,8 +33,9 @@ pub struct Arguments {
     /// Data files in place of those that the description of a rig names
     #[arg(long, value_name = "FILE")]
     data: Vec<PathBuf>,
-    /// What the columns of a rig's files are called: `channel = "header"` or
-    /// `channel = { column = "header", unit = "mm" }` a line, in place of the description's
+    /// What the columns of the files are called: `channel = "header"` or
+    /// `channel = { column = "header", unit = "mm" }` a line, in place of the usual names or of the
+    /// description's
     #[arg(long, value_name = "MAP.toml")]
     columns: Option<PathBuf>,
     /// Print a commented description to fill in: table, actuator, drive, hysteretic device, material or

@@ -37,7 +37,7 @@ pub const REPORT: &str = "report.html";
 /// Diagnoses the case in folder `subject`, or the rig that the description `subject` (`.toml`)
 /// tells of, on `data` in place of its own files if there are any. Writes the extended model, its
 /// FMUs, the JSON object, the report and, of a rig, curves and pictures into `folder`, all or
-/// nothing. The file `columns` may name the columns of a rig's files otherwise. `observer` is told what
+/// nothing. The file `columns` may name the columns otherwise. `observer` is told what
 /// is tried.
 ///
 /// # Errors
@@ -141,7 +141,7 @@ fn fault(subject: &Path, error: DiagnosisError) -> Error {
             option: "--data",
             reason: error.to_string(),
         },
-        DiagnosisError::ColumnsOfACase => Error::Option {
+        DiagnosisError::Channel { .. } => Error::Option {
             option: "--columns",
             reason: error.to_string(),
         },

@@ -27,7 +27,9 @@ mod template;
 mod transfer_system;
 
 pub use confirmed::Confirmed;
-pub use description::{Column, Description, DescriptionError, LeftOut, Quantity, renamed};
+pub use description::{
+    Column, Description, DescriptionError, LeftOut, Quantity, column_map, renamed,
+};
 pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
 pub use extended::{ExtendedRig, FileErrors, Prediction};
 
