@@ -14,6 +14,7 @@ pub mod figures;
 pub mod fmu;
 pub mod identify;
 pub mod iteration;
+mod json;
 pub mod library;
 pub mod live;
 pub mod master;

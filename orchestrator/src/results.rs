@@ -5,6 +5,8 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use serde::Serialize;
+
 static MAY_OVERWRITE: AtomicBool = AtomicBool::new(false);
 
 /// Lets this process replace files that differ (`--force`).
@@ -12,7 +14,7 @@ pub fn allow_overwriting() {
     MAY_OVERWRITE.store(true, Ordering::Relaxed);
 }
 
-fn may_overwrite() -> bool {
+pub(crate) fn may_overwrite() -> bool {
     MAY_OVERWRITE.load(Ordering::Relaxed)
 }
 
@@ -144,6 +146,17 @@ impl Results {
     /// As [`Results::write`].
     pub fn write_text(&mut self, name: &str, text: &str) -> Result<(), ResultsError> {
         self.write(name, |file| file.write_all(text.as_bytes()))
+    }
+
+    /// Writes a value as JSON for people, a line a field.
+    ///
+    /// # Errors
+    /// As [`Results::write`].
+    pub fn write_json(&mut self, name: &str, value: &impl Serialize) -> Result<(), ResultsError> {
+        self.write(name, |file| {
+            serde_json::to_writer_pretty(&mut *file, value)?;
+            file.write_all(b"\n")
+        })
     }
 
     /// Where files lie until [`Results::finish`]; one that is made there is told by

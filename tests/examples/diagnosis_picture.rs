@@ -9,7 +9,8 @@ use std::process::Command;
 
 use hidden_effects::case::{Case, Kind, Settings};
 use identification::diagnosis::engine::Observer;
-use shakebench::diagnosis::{REPORT, diagnose};
+use shakebench::diagnosis::diagnose;
+use shakebench::report::FILE;
 
 /// Seed of the case.
 const SEED: u64 = 7;
@@ -21,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Case::draw(SEED, &Settings::new(Kind::This("valve_dead_band"))).write(&case)?;
     let report = diagnose(&case, &[], None, &folder.join("results"), Observer::none())?;
     println!("{}", report.sentence);
-    let page = folder.join("results").join(REPORT);
+    let page = folder.join("results").join(FILE);
     let picture = root.join("docs/diagnosis-report.png");
     let browser = std::env::var("CHROMIUM").unwrap_or_else(|_| "chromium".into());
     let status = Command::new(&browser)

@@ -299,12 +299,9 @@ fn write(
     outcome: &Outcome,
     page: &report::Report,
 ) -> Result<Vec<PathBuf>, Error> {
-    let page = report::html(page).map_err(|error| Error::File {
-        path: folder.join("report.html"),
-        reason: error.to_string(),
-    })?;
+    let page = report::render(page, &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text("report.html", &page)?;
+    results.write_text(report::FILE, &page)?;
     results.write("scores.json", |file| {
         serde_json::to_writer_pretty(file, outcome).map_err(std::io::Error::other)
     })?;

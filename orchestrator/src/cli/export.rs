@@ -6,13 +6,13 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 
 use super::rig::RigArguments;
+use super::run;
 use crate::error::Error;
 use crate::fmu::FmiVersion;
 use crate::master::Algorithm;
 use crate::results::Results;
-use crate::run::experiment::{Request, is_file, prepare};
+use crate::run::experiment::{Request, prepare};
 use crate::ssp::export::{Experiment, write};
-use crate::units;
 
 /// Options of `shakebench export`.
 #[derive(Debug, Args)]
@@ -69,38 +69,20 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Version::Two => FmiVersion::V2,
         Version::Three => FmiVersion::V3,
     };
-    let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
-    let duration = arguments.duration.as_deref().map(|text| {
-        units::value_in(text, "s").map_err(|error| Error::Option {
-            option: "--duration",
-            reason: error.to_string(),
-        })
-    });
-    if is_file(&arguments.system) {
-        let given = [
-            ("--plant", arguments.rig.plant.is_some()),
-            ("--specimen", arguments.rig.specimen.is_some()),
-        ];
-        if let Some((option, _)) = given.into_iter().find(|(_, given)| *given) {
-            let reason = format!(
-                "{} is a file and has its own; edit it instead",
-                arguments.system
-            );
-            return Err(Error::Option { option, reason });
-        }
-    }
+    let duration = arguments.duration.as_deref();
+    let duration = duration.map(|text| run::quantity("--duration", text, "s"));
     let request = Request {
-        plant: arguments.rig.plant(),
-        specimen: arguments.rig.specimen(),
-        tuning: arguments.rig.tuning,
-        control_model: arguments.rig.control_model.as_ref().map(absolute),
-        record: arguments.record.as_ref().map(absolute),
-        reference: arguments.reference.as_ref().map(absolute),
-        set: arguments.set.clone(),
         fmi,
         algorithm: Some(arguments.algorithm),
         duration_s: duration.transpose()?,
-        ..Request::built_in(&arguments.system)
+        ..run::request(&run::Arguments::of(
+            Some(arguments.system.clone()),
+            [arguments.record.clone(), arguments.reference.clone()],
+            arguments.rig.clone(),
+            arguments.set.clone(),
+            [None, None],
+            None,
+        ))?
     };
     let prepared = prepare(&request)?;
     let parent = arguments

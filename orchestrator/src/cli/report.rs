@@ -8,7 +8,7 @@ use clap::Args;
 use crate::comparison;
 use crate::diagnosis;
 use crate::error::Error;
-use crate::results::Results;
+use crate::report;
 use crate::run::page;
 
 /// Options of `shakebench report`.
@@ -40,8 +40,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ));
     }
     let has = |name: &str| folder.join(name).is_file();
-    let report = folder.join(diagnosis::REPORT);
-    let (kind, html) = if has("manifest.json") || has("results.csv") {
+    let (kind, page) = if has("manifest.json") || has("results.csv") {
         ("run", page::page_again(folder)?)
     } else if has(comparison::COMPARISON) {
         ("comparison", comparison::page_again(folder)?)
@@ -53,9 +52,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
              comparison.json of a comparison, or diagnosis.json of a diagnosis",
         ));
     };
-    let mut results = Results::begin(folder)?;
-    results.write_text(diagnosis::REPORT, &html)?;
-    results.finish()?;
+    let report = report::write(&page, folder)?;
     if arguments.json {
         println!("{}", serde_json::json!({"of": kind, "report": report}));
     } else {

@@ -22,6 +22,7 @@ use crate::design::model::{self, ModelDesign};
 use crate::error::Error;
 use crate::fmu::FmiVersion;
 use crate::identify::{Form, Identified, from_recordings};
+use crate::report;
 use crate::report::number::significant;
 use crate::results::Results;
 use crate::system::control_model::ControlModel;
@@ -380,7 +381,7 @@ impl Commissioned {
         results.write_text(MODEL, &self.model_text)?;
         // Systems are designed on the file itself, as `run --control-model` would.
         let model = results.staging().join(MODEL);
-        let mut files = vec![PathBuf::from(MODEL), "report.html".into()];
+        let mut files = vec![PathBuf::from(MODEL), report::FILE.into()];
         for own in self.design.loops.iter().filter(|own| own.robust) {
             let name = format!("{}.toml", own.name);
             let text = systems::system(&self.request, &own.name, &model)?;
@@ -390,10 +391,9 @@ impl Commissioned {
         let recordings = self.recordings.iter();
         files.extend(recordings.map(|own| format!("{RECORDINGS}/{}.csv", own.name).into()));
         self.files = files;
-        let page = page::page(self)?;
-        results.write_text("report.html", &page)?;
-        let json = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
-        results.write_text("commission.json", &json)?;
+        let page = report::render(&page::report(self), &folder.join(report::FILE))?;
+        results.write_text(report::FILE, &page)?;
+        results.write_json("commission.json", self)?;
         results.finish()?;
         Ok(())
     }

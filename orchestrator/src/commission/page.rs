@@ -1,27 +1,13 @@
 //! The report of a commissioned rig.
 
 use super::Commissioned;
-use crate::error::Error;
 use crate::identify::{EQUATION_COLUMNS, Form, PARAMETER_COLUMNS};
 use crate::report::number::significant;
-use crate::report::{
-    self, Abscissa, Axis, Cell, Fact, Panel, Report, Section, Series, Table, Units,
-};
+use crate::report::{Abscissa, Axis, Cell, Fact, Panel, Report, Section, Series, Table, Units};
 use crate::units::STANDARD_GRAVITY;
 use identification::data::Channel;
 
-/// The page.
-///
-/// # Errors
-/// A report that cannot be rendered.
-pub(super) fn page(own: &Commissioned) -> Result<String, Error> {
-    report::html(&report(own)).map_err(|error| Error::File {
-        path: "report.html".into(),
-        reason: error.to_string(),
-    })
-}
-
-fn report(own: &Commissioned) -> Report {
+pub(super) fn report(own: &Commissioned) -> Report {
     let robust = own.design.loops.iter().filter(|one| one.robust).count();
     let worst = own.predictions.iter().map(|p| p.largest_percent);
     let worst = worst.fold(f64::NAN, f64::max);
@@ -68,7 +54,7 @@ fn report(own: &Commissioned) -> Report {
 
 fn growth(own: &Commissioned) -> Section {
     let rows = own.growth.iter().map(|trial| {
-        vec![
+        [
             Cell::Quantity(trial.reference_m, Units::DISPLACEMENT, 3),
             Cell::Quantity(trial.displacement_m, Units::DISPLACEMENT, 3),
             Cell::Text(significant(trial.acceleration_m_s2 / STANDARD_GRAVITY, 3)),
@@ -78,30 +64,20 @@ fn growth(own: &Commissioned) -> Section {
     Section {
         heading: "Growth of the excitation".into(),
         notes: own.warnings.clone(),
-        tables: vec![Table {
-            caption: "Peaks of each trial, with the interlock armed".into(),
-            columns: ["reference", "displacement", "acceleration (g)", "end"]
-                .map(String::from)
-                .to_vec(),
-            rows: rows.collect(),
-        }],
+        tables: vec![Table::of(
+            "Peaks of each trial, with the interlock armed",
+            ["reference", "displacement", "acceleration (g)", "end"],
+            rows,
+        )],
         ..Section::default()
     }
 }
 
 fn model(own: &Commissioned) -> Section {
-    let table = |caption: &str, columns: [&str; 4], rows: Vec<[String; 4]>| Table {
-        caption: caption.into(),
-        columns: columns.map(String::from).to_vec(),
-        rows: rows
-            .into_iter()
-            .map(|row| row.map(Cell::from).to_vec())
-            .collect(),
-    };
     let mut tables = match &own.identified.form {
         Form::Hydraulic(found) => vec![
-            table("Parameters", PARAMETER_COLUMNS, found.parameters()),
-            table(
+            Table::of("Parameters", PARAMETER_COLUMNS, found.parameters()),
+            Table::of(
                 "What is left of the equations",
                 EQUATION_COLUMNS,
                 found.equations(),
@@ -109,36 +85,30 @@ fn model(own: &Commissioned) -> Section {
         ],
         Form::General(found) => {
             let rows = crate::identify::parameters(found);
-            vec![table("Parameters", PARAMETER_COLUMNS, rows)]
+            vec![Table::of("Parameters", PARAMETER_COLUMNS, rows)]
         }
     };
     if !own.predictions.is_empty() {
         let number = |value: f64| Cell::Text(significant(value, 3));
-        tables.push(Table {
-            caption: "The model on motions that were not fitted, under the same controller".into(),
-            columns: [
+        tables.push(Table::of(
+            "The model on motions that were not fitted, under the same controller",
+            [
                 "motion",
                 "peak acceleration (g)",
                 "largest error (%)",
                 "rms error (%)",
                 "rms error of the command (%)",
-            ]
-            .map(String::from)
-            .to_vec(),
-            rows: own
-                .predictions
-                .iter()
-                .map(|one| {
-                    vec![
-                        Cell::Text(one.motion.clone()),
-                        number(one.peak_m_s2 / STANDARD_GRAVITY),
-                        number(one.largest_percent),
-                        number(one.rms_percent),
-                        number(one.command_percent),
-                    ]
-                })
-                .collect(),
-        });
+            ],
+            own.predictions.iter().map(|one| {
+                [
+                    Cell::Text(one.motion.clone()),
+                    number(one.peak_m_s2 / STANDARD_GRAVITY),
+                    number(one.largest_percent),
+                    number(one.rms_percent),
+                    number(one.command_percent),
+                ]
+            }),
+        ));
     }
     Section {
         heading: "Model".into(),

@@ -6,6 +6,7 @@ use super::errors;
 use super::result::{Comparison, History, Row};
 use super::tables::{ErrorTable, tables};
 use crate::error::Error;
+use crate::json;
 use crate::report::{
     self, Axis, Bar, BarGroup, Bars, Panel, Report, Section, Series, Units, identity,
 };
@@ -19,17 +20,17 @@ pub const COMPARISON: &str = "comparison.json";
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(comparison: &Comparison, folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let page = page(comparison, folder)?;
+    let page = report::render(&page(comparison), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text("report.html", &page)?;
+    results.write_text(report::FILE, &page)?;
     results.write_text(COMPARISON, &serde_json::json!(comparison).to_string())?;
     results.write_text(errors::FILE, &errors::written(&comparison.rows))?;
     Ok(results.finish()?)
 }
 
-fn page(comparison: &Comparison, folder: &Path) -> Result<String, Error> {
+fn page(comparison: &Comparison) -> Report {
     let rows = &comparison.rows;
-    let report = Report {
+    Report {
         title: "Comparison of controllers".into(),
         summary: summary(comparison),
         identity: vec![
@@ -56,26 +57,16 @@ fn page(comparison: &Comparison, folder: &Path) -> Result<String, Error> {
         }],
         footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
         ..Report::default()
-    };
-    report::html(&report).map_err(|error| Error::File {
-        path: folder.to_path_buf(),
-        reason: error.to_string(),
-    })
+    }
 }
 
 /// The report of the comparison whose files lie in `folder`; without `errors.csv` it has no plots.
 ///
 /// # Errors
 /// A file that cannot be read or is none of a comparison.
-pub fn page_again(folder: &Path) -> Result<String, Error> {
+pub fn page_again(folder: &Path) -> Result<Report, Error> {
     let path = folder.join(COMPARISON);
-    let fault = |reason: String| Error::File {
-        path: path.clone(),
-        reason,
-    };
-    let text = std::fs::read_to_string(&path).map_err(|error| fault(error.to_string()))?;
-    let mut comparison: Comparison = serde_json::from_str(&text)
-        .map_err(|error| fault(format!("not the JSON of a comparison: {error}")))?;
+    let mut comparison: Comparison = json::read(&path, "the JSON of a comparison")?;
     let plots = folder.join(errors::FILE);
     if plots.is_file() {
         let controllers = comparison.controllers().into_iter().map(String::from);
@@ -87,7 +78,7 @@ pub fn page_again(folder: &Path) -> Result<String, Error> {
             }
         }
     }
-    page(&comparison, folder)
+    Ok(page(&comparison))
 }
 
 fn motions(rows: &[Row]) -> Vec<&str> {

@@ -2,8 +2,8 @@
 
 use super::result::{Comparison, Measure, column, deviation, median};
 use super::thesis::{CONTROLLERS, PRINTED, PRINTED_FREQUENCY, PRINTED_TIME, Printed, known};
+use crate::report;
 use crate::report::columns::aligned;
-use crate::report::{self, Cell};
 
 /// A table of errors: a row for each motion, a column for each controller.
 pub struct ErrorTable {
@@ -121,14 +121,7 @@ impl ErrorTable {
     }
 
     pub(super) fn report_table(&self) -> report::Table {
-        let mut rows = self.rows.iter();
-        report::Table {
-            caption: self.caption.clone(),
-            columns: rows.next().cloned().unwrap_or_default(),
-            rows: rows
-                .map(|row| row.iter().cloned().map(Cell::Text).collect())
-                .collect(),
-        }
+        report::Table::headed(&self.caption, self.rows.clone())
     }
 }
 

@@ -14,10 +14,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::report::number::significant;
-use crate::report::{
-    self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units,
-};
-use crate::results::Results;
+use crate::report::{self, Abscissa, Axis, Panel, Report, Section, Series, Style, Table, Units};
 use crate::system::control_model::ControlModel;
 
 /// Least margins that a controller must keep on 95 of 100 rigs that the model's uncertainty allows;
@@ -332,25 +329,11 @@ impl ModelDesign {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<PathBuf, Error> {
-        const REPORT: &str = "report.html";
-        let page = report::html(&self.report()).map_err(|error| Error::File {
-            path: folder.join(REPORT),
-            reason: error.to_string(),
-        })?;
-        let mut results = Results::begin(folder)?;
-        results.write_text(REPORT, &page)?;
-        results.finish()?;
-        Ok(folder.join(REPORT))
+        report::write(&self.report(), folder)
     }
 
     /// The sections of the report, for a page of its own or a part of another.
     pub fn sections(&self) -> Vec<Section> {
-        let table = self.table();
-        let columns = table[0].iter().zip(&table[1]);
-        let columns = columns.map(|(name, unit)| match unit.as_str() {
-            "" => name.clone(),
-            unit => format!("{name} ({unit})"),
-        });
         let mut sections = vec![Section {
             heading: "Controllers".into(),
             text: vec![format!(
@@ -361,15 +344,7 @@ impl ModelDesign {
                 self.draws, self.seed
             )],
             notes: self.warnings.clone(),
-            tables: vec![Table {
-                caption: "Margins".into(),
-                columns: columns.collect(),
-                rows: table
-                    .iter()
-                    .skip(2)
-                    .map(|row| row.iter().cloned().map(Cell::Text).collect())
-                    .collect(),
-            }],
+            tables: vec![Table::headed_with_units("Margins", self.table())],
             ..Section::default()
         }];
         sections.extend(self.loops.iter().map(drawn_section));
@@ -452,17 +427,13 @@ fn drawn_section(own: &LoopOnModel) -> Section {
         heading: own.name.clone(),
         text,
         panels,
-        tables: vec![Table {
-            caption: "Parameters, SI".into(),
-            columns: vec!["parameter".into(), "value".into()],
-            rows: own
-                .parameters
+        tables: vec![Table::of(
+            "Parameters, SI",
+            ["parameter", "value"],
+            own.parameters
                 .iter()
-                .map(|(name, value)| {
-                    vec![Cell::Text(name.clone()), Cell::Text(significant(*value, 6))]
-                })
-                .collect(),
-        }],
+                .map(|(name, value)| [name.clone(), significant(*value, 6)]),
+        )],
         ..Section::default()
     }
 }

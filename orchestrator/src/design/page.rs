@@ -19,11 +19,9 @@ use super::{Design, bode};
 use crate::error::Error;
 use crate::figures::Figure;
 use crate::report::{
-    self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units, identity,
+    self, Abscissa, Axis, Panel, Report, Section, Series, Style, Table, Units, identity,
 };
-use crate::results::Results;
 
-const REPORT: &str = "report.html";
 const POINTS: usize = 600;
 /// Drawn from 0.01 Hz to the Nyquist frequency.
 const FIRST_HZ: f64 = 0.01;
@@ -33,35 +31,12 @@ const FIRST_HZ: f64 = 0.01;
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(design: &Design, folder: &Path) -> Result<PathBuf, Error> {
-    let page = report::html(&report(design)).map_err(|error| Error::File {
-        path: folder.join(REPORT),
-        reason: error.to_string(),
-    })?;
-    let mut results = Results::begin(folder)?;
-    results.write_text(REPORT, &page)?;
-    results.finish()?;
-    Ok(folder.join(REPORT))
+    report::write(&report(design), folder)
 }
 
 fn report(design: &Design) -> Report {
     let loops = &design.drawn;
-    let table = table(&design.loops);
-    let mut heads = table.iter().take(2);
-    let (names, units) = (heads.next(), heads.next());
-    let columns = names.into_iter().flatten().zip(units.into_iter().flatten());
-    let columns = columns.map(|(name, unit)| match unit.as_str() {
-        "" => name.clone(),
-        unit => format!("{name} ({unit})"),
-    });
-    let figures = Table {
-        caption: "Margins".into(),
-        columns: columns.collect(),
-        rows: table
-            .iter()
-            .skip(2)
-            .map(|row| row.iter().cloned().map(Cell::Text).collect())
-            .collect(),
-    };
+    let figures = Table::headed_with_units("Margins", table(&design.loops));
     let mut sections = vec![Section {
         heading: "Loops".into(),
         text: vec![

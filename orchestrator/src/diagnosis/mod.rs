@@ -24,6 +24,7 @@ use identification::diagnosis::{
 };
 
 use crate::error::Error;
+use crate::json;
 use crate::report::{self, Report};
 use crate::results::Results;
 
@@ -31,8 +32,6 @@ use crate::results::Results;
 pub const EXTENDED_MODEL: &str = "extended_model.toml";
 /// File with the JSON object, in the folder of `--out`.
 pub const DIAGNOSIS: &str = "diagnosis.json";
-/// File with the report, in the folder of `--out`.
-pub const REPORT: &str = "report.html";
 
 /// Diagnoses the case in folder `subject`, or the rig that the description `subject` (`.toml`)
 /// tells of, on `data` in place of its own files if there are any. Writes the extended model, its
@@ -72,7 +71,8 @@ pub fn diagnose(
             page::of_rig(&found.name, subject, &report, &curves)
         }
     };
-    results.write_text(REPORT, &html(&page, folder)?)?;
+    let page = report::render(&page, &folder.join(report::FILE))?;
+    results.write_text(report::FILE, &page)?;
     results.write_text(DIAGNOSIS, &format!("{:#}\n", serde_json::json!(report)))?;
     results.finish()?;
     Ok(report)
@@ -80,7 +80,7 @@ pub fn diagnose(
 
 /// The files of `report`, which lie in `folder`, for people.
 pub fn files(report: &DiagnosisReport, folder: &Path) -> Vec<PathBuf> {
-    let mut files = [REPORT, DIAGNOSIS, EXTENDED_MODEL]
+    let mut files = [report::FILE, DIAGNOSIS, EXTENDED_MODEL]
         .map(|name| folder.join(name))
         .to_vec();
     if let Evidence::Rig(evidence) = &report.evidence {
@@ -114,10 +114,6 @@ pub fn template(word: &str) -> Result<String, Error> {
             ),
         }
     })
-}
-
-fn html(page: &Report, folder: &Path) -> Result<String, Error> {
-    report::html(page).map_err(|error| file_fault(&folder.join(REPORT), error))
 }
 
 fn file_fault(path: &Path, error: impl std::fmt::Display) -> Error {
@@ -154,21 +150,19 @@ fn fault(subject: &Path, error: DiagnosisError) -> Error {
 ///
 /// # Errors
 /// A file that cannot be read or is none of a diagnosis; a report with pictures that would be lost.
-pub fn page_again(folder: &Path) -> Result<String, Error> {
+pub fn page_again(folder: &Path) -> Result<Report, Error> {
     let path = folder.join(DIAGNOSIS);
-    let text = std::fs::read_to_string(&path).map_err(|error| file_fault(&path, error))?;
-    let report: DiagnosisReport = serde_json::from_str(&text)
-        .map_err(|error| file_fault(&path, format!("not the JSON of a diagnosis: {error}")))?;
-    let curves = match &report.evidence {
+    let found: DiagnosisReport = json::read(&path, "the JSON of a diagnosis")?;
+    let curves = match &found.evidence {
         Evidence::Rig(_) => rig::curves_again(folder)?,
         Evidence::ShakeTable(_) => None,
     };
-    if curves.is_none() && folder.join(REPORT).is_file() {
+    if curves.is_none() && folder.join(report::FILE).is_file() {
         return Err(file_fault(
             folder,
             "its report.html has pictures that diagnosis.json does not hold; move it away to have \
              one without them, or run `shakebench diagnose` again",
         ));
     }
-    html(&page::again(folder, &report, curves.as_deref()), folder)
+    Ok(page::again(folder, &found, curves.as_deref()))
 }

@@ -18,17 +18,6 @@ use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Panel, Report, Section, Tab
 use plant::identified::nominal::{shake_table_values, specimen_values};
 
 /// A table of `rows`, of which the first are the headings.
-fn table(caption: &str, rows: Vec<Vec<String>>) -> Table {
-    let mut rows = rows.into_iter();
-    Table {
-        caption: caption.into(),
-        columns: rows.next().unwrap_or_default(),
-        rows: rows
-            .map(|row| row.into_iter().map(Cell::from).collect())
-            .collect(),
-    }
-}
-
 fn page(name: &str, source: &str, report: &DiagnosisReport, sections: Vec<Section>) -> Report {
     Report {
         title: format!("Diagnosis of {name}"),
@@ -146,7 +135,7 @@ fn rig_sections(report: &DiagnosisReport, curves: Option<&[Curves]>) -> Vec<Sect
                 rig.output,
                 100.0 * evidence.unexplained_share
             )],
-            tables: vec![table("", text::parts(rig))],
+            tables: vec![Table::headed("", text::parts(rig))],
             ..Section::default()
         },
     ];
@@ -193,7 +182,7 @@ fn extended_rig(rig: &RigDiagnosis) -> Section {
             }
             _ => "The values of extended_model.toml. SI.".into(),
         }],
-        tables: vec![table("", rows)],
+        tables: vec![Table::headed("", rows)],
         ..Section::default()
     }
 }
@@ -252,7 +241,7 @@ fn facts(report: &DiagnosisReport) -> Vec<Fact> {
 fn findings(report: &DiagnosisReport) -> Section {
     let mut tables = Vec::new();
     if !report.effects.is_empty() {
-        tables.push(table(
+        tables.push(Table::headed(
             "Estimates ± one standard error, and what they are with a confidence of 95 %",
             text::parameters(report),
         ));
@@ -350,7 +339,7 @@ fn gain(report: &DiagnosisReport, diagnosis: Option<&Diagnosis>) -> Section {
             text::share(&report.gain)
         )],
         bars: bars("One step ahead", &report.gain, interval),
-        tables: vec![table(
+        tables: vec![Table::headed(
             "NRMSE one step ahead, and in noise floors",
             text::channels(&report.gain).unwrap_or_default(),
         )],
@@ -371,7 +360,7 @@ fn closed_loop(gain: &GainReport) -> Section {
             format!("{}.", text::share(gain)),
         ],
         bars: bars("Whole record, co-simulated", gain, |_| None),
-        tables: vec![table(
+        tables: vec![Table::headed(
             "NRMSE in closed-loop co-simulation, and in noise floors",
             text::channels(gain).unwrap_or_default(),
         )],
@@ -402,7 +391,7 @@ fn relations(evidence: &ShakeTableEvidence) -> Section {
              sensor or the motion that they share."
                 .into(),
         ],
-        tables: vec![table("", rows)],
+        tables: vec![Table::headed("", rows)],
         ..Section::default()
     }
 }
@@ -481,7 +470,7 @@ fn extended_case(case: &Case, model: &ExtendedModel) -> Section {
              reads. SI."
                 .into(),
         ],
-        tables: vec![table("", rows)],
+        tables: vec![Table::headed("", rows)],
         ..Section::default()
     }
 }

@@ -88,7 +88,7 @@ pub fn write(figures: &[Figure], motion: &str, folder: &Path) -> Result<Vec<Path
         panels: figure.panels.clone(),
         ..Section::default()
     });
-    let page = report::html(&Report {
+    let page = Report {
         title: "Figures of the thesis, drawn again".into(),
         summary: format!(
             "{} figures of Lin (2017) as this program computes them, on {motion}; lay them beside \
@@ -98,13 +98,10 @@ pub fn write(figures: &[Figure], motion: &str, folder: &Path) -> Result<Vec<Path
         identity: vec![identity::entry("Motion", motion), identity::version()],
         sections: sections.collect(),
         ..Report::default()
-    })
-    .map_err(|error| Error::File {
-        path: folder.join("report.html"),
-        reason: error.to_string(),
-    })?;
+    };
+    let page = report::render(&page, &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text("report.html", &page)?;
+    results.write_text(report::FILE, &page)?;
     for figure in figures {
         for (n, panel) in figure.panels.iter().enumerate() {
             let name = format!("figure-{}-{}.svg", figure.number, n + 1);

@@ -13,7 +13,7 @@ use identification::identify::model_file::ModelFile;
 use super::poles;
 use super::summary::Summary;
 use crate::report::number::significant;
-use crate::report::{Cell, Report, Section, Table, identity};
+use crate::report::{Report, Section, Table, identity};
 
 /// What was found from the first part of the recordings, and how the rest obeys it.
 pub struct HydraulicIdentification {
@@ -176,14 +176,6 @@ impl HydraulicIdentification {
 
     /// The report.
     pub(super) fn report(&self, summary: &Summary) -> Report {
-        let table = |caption: &str, columns: [&str; 4], rows: Vec<[String; 4]>| Table {
-            caption: caption.into(),
-            columns: columns.map(String::from).to_vec(),
-            rows: rows
-                .into_iter()
-                .map(|row| row.map(Cell::from).to_vec())
-                .collect(),
-        };
         let explained = "What is left of the equations is noise.";
         Report {
             title: "Identified hydraulic rig".into(),
@@ -202,8 +194,8 @@ impl HydraulicIdentification {
                 notes: summary.warnings.clone(),
                 panels: vec![poles::panel(summary)],
                 tables: vec![
-                    table("Parameters", PARAMETER_COLUMNS, self.parameters()),
-                    table(
+                    Table::of("Parameters", PARAMETER_COLUMNS, self.parameters()),
+                    Table::of(
                         "What is left of the equations",
                         EQUATION_COLUMNS,
                         self.equations(),

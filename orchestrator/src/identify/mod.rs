@@ -183,10 +183,7 @@ impl Identified {
             Form::General(found) => page::report(found, &self.recordings, &self.summary),
             Form::Hydraulic(own) => own.report(&self.summary),
         };
-        let page = report::html(&page).map_err(|error| Error::File {
-            path: beside.clone(),
-            reason: error.to_string(),
-        })?;
+        let page = report::render(&page, &beside)?;
         let model = self.model_file()?.to_toml()?;
         let folder = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,

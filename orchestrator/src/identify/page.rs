@@ -3,6 +3,7 @@
 use identification::data::Recording;
 use identification::identify::identified::RigIdentification;
 
+use super::hydraulic::PARAMETER_COLUMNS;
 use super::parameters::parameters;
 use super::summary::Summary;
 use super::{poles, residuals, responses};
@@ -39,16 +40,11 @@ pub(super) fn report(
     recordings: &[Recording],
     summary: &Summary,
 ) -> Report {
-    let table = Table {
-        caption: "Parameters with standard errors".into(),
-        columns: ["parameter", "value", "standard error", "unit"]
-            .map(String::from)
-            .to_vec(),
-        rows: parameters(found)
-            .into_iter()
-            .map(|row| row.map(Cell::from).to_vec())
-            .collect(),
-    };
+    let table = Table::of(
+        "Parameters with standard errors",
+        PARAMETER_COLUMNS,
+        parameters(found),
+    );
     let mut sections = vec![Section {
         heading: "Model".into(),
         notes: summary.warnings.clone(),

@@ -35,7 +35,7 @@ pub(super) fn table(summary: &Summary) -> Table {
     let rows = parts(summary).into_iter().flat_map(|(name, poles, _)| {
         poles.iter().map(move |&[re, im]| {
             let size = re.hypot(im);
-            vec![
+            [
                 Cell::from(name),
                 Cell::Number(re, 5),
                 Cell::Number(im, 5),
@@ -45,18 +45,16 @@ pub(super) fn table(summary: &Summary) -> Table {
             ]
         })
     });
-    Table {
-        caption: "Poles".into(),
-        columns: [
+    Table::of(
+        "Poles",
+        [
             "of",
             "real part [1/s]",
             "imaginary part [1/s]",
             "natural frequency",
             "in Hz",
             "damping ratio",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: rows.collect(),
-    }
+        ],
+        rows,
+    )
 }

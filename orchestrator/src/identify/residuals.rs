@@ -21,7 +21,7 @@ pub(super) fn section(found: &RigIdentification) -> Section {
         own.push(line(&test.autocorrelation, 1));
         cross.push(line(&test.cross_correlation, 0));
         let share = |value: f64| Cell::Quantity(100.0 * value, Units::PERCENT, 2);
-        rows.push(vec![
+        rows.push([
             Cell::from(name.as_str()),
             share(test.outside()),
             share(test.cross_outside()),
@@ -68,18 +68,16 @@ pub(super) fn section(found: &RigIdentification) -> Section {
                 cross,
             ),
         ],
-        tables: vec![Table {
-            columns: [
+        tables: vec![Table::of(
+            "",
+            [
                 "recording, channel",
                 "lags outside 99 %",
                 "with the command",
                 "white",
-            ]
-            .map(String::from)
-            .to_vec(),
+            ],
             rows,
-            ..Table::default()
-        }],
+        )],
         ..Section::default()
     }
 }

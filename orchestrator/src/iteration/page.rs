@@ -17,12 +17,9 @@ const DRIVE: &str = "drive.csv";
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(iteration: &Iteration, folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let page = report::html(&page(iteration)).map_err(|error| Error::File {
-        path: folder.to_path_buf(),
-        reason: error.to_string(),
-    })?;
+    let page = report::render(&page(iteration), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text("report.html", &page)?;
+    results.write_text(report::FILE, &page)?;
     results.write_text(
         ITERATION,
         &(serde_json::json!(iteration).to_string() + "\n"),
@@ -38,7 +35,7 @@ fn page(iteration: &Iteration) -> Report {
         value.map_or("-".into(), |value| Cell::Quantity(value, Units::PERCENT, 3))
     };
     let rows = iteration.runs.iter().map(|run| {
-        vec![
+        [
             Cell::Number(run.iteration as f64, 2),
             percent(run.measured_percent),
             percent(run.time_domain_percent),
@@ -80,12 +77,12 @@ fn page(iteration: &Iteration) -> Report {
                  energy of all runs on the specimen over that of the motion played once."
                     .into(),
             ],
-            tables: vec![Table {
-                caption: format!(
+            tables: vec![Table::of(
+                &format!(
                     "The best run is {}; its drive is in {DRIVE}.",
                     iteration.best
                 ),
-                columns: [
+                [
                     "corrections",
                     "measured error",
                     "RMS acceleration error",
@@ -93,11 +90,9 @@ fn page(iteration: &Iteration) -> Report {
                     "response spectrum",
                     "exposure",
                     "ended",
-                ]
-                .map(str::to_string)
-                .to_vec(),
-                rows: rows.collect(),
-            }],
+                ],
+                rows,
+            )],
             panels: errors.collect(),
             ..Section::default()
         }],

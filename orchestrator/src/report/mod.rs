@@ -1,7 +1,7 @@
 //! Reports: figures, tables and plots in one HTML file that opens without a network, and single
 //! plots as SVG.
 //!
-//! A [`Report`] is plain data; [`html`] renders it, [`svg`] renders one [`Panel`]. [`run`] makes
+//! A [`Report`] is plain data; [`render`] makes its page, [`svg`] renders one [`Panel`]. [`run`] makes
 //! the report of a run; comparisons, designs, identification and diagnosis fill the same data.
 
 mod bars;
@@ -10,6 +10,7 @@ pub(crate) mod columns;
 mod html;
 pub mod identity;
 pub(crate) mod number;
+mod page;
 mod run;
 mod svg;
 pub(crate) mod units;
@@ -18,6 +19,7 @@ use std::sync::Arc;
 
 pub use bars::{Bar, BarGroup, Bars};
 pub use html::html;
+pub use page::{FILE, render, write};
 pub use run::{Changed, Component, Run, SpecimenHistory, Whole, run};
 pub use svg::svg;
 pub use units::{UnitSystem, Units};
@@ -76,6 +78,52 @@ pub struct Table {
     pub columns: Vec<String>,
     /// Rows.
     pub rows: Vec<Vec<Cell>>,
+}
+
+impl Table {
+    /// Of cells in columns of these headings.
+    #[must_use]
+    pub fn of<const N: usize, C: Into<Cell>>(
+        caption: &str,
+        columns: [&str; N],
+        rows: impl IntoIterator<Item = [C; N]>,
+    ) -> Self {
+        Self {
+            caption: caption.to_string(),
+            columns: columns.map(str::to_string).to_vec(),
+            rows: rows
+                .into_iter()
+                .map(|row| row.map(Into::into).to_vec())
+                .collect(),
+        }
+    }
+
+    /// Of rows as a terminal shows them too: the first are the headings.
+    #[must_use]
+    pub fn headed<C: Into<Cell>>(caption: &str, rows: Vec<Vec<C>>) -> Self {
+        let mut rows = rows.into_iter();
+        let heads = rows.next().unwrap_or_default().into_iter();
+        Self {
+            caption: caption.to_string(),
+            columns: heads.map(|head| head.into().text(UnitSystem::Us)).collect(),
+            rows: rows
+                .map(|row| row.into_iter().map(Into::into).collect())
+                .collect(),
+        }
+    }
+
+    /// As [`Table::headed`], with the units of the columns, or nothing, in the second row.
+    #[must_use]
+    pub fn headed_with_units(caption: &str, mut rows: Vec<Vec<String>>) -> Self {
+        if rows.len() > 1 {
+            let units = rows.remove(1);
+            let heads = rows[0].iter_mut().zip(units);
+            heads
+                .filter(|(_, unit)| !unit.is_empty())
+                .for_each(|(name, unit)| *name += &format!(" ({unit})"));
+        }
+        Self::headed(caption, rows)
+    }
 }
 
 /// One cell of a table.

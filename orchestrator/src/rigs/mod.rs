@@ -23,6 +23,7 @@ use crate::fmu::FmiVersion;
 use crate::master::{Algorithm, Ending};
 use crate::metrics;
 use crate::motion::Motion;
+use crate::report;
 use crate::results::Results;
 use crate::run::experiment::{self, Prepared, prepare_file};
 use crate::system::built_in;
@@ -246,10 +247,10 @@ impl Study {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+        let page = report::render(&page::page(self), &folder.join(report::FILE))?;
         let mut results = Results::begin(folder)?;
-        results.write_text("report.html", &page::page(self)?)?;
-        let json = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
-        results.write_text("rigs.json", &json)?;
+        results.write_text(report::FILE, &page)?;
+        results.write_json("rigs.json", self)?;
         Ok(results.finish()?)
     }
 

@@ -1,9 +1,8 @@
 //! The study as a table and as a page.
 
 use super::{DesignedOn, Study};
-use crate::error::Error;
 use crate::report::number::significant;
-use crate::report::{self, Bar, BarGroup, Bars, Cell, Report, Section, Table};
+use crate::report::{Bar, BarGroup, Bars, Report, Section, Table};
 
 fn word(design: DesignedOn) -> &'static str {
     match design {
@@ -61,12 +60,7 @@ pub(super) fn ranking(study: &Study) -> Vec<String> {
 }
 
 /// The page.
-///
-/// # Errors
-/// A report that cannot be rendered.
-pub(super) fn page(study: &Study) -> Result<String, Error> {
-    let mut rows = table(study).into_iter();
-    let columns = rows.next().unwrap_or_default();
+pub(super) fn page(study: &Study) -> Report {
     let mut groups: Vec<BarGroup> = Vec::new();
     for own in &study.standings {
         let Some(middle) = own.error_percent.p50 else {
@@ -104,7 +98,7 @@ pub(super) fn page(study: &Study) -> Result<String, Error> {
             Some(format!("rig {}: {reason}", row.rig.number))
         })
         .collect();
-    let report = Report {
+    Report {
         title: format!("{} rigs", study.rows.len()),
         summary: ranking(study).first().cloned().unwrap_or_default(),
         sections: vec![
@@ -122,13 +116,7 @@ pub(super) fn page(study: &Study) -> Result<String, Error> {
                     groups,
                     mark: None,
                 }],
-                tables: vec![Table {
-                    caption: "Standings".into(),
-                    columns,
-                    rows: rows
-                        .map(|row| row.into_iter().map(Cell::Text).collect())
-                        .collect(),
-                }],
+                tables: vec![Table::headed("Standings", table(study))],
                 ..Section::default()
             },
             Section {
@@ -148,9 +136,5 @@ pub(super) fn page(study: &Study) -> Result<String, Error> {
             study.seed
         ),
         ..Report::default()
-    };
-    report::html(&report).map_err(|error| Error::File {
-        path: "report.html".into(),
-        reason: error.to_string(),
-    })
+    }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
+use super::summary::Table;
 use crate::error::Error;
 use crate::fmu::{FmiVersion, Options};
 use crate::library::FmuLibrary;
@@ -13,7 +14,7 @@ use crate::motion::{self, Motion, Scaling};
 use crate::ssp;
 use crate::system::tuning::{self, Tuning, Wanted};
 use crate::system::{
-    self, Between, InputTable, Link, Origin, System, SystemFile, VariableName, built_in,
+    self, Between, InputTable, Link, Origin, Quantity, System, SystemFile, VariableName, built_in,
 };
 use crate::units::hint;
 
@@ -138,10 +139,19 @@ impl Prepared {
     pub fn judge(&self, outcome: &mut Outcome) {
         /// An error of so many times the motion's peak is no tracking.
         const LOST: f64 = 5.0;
+        let names = self.system.components.iter().map(|own| own.name.as_str());
+        let links: Vec<Link> = self.system.links().collect();
+        let Some(table) = Table::among(names, &links, &outcome.record) else {
+            return;
+        };
+        let asked = Origin::Reference {
+            quantity: Quantity::Displacement,
+            ahead: 0,
+        };
         let column = |name: &str| outcome.record.column(name);
         let (Some(table), Some(asked), Some(times)) = (
-            column("table.displacement"),
-            column("reference.displacement"),
+            column(&table.name("displacement")),
+            column(&asked.to_string()),
             column("time"),
         ) else {
             return;

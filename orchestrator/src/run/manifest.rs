@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 use super::experiment::Request;
 use crate::error::Error;
 use crate::fmu::{Causality, hexadecimal};
+use crate::json;
 use crate::master::Algorithm;
 use crate::motion::Motion;
 use crate::system::{Link, System};
@@ -135,13 +136,7 @@ impl Manifest {
     /// # Errors
     /// A file that cannot be read or is none.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let fault = |reason: String| Error::File {
-            path: path.to_path_buf(),
-            reason,
-        };
-        let text = std::fs::read_to_string(path).map_err(|error| fault(error.to_string()))?;
-        serde_json::from_str(&text)
-            .map_err(|error| fault(format!("not the manifest of a run: {error}")))
+        json::read(path, "the manifest of a run")
     }
 
     /// What differs between the run written down here and a repetition of it, a line each.

@@ -3,7 +3,6 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::experiment::Prepared;
@@ -16,7 +15,7 @@ use crate::fmu::hexadecimal;
 use crate::master::{Outcome, Record};
 use crate::motion::Motion;
 use crate::report::number::significant;
-use crate::report::{self, Cell, Component, SpecimenHistory, Whole};
+use crate::report::{self, Cell, Component, Report, SpecimenHistory, Whole};
 use crate::results::Results;
 use crate::units::STANDARD_GRAVITY;
 
@@ -42,14 +41,15 @@ pub fn write(
     })?;
     manifest.results_sha256 = hexadecimal(&sum.finalize());
     // A page of an earlier run here would be another run's.
-    results.replaces(&["report.html"]);
+    results.replaces(&[report::FILE]);
     let columns = columns(&prepared.system, &outcome.record);
     results.write(COLUMNS, |file| write_columns(&columns, file))?;
-    results.write_text("summary.json", &json(summary))?;
-    results.write_text("manifest.json", &json(manifest))?;
+    results.write_json("summary.json", summary)?;
+    results.write_json("manifest.json", manifest)?;
     let motion = &prepared.motion;
     if let Some(page) = page(summary, manifest, motion, motion.into(), &outcome.record) {
-        results.write_text("report.html", &page)?;
+        let page = report::render(&page, &folder.join(report::FILE))?;
+        results.write_text(report::FILE, &page)?;
     }
     Ok(results.finish()?)
 }
@@ -72,10 +72,6 @@ impl<W: Write> Write for Hashed<'_, W> {
     }
 }
 
-fn json(value: &impl Serialize) -> String {
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
-}
-
 /// The report; none where there is no table.
 fn page(
     summary: &Summary,
@@ -83,7 +79,7 @@ fn page(
     motion: &Motion,
     whole: Whole,
     record: &Record,
-) -> Option<String> {
+) -> Option<Report> {
     let table = Table::find(manifest, record)?;
     let asked = asked(record, motion);
     let (motion, whole) = match &asked {
@@ -137,7 +133,7 @@ fn page(
             manifest.shakebench
         ),
     };
-    report::html(&report::run(&run)).ok()
+    Some(report::run(&run))
 }
 
 /// The limit of the component that gives the first command.
@@ -181,7 +177,7 @@ fn components(manifest: &Manifest, summary: &Summary) -> Vec<Component> {
 ///
 /// # Errors
 /// A file that is missing or is none of a run.
-pub fn page_again(folder: &Path) -> Result<String, Error> {
+pub fn page_again(folder: &Path) -> Result<Report, Error> {
     let manifest = Manifest::read(&folder.join("manifest.json"))?;
     let summary = Summary::read(&folder.join("summary.json"))?;
     let place = folder.join(RESULTS);

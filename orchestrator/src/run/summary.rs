@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 use super::experiment::Prepared;
 use super::manifest::Manifest;
 use crate::error::Error;
+use crate::json;
 use crate::master::{Ended, Ending, Outcome, RealTime, Record};
 use crate::metrics::{self, Tracking};
 use crate::motion::Motion;
-use crate::system::Origin;
+use crate::system::{Link, Origin};
 use crate::units::{self, INCH, STANDARD_GRAVITY};
 
 /// `summary.json` of a run, and what `--json` prints.
@@ -99,13 +100,7 @@ impl Summary {
     /// # Errors
     /// A file that cannot be read or is none.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let fault = |reason: String| Error::File {
-            path: path.to_path_buf(),
-            reason,
-        };
-        let text = std::fs::read_to_string(path).map_err(|error| fault(error.to_string()))?;
-        serde_json::from_str(&text)
-            .map_err(|error| fault(format!("not the summary of a run: {error}")))
+        json::read(path, "the summary of a run")
     }
 
     /// Measures a run.
@@ -222,8 +217,18 @@ pub(crate) struct Table<'a> {
 
 impl<'a> Table<'a> {
     pub(crate) fn find(manifest: &'a Manifest, record: &Record) -> Option<Self> {
+        let names = manifest.components.keys().map(String::as_str);
+        Self::among(names, &manifest.connections, record)
+    }
+
+    /// As [`Table::find`], among components of these names, in alphabetical order.
+    pub(crate) fn among(
+        mut names: impl Iterator<Item = &'a str> + Clone,
+        connections: &[Link],
+        record: &Record,
+    ) -> Option<Self> {
         let valve = |name: &str| {
-            let mut links = manifest.connections.iter();
+            let mut links = connections.iter();
             links
                 .find(|link| link.to.component == name && link.to.variable == "valve_command")
                 .map(|link| &link.from)
@@ -233,9 +238,8 @@ impl<'a> Table<'a> {
             outputs.all(|output| record.columns.contains(&format!("{name}.{output}")))
                 && valve(name).is_some()
         };
-        let mut names = manifest.components.keys().map(String::as_str);
-        let name = match manifest.components.get_key_value("table") {
-            Some((name, _)) => name,
+        let name = match names.clone().find(|name| *name == "table") {
+            Some(name) => name,
             None => names.find(|name| moves(name))?,
         };
         // Back from the valve: an interlock takes the controller's command.
@@ -247,8 +251,7 @@ impl<'a> Table<'a> {
                 break;
             }
             commands.push(signal);
-            at = manifest
-                .connections
+            at = connections
                 .iter()
                 .find(|link| {
                     link.to.component == output.component

@@ -12,6 +12,7 @@ pub use differences::Difference;
 use crate::error::Error;
 use crate::master::{Ending, Record};
 use crate::metrics::Tracking;
+use crate::report;
 use crate::results::Results;
 use crate::run::manifest::Manifest;
 use crate::run::signals::{RESULTS, read_csv};
@@ -153,12 +154,9 @@ impl RunComparison {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
-        let page = crate::report::html(&page::report(self)).map_err(|error| Error::File {
-            path: folder.join("report.html"),
-            reason: error.to_string(),
-        })?;
+        let page = report::render(&page::report(self), &folder.join(report::FILE))?;
         let mut results = Results::begin(folder)?;
-        results.write_text("report.html", &page)?;
+        results.write_text(report::FILE, &page)?;
         results.write_text(RUNS, &format!("{:#}\n", serde_json::json!(self)))?;
         results.write("runs.csv", |file| {
             let mut csv = csv::Writer::from_writer(file);
@@ -198,7 +196,7 @@ impl RunComparison {
         page::figures(self)
             .iter()
             .map(|row| {
-                let system = crate::report::UnitSystem::of_text();
+                let system = report::UnitSystem::of_text();
                 row.iter().map(|cell| cell.text(system)).collect()
             })
             .collect()

@@ -152,16 +152,10 @@ pub(super) fn figures(comparison: &RunComparison) -> Vec<Vec<Cell>> {
 }
 
 fn table(comparison: &RunComparison) -> Table {
-    let mut rows = figures(comparison).into_iter();
-    let heads = rows.next().unwrap_or_default();
-    Table {
-        caption: "Errors are RMS over the peak of the reference.".into(),
-        columns: heads
-            .iter()
-            .map(|cell| cell.text(crate::report::UnitSystem::Us))
-            .collect(),
-        rows: rows.collect(),
-    }
+    Table::headed(
+        "Errors are RMS over the peak of the reference.",
+        figures(comparison),
+    )
 }
 
 /// The runs on a motion over each other, with the reference of the first.

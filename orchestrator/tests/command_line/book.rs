@@ -194,6 +194,26 @@ fn your_own_parts() {
 }
 
 #[test]
+fn your_own_rig() {
+    run_page("your-own-rig.md");
+}
+
+#[test]
+fn reports_and_comparing_runs() {
+    run_page("reports.md");
+}
+
+#[test]
+fn iterative_control() {
+    run_page("iterative-control.md");
+}
+
+#[test]
+fn ssp_archives() {
+    run_page("ssp.md");
+}
+
+#[test]
 fn from_your_csv_to_a_diagnosis() {
     run_page("from-csv-to-diagnosis.md");
 }

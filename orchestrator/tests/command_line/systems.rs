@@ -50,6 +50,20 @@ fn the_system_as_it_stands_runs() {
 }
 
 #[test]
+fn a_table_that_runs_away_is_a_failed_run_whatever_it_is_called() {
+    for name in ["table", "platform"] {
+        let folder = tempfile::tempdir().unwrap();
+        let wrong_way = SYSTEM
+            .replace("\"3 V/in\"", "\"-3 V/in\"")
+            .replace("table", name);
+        fs::write(folder.path().join("rig.toml"), wrong_way).unwrap();
+        let output = shakebench(folder.path(), &["run", "rig.toml", "--duration", "4 s"]);
+        assert_eq!(output.status.code(), Some(1), "{name}: {}", stderr(&output));
+        assert!(stderr(&output).contains("the run ran away"), "{name}");
+    }
+}
+
+#[test]
 fn no_toml() {
     changed("connections = [", "connections = ", &["line 3"]);
     changed("period", "perriod", &["perriod", "line"]);

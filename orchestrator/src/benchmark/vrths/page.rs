@@ -134,17 +134,6 @@ fn facts(outcome: &Outcome) -> Vec<Fact> {
     ]
 }
 
-fn table(caption: &str, rows: Vec<Vec<String>>) -> Table {
-    let mut rows = rows.into_iter();
-    Table {
-        caption: caption.into(),
-        columns: rows.next().unwrap_or_default(),
-        rows: rows
-            .map(|row| row.into_iter().map(Cell::Text).collect())
-            .collect(),
-    }
-}
-
 fn scores(outcome: &Outcome) -> Section {
     let bars = |title: &str, place: usize| Bars {
         title: title.into(),
@@ -182,7 +171,7 @@ fn scores(outcome: &Outcome) -> Section {
             bars("J4, first floor, %", 3),
             bars("J6, second floor, %", 5),
         ],
-        tables: vec![table(
+        tables: vec![Table::headed(
             "Mean/largest: J1 in ms, the others in %",
             outcome.score_rows(),
         )],
@@ -202,7 +191,10 @@ fn published(outcome: &Outcome) -> Section {
                      derivative blocks."
                 .into(),
         }],
-        tables: vec![table("J1 in ms, J2 to J9 in %", outcome.table3_rows())],
+        tables: vec![Table::headed(
+            "J1 in ms, J2 to J9 in %",
+            outcome.table3_rows(),
+        )],
         ..Section::default()
     }
 }

@@ -13,8 +13,9 @@ use identification::diagnosis::DiagnosisReport;
 use identification::diagnosis::engine::{Observer, Verdict};
 use identification::diagnosis::rigs::foreign::{self, ForeignDiagnosis, ForeignModel};
 
-use super::{DIAGNOSIS, EXTENDED_MODEL, REPORT, file_fault, html, page};
+use super::{DIAGNOSIS, EXTENDED_MODEL, file_fault, page};
 use crate::error::Error;
+use crate::report;
 use crate::results::Results;
 use map::Map;
 use simulator::{Alone, Mapped, mapped, open};
@@ -101,7 +102,8 @@ pub fn diagnose(
     report.wall_s = begun.elapsed().as_secs_f64();
     let panels = pictures::panels(&subject, &found);
     let page = page::of_foreign(&subject.name, model, &report, panels);
-    results.write_text(REPORT, &html(&page, folder)?)?;
+    let page = report::render(&page, &folder.join(report::FILE))?;
+    results.write_text(report::FILE, &page)?;
     results.write_text(DIAGNOSIS, &format!("{:#}\n", serde_json::json!(report)))?;
     results.finish()?;
     Ok(report)

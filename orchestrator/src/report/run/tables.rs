@@ -5,42 +5,38 @@ use crate::metrics::Tracking;
 use crate::metrics::laboratory::Laboratory;
 use crate::report::{Cell, Table, Units};
 
-fn columns<const N: usize>(names: [&str; N]) -> Vec<String> {
-    names.map(str::to_string).to_vec()
-}
-
 /// Peaks and errors.
 pub(super) fn tracking(whole: Whole, tracking: &Tracking) -> Table {
     let length = |value| Cell::Quantity(value, Units::DISPLACEMENT, 4);
     let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4);
     let percent = |value| Cell::Quantity(value, Units::PERCENT, 3);
     let none = || Cell::Text(String::new());
-    Table {
-        caption: "Errors in percent are relative to the peak of the reference.".to_string(),
-        columns: columns(["", "reference", "table", "largest error", "RMS error"]),
-        rows: vec![
-            vec![
+    Table::of(
+        "Errors in percent are relative to the peak of the reference.",
+        ["", "reference", "table", "largest error", "RMS error"],
+        [
+            [
                 "displacement, peak".into(),
                 length(whole.peak_displacement),
                 length(tracking.peak_displacement),
                 length(tracking.peak_displacement_error),
                 percent(tracking.displacement_percent),
             ],
-            vec![
+            [
                 "acceleration, peak".into(),
                 acceleration(whole.peak_acceleration),
                 acceleration(tracking.peak_acceleration),
                 acceleration(tracking.peak_acceleration_error),
                 percent(tracking.time_domain_percent),
             ],
-            vec![
+            [
                 "acceleration, Fourier amplitudes to 25 Hz".into(),
                 none(),
                 none(),
                 none(),
                 percent(tracking.frequency_domain_percent),
             ],
-            vec![
+            [
                 "acceleration, correlation".into(),
                 none(),
                 Cell::Number(tracking.correlation, 5),
@@ -48,105 +44,96 @@ pub(super) fn tracking(whole: Whole, tracking: &Tracking) -> Table {
                 none(),
             ],
         ],
-    }
+    )
 }
 
 /// Response spectra and transfer function, a row for each band.
 pub(super) fn bands(own: &Laboratory) -> Table {
     let percent = |value| Cell::Quantity(value, Units::PERCENT, 3);
     let rows = own.response_spectrum_percent.iter().enumerate();
-    Table {
-        caption: "Response spectrum at 5 % damping: how far the table's is from the reference's. \
-                  Transfer function from the reference's to the table's acceleration, each frequency \
-                  weighted by the reference's power."
-            .to_string(),
-        columns: columns([
+    Table::of(
+        "Response spectrum at 5 % damping: how far the table's is from the reference's. \
+         Transfer function from the reference's to the table's acceleration, each frequency \
+         weighted by the reference's power.",
+        [
             "band, Hz",
             "spectrum, largest",
             "spectrum, mean",
             "gain",
             "delay, ms",
             "coherence",
-        ]),
-        rows: rows
-            .map(|(n, spectrum)| {
-                let [from, to] = spectrum.band_hz;
-                let band = own.coherence.as_ref().map(|bands| &bands[n]);
-                let number = |value: Option<f64>, digits| {
-                    value.map_or("-".into(), |value| Cell::Number(value, digits))
-                };
-                vec![
-                    format!("{from} to {to}").into(),
-                    percent(spectrum.largest),
-                    percent(spectrum.mean),
-                    number(band.map(|band| band.gain), 4),
-                    number(band.map(|band| 1e3 * band.delay_s), 3),
-                    number(band.map(|band| band.coherence), 4),
-                ]
-            })
-            .collect(),
-    }
+        ],
+        rows.map(|(n, spectrum)| {
+            let [from, to] = spectrum.band_hz;
+            let band = own.coherence.as_ref().map(|bands| &bands[n]);
+            let number = |value: Option<f64>, digits| {
+                value.map_or("-".into(), |value| Cell::Number(value, digits))
+            };
+            [
+                format!("{from} to {to}").into(),
+                percent(spectrum.largest),
+                percent(spectrum.mean),
+                number(band.map(|band| band.gain), 4),
+                number(band.map(|band| 1e3 * band.delay_s), 3),
+                number(band.map(|band| band.coherence), 4),
+            ]
+        }),
+    )
 }
 
 /// The strong part of the motion and its energy.
 pub(super) fn strong_part(own: &Laboratory) -> Table {
-    Table {
-        caption: "Significant duration: from 5 to 95 % of the reference's Arias intensity.".into(),
-        columns: columns(["", "value"]),
-        rows: vec![
-            vec![
+    Table::of(
+        "Significant duration: from 5 to 95 % of the reference's Arias intensity.",
+        ["", "value"],
+        [
+            [
                 "significant duration".into(),
                 Cell::Quantity(own.significant_duration_s, Units::TIME, 3),
             ],
-            vec![
+            [
                 "normalised RMS acceleration error over it".into(),
                 Cell::Quantity(own.significant_duration_percent, Units::PERCENT, 3),
             ],
-            vec!["peak ratio".into(), Cell::Number(own.peak_ratio, 4)],
-            vec!["Arias ratio".into(), Cell::Number(own.arias_ratio, 4)],
+            ["peak ratio".into(), Cell::Number(own.peak_ratio, 4)],
+            ["Arias ratio".into(), Cell::Number(own.arias_ratio, 4)],
         ],
-    }
+    )
 }
 
 /// Settings, parameters that differ from their defaults, and components.
 pub(super) fn what_was_run(run: &Run) -> Vec<Table> {
     let motion = run.motion;
     let mut rows = vec![
-        vec![Cell::from("ended"), run.ended.into()],
-        vec![
+        [Cell::from("ended"), run.ended.into()],
+        [
             "duration of the motion".into(),
             Cell::Quantity(run.whole.duration, Units::TIME, 5),
         ],
-        vec![
+        [
             "sample time".into(),
             Cell::Quantity(1e3 * motion.dt, Units::same("ms"), 3),
         ],
     ];
     if let Some(seed) = motion.seed {
-        rows.push(vec!["seed of the motion".into(), seed.to_string().into()]);
+        rows.push(["seed of the motion".into(), seed.to_string().into()]);
     }
     let settings = run.settings.iter();
-    rows.extend(settings.map(|(name, value)| vec![name.as_str().into(), value.clone()]));
-    let mut tables = vec![Table {
-        columns: columns(["", ""]),
-        rows,
-        ..Table::default()
-    }];
+    rows.extend(settings.map(|(name, value)| [name.as_str().into(), value.clone()]));
+    let mut tables = vec![Table::of("", ["", ""], rows)];
     if !run.changed.is_empty() {
         let rows = run.changed.iter();
-        tables.push(Table {
-            caption: "Values that differ from their component's default".into(),
-            columns: columns(["parameter", "value", "default"]),
-            rows: rows
-                .map(|one| {
-                    vec![
-                        one.name.as_str().into(),
-                        one.value.clone(),
-                        one.default.clone(),
-                    ]
-                })
-                .collect(),
-        });
+        tables.push(Table::of(
+            "Values that differ from their component's default",
+            ["parameter", "value", "default"],
+            rows.map(|one| {
+                [
+                    one.name.as_str().into(),
+                    one.value.clone(),
+                    one.default.clone(),
+                ]
+            }),
+        ));
     }
     if !run.components.is_empty() {
         tables.push(components(run));
@@ -164,16 +151,16 @@ fn components(run: &Run) -> Table {
             ],
             None => [Cell::from(""), Cell::from("")],
         };
-        vec![
+        [
             one.name.as_str().into(),
             one.model.as_str().into(),
             time,
             share,
         ]
     });
-    Table {
-        caption: "Components, and the time that their steps took".into(),
-        columns: columns(["component", "FMU", "time in its steps", "share"]),
-        rows: rows.collect(),
-    }
+    Table::of(
+        "Components, and the time that their steps took",
+        ["component", "FMU", "time in its steps", "share"],
+        rows,
+    )
 }
