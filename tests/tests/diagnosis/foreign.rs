@@ -175,6 +175,7 @@ fn our_own_specimen_and_the_system_around_it() {
     };
     let [mass, damping, stiffness] = ["mass", "damping", "stiffness"].map(start);
     let softer = 0.85 * stiffness;
+    const LAG: f64 = 0.03;
     let ground = |t: f64| 2.0 * (9.0 * t).sin() + 1.5 * (23.0 * t + 0.4).sin() + (5.1 * t).cos();
     let (step, fine) = (0.002, 20);
     let (mut x, mut v, mut read) = (0.0, 0.0, 0.0_f64);
@@ -194,7 +195,7 @@ fn our_own_specimen_and_the_system_around_it() {
             if part == 0 {
                 force.push(read);
             }
-            read += h / 0.008 * (pull - read);
+            read += h / LAG * (pull - read);
         }
     }
     let time = (0..5000).map(|k| step * k as f64).collect();
@@ -216,7 +217,14 @@ fn our_own_specimen_and_the_system_around_it() {
         report.sentence,
         report.notes
     );
-    eprintln!("{} {:?}", report.sentence, report.notes);
+    let mut all = names(&report);
+    all.sort_by(|a, b| a.0.cmp(b.0));
+    let [(lag, time), (drift, change)] = all[..] else {
+        panic!("{}", report.sentence);
+    };
+    assert_eq!((lag, drift), ("force.lag", "stiffness.drift"));
+    assert!((time / LAG - 1.0).abs() < 0.02, "{time}");
+    assert!((change + 0.15).abs() < 0.002, "{change}");
     let system = report.extended_model.as_ref().unwrap();
     let request = Request::built_in(&system.display().to_string());
     let prepared = prepare(&request).unwrap();
