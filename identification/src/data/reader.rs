@@ -46,6 +46,43 @@ pub fn known_column(cell: &str) -> Option<Channel> {
     Heading::parse(cell).map(|heading| heading.channel)
 }
 
+/// What a file calls a channel, and in which unit it has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Named {
+    /// The channel.
+    pub channel: Channel,
+    /// The header's cell.
+    pub head: String,
+    /// The unit.
+    pub unit: String,
+}
+
+/// The columns that [`Recording::read`] takes from a file.
+///
+/// # Errors
+/// As [`Recording::read`].
+pub fn named_columns(file: &Path) -> Result<Vec<Named>, DataError> {
+    let wanted = Wanted {
+        is_column: &|cell| known_column(cell).is_some(),
+        header: HEADER,
+    };
+    let sheet = Sheet::read(file, wanted)?;
+    let found = columns(&sheet, &[])?;
+    let mut all = Vec::new();
+    for channel in Channel::KNOWN {
+        if let Some(column) = the_one(&found, channel, &sheet)? {
+            factor(&sheet, column)?;
+            let unit = column.unit.as_ref().map(|(_, unit)| unit.clone());
+            all.push(Named {
+                channel,
+                head: sheet.heads()[column.place].clone(),
+                unit: unit.unwrap_or_default(),
+            });
+        }
+    }
+    Ok(all)
+}
+
 /// A column of a sheet with its unit.
 struct Column {
     channel: Channel,
@@ -184,20 +221,33 @@ fn columns(sheet: &Sheet, called: &[Called]) -> Result<Vec<Column>, DataError> {
     let headings = sheet.heads().iter().enumerate();
     let known = headings.filter_map(|(place, cell)| {
         let heading = Heading::parse(cell)?;
+        let in_header = heading.unit_text().map(|unit| (sheet.header_line(), unit));
+        let unit = in_header.or_else(|| below(place));
+        let channel = meant(heading.channel, heading.is_own_name(), unit.as_ref());
         let is_taken = called
             .iter()
-            .any(|own| own.channel == heading.channel || own.is(cell));
-        let in_header = heading.unit_text().map(|unit| (sheet.header_line(), unit));
+            .any(|own| own.channel == channel || own.is(cell));
         (!is_taken).then(|| Column {
-            channel: heading.channel,
+            channel,
             place,
             name: heading.name.to_string(),
             own_name: heading.is_own_name(),
-            unit: in_header.or_else(|| below(place)),
+            unit,
         })
     });
     found.extend(known);
     Ok(found)
+}
+
+/// A command in a unit of length is the displacement that was asked for.
+fn meant(channel: Channel, own_name: bool, unit: Option<&(u64, String)>) -> Channel {
+    let is_length =
+        |(_, unit): &(u64, String)| factor_meant(unit, Channel::Reference.unit()).is_ok();
+    if channel == Channel::ValveCommand && !own_name && unit.is_some_and(is_length) {
+        Channel::Reference
+    } else {
+        channel
+    }
 }
 
 /// The column of a channel: the one of its own name, else the one of another name whose unit fits.
@@ -230,7 +280,7 @@ fn the_one<'a>(
     }
 }
 
-/// A column `command [mm]` is no valve command.
+/// A column `velocity [mm]` of another name is no velocity.
 fn fits(column: &Column) -> bool {
     column
         .unit

@@ -207,6 +207,7 @@ impl ExtendedRig {
             columns: self.columns.clone(),
             nominal,
             left_out: LeftOut::SecondHalf(true),
+            transfer_function: None,
             path: self.path.clone(),
         }
     }
