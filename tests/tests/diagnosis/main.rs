@@ -4,4 +4,5 @@ mod extended_model;
 mod hidden_effects;
 mod measured;
 mod spreadsheet_files;
+mod transfer_system;
 mod walkthrough;
