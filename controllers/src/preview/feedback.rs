@@ -2,7 +2,7 @@
 //! late measurements, with a force on the table and an offset of the valve as disturbances.
 
 use nalgebra::{DMatrix, DVector, RowSVector, SMatrix, SVector};
-use plant::linear::discrete_riccati;
+use plant::linear::{DiscreteStateSpace, discrete_riccati};
 
 use super::model::{OUTPUTS, STATES, SampledRig};
 use crate::ModelError;
@@ -195,63 +195,67 @@ impl Feedback {
         next
     }
 
-    /// Whether `rig` comes to rest under this feedback with its commands times `gain` and the
-    /// measurements `late` samples late.
-    pub fn holds(&self, rig: &SampledRig, gain: f64, late: usize) -> bool {
+    /// Largest magnitude of the poles of `plant` (valve command to what is measured) under this
+    /// feedback, which takes it for `rig`, with its commands times `gain` and the measurements `late`
+    /// samples late: below one the plant comes to rest.
+    pub fn slowest_pole(
+        &self,
+        rig: &SampledRig,
+        plant: &DiscreteStateSpace,
+        gain: f64,
+        late: usize,
+    ) -> f64 {
         // The loop is linear: its transition, one basis vector after the other.
-        const LINE: usize = MAXIMUM_DELAY + 1;
-        let order = STATES * (late.min(LINE) + 1) + ALL + self.delay;
-        let late = late.min(LINE);
-        let mut transition = DMatrix::from_columns(
-            &(0..order)
-                .map(|basis| {
-                    let at = |i: usize| if i == basis { 1.0 } else { 0.0 };
-                    let mut place = 0;
-                    let mut take = |many: usize| {
-                        place += many;
-                        place - many
-                    };
-                    let line: Vec<SVector<f64, STATES>> = (0..=late)
-                        .map(|_| {
-                            let first = take(STATES);
-                            SVector::from_fn(|i, _| at(first + i))
-                        })
-                        .collect();
-                    let mut state = FeedbackState::default();
-                    let first = take(ALL);
-                    state.prediction = std::array::from_fn(|i| at(first + i));
-                    let first = take(self.delay);
-                    for i in 0..self.delay {
-                        state.commands[i] = at(first + i);
-                    }
-                    let measured = rig.c * line[late];
-                    let rest = SVector::zeros();
-                    let u = self.command(&mut state, rig, &rest, 0.0, &measured, 0.0);
-                    self.sent(&mut state, rig, u, 0.0);
-                    let mut next = vec![rig.advance(&line[0], gain * u, [0.0; 2])];
-                    next.extend(&line[..late]);
-                    let mut column: Vec<f64> = next.iter().flatten().copied().collect();
-                    column.extend(state.prediction);
-                    column.extend(&state.commands[..self.delay]);
-                    DVector::from_vec(column)
-                })
-                .collect::<Vec<_>>(),
-        );
+        let states = plant.order();
+        let late = late.min(MAXIMUM_DELAY + 1);
+        let order = states * (late + 1) + ALL + self.delay;
+        let rest = SVector::zeros();
+        let columns: Vec<DVector<f64>> = (0..order)
+            .map(|basis| {
+                let mut unit = DVector::zeros(order);
+                unit[basis] = 1.0;
+                let line = |age: usize| unit.rows(age * states, states).into_owned();
+                let filter = states * (late + 1);
+                let mut state = FeedbackState::default();
+                state.prediction = std::array::from_fn(|i| unit[filter + i]);
+                for i in 0..self.delay {
+                    state.commands[i] = unit[filter + ALL + i];
+                }
+                let measured = &plant.c * line(late);
+                let measured = SVector::from_fn(|i, _| measured[i]);
+                let u = self.command(&mut state, rig, &rest, 0.0, &measured, 0.0);
+                self.sent(&mut state, rig, u, 0.0);
+                let mut next = DVector::zeros(order);
+                next.rows_mut(0, states)
+                    .copy_from(&(&plant.a * line(0) + plant.b.column(0) * (gain * u)));
+                for age in 0..late {
+                    next.rows_mut((age + 1) * states, states)
+                        .copy_from(&line(age));
+                }
+                for i in 0..ALL {
+                    next[filter + i] = state.prediction[i];
+                }
+                for i in 0..self.delay {
+                    next[filter + ALL + i] = state.commands[i];
+                }
+                next
+            })
+            .collect();
+        let mut transition = DMatrix::from_columns(&columns);
         // The states differ by orders of magnitude, and the slowest poles lie next to one.
         nalgebra::linalg::balancing::balance_parlett_reinsch(&mut transition);
-        transition
-            .complex_eigenvalues()
-            .iter()
-            .all(|pole| pole.norm() < 1.0)
+        let poles = transition.complex_eigenvalues();
+        poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max)
     }
 
-    /// Whether the loop keeps a gain margin of 6 dB up and down, and bears measurements that are one
-    /// sample later than it knows.
-    pub fn is_robust(&self, rig: &SampledRig) -> bool {
+    /// Whether `plant` keeps a gain margin of 6 dB up and down under this feedback, and bears
+    /// measurements that are one sample later than it knows.
+    pub fn is_robust(&self, rig: &SampledRig, plant: &DiscreteStateSpace) -> bool {
+        let holds = |gain, late| self.slowest_pole(rig, plant, gain, late) < 1.0;
         [1.0 / MARGIN, 1.0, MARGIN]
             .iter()
-            .all(|gain| self.holds(rig, *gain, self.delay))
-            && self.holds(rig, 1.0, self.delay + 1)
+            .all(|gain| holds(*gain, self.delay))
+            && holds(1.0, self.delay + 1)
     }
 }
 

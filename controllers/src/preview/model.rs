@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, SMatrix, SVector};
 use plant::identified::shake_table::ShakeTable;
+use plant::linear::{DiscreteStateSpace, StateSpace};
+use plant::specimens::linear::LinearSpecimen;
 
 use crate::ModelError;
 
@@ -83,6 +85,36 @@ impl RigModel {
         (a, b)
     }
 
+    /// The rig with a specimen on it, sampled with `period` (s): from the valve command (V) to
+    /// displacement, velocity and acceleration (SI). States beyond the rig's: drift and its rate.
+    pub fn under(&self, specimen: &LinearSpecimen, period: f64) -> DiscreteStateSpace {
+        const ALL: usize = STATES + 2;
+        const DRIFT: usize = STATES;
+        let (rig, input) = self.dynamics();
+        let mut a = DMatrix::zeros(ALL, ALL);
+        a.view_mut((0, 0), (STATES, STATES)).copy_from(&rig);
+        for (state, coefficient) in [specimen.stiffness, specimen.damping]
+            .into_iter()
+            .enumerate()
+        {
+            a[(STATES - 1, DRIFT + state)] = input[(STATES - 1, 1)] * coefficient;
+        }
+        // The table's acceleration drives the drift.
+        let shaken = -a.row(STATES - 1);
+        a.row_mut(DRIFT + 1).copy_from(&shaken);
+        a[(DRIFT + 1, DRIFT)] -= specimen.stiffness / specimen.mass;
+        a[(DRIFT + 1, DRIFT + 1)] -= specimen.damping / specimen.mass;
+        a[(DRIFT, DRIFT + 1)] = 1.0;
+        let mut b = DMatrix::zeros(ALL, 1);
+        b.view_mut((0, 0), (STATES, 1)).copy_from(&input.column(0));
+        let mut c = DMatrix::zeros(OUTPUTS, ALL);
+        (c[(0, 3)], c[(1, 4)]) = (1.0, 1.0);
+        let acceleration = a.row(STATES - 1).into_owned();
+        c.row_mut(2).copy_from(&acceleration);
+        let d = DMatrix::zeros(OUTPUTS, 1);
+        StateSpace { a, b, c, d }.sample(period)
+    }
+
     /// The rig sampled with `period` (s).
     pub fn sample(&self, period: f64) -> SampledRig {
         // The command is held, the force goes evenly from one sample's to the next's.
@@ -132,6 +164,17 @@ pub struct SampledRig {
 }
 
 impl SampledRig {
+    /// From the valve command alone to what is measured.
+    pub fn driven(&self, period: f64) -> DiscreteStateSpace {
+        DiscreteStateSpace {
+            a: DMatrix::from_fn(STATES, STATES, |i, j| self.a[(i, j)]),
+            b: DMatrix::from_fn(STATES, 1, |i, _| self.b[i]),
+            c: DMatrix::from_fn(OUTPUTS, STATES, |i, j| self.c[(i, j)]),
+            d: DMatrix::zeros(OUTPUTS, 1),
+            period,
+        }
+    }
+
     /// The state a sample later under `command` (V) and `forces` (N) at both ends.
     pub fn advance(
         &self,

@@ -64,6 +64,26 @@ pub struct Draw {
     pub late: f64,
 }
 
+impl Noise {
+    /// With white noise of displacement (m) and acceleration (m/s²), and the velocity estimated from
+    /// the two.
+    fn of(displacement: f64, acceleration: f64) -> Self {
+        // Below these sensors err in other ways than by noise (as for the velocity's filter of the
+        // instrumentation).
+        let displacement = displacement.max(1e-4 * INCH);
+        let acceleration = acceleration.max(0.01 * G);
+        // Steady Kalman filter of a double integrator: sqrt(2) Q^(3/4) R^(1/4) is the variance of
+        // the velocity for densities Q of the acceleration's noise and R of the displacement's.
+        let [q, r] = [acceleration, displacement].map(|own| own * own * SAMPLING_PERIOD);
+        let velocity = (std::f64::consts::SQRT_2 * q.powf(0.75) * r.powf(0.25)).sqrt();
+        Self {
+            displacement,
+            velocity,
+            acceleration,
+        }
+    }
+}
+
 impl ControlModel {
     /// Reads a model file; a sentence says what is wrong.
     ///
@@ -96,28 +116,30 @@ impl ControlModel {
             let value = file.noise.as_ref().and_then(|noise| noise.get(channel));
             value.and_then(toml::Value::as_float).unwrap_or(0.0) * units.length
         };
-        // Below these sensors err in other ways than by noise (as for the velocity's filter of the
-        // instrumentation).
-        let displacement = noise("displacement").max(1e-4 * INCH);
-        let acceleration = noise("acceleration").max(0.01 * G);
-        // Steady Kalman filter of a double integrator: sqrt(2) Q^(3/4) R^(1/4) is the variance of
-        // the velocity for densities Q of the acceleration's noise and R of the displacement's.
-        let [q, r] = [acceleration, displacement].map(|own| own * own * SAMPLING_PERIOD);
-        let velocity = (std::f64::consts::SQRT_2 * q.powf(0.75) * r.powf(0.25)).sqrt();
         let late = file.command_delay.unwrap_or(0.0);
         Ok(Self {
             rig,
             late: late.max(0.0),
             delay: (late / SAMPLING_PERIOD).round().max(0.0) as usize,
-            noise: Noise {
-                displacement,
-                velocity,
-                acceleration,
-            },
+            noise: Noise::of(noise("displacement"), noise("acceleration")),
             specimen_mass: file.specimen(name).map_err(said)?.map(|own| own.mass),
             hydraulics: file.hydraulic_rig(name).map_err(said)?,
             uncertainty: Uncertainty::of(file, units),
         })
+    }
+
+    /// The identified plant as the thesis prints it (Eq 2-13, 2-14, 2-28): nothing is late there, and
+    /// its sensors have no noise.
+    pub fn identified() -> Self {
+        Self {
+            rig: ShakeTable::default(),
+            delay: 0,
+            late: 0.0,
+            noise: Noise::of(0.0, 0.0),
+            specimen_mass: None,
+            hydraulics: None,
+            uncertainty: Uncertainty::Unknown,
+        }
     }
 
     /// Lateness and noise, as the rules of the controllers take them.

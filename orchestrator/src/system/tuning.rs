@@ -9,8 +9,9 @@
 //! - force loop, lambda and K of sliding mode: [`Hierarchy::tuned`](controllers::tuning::sliding_mode::Hierarchy::tuned),
 //!   the largest gain that leaves the whole hierarchy a margin of 6 dB on the model;
 //! - preview control: model, friction, delay and noise, with a feedback that
-//!   keeps a margin of 6 dB ([`preview::Parameters::tuned`]); of the specimen it knows mass and
-//!   damping, its stiffness a fifth too low and its yield force a fifth too high;
+//!   keeps a margin of 6 dB, bare and under the specimen ([`preview::Parameters::tuned`]); of the
+//!   specimen it knows mass and damping, its stiffness a fifth too low and its yield force a fifth too
+//!   high;
 //! - sliding mode and model predictive control have the model as theirs and know the delay; the
 //!   latter also knows the measurements' noise and weighs outputs in units of stroke, 20 in/s and
 //!   1 g.
@@ -159,7 +160,11 @@ pub(super) fn apply(
                 "printed parameters know no `--control-model`; expected one of the two".into(),
             );
         }
-        (Some(Tuning::Printed), None, _) | (None, None, false) => return Ok(()),
+        (Some(Tuning::Printed), None, true) => return Ok(()),
+        (Some(Tuning::Printed) | None, None, false) => {
+            own = Rules::unprinted(ControlModel::identified());
+            &own
+        }
         (Some(Tuning::Tuned), None, false) => {
             return Err(format!(
                 "there is no tuning for the plant `{}`: the printed one was made for it; \
@@ -200,13 +205,20 @@ const KNOWN_STIFFNESS: f64 = 0.8;
 /// As [`KNOWN_STIFFNESS`], for the yield force.
 const KNOWN_YIELD_FORCE: f64 = 1.2;
 
+/// A specimen as a controller knows it.
+fn known(specimen: &YieldingSpecimen) -> YieldingSpecimen {
+    let mut known = *specimen;
+    known.columns.yield_force *= KNOWN_YIELD_FORCE;
+    known.columns.yield_displacement *= KNOWN_YIELD_FORCE / KNOWN_STIFFNESS;
+    known
+}
+
 /// All rules on a model.
 #[derive(Debug, Clone)]
 pub struct Rules {
     model: ControlModel,
-    suite: Suite,
-    /// What keeps others from being tuned is no fault of theirs: a sentence then.
-    preview: Result<preview::Parameters, String>,
+    /// Of the controllers whose parameters the thesis prints; none: those stay as printed.
+    suite: Option<Suite>,
 }
 
 fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
@@ -221,15 +233,13 @@ impl Rules {
     /// # Errors
     /// A model for which a rule finds none.
     pub fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
-        let suite = model.suite()?;
-        let preview = preview_control(&model)
-            .tuned()
-            .map_err(|error| error.to_string());
-        Ok(Self {
-            model,
-            suite,
-            preview,
-        })
+        let suite = Some(model.suite()?);
+        Ok(Self { model, suite })
+    }
+
+    /// Those of the controllers alone whose parameters the thesis does not print.
+    pub fn unprinted(model: ControlModel) -> Self {
+        Self { model, suite: None }
     }
 
     /// Gives the controllers in `file` their parameters, under a specimen; its mass counts where the
@@ -242,53 +252,57 @@ impl Rules {
         let mass = specimen.map(|specimen| specimen.mass);
         let specimen_mass = self.model.specimen_mass.or(mass);
         for (name, component) in &mut file.components {
-            match component.tuning {
-                None => {}
-                Some(Rule::DisplacementPid) => self.named(component, Member::DisplacementPid),
-                Some(Rule::ForcePid) => self.force_pid(component),
-                Some(Rule::LoopShaping) => self.named(component, Member::LoopShaping),
-                Some(Rule::ModelPredictive) => {
-                    self.model_predictive(component);
+            let Some(rule) = component.tuning else {
+                continue;
+            };
+            match rule {
+                Rule::Preview => self.preview(component, specimen)?,
+                Rule::LinearQuadraticGaussian => {
+                    self.linear_quadratic_gaussian(component, specimen)?;
+                }
+                _ => {}
+            }
+            let Some(suite) = &self.suite else {
+                continue;
+            };
+            let member = match rule {
+                Rule::DisplacementPid => Member::DisplacementPid,
+                Rule::LoopShaping => Member::LoopShaping,
+                Rule::ThreeVariable => Member::ThreeVariable,
+                Rule::ModelPredictive => {
+                    self.model(component);
+                    component.set("loop_delay_samples", self.model.delay as i64);
                     delay_references(&mut file.connections, name, self.model.delay);
+                    Member::ModelPredictive
                 }
-                Some(Rule::Preview) => self.preview(component, specimen)?,
-                Some(Rule::LinearQuadraticGaussian) => {
-                    self.linear_quadratic_gaussian(component)?;
+                Rule::SlidingMode => {
+                    self.sliding_mode(component, specimen_mass);
+                    Member::SlidingMode
                 }
-                Some(Rule::SlidingMode) => self.sliding_mode(component, specimen_mass),
-                Some(Rule::ThreeVariable) => self.named(component, Member::ThreeVariable),
-                Some(Rule::UnderPrediction) => self.under_prediction(component),
+                Rule::ForcePid => {
+                    let force = &suite.sliding_mode.force;
+                    let gains = [
+                        ("proportional_gain", force.proportional),
+                        ("integral_gain", force.integral),
+                    ];
+                    set(component, &gains);
+                    continue;
+                }
+                Rule::UnderPrediction => {
+                    set(component, &suite.mpc.low_level.gains.named());
+                    continue;
+                }
+                Rule::Preview | Rule::LinearQuadraticGaussian => continue,
+            };
+            for (parameter, value) in suite.named(member) {
+                component.set(&parameter, value);
             }
         }
         Ok(())
     }
 
-    /// What the suite sets a controller to.
-    fn named(&self, component: &mut ComponentFile, member: Member) {
-        for (name, value) in self.suite.named(member) {
-            component.set(&name, value);
-        }
-    }
-
-    /// Three-variable control as the prediction above it knows it.
-    fn under_prediction(&self, component: &mut ComponentFile) {
-        set(component, &self.suite.mpc.low_level.gains.named());
-    }
-
-    fn force_pid(&self, component: &mut ComponentFile) {
-        let force = &self.suite.sliding_mode.force;
-        set(
-            component,
-            &[
-                ("proportional_gain", force.proportional),
-                ("integral_gain", force.integral),
-            ],
-        );
-    }
-
     fn sliding_mode(&self, component: &mut ComponentFile, specimen_mass: Option<f64>) {
         self.model(component);
-        self.named(component, Member::SlidingMode);
         if let Some(mass) = specimen_mass {
             component.set("specimen_mass", mass);
         }
@@ -297,19 +311,13 @@ impl Rules {
         component.set("reference_ahead", true);
     }
 
-    fn model_predictive(&self, component: &mut ComponentFile) {
-        self.model(component);
-        self.named(component, Member::ModelPredictive);
-        component.set("loop_delay_samples", self.model.delay as i64);
-    }
-
     /// Preview control's model, margins, noise, friction and specimen.
     fn preview(
         &self,
         component: &mut ComponentFile,
         specimen: Option<&YieldingSpecimen>,
     ) -> Result<(), String> {
-        self.linear_quadratic_gaussian(component)?;
+        self.linear_quadratic_gaussian(component, specimen)?;
         if let Some((own, shape)) = &self.model.hydraulics {
             set(
                 component,
@@ -324,29 +332,34 @@ impl Rules {
             );
         }
         component.set("specimen_known", specimen.is_some());
-        if let Some(specimen) = specimen {
-            let columns = &specimen.columns;
-            let drift = columns.yield_displacement * KNOWN_YIELD_FORCE / KNOWN_STIFFNESS;
+        if let Some(known) = specimen.map(known) {
             set(
                 component,
                 &[
-                    ("specimen_mass", specimen.mass),
-                    ("specimen_damping", specimen.damping),
+                    ("specimen_mass", known.mass),
+                    ("specimen_damping", known.damping),
+                    ("specimen_yield_force", known.columns.yield_force),
                     (
-                        "specimen_yield_force",
-                        columns.yield_force * KNOWN_YIELD_FORCE,
+                        "specimen_yield_displacement",
+                        known.columns.yield_displacement,
                     ),
-                    ("specimen_yield_displacement", drift),
-                    ("specimen_post_yield_ratio", columns.post_yield_ratio),
+                    ("specimen_post_yield_ratio", known.columns.post_yield_ratio),
                 ],
             );
         }
         Ok(())
     }
 
-    /// Preview control's model, margins and noise, without friction and specimen.
-    fn linear_quadratic_gaussian(&self, component: &mut ComponentFile) -> Result<(), String> {
-        let tuned = self.preview.as_ref().map_err(Clone::clone)?;
+    /// Preview control's model and noise, and margins under the specimen; without friction and
+    /// specimen in its model.
+    fn linear_quadratic_gaussian(
+        &self,
+        component: &mut ComponentFile,
+        specimen: Option<&YieldingSpecimen>,
+    ) -> Result<(), String> {
+        let mut own = preview_control(&self.model);
+        own.load.specimen = specimen.map(known);
+        let tuned = own.tuned().map_err(|error| error.to_string())?;
         let noise = &self.model.noise;
         self.model(component);
         if let Some((own, _)) = &self.model.hydraulics {
