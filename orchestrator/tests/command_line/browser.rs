@@ -49,7 +49,7 @@ fn case() -> Option<PathBuf> {
 }
 
 /// A mass on a hardening spring, recorded at 250 Hz, with what is believed of it; the description's file.
-fn rig(folder: &Path) -> PathBuf {
+fn described(folder: &Path) -> PathBuf {
     use std::fmt::Write;
     let mut record = String::from("time [s],force [N],displacement [mm]\n");
     let (mut y, mut v) = (0.0_f64, 0.0_f64);
@@ -103,8 +103,8 @@ fn pages_are_drawn_whole_and_tell_the_figures_of_their_files() {
     done(folder, &["compare-runs", "mpc", "lost", "--out", "runs"], 0);
     done(folder, &["design", "--out", "design"], 0);
     done(folder, &["figures", "--out", "figures"], 0);
-    let described = rig(folder).display().to_string();
-    done(folder, &["diagnose", &described, "--out", "rig"], 0);
+    let oscillator = described(folder).display().to_string();
+    done(folder, &["diagnose", &oscillator, "--out", "rig"], 0);
     let mut pages = ["mpc", "lost", "runs", "design", "figures", "rig"]
         .map(|name| folder.join(name).join("report.html"))
         .to_vec();
