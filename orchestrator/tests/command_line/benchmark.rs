@@ -89,7 +89,13 @@ fn a_record_that_would_be_overwritten_is_told_before_it_is_diagnosed() {
         "--motion=built-in",
         "--out=out",
     ];
-    refused(folder.path(), &arguments, &["record.csv", "--force"]);
+    let output = shakebench(folder.path(), &arguments);
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("record.csv") && said.contains("--force"),
+        "{said}"
+    );
     println!("refused after {:.1} s", begun.elapsed().as_secs_f64());
     let kept = std::fs::read_dir(&out).unwrap().count();
     assert_eq!(kept, 1);

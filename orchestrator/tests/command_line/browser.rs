@@ -51,7 +51,7 @@ fn case() -> Option<PathBuf> {
 /// A mass on a hardening spring, recorded at 250 Hz, with what is believed of it; the description's file.
 fn described(folder: &Path) -> PathBuf {
     use std::fmt::Write;
-    let mut record = String::from("time [s],force [N],displacement [mm]\n");
+    let mut record = String::from("time,force,displacement\n");
     let (mut y, mut v) = (0.0_f64, 0.0_f64);
     for k in 0..40_000 {
         let t = f64::from(k) * 2.5e-4;

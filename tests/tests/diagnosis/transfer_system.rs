@@ -9,8 +9,9 @@ use shakebench::benchmark::vrths::hidden::{HiddenOutcome, HiddenStudy, Recorded}
 use shakebench::benchmark::vrths::study::ControllerScore;
 use shakebench::benchmark::vrths::{motions, roster};
 
-/// Steps of the plant a sample, semi-implicit Euler.
-const INNER: usize = 64;
+/// Steps of the plant a sample, of fourth order: what they are wrong by is far below a microsecond of delay,
+/// which the diagnosis would see.
+const INNER: usize = 16;
 
 /// What the plant has beside the benchmark's numbers.
 #[derive(Clone, Copy)]
@@ -27,22 +28,40 @@ fn forces(command: &[f64], hidden: Hidden, seed: u64) -> Vec<f64> {
     let (gain, m, nominal): (f64, f64, f64) = (1.0261, 29.13, 1.19e6);
     let c = 2.0 * 0.0097 * (m * nominal).sqrt();
     let k = nominal * (1.0 + hidden.stiffer);
+    // Within its play the spool stays.
+    let moved = |spool: f64, u: f64, x: f64| {
+        let drive = gain * u - x;
+        spool.clamp(drive - 0.5 * hidden.play, drive + 0.5 * hidden.play)
+    };
+    let rates = |[flow, rate, force, x, v]: [f64; 5], spool: f64, u: f64| {
+        [
+            rate,
+            a1b0 * moved(spool, u, x) - beta1 * rate - beta2 * flow,
+            flow - a2 * v - a3 * force,
+            v,
+            (force - c * v - k * x) / m,
+        ]
+    };
+    let after = |state: [f64; 5], by: f64, rate: [f64; 5]| -> [f64; 5] {
+        std::array::from_fn(|i| state[i] + by * rate[i])
+    };
     let h = PERIOD / INNER as f64;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let (mut flow, mut rate, mut force, mut x, mut v, mut spool) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let (mut state, mut spool) = ([0.0; 5], 0.0);
     let mut record = Vec::with_capacity(command.len());
     for u in command {
         // Twelve evenly distributed numbers make a nearly normal one.
         let noise: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
-        record.push(force + 2.2 * noise);
+        record.push(state[2] + 2.2 * noise);
         for _ in 0..INNER {
-            let drive: f64 = gain * u - x;
-            spool = f64::clamp(spool, drive - 0.5 * hidden.play, drive + 0.5 * hidden.play);
-            rate += h * (a1b0 * spool - beta1 * rate - beta2 * flow);
-            flow += h * rate;
-            force += h * (flow - a2 * v - a3 * force);
-            v += h * (force - c * v - k * x) / m;
-            x += h * v;
+            spool = moved(spool, *u, state[3]);
+            let first = rates(state, spool, *u);
+            let second = rates(after(state, 0.5 * h, first), spool, *u);
+            let third = rates(after(state, 0.5 * h, second), spool, *u);
+            let last = rates(after(state, h, third), spool, *u);
+            let mean =
+                std::array::from_fn(|i| (first[i] + 2.0 * (second[i] + third[i]) + last[i]) / 6.0);
+            state = after(state, h, mean);
         }
     }
     record
@@ -121,16 +140,15 @@ fn play_in_a_plant_written_anew_is_named_and_the_law_designed_on_it_tracks() {
     gains(&outcome, [0.6, 0.4]);
 }
 
-/// Force and command tell a stiffer specimen hardly from less leakage with more damping of the valve, and
-/// nothing else is recorded.
 #[test]
-#[ignore = "a goal that is not reached"]
-fn open_a_specimen_that_is_stiffer_by_eight_percent_is_named() {
+fn a_specimen_that_is_stiffer_is_named_and_the_law_designed_on_it_tracks() {
     let hidden = Hidden {
         play: 0.0,
         stiffer: 0.08,
     };
     let outcome = studied(hidden, &[("specimen_stiffness", 0.08)], 5);
     assert_eq!(outcome.named, ["specimen_stiffness"]);
+    let found = outcome.hidden[0].found.unwrap();
+    assert!((found / 0.08 - 1.0).abs() < 0.02, "{found}");
     gains(&outcome, [1.0, 0.8]);
 }
