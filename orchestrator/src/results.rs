@@ -14,7 +14,7 @@ pub fn allow_overwriting() {
     MAY_OVERWRITE.store(true, Ordering::Relaxed);
 }
 
-fn may_overwrite() -> bool {
+pub(crate) fn may_overwrite() -> bool {
     MAY_OVERWRITE.load(Ordering::Relaxed)
 }
 

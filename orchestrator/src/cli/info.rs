@@ -90,6 +90,7 @@ fn fmu(fmu: &Fmu) -> String {
     text += &row("platforms", &fmu.platforms.join(", "));
     text += &row("model exchange", yes(d.offers_model_exchange));
     text += &row("saves its state", yes(d.saves_state));
+    text += &row("writes its state", yes(d.writes_state));
     if let Some(step) = d.preferred_step {
         text += &row("preferred step", &format!("{step} s"));
     }

@@ -14,9 +14,10 @@ use super::rig::RigArguments;
 use crate::error::Error;
 use crate::fmu::{Isolation, Options, Trace};
 use crate::live::{Scene, Server, Tap};
-use crate::master::{Algorithm, Ended, Pace, Simulation};
+use crate::master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Simulation};
 use crate::motion;
-use crate::results::{Results, unused};
+use crate::results::{Results, allow_overwriting, unused};
+use crate::run::checkpoint::{self, Checkpoints, Unfinished};
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
@@ -33,6 +34,8 @@ use crate::units::{self, STANDARD_GRAVITY};
     shakebench run my-rig.toml --algorithm jacobi --step 1ms --json\n  \
     shakebench run system.ssp --duration \"10 s\"\n  \
     shakebench run Theirs.fmu --input forces.csv\n  \
+    shakebench run long.toml --duration \"2 h\" --checkpoint-every \"1 min\" --out long\n  \
+    shakebench run --resume long\n  \
     shakebench run --manifest shakebench-results/three-variable-synthetic-1/manifest.json")]
 pub struct Arguments {
     /// Built-in system, .toml file, .ssp archive or single .fmu [default: three-variable]
@@ -109,6 +112,16 @@ pub struct Arguments {
     /// Ask the FMUs for debug messages: all, or those of these categories
     #[arg(long, value_name = "CATEGORY", num_args = 0.., value_delimiter = ',')]
     log: Option<Vec<String>>,
+    /// Keep a checkpoint every so much simulated time, from which a run that was interrupted or killed
+    /// goes on to the bit; the FMUs must be able to write their states
+    #[arg(long, value_name = "T")]
+    checkpoint_every: Option<String>,
+    /// Go on with the run in this folder from its last checkpoint
+    #[arg(long, value_name = "DIR", conflicts_with_all = [
+        "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
+        "duration", "scaling", "seed", "manifest", "out", "record_every", "checkpoint_every",
+    ])]
+    resume: Option<PathBuf>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
         "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
@@ -151,7 +164,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         .as_deref()
         .map(Manifest::read)
         .transpose()?;
-    let request = match &written {
+    let unfinished = arguments
+        .resume
+        .as_deref()
+        .map(checkpoint::read)
+        .transpose()?;
+    let known = written.as_ref();
+    let known = known.or(unfinished.as_ref().map(|run| &run.manifest));
+    let request = match known {
         Some(manifest) => manifest.request.clone(),
         None => request(arguments)?,
     };
@@ -168,7 +188,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let before = Manifest::read(&place.join("manifest.json"));
         before.is_ok_and(|before| before.request == request)
     };
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.resume.as_ref().or(arguments.out.as_ref());
+    let folder = folder.cloned().unwrap_or_else(|| {
         let name = match motion.is_empty() {
             true => system.name.clone(),
             false => format!("{}-{}", system.name, motion.name),
@@ -177,9 +198,26 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         unused(&Path::new("shakebench-results").join(name), is_same)
     });
     Results::check(&folder)?;
+    let plan = (prepared.algorithm, *step, *samples);
+    let mut manifest = Manifest::new(&request, system, motion, plan);
     let mut simulation = prepared.simulation(prepared.algorithm)?;
     simulation.heed(interrupt::heed());
-    simulation.keep_every(arguments.record_every);
+    let has_checkpoints = unfinished.is_some() || arguments.checkpoint_every.is_some();
+    match unfinished {
+        Some(unfinished) => go_on(&mut simulation, &folder, &manifest, unfinished)?,
+        None => {
+            checkpoint::refuse_unfinished(&folder)?;
+            simulation.keep_every(arguments.record_every);
+            if let Some(every) = &arguments.checkpoint_every {
+                let every = quantity("--checkpoint-every", every, "s")? / motion.dt;
+                let every = (every.round() as usize).max(1);
+                let plan = (arguments.record_every, every);
+                simulation.check_checkpoints()?;
+                let checkpoints = Checkpoints::begin(&folder, &manifest, plan, None)?;
+                keep(&mut simulation, checkpoints, every)?;
+            }
+        }
+    }
     let live = match arguments.watch {
         Some(port) => Some(watch(&prepared, &mut simulation, port)?),
         None => None,
@@ -196,10 +234,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     bar.finish_and_clear();
     prepared.judge(&mut outcome);
 
-    let plan = (prepared.algorithm, *step, *samples);
-    let mut manifest = Manifest::new(&request, system, motion, plan);
     let summary = Summary::new(&prepared, &outcome, &manifest);
     let files = page::write(&folder, &prepared, &outcome, &summary, &mut manifest)?;
+    let can_go_on = has_checkpoints
+        && matches!(outcome.ended.kind(), Ending::Interrupted | Ending::Failed)
+        && checkpoint::is_there(&folder);
+    if has_checkpoints && !can_go_on {
+        checkpoint::remove(&folder);
+    }
     for line in &summary.warnings {
         eprintln!("warning: {line}");
     }
@@ -233,7 +275,59 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     eprintln!("error: the run ended early: {}", outcome.ended.message());
     eprintln!("what was computed until then is saved");
+    if can_go_on {
+        eprintln!(
+            "it goes on from its last checkpoint with: shakebench run --resume {}",
+            folder.display()
+        );
+    }
     Ok(ExitCode::from(1))
+}
+
+/// Goes on where a run was left.
+///
+/// # Errors
+/// A checkpoint of what is not the same any more, or that cannot be gone on with.
+fn go_on(
+    simulation: &mut Simulation,
+    folder: &Path,
+    manifest: &Manifest,
+    unfinished: Unfinished,
+) -> Result<(), Error> {
+    let differences = unfinished.manifest.differences(manifest);
+    if !differences.is_empty() {
+        return Err(Error::File {
+            path: folder.to_path_buf(),
+            reason: format!(
+                "the run cannot go on to the bit, for it is not the same any more: {}",
+                differences.join("; ")
+            ),
+        });
+    }
+    let plan = (unfinished.record_every, unfinished.every);
+    let checkpoints = Checkpoints::begin(folder, manifest, plan, Some(&unfinished))?;
+    simulation.keep_every(unfinished.record_every);
+    simulation.resume(&unfinished.checkpoint, unfinished.record)?;
+    keep(simulation, checkpoints, plan.1)?;
+    // What the run saved when it was interrupted is a part of what it saves now.
+    let before = Manifest::read(&folder.join("manifest.json"));
+    if before.is_ok_and(|before| before.request == manifest.request) {
+        allow_overwriting();
+    }
+    Ok(())
+}
+
+/// Lets checkpoints be kept while the run goes on.
+///
+/// # Errors
+/// A component that cannot write its state.
+fn keep(
+    simulation: &mut Simulation,
+    mut checkpoints: Checkpoints,
+    every: usize,
+) -> Result<(), Error> {
+    let keep: KeepCheckpoint = Box::new(move |moment, record| checkpoints.keep(moment, record));
+    Ok(simulation.keep_checkpoints(every, keep)?)
 }
 
 /// Serves the page of the run and says where.

@@ -150,6 +150,12 @@ functions! {
     GetState = 12, "GetFMUstate", "GetFMUState";
     SetState = 13, "SetFMUstate", "SetFMUState";
     FreeState = 14, "FreeFMUstate", "FreeFMUState";
+    /// `handle`: the state; gives `handle`: how many bytes.
+    SizeOfState = 32, "SerializedFMUstateSize", "SerializedFMUStateSize";
+    /// `handle`: the state; gives values: its bytes.
+    WriteState = 33, "SerializeFMUstate", "SerializeFMUState";
+    /// Values: bytes; gives `handle`: a state.
+    ReadState = 34, "DeSerializeFMUstate", "DeserializeFMUState";
     Terminate = 15, "Terminate", "Terminate";
     Reset = 16, "Reset", "Reset";
     FreeInstance = 17, "FreeInstance", "FreeInstance";
@@ -250,4 +256,34 @@ pub(super) trait Endpoint: Send {
     /// # Errors
     /// No status came back.
     fn call(&mut self, call: &mut Call) -> Result<i32, Lost>;
+
+    /// Reads Float64 variables and gives the status; none where [`Endpoint::call`] has to.
+    #[inline]
+    fn get_reals(&mut self, _references: &[u32], _values: &mut [f64]) -> Option<i32> {
+        None
+    }
+
+    /// Sets Float64 variables and gives the status; none where [`Endpoint::call`] has to.
+    #[inline]
+    fn set_reals(&mut self, _references: &[u32], _values: &[f64]) -> Option<i32> {
+        None
+    }
+
+    /// Steps from `time` by `step`, s; none where [`Endpoint::call`] has to.
+    #[inline]
+    fn step(&mut self, _time: f64, _step: f64) -> Option<Stepped> {
+        None
+    }
+}
+
+/// What came of a step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stepped {
+    pub status: i32,
+    /// The FMU asks to end the run.
+    pub end: bool,
+    /// It came back before the end of the step.
+    pub early: bool,
+    /// How far it came, s.
+    pub last: f64,
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use super::Kind;
 
 /// A value of any type.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Datum {
     /// A number.
     Number(f64),

@@ -79,7 +79,10 @@ fn arguments(call: &Call, version: FmiVersion) -> String {
         Function::DoStep => format!("{a}, {b}"),
         Function::SetTime => a.to_string(),
         Function::SetContinuousStates => values(call, Scalar::Float64, version),
-        Function::SetState | Function::FreeState => format!("{:#x}", call.handle),
+        Function::SetState | Function::FreeState | Function::SizeOfState | Function::WriteState => {
+            format!("{:#x}", call.handle)
+        }
+        Function::ReadState => format!("{} bytes", call.count),
         Function::SetDebugLogging => {
             format!(
                 "{}, {}",
@@ -120,7 +123,8 @@ fn given(call: &Call, version: FmiVersion) -> String {
         Function::CompletedIntegratorStep => {
             format!(" event {}, terminate {}", call.flags[0], call.flags[1])
         }
-        Function::GetState => format!(" {:#x}", call.handle),
+        Function::GetState | Function::ReadState => format!(" {:#x}", call.handle),
+        Function::SizeOfState => format!(" {} bytes", call.handle),
         Function::GetTerminated => format!(" {}", call.flags[0]),
         Function::GetLastSuccessfulTime => format!(" {a}"),
         Function::GetNumberOfContinuousStates | Function::GetNumberOfEventIndicators => {

@@ -13,6 +13,8 @@ pub(super) struct Clock {
     begin: Instant,
     /// Coupling step, s.
     step: f64,
+    /// The tick at which the clock starts.
+    first: usize,
     ticks: usize,
     missed: usize,
     worst: Duration,
@@ -36,10 +38,11 @@ pub struct RealTime {
 }
 
 impl Clock {
-    pub(super) fn new(step: f64) -> Self {
+    pub(super) fn new(step: f64, first: usize) -> Self {
         Self {
             begin: Instant::now(),
             step,
+            first,
             ticks: 0,
             missed: 0,
             worst: Duration::ZERO,
@@ -49,14 +52,15 @@ impl Clock {
 
     /// Waits until the tick is due.
     pub(super) fn wait(&mut self, tick: usize) {
-        if tick == 0 {
+        if tick == self.first {
             self.begin = Instant::now();
         }
-        let due = Duration::from_secs_f64(tick as f64 * self.step);
+        let since = tick - self.first;
+        let due = Duration::from_secs_f64(since as f64 * self.step);
         let now = self.begin.elapsed();
         if now < due {
             std::thread::sleep(due - now);
-        } else if tick > 0 {
+        } else if since > 0 {
             self.missed += 1;
             self.worst = self.worst.max(now - due);
         }

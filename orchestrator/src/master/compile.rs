@@ -1,6 +1,7 @@
 //! From a checked system to a simulation: loads the FMUs and prepares every exchange of values.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::time::Duration;
 
 use super::action::Action;
@@ -133,6 +134,13 @@ impl Simulation {
                 alias_names.push(name);
             }
         }
+        let mut kept: Vec<Range<usize>> = Vec::new();
+        for signal in (0..plan.names.len()).filter(|&signal| !reference.is_shifted(signal)) {
+            match kept.last_mut() {
+                Some(last) if last.end == signal => last.end += 1,
+                _ => kept.push(signal..signal + 1),
+            }
+        }
         let (exact_names, exact) = plan.exact.into_iter().unzip();
         let signals = Signals {
             numbers: vec![0.0; plan.names.len()],
@@ -148,6 +156,10 @@ impl Simulation {
             last_signals: signals.clone(),
             signals,
             tap: None,
+            tripped: None,
+            keeper: None,
+            resumed: None,
+            first_tick: 0,
             names: plan.names,
             exact_names,
             reference,
@@ -157,6 +169,7 @@ impl Simulation {
             notes,
             interrupt: None,
             keep_every: 1,
+            kept,
             alias_signals,
             alias_names,
             clock: None,

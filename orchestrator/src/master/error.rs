@@ -26,6 +26,16 @@ pub enum MasterError {
          (its FMU does not offer it); choose --algorithm gauss-seidel"
     )]
     NoState(String),
+    /// A component whose state cannot be kept in a file.
+    #[error(
+        "checkpoints keep the states of all components, but `{0}` cannot write its own (its FMU does \
+         not offer canGetAndSetFMUState and canSerializeFMUState for co-simulation); run without \
+         --checkpoint-every"
+    )]
+    NoWrittenState(String),
+    /// A checkpoint of another system.
+    #[error("the checkpoint is one of another run: its components or signals are not these")]
+    OtherCheckpoint,
     /// Values that grow without bound.
     #[error("the run diverges: `{variable}` is {value:e} at {time} s")]
     Diverged {

@@ -6,6 +6,7 @@
 //! holds the outputs at `t_k` together with the commands computed from them.
 
 mod action;
+mod checkpoint;
 mod clock;
 mod compile;
 mod error;
@@ -21,10 +22,12 @@ mod start;
 mod transfer;
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+pub use checkpoint::{Checkpoint, KeepCheckpoint};
 pub use clock::RealTime;
 pub use error::MasterError;
 pub use record::Record;
@@ -99,6 +102,9 @@ pub struct Simulation {
     interrupt: Option<&'static AtomicBool>,
     /// One row is kept of so many.
     keep_every: usize,
+    /// Places of the numbers that are recorded: not what lies ahead of the motion, which is the
+    /// same history some samples later.
+    kept: Vec<Range<usize>>,
     /// Signals that are recorded under a further name, and those names.
     alias_signals: Vec<usize>,
     alias_names: Vec<String>,
@@ -114,6 +120,14 @@ pub struct Simulation {
     next_signals: Signals,
     /// Who watches.
     tap: Option<Arc<Tap>>,
+    /// What tripped, while the run goes on to its end.
+    tripped: Option<run::Tripped>,
+    /// Who keeps checkpoints.
+    keeper: Option<checkpoint::Keeper>,
+    /// What was before, where the run goes on from a checkpoint.
+    resumed: Option<checkpoint::Resumed>,
+    /// The tick at which this process began.
+    first_tick: usize,
 }
 
 /// What ends a run early.
@@ -150,7 +164,7 @@ struct Part {
 }
 
 /// One in so many steps of a component is timed: looking at the clock costs as much as a short step.
-const TIMED: u32 = 16;
+const TIMED: u32 = 64;
 
 impl Part {
     /// Steps it; a failure that may be is kept instead of given.

@@ -1,5 +1,7 @@
 //! What was recorded: a row a sample.
 
+use std::ops::Range;
+
 use crate::fmu::Datum;
 
 /// Signals over time, SI units.
@@ -15,9 +17,7 @@ pub struct Record {
 
 impl Record {
     /// Makes room for so many rows, so that filling them allocates nothing.
-    pub(crate) fn with_capacity(names: &[String], rows: usize) -> Self {
-        let mut columns = vec!["time".to_string()];
-        columns.extend_from_slice(names);
+    pub(crate) fn with_capacity(columns: Vec<String>, rows: usize) -> Self {
         let values = Vec::with_capacity(rows * columns.len());
         Self {
             columns,
@@ -32,23 +32,63 @@ impl Record {
         self
     }
 
-    pub(crate) fn push(&mut self, time: f64, signals: &[f64], exact: &[Datum]) {
-        self.values.push(time);
-        self.values.extend_from_slice(signals);
-        self.exact.extend_from_slice(exact);
+    /// Adds the rows of a record with the same columns.
+    pub(crate) fn append(&mut self, other: &Self) {
+        self.values.extend_from_slice(&other.values);
+        self.exact.extend_from_slice(&other.exact);
     }
 
-    /// As [`Record::push`], with some signals once more behind.
+    /// The rows from `row` on, as one: numbers, and values that numbers do not hold.
+    pub(crate) fn from_row(&self, row: usize) -> (&[f64], &[Datum]) {
+        let numbers = self.values.get(row * self.columns.len()..);
+        let exact = self.exact.get(row * self.exact_columns.len()..);
+        (numbers.unwrap_or_default(), exact.unwrap_or_default())
+    }
+
+    /// A record of whole rows; none where the numbers do not fill them.
+    pub(crate) fn of(
+        columns: Vec<String>,
+        values: Vec<f64>,
+        exact_columns: Vec<String>,
+        exact: Vec<Datum>,
+    ) -> Option<Self> {
+        let whole = values.len().is_multiple_of(columns.len().max(1));
+        let rows = values.len() / columns.len().max(1);
+        (whole && exact.len() == rows * exact_columns.len()).then_some(Self {
+            columns,
+            values,
+            exact_columns,
+            exact,
+        })
+    }
+
+    /// Adds a row.
+    pub(crate) fn push(&mut self, time: f64, signals: &[f64], exact: &[Datum]) {
+        self.push_with(
+            time,
+            signals,
+            std::slice::from_ref(&(0..signals.len())),
+            &[],
+            exact,
+        );
+    }
+
+    /// Adds a row: of the signals those at the places `kept`, and some once more behind.
     pub(crate) fn push_with(
         &mut self,
         time: f64,
         signals: &[f64],
+        kept: &[Range<usize>],
         again: &[usize],
         exact: &[Datum],
     ) {
-        self.push(time, signals, exact);
+        self.values.push(time);
+        for places in kept {
+            self.values.extend_from_slice(&signals[places.clone()]);
+        }
         self.values
             .extend(again.iter().map(|&signal| signals[signal]));
+        self.exact.extend_from_slice(exact);
     }
 
     /// The values of a row that numbers do not hold, in the order of `exact_columns`.

@@ -12,6 +12,20 @@ pub(super) struct Reference {
     taps: Vec<Tap>,
     /// Where each tap's table was last looked up.
     rows: Vec<usize>,
+    /// The taps of the motion, those that follow each other together.
+    spans: Vec<Span>,
+    /// How many taps the spans were made of.
+    planned: usize,
+}
+
+/// Signals side by side that are samples of one history side by side.
+struct Span {
+    history: usize,
+    /// Samples ahead of the first.
+    ahead: isize,
+    /// The first signal.
+    first: usize,
+    count: usize,
 }
 
 /// A signal from outside.
@@ -34,6 +48,8 @@ impl Reference {
             tables: tables.to_vec(),
             taps: Vec::new(),
             rows: Vec::new(),
+            spans: Vec::new(),
+            planned: 0,
         }
     }
 
@@ -65,26 +81,69 @@ impl Reference {
         self.taps.len()
     }
 
+    /// Whether a signal is one that lies ahead or behind: the same history some samples later.
+    pub(super) fn is_shifted(&self, signal: usize) -> bool {
+        matches!(self.taps.get(signal), Some(Tap::Motion(_, ahead)) if *ahead != 0)
+    }
+
+    /// Finds the spans of all taps.
+    fn plan(&mut self) {
+        self.spans.clear();
+        for (signal, tap) in self.taps.iter().enumerate() {
+            let Tap::Motion(history, ahead) = *tap else {
+                continue;
+            };
+            if let Some(last) = self.spans.last_mut()
+                && last.history == history
+                && last.first + last.count == signal
+                && last.ahead + last.count as isize == ahead
+            {
+                last.count += 1;
+                continue;
+            }
+            self.spans.push(Span {
+                history,
+                ahead,
+                first: signal,
+                count: 1,
+            });
+        }
+        self.planned = self.taps.len();
+    }
+
     /// Puts the values at `sample` of the motion and at `time`, s, of the tables into the first
     /// signals; before its beginning the motion rests at zero, after its end at its last
     /// displacement.
     pub(super) fn sample(&mut self, sample: usize, time: f64, signals: &mut [f64]) {
+        if self.planned != self.taps.len() {
+            self.plan();
+        }
+        for span in &self.spans {
+            let values = &self.histories[span.history];
+            let signals = &mut signals[span.first..span.first + span.count];
+            let from = sample.checked_add_signed(span.ahead);
+            let there = from.and_then(|from| values.get(from..from + span.count));
+            if let Some(there) = there {
+                signals.copy_from_slice(there);
+                continue;
+            }
+            let at_rest = match span.history {
+                0 => values.last().copied().unwrap_or(0.0),
+                _ => 0.0,
+            };
+            for (signal, ahead) in signals.iter_mut().zip(span.ahead..) {
+                let place = sample.checked_add_signed(ahead);
+                *signal = place.map_or(0.0, |place| values.get(place).copied().unwrap_or(at_rest));
+            }
+        }
+        if self.tables.is_empty() {
+            return;
+        }
         let taps = self.taps.iter().zip(&mut self.rows);
         for (signal, (tap, row)) in signals.iter_mut().zip(taps) {
-            *signal = match *tap {
-                Tap::Table(table, column) => self.tables[table].at(column, time, row),
-                Tap::Motion(history, ahead) => {
-                    let values = &self.histories[history];
-                    let at_rest = if history == 0 {
-                        values.last().copied().unwrap_or(0.0)
-                    } else {
-                        0.0
-                    };
-                    sample
-                        .checked_add_signed(ahead)
-                        .map_or(0.0, |place| values.get(place).copied().unwrap_or(at_rest))
-                }
-            };
+            if let Tap::Table(table, column) = *tap {
+                *signal = self.tables[table].at(column, time, row);
+            }
         }
     }
 }

@@ -184,17 +184,20 @@ impl Simulation {
     /// What was computed is returned however the run ends.
     pub fn run(mut self, samples: usize, pace: Pace, progress: &mut dyn FnMut(usize)) -> Outcome {
         let rows = samples.div_ceil(self.keep_every);
-        let names: Vec<String> = self
-            .names
-            .iter()
-            .chain(&self.alias_names)
-            .cloned()
-            .collect();
-        let mut record = Record::with_capacity(&names, rows).beside(&self.exact_names);
-        self.clock = (pace == Pace::RealTime).then(|| Clock::new(self.step));
-        let begin = Instant::now();
-        let ended = self.play(samples, progress, &mut record);
-        let wall = begin.elapsed().as_secs_f64();
+        let mut record = Record::with_capacity(self.columns(), rows).beside(&self.exact_names);
+        self.first_tick = self.tick;
+        let resumed = self.resumed.take();
+        let before = resumed.as_ref().map_or(0.0, |resumed| resumed.wall);
+        if let Some(resumed) = resumed {
+            record.append(&resumed.record);
+        }
+        self.clock = (pace == Pace::RealTime).then(|| Clock::new(self.step, self.tick));
+        let clock = Stopwatch {
+            begin: Instant::now(),
+            before,
+        };
+        let ended = self.play(samples, progress, &mut record, &clock);
+        let wall = clock.read();
         progress(record.len());
         self.close();
         let notes = std::mem::take(&mut self.notes);
@@ -233,8 +236,8 @@ impl Simulation {
         samples: usize,
         progress: &mut dyn FnMut(usize),
         record: &mut Record,
+        stopwatch: &Stopwatch,
     ) -> Result<Ended, MasterError> {
-        let mut tripped: Option<Tripped> = None;
         let mut stopped = false;
         while self.tick < samples * self.ticks_per_row {
             if let Some(clock) = &mut self.clock {
@@ -244,7 +247,13 @@ impl Simulation {
                 .interrupt
                 .is_some_and(|asked| asked.load(Ordering::Relaxed))
             {
+                if self.tick > self.first_tick {
+                    self.keep_checkpoint(record, stopwatch.read())?;
+                }
                 return Ok(Ended::Interrupted { time: self.time() });
+            }
+            if self.is_checkpoint_due() {
+                self.keep_checkpoint(record, stopwatch.read())?;
             }
             self.observe()?;
             if self.tick.is_multiple_of(self.ticks_per_row) {
@@ -269,15 +278,15 @@ impl Simulation {
             }
             if let Some(end) = &self.end {
                 let numbers = &self.signals.numbers;
-                if tripped.is_none() && numbers[end.when] != 0.0 {
-                    tripped = Some(Tripped {
+                if self.tripped.is_none() && numbers[end.when] != 0.0 {
+                    self.tripped = Some(Tripped {
                         time: self.time(),
                         end: self.time() + end.after,
                         signal: self.names[end.when].clone(),
                         cause: end.cause_in_words(numbers),
                     });
                 }
-                if tripped.as_ref().is_some_and(|t| self.time() >= t.end) {
+                if self.tripped.as_ref().is_some_and(|t| self.time() >= t.end) {
                     break;
                 }
             }
@@ -286,6 +295,7 @@ impl Simulation {
                 return Ok(ended);
             }
         }
+        let tripped = self.tripped.take();
         let time = tripped.as_ref().map_or(self.time(), |t| t.time);
         if let Some(error) = self.parts.iter_mut().find_map(|part| part.failure.take()) {
             return Ok(Ended::Stopped { error, time });
@@ -298,8 +308,23 @@ impl Simulation {
     }
 }
 
+/// Time that the stepping takes, with what it took before a checkpoint.
+struct Stopwatch {
+    begin: Instant,
+    /// s.
+    before: f64,
+}
+
+impl Stopwatch {
+    /// s.
+    fn read(&self) -> f64 {
+        self.before + self.begin.elapsed().as_secs_f64()
+    }
+}
+
 /// The system asked to end the run.
-struct Tripped {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Tripped {
     /// When, s.
     time: f64,
     /// When it ends, s.
@@ -327,6 +352,17 @@ impl Simulation {
         self.interrupt = Some(asked);
     }
 
+    /// Columns of its record; the first is `time`.
+    pub(super) fn columns(&self) -> Vec<String> {
+        let numbers = self
+            .kept
+            .iter()
+            .flat_map(|places| &self.names[places.clone()]);
+        let all = std::iter::once("time").chain(numbers.map(String::as_str));
+        let all = all.chain(self.alias_names.iter().map(String::as_str));
+        all.map(str::to_string).collect()
+    }
+
     /// Keeps a row in every so many samples only.
     pub fn keep_every(&mut self, samples: usize) {
         self.keep_every = samples.max(1);
@@ -335,7 +371,7 @@ impl Simulation {
     /// Keeps a row.
     fn keep(&self, time: f64, record: &mut Record) {
         let (numbers, exact) = (&self.signals.numbers, &self.signals.exact);
-        record.push_with(time, numbers, &self.alias_signals, exact);
+        record.push_with(time, numbers, &self.kept, &self.alias_signals, exact);
         if let Some(tap) = &self.tap {
             tap.push(time, numbers);
         }
@@ -344,7 +380,9 @@ impl Simulation {
     /// Values that no physical quantity has are a run that diverges.
     fn check_bounds(&self) -> Result<(), MasterError> {
         let numbers = &self.signals.numbers;
-        if numbers.iter().all(|value| value.abs() < DIVERGED) {
+        // All of them, so that nothing branches.
+        let fits = |all, value: &f64| all & (value.abs() < DIVERGED);
+        if numbers.iter().fold(true, fits) {
             return Ok(());
         }
         let place = numbers.iter().position(|value| value.abs() >= DIVERGED);

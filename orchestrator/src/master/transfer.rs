@@ -163,7 +163,15 @@ impl Inputs {
         self.transfer_exact(now, instance)
     }
 
+    #[inline]
     fn transfer_exact(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
+        if self.exact.is_empty() {
+            return Ok(());
+        }
+        self.transfer_all_exact(signals, instance)
+    }
+
+    fn transfer_all_exact(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
         for group in &mut self.exact {
             for &(place, signal) in &group.sources {
                 group.data[place] = match signal {

@@ -118,12 +118,9 @@ pub fn read_csv(path: &Path) -> Result<Record, Error> {
     let mut csv = csv::Reader::from_reader(file);
     let names = csv.headers().map_err(|error| fault(error.to_string()))?;
     let names: Vec<String> = names.iter().map(String::from).collect();
-    let Some(("time", names)) = names
-        .split_first()
-        .map(|(time, rest)| (time.as_str(), rest))
-    else {
+    if names.first().is_none_or(|first| first != "time") {
         return Err(fault("the first column is not `time`".into()));
-    };
+    }
     let mut record = Record::with_capacity(names, 0);
     for (row, line) in csv.records().zip(2..) {
         let row = row.map_err(|error| fault(error.to_string()))?;

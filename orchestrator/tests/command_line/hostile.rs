@@ -11,7 +11,7 @@ use zip::{ZipWriter, write::SimpleFileOptions};
 use crate::{shakebench, stderr, stdout};
 
 /// Compiles `tests/importers/hostile/hostile.c` with a behaviour and packs it as `hostile.fmu`.
-fn pack(folder: &Path, behaviour: &str, attributes: &str) {
+pub(crate) fn pack(folder: &Path, behaviour: &str, attributes: &str) {
     pack_as(folder, "hostile.fmu", behaviour, attributes, "");
 }
 
@@ -52,7 +52,7 @@ fn pack_as(folder: &Path, name: &str, behaviour: &str, attributes: &str, unknown
     archive.finish().unwrap();
 }
 
-const ALONE: &str = r#"
+pub(crate) const ALONE: &str = r#"
     connections = ["reference.displacement -> it.u"]
     [components.it]
     fmu = "hostile.fmu"

@@ -145,6 +145,7 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
         needs_execution_tool: flag(|it| it.needsExecutionTool, |it| it.needsExecutionTool),
         log_categories: file.logCategories.iter().map(|c| c.name.clone()).collect(),
         saves_state: flag(|it| it.canGetAndSetFMUstate, |_| false),
+        writes_state: flag(|it| it.canSerializeFMUstate, |_| false),
         variable_step: steps.is_none_or(|it| it.canHandleVariableCommunicationStepSize),
         offers_model_exchange: exchange.is_some(),
         event_indicators: file.numberOfEventIndicators as usize,

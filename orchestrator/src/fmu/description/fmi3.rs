@@ -118,6 +118,7 @@ pub(super) fn read(text: &str, sizes: &Sizes) -> Result<Description, String> {
         needs_execution_tool: flag(|it| it.needsExecutionTool, |it| it.needsExecutionTool),
         log_categories: file.logCategories.iter().map(|c| c.name.clone()).collect(),
         saves_state: flag(|it| it.canGetAndSetFMUState, |_| false),
+        writes_state: flag(|it| it.canSerializeFMUState, |_| false),
         variable_step: steps.is_none_or(|it| it.canHandleVariableCommunicationStepSize),
         offers_model_exchange: exchange.is_some(),
         event_indicators: file.eventIndicators.len(),

@@ -165,6 +165,8 @@ pub struct Description {
     pub log_categories: Vec<String>,
     /// Whether its state can be saved and restored.
     pub saves_state: bool,
+    /// Whether a saved state can be written to a file and read again.
+    pub writes_state: bool,
     /// Whether it offers model exchange, too.
     pub offers_model_exchange: bool,
     /// Continuous states, as far as the description tells (arrays count once).

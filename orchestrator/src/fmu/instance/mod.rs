@@ -50,6 +50,9 @@ enum Phase {
     Over,
 }
 
+/// No state has more bytes.
+const MOST_STATE: usize = 1 << 30;
+
 /// A state that an instance was asked to keep; it is given back with [`Instance::free_state`].
 #[derive(Debug, Default)]
 pub struct State(u64);
@@ -246,6 +249,44 @@ impl Instance {
         let mut call = Call::plain(Function::SetState);
         call.handle = state.0;
         self.call(&mut call)
+    }
+
+    /// A kept state as bytes, which another instance of the same FMU can read.
+    ///
+    /// # Errors
+    /// The FMU's refusal; a state that is too large to be real.
+    pub fn state_as_bytes(&mut self, state: &State) -> Outcome<Vec<u8>> {
+        let mut call = Call::plain(Function::SizeOfState);
+        call.handle = state.0;
+        self.call(&mut call)?;
+        let size = usize::try_from(call.handle).unwrap_or(usize::MAX);
+        if size > MOST_STATE {
+            let outcome = format!("gave a state of {size} bytes");
+            return Err(self.failure(Function::SizeOfState, &[], outcome));
+        }
+        // Aligned for every type.
+        let mut words = vec![0_u64; size.div_ceil(8)];
+        let bytes = &mut bytemuck::cast_slice_mut(&mut words)[..size];
+        let mut call = Call::plain(Function::WriteState);
+        call.handle = state.0;
+        call.count = size;
+        call.values = Values::Out(bytes);
+        self.call(&mut call)?;
+        Ok(bytemuck::cast_slice::<u64, u8>(&words)[..size].to_vec())
+    }
+
+    /// A state from its bytes.
+    ///
+    /// # Errors
+    /// The FMU's refusal: of bytes that are no state of it.
+    pub fn state_of_bytes(&mut self, bytes: &[u8]) -> Outcome<State> {
+        let mut words = vec![0_u64; bytes.len().div_ceil(8)];
+        bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
+        let mut call = Call::plain(Function::ReadState);
+        call.count = bytes.len();
+        call.values = Values::In(&bytemuck::cast_slice(&words)[..bytes.len()]);
+        self.call(&mut call)?;
+        Ok(State(call.handle))
     }
 
     /// Lets go of a kept state.

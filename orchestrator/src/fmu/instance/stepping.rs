@@ -1,7 +1,7 @@
 //! Steps, and the events on the way.
 
 use super::super::FmiVersion;
-use super::super::call::{Call, Function};
+use super::super::call::{Call, Function, Lost};
 use super::{Instance, Outcome, Phase};
 
 /// How often events may follow each other at one moment.
@@ -27,11 +27,34 @@ impl Instance {
         if self.has_events {
             return self.step_with_events(time, step);
         }
+        if self.trace.is_none()
+            && let Some(stepped) = self.endpoint.step(time, step)
+        {
+            if matches!(stepped.status, 0 | 1) && !stepped.end && !stepped.early {
+                return Ok(Progress::Whole);
+            }
+            let (end, early, last) = (stepped.end, stepped.early, stepped.last);
+            return self.stepped(
+                Ok(stepped.status),
+                (end, early, last),
+                &Call::plain(Function::DoStep),
+            );
+        }
         let mut call = Call::plain(Function::DoStep);
         call.numbers = [time, step, 0.0];
         let done = self.carry_out(&mut call);
         let [_, end, early, ..] = call.flags;
         let last = call.numbers[0];
+        self.stepped(done, (end, early, last), &call)
+    }
+
+    /// What came of a step: whether the FMU asks to end the run, came back early, and how far it came.
+    fn stepped(
+        &mut self,
+        done: Result<i32, Lost>,
+        (end, early, last): (bool, bool, f64),
+        call: &Call,
+    ) -> Outcome<Progress> {
         match done {
             Ok(0 | 1) if end => Ok(Progress::Ended(last)),
             Ok(0 | 1) if !early => Ok(Progress::Whole),
@@ -40,7 +63,7 @@ impl Instance {
                 Err(self.failure(Function::DoStep, &[], outcome))
             }
             Ok(2) => self.discarded(end, last),
-            outcome => self.judge(outcome, &call).map(|()| Progress::Whole),
+            outcome => self.judge(outcome, call).map(|()| Progress::Whole),
         }
     }
 

@@ -12,6 +12,17 @@ impl Instance {
     #[inline]
     pub fn get(&mut self, kind: &Kind, references: &[u32], values: &mut [f64]) -> Outcome {
         let scalar = self.scalar(kind);
+        if scalar == Scalar::Float64
+            && self.trace.is_none()
+            && let Some(status) = self.endpoint.get_reals(references, values)
+        {
+            if !matches!(status, 0 | 1) {
+                let mut call = Call::plain(Function::Get(scalar));
+                call.references = references;
+                return self.judge(Ok(status), &call);
+            }
+            return self.finite(scalar, references, values);
+        }
         let mut call = Call::plain(Function::Get(scalar));
         call.references = references;
         call.count = values.len();
@@ -28,17 +39,27 @@ impl Instance {
             self.scratch = scratch;
             done?;
         }
-        match values.iter().position(|value| !value.is_finite()) {
-            None => Ok(()),
-            Some(at) => {
-                let outcome = format!("gave {}", values[at]);
-                let one = match values.len() == references.len() {
-                    true => &references[at..=at],
-                    false => references,
-                };
-                Err(self.failure(Function::Get(scalar), one, outcome))
-            }
+        self.finite(scalar, references, values)
+    }
+
+    /// Whether all that was read is finite.
+    #[inline]
+    fn finite(&self, scalar: Scalar, references: &[u32], values: &[f64]) -> Outcome {
+        // All of them, so that nothing branches.
+        if values
+            .iter()
+            .fold(true, |all, value| all & value.is_finite())
+        {
+            return Ok(());
         }
+        let at = values.iter().position(|value| !value.is_finite());
+        let at = at.unwrap_or_default();
+        let outcome = format!("gave {}", values[at]);
+        let one = match values.len() == references.len() {
+            true => &references[at..=at],
+            false => references,
+        };
+        Err(self.failure(Function::Get(scalar), one, outcome))
     }
 
     /// Sets the variables `references`, all of type `kind`.
@@ -48,6 +69,17 @@ impl Instance {
     #[inline]
     pub fn set(&mut self, kind: &Kind, references: &[u32], values: &[f64]) -> Outcome {
         let scalar = self.scalar(kind);
+        if scalar == Scalar::Float64
+            && self.trace.is_none()
+            && let Some(status) = self.endpoint.set_reals(references, values)
+        {
+            if matches!(status, 0 | 1) {
+                return Ok(());
+            }
+            let mut call = Call::plain(Function::Set(scalar));
+            call.references = references;
+            return self.judge(Ok(status), &call);
+        }
         let mut call = Call::plain(Function::Set(scalar));
         call.references = references;
         call.count = values.len();

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use percent_encoding::{AsciiSet, CONTROLS, utf8_percent_encode};
 
 use super::super::FmiVersion;
-use super::super::call::{Call, Endpoint, Function, Lost, Scalar, Values};
+use super::super::call::{Call, Endpoint, Function, Lost, Scalar, Stepped, Values};
 use super::callbacks::{Callbacks, Environment};
 use super::library::Functions;
 use super::{
@@ -30,6 +30,9 @@ type Access = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void) 
 type DoStep = unsafe extern "C" fn(*mut c_void, f64, f64, c_int) -> c_int;
 type State = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
 type SetState = unsafe extern "C" fn(*mut c_void, *mut c_void) -> c_int;
+type SizeOfState = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut usize) -> c_int;
+type WriteState = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut c_void, usize) -> c_int;
+type ReadState = unsafe extern "C" fn(*mut c_void, *mut c_void, usize, *mut *mut c_void) -> c_int;
 type Logging = unsafe extern "C" fn(*mut c_void, c_int, usize, *const *const c_char) -> c_int;
 type BooleanStatus = unsafe extern "C" fn(*mut c_void, c_int, *mut c_int) -> c_int;
 type RealStatus = unsafe extern "C" fn(*mut c_void, c_int, *mut f64) -> c_int;
@@ -64,6 +67,9 @@ struct Table {
     get_state: Option<State>,
     set_state: Option<SetState>,
     free_state: Option<State>,
+    size_of_state: Option<SizeOfState>,
+    write_state: Option<WriteState>,
+    read_state: Option<ReadState>,
     logging: Option<Logging>,
     boolean_status: Option<BooleanStatus>,
     real_status: Option<RealStatus>,
@@ -121,6 +127,9 @@ impl Fmi2 {
                 get_state: f.optional("GetFMUstate"),
                 set_state: f.optional("SetFMUstate"),
                 free_state: f.optional("FreeFMUstate"),
+                size_of_state: f.optional("SerializedFMUstateSize"),
+                write_state: f.optional("SerializeFMUstate"),
+                read_state: f.optional("DeSerializeFMUstate"),
                 logging: f.optional("SetDebugLogging"),
                 boolean_status: f.optional("GetBooleanStatus"),
                 real_status: f.optional("GetRealStatus"),
@@ -252,6 +261,27 @@ impl Fmi2 {
                     call.handle = 0;
                     Ok(status)
                 }
+                Function::SizeOfState => {
+                    let state = call.handle as usize as *mut c_void;
+                    let mut size = 0;
+                    let size_of = table.size_of_state.ok_or_else(missing)?;
+                    let status = size_of(c, state, &raw mut size);
+                    call.handle = size as u64;
+                    Ok(status)
+                }
+                Function::WriteState => {
+                    let state = call.handle as usize as *mut c_void;
+                    let write = table.write_state.ok_or_else(missing)?;
+                    Ok(write(c, state, pointer(&mut call.values), call.count))
+                }
+                Function::ReadState => {
+                    let mut state = std::ptr::null_mut();
+                    let read = table.read_state.ok_or_else(missing)?;
+                    let bytes = pointer(&mut call.values);
+                    let status = read(c, bytes, call.count, &raw mut state);
+                    call.handle = state as usize as u64;
+                    Ok(status)
+                }
                 Function::SetDebugLogging => {
                     let logging = table.logging.ok_or_else(missing)?;
                     let on = c_int::from(call.flags[0]);
@@ -345,6 +375,42 @@ impl Endpoint for Fmi2 {
         let status = self.carry_out(call)?;
         self.is_dead = status == FATAL;
         Ok(status)
+    }
+
+    #[inline]
+    fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Option<i32> {
+        let get =
+            self.table.get[0].filter(|_| !self.is_dead && references.len() == values.len())?;
+        let (n, values) = (references.len(), values.as_mut_ptr().cast());
+        // SAFETY: the instance lives, and there are as many values as references.
+        let status = unsafe { get(self.instance.0, references.as_ptr(), n, values) };
+        self.is_dead = status == FATAL;
+        Some(status)
+    }
+
+    #[inline]
+    fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Option<i32> {
+        let set =
+            self.table.set[0].filter(|_| !self.is_dead && references.len() == values.len())?;
+        let (n, values) = (references.len(), values.as_ptr().cast_mut().cast());
+        // SAFETY: as for reading; what is set is only read.
+        let status = unsafe { set(self.instance.0, references.as_ptr(), n, values) };
+        self.is_dead = status == FATAL;
+        Some(status)
+    }
+
+    #[inline]
+    fn step(&mut self, time: f64, step: f64) -> Option<Stepped> {
+        let do_step = self.table.do_step.filter(|_| !self.is_dead)?;
+        // SAFETY: the instance lives.
+        let status = unsafe { do_step(self.instance.0, time, step, 0) };
+        self.is_dead = status == FATAL;
+        Some(Stepped {
+            status,
+            end: false,
+            early: false,
+            last: time + step,
+        })
     }
 }
 

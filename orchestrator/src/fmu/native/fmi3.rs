@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_int, c_void};
 use std::sync::Arc;
 
 use super::super::FmiVersion;
-use super::super::call::{Call, Endpoint, Function, Lost, Scalar, Values};
+use super::super::call::{Call, Endpoint, Function, Lost, Scalar, Stepped, Values};
 use super::callbacks::{Environment, log_message};
 use super::library::Functions;
 use super::{
@@ -53,6 +53,9 @@ type DoStep =
     unsafe extern "C" fn(*mut c_void, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64) -> c_int;
 type State = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
 type SetState = unsafe extern "C" fn(*mut c_void, *mut c_void) -> c_int;
+type SizeOfState = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut usize) -> c_int;
+type WriteState = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut c_void, usize) -> c_int;
+type ReadState = unsafe extern "C" fn(*mut c_void, *mut c_void, usize, *mut *mut c_void) -> c_int;
 type Logging = unsafe extern "C" fn(*mut c_void, bool, usize, *const *const c_char) -> c_int;
 type SetTime = unsafe extern "C" fn(*mut c_void, f64) -> c_int;
 type Reals = unsafe extern "C" fn(*mut c_void, *mut c_void, usize) -> c_int;
@@ -89,6 +92,9 @@ struct Table {
     get_state: Option<State>,
     set_state: Option<SetState>,
     free_state: Option<State>,
+    size_of_state: Option<SizeOfState>,
+    write_state: Option<WriteState>,
+    read_state: Option<ReadState>,
     logging: Option<Logging>,
     enter_configuration_mode: Option<Simple>,
     exit_configuration_mode: Option<Simple>,
@@ -151,6 +157,9 @@ impl Fmi3 {
                 get_state: f.optional("GetFMUState"),
                 set_state: f.optional("SetFMUState"),
                 free_state: f.optional("FreeFMUState"),
+                size_of_state: f.optional("SerializedFMUStateSize"),
+                write_state: f.optional("SerializeFMUState"),
+                read_state: f.optional("DeserializeFMUState"),
                 logging: f.optional("SetDebugLogging"),
                 enter_configuration_mode: f.optional("EnterConfigurationMode"),
                 exit_configuration_mode: f.optional("ExitConfigurationMode"),
@@ -308,6 +317,27 @@ impl Fmi3 {
                     let mut state = call.handle as usize as *mut c_void;
                     let status = table.free_state.ok_or_else(missing)?(c, &raw mut state);
                     call.handle = 0;
+                    Ok(status)
+                }
+                Function::SizeOfState => {
+                    let state = call.handle as usize as *mut c_void;
+                    let mut size = 0;
+                    let size_of = table.size_of_state.ok_or_else(missing)?;
+                    let status = size_of(c, state, &raw mut size);
+                    call.handle = size as u64;
+                    Ok(status)
+                }
+                Function::WriteState => {
+                    let state = call.handle as usize as *mut c_void;
+                    let write = table.write_state.ok_or_else(missing)?;
+                    Ok(write(c, state, pointer(&mut call.values), call.count))
+                }
+                Function::ReadState => {
+                    let mut state = std::ptr::null_mut();
+                    let read = table.read_state.ok_or_else(missing)?;
+                    let bytes = pointer(&mut call.values);
+                    let status = read(c, bytes, call.count, &raw mut state);
+                    call.handle = state as usize as u64;
                     Ok(status)
                 }
                 Function::SetDebugLogging => {
@@ -477,6 +507,54 @@ impl Endpoint for Fmi3 {
         let status = self.carry_out(call)?;
         self.is_dead = status == FATAL;
         Ok(status)
+    }
+
+    #[inline]
+    fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Option<i32> {
+        let get = self.table.get[Scalar::Float64 as usize].filter(|_| !self.is_dead)?;
+        let (n, m, values) = (references.len(), values.len(), values.as_mut_ptr().cast());
+        // SAFETY: the instance lives, and there are as many references and values as is said.
+        let status = unsafe { get(self.instance.0, references.as_ptr(), n, values, m) };
+        self.is_dead = status == FATAL;
+        Some(status)
+    }
+
+    #[inline]
+    fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Option<i32> {
+        let set = self.table.set[Scalar::Float64 as usize].filter(|_| !self.is_dead)?;
+        let (n, m) = (references.len(), values.len());
+        let values = values.as_ptr().cast_mut().cast();
+        // SAFETY: as for reading; what is set is only read.
+        let status = unsafe { set(self.instance.0, references.as_ptr(), n, values, m) };
+        self.is_dead = status == FATAL;
+        Some(status)
+    }
+
+    #[inline]
+    fn step(&mut self, time: f64, step: f64) -> Option<Stepped> {
+        let do_step = self.table.do_step.filter(|_| !self.is_dead)?;
+        let (mut event, mut end, mut early, mut last) = (0, 0, 0, time + step);
+        // SAFETY: the instance lives, and so do the places for what is given.
+        let status = unsafe {
+            let (event, end) = (&raw mut event, &raw mut end);
+            do_step(
+                self.instance.0,
+                time,
+                step,
+                false,
+                event,
+                end,
+                &raw mut early,
+                &raw mut last,
+            )
+        };
+        self.is_dead = status == FATAL;
+        Some(Stepped {
+            status,
+            end: end != 0,
+            early: early != 0,
+            last,
+        })
     }
 }
 
