@@ -6,5 +6,6 @@ pub mod diagnosis;
 mod error;
 pub mod estimation;
 pub mod identify;
+pub mod one_input;
 
 pub use error::IdentificationError;

@@ -39,28 +39,29 @@ impl ExtendedModel {
     pub fn new(model: &Estimated, named: &[NamedEffect]) -> Self {
         let error = |name: &str| model.standard_errors.get(name).copied();
         let mut parameters: BTreeMap<&'static str, BTreeMap<String, Estimate>> = BTreeMap::new();
-        let mut put = |component, name: &str, value, standard_error| {
-            let estimate = Estimate {
-                value,
-                standard_error,
-            };
-            let set = parameters.entry(component).or_default();
-            set.insert(name.to_string(), estimate);
-        };
         let nominal = NominalRig {
             shake_table: model.shake_table,
             specimen: model.specimen,
         };
         for (parameter, value) in nominal.parameters() {
-            let component = parameter.component().name();
-            put(component, parameter.variable, value, error(parameter.name));
+            let own = parameters.entry(parameter.component().name()).or_default();
+            let standard_error = error(parameter.name);
+            own.insert(
+                parameter.variable.to_string(),
+                Estimate {
+                    value,
+                    standard_error,
+                },
+            );
         }
         let (mut values, mut errors) = (EffectSections::new(), EffectSections::new());
         let (mut on_rig, mut on_sensors) = (model.effects, model.sensors);
-        for named in named {
-            let Some(effect) = effects::find(named.effect) else {
+        for effect in effects::all() {
+            let named = named.iter().find(|named| named.effect == effect.name);
+            // What was known before stays in the model beside what was found.
+            if named.is_none() && !effect.is_on(&model.effects, &model.sensors) {
                 continue;
-            };
+            }
             for parameter in effect.parameters {
                 let home = match parameter.variable {
                     Variable::Own => effect.name,
@@ -71,12 +72,24 @@ impl ExtendedModel {
                     continue;
                 };
                 let value = *field.of(&mut on_rig, &mut on_sensors);
-                let estimate = named.parameters.iter().find(|p| p.name == parameter.name);
-                let standard_error = estimate
+                let estimates = named.map_or(&[][..], |named| &named.parameters);
+                let standard_error = estimates
+                    .iter()
+                    .find(|p| p.name == parameter.name)
                     .map(|p| p.standard_error)
                     .filter(|error| error.is_finite() && *error > 0.0);
                 let full = format!("{home}.{}", parameter.name);
-                put(effect.component.name(), &full, value, standard_error);
+                let own = parameters.entry(effect.component.name()).or_default();
+                if standard_error.is_none() && own.contains_key(&full) {
+                    continue;
+                }
+                own.insert(
+                    full,
+                    Estimate {
+                        value,
+                        standard_error,
+                    },
+                );
                 let section = values.entry(home.to_string()).or_default();
                 section.insert(parameter.name.to_string(), value);
                 if let Some(error) = standard_error {

@@ -20,7 +20,7 @@ use crate::component_library::{ComponentLibrary, Descriptions};
 pub use crate::fmu::FmiVersion;
 pub use annotation::build_of;
 pub use archive::PackedFmu;
-pub(crate) use archive::write_archive;
+pub(crate) use archive::{Compression, write_archive};
 pub use error::PackError;
 pub(crate) use error::file_error;
 pub use merge::merge;
@@ -41,6 +41,7 @@ pub fn build_fmus(out: &Path, versions: &[FmiVersion]) -> Result<Vec<PackedFmu>,
     let form = Form {
         versions,
         revision: None,
+        compression: Compression::Fast,
     };
     packing::pack(&Workspace::find()?, Workspace::published, out, form)
 }
@@ -56,7 +57,11 @@ pub fn pack_libraries(
     versions: &[FmiVersion],
     revision: Option<&str>,
 ) -> Result<Vec<PackedFmu>, PackError> {
-    let form = Form { versions, revision };
+    let form = Form {
+        versions,
+        revision,
+        compression: Compression::Smallest,
+    };
     let components = |workspace: &Workspace| workspace.published_from(libraries);
     packing::pack(&Workspace::find()?, components, out, form)
 }
@@ -84,6 +89,7 @@ pub fn build_component(
     let form = Form {
         versions,
         revision: None,
+        compression: Compression::Fast,
     };
     packing::pack(&Workspace::find()?, component, out, form)
 }

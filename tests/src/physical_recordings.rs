@@ -1,8 +1,6 @@
 //! Recordings of the physical rig under a displacement controller, as a laboratory would take them
 //! before it has a model: seeded, native, SI.
 
-use std::f64::consts::TAU;
-
 use controllers::pid::{Pid, PidInput};
 use controllers::{Controller, ModelError};
 use identification::closed_loop::Found;
@@ -13,6 +11,7 @@ use plant::sensors::instrumentation::{Instrumentation, InstrumentationState, Tru
 use plant::servo_hydraulic::{SealFriction, ServoHydraulicRig, ServoHydraulicTable};
 use plant::specimens::YieldingSpecimen;
 use plant::specimens::linear::LinearSpecimen;
+use shakebench::commission::motions::Sines;
 use units::constants::{G, SAMPLING_PERIOD};
 
 /// What stands on the table.
@@ -143,52 +142,16 @@ impl PhysicalTest {
         instruments
     }
 
-    /// Sines of random phase with the table's acceleration about flat from 0.5 Hz up, faded in and out, of unit root
-    /// mean square.
+    /// The motion of unit root mean square, as a rig is commissioned with.
     pub fn shape(&self) -> Vec<f64> {
-        let count = (self.duration / self.period).round() as usize;
-        let (low, high) = self.band;
-        let frequencies: Vec<f64> = match self.lines {
-            Some(lines) => (0..lines)
-                .map(|i| low * (high / low).powf(i as f64 / (lines - 1) as f64))
-                .collect(),
-            None => {
-                let step = 1.0 / self.duration;
-                let first = (low / step).ceil() as usize;
-                (first..=(high / step) as usize)
-                    .map(|i| i as f64 * step)
-                    .collect()
-            }
-        };
-        let mut sum = vec![0.0; count];
-        for (i, &f) in frequencies.iter().enumerate() {
-            let noise = Noise {
-                seed: self.seed ^ 0x5151,
-                channel: 9,
-                sample: i as u64,
-            };
-            let phase = TAU * 1e3 * noise.gaussian();
-            // The loop follows to some 2 Hz; above, the table's acceleration stays flat only under
-            // a reference that falls by one power less.
-            let amplitude = (1.0 + f / 2.0) / (1.0 + (f / 0.5).powi(2));
-            // A rotating phasor: one complex product a sample.
-            let (mut re, mut im) = (phase.cos() * amplitude, phase.sin() * amplitude);
-            let (s, c) = (TAU * f * self.period).sin_cos();
-            for value in &mut sum {
-                *value += re;
-                (re, im) = (re * c - im * s, re * s + im * c);
-            }
+        Sines {
+            band: self.band,
+            lines: self.lines,
+            duration: self.duration,
+            dt: self.period,
+            seed: self.seed,
         }
-        let fade = (2.0 / self.period) as usize;
-        for k in 0..fade.min(count / 2) {
-            let t = k as f64 / fade as f64;
-            let weight = t * t * (3.0 - 2.0 * t);
-            sum[k] *= weight;
-            sum[count - 1 - k] *= weight;
-        }
-        let square: f64 = sum.iter().map(|v| v * v).sum();
-        let scale = (square / count as f64).sqrt().max(f64::MIN_POSITIVE);
-        sum.iter().map(|v| v / scale).collect()
+        .shape()
     }
 
     /// Plays `reference` (m) on the rig.

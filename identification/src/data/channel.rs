@@ -68,7 +68,14 @@ impl Channel {
             Self::Displacement => (
                 "displacement",
                 "m",
-                &["x", "disp", "position", "table_displacement"],
+                &[
+                    "x",
+                    "disp",
+                    "position",
+                    "table_displacement",
+                    "x_meas",
+                    "measured_displacement",
+                ],
             ),
             Self::Velocity => ("velocity", "m/s", &["v", "vel", "table_velocity"]),
             Self::Acceleration => (
@@ -83,7 +90,14 @@ impl Channel {
             Self::Reference => (
                 "reference",
                 "m",
-                &["x_ref", "ref", "setpoint", "reference_displacement"],
+                &[
+                    "x_ref",
+                    "ref",
+                    "setpoint",
+                    "reference_displacement",
+                    "x_cmd",
+                    "displacement_command",
+                ],
             ),
             Self::Other { name, unit } => (name, unit, &[]),
         }
@@ -212,6 +226,7 @@ mod tests {
             ("Actuator Force (kN)", Channel::ActuatorForce, "kN"),
             ("displacement []", Channel::Displacement, ""),
             ("x_ref [mm]", Channel::Reference, "mm"),
+            ("x_cmd_mm", Channel::Reference, "mm"),
         ];
         for (cell, channel, unit) in cases {
             assert_eq!(read(cell), Some((channel, unit.to_string())), "{cell}");

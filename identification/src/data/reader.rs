@@ -29,6 +29,43 @@ pub fn known_column(cell: &str) -> Option<Channel> {
     Heading::parse(cell).map(|heading| heading.channel)
 }
 
+/// What a file calls a channel, and in which unit it has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Named {
+    /// The channel.
+    pub channel: Channel,
+    /// The header's cell.
+    pub head: String,
+    /// The unit.
+    pub unit: String,
+}
+
+/// The columns that [`Recording::read`] takes from a file.
+///
+/// # Errors
+/// As [`Recording::read`].
+pub fn named_columns(file: &Path) -> Result<Vec<Named>, DataError> {
+    let wanted = Wanted {
+        is_column: &|cell| known_column(cell).is_some(),
+        header: HEADER,
+    };
+    let sheet = Sheet::read(file, wanted)?;
+    let found = columns(&sheet);
+    let mut all = Vec::new();
+    for channel in Channel::KNOWN {
+        if let Some(column) = the_one(&found, channel, &sheet)? {
+            factor(&sheet, column)?;
+            let unit = column.unit.as_ref().map(|(_, unit)| unit.clone());
+            all.push(Named {
+                channel,
+                head: sheet.heads()[column.place].clone(),
+                unit: unit.unwrap_or_default(),
+            });
+        }
+    }
+    Ok(all)
+}
+
 /// A column of a sheet with its unit.
 struct Column {
     channel: Channel,
@@ -136,15 +173,27 @@ fn columns(sheet: &Sheet) -> Vec<Column> {
                     .unit_below(place)
                     .map(|(line, unit)| (line, unit.into()))
             };
+            let unit = in_header.or_else(below);
             Some(Column {
-                channel: heading.channel,
+                channel: meant(heading.channel, heading.is_own_name(), unit.as_ref()),
                 place,
                 name: heading.name.to_string(),
                 own_name: heading.is_own_name(),
-                unit: in_header.or_else(below),
+                unit,
             })
         })
         .collect()
+}
+
+/// A command in a unit of length is the displacement that was asked for.
+fn meant(channel: Channel, own_name: bool, unit: Option<&(u64, String)>) -> Channel {
+    let is_length =
+        |(_, unit): &(u64, String)| factor_meant(unit, Channel::Reference.unit()).is_ok();
+    if channel == Channel::ValveCommand && !own_name && unit.is_some_and(is_length) {
+        Channel::Reference
+    } else {
+        channel
+    }
 }
 
 /// The column of a channel: the one of its own name, else the one of another name whose unit fits.
@@ -177,7 +226,7 @@ fn the_one<'a>(
     }
 }
 
-/// A column `command [mm]` is no valve command.
+/// A column `velocity [mm]` of another name is no velocity.
 fn fits(column: &Column) -> bool {
     column
         .unit

@@ -66,6 +66,13 @@ impl Triangular {
             .then_some(solution)
     }
 
+    /// Sum of squares that the first `columns` columns leave of the last one.
+    pub fn left(&self, columns: usize) -> f64 {
+        let last = self.factor.ncols() - 1;
+        let rows = columns.min(self.factor.nrows())..self.factor.nrows();
+        rows.map(|row| self.factor[(row, last)].powi(2)).sum()
+    }
+
     /// The factor of the regressors alone, square.
     pub fn regressor_factor(&self) -> DMatrix<f64> {
         let n = self.regressors;

@@ -3,6 +3,7 @@
 use nalgebra::{Complex, DMatrix, DVector};
 use plant::identified::coupled::Rig;
 
+use crate::diagnosis::rigs::shake_table::predictor::Disturbance;
 use crate::estimation::gauss_newton::GaussNewtonEstimate;
 use crate::estimation::prediction::Parameter;
 use crate::estimation::residuals::ResidualTest;
@@ -62,6 +63,19 @@ impl RigIdentification {
         let log_noise = Own::LogNoise(NoiseOn::Output(output));
         let relative = self.parameters[log_noise.of(recording)].exp();
         relative * self.model.experiments[recording].scale[output]
+    }
+
+    /// Noise of a recording's command in V, as [`Nominal::command_noise`] has it: the white voltage
+    /// that was identified beside the command, as slow as an unseen voltage of a servo valve.
+    ///
+    /// [`Nominal::command_noise`]: crate::diagnosis::case::Nominal::command_noise
+    pub fn command_noise(&self, recording: usize) -> f64 {
+        let log_noise = Own::LogNoise(NoiseOn::Command);
+        let own = &self.model.experiments[recording];
+        let white = self.parameters[log_noise.of(recording)].exp() * own.command_scale;
+        let unseen = Disturbance::beside_command(1.0, own.period);
+        // Of one spectral density at low frequencies.
+        white / unseen.sigma * ((1.0 - unseen.phi) / (1.0 + unseen.phi)).sqrt()
     }
 
     /// Takes over the numbers of an estimate.

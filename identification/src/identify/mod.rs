@@ -4,6 +4,7 @@ mod assessment;
 mod checks;
 mod identifiability;
 pub mod identified;
+pub mod instrument;
 pub mod model;
 pub mod model_file;
 pub mod parameters;

@@ -13,6 +13,7 @@ use crate::identify::assessment::assess;
 use crate::identify::checks;
 use crate::identify::identifiability;
 use crate::identify::identified::RigIdentification;
+use crate::identify::instrument::bias;
 use crate::identify::model::RigModel;
 use crate::identify::parameters::{Name, NoiseOn, Own, Physical, PhysicalValues};
 use crate::identify::setup::{fit_part, parameters, whole_recordings};
@@ -112,6 +113,7 @@ pub fn identify(
     found.iterations = iterations + estimate.iterations;
     found.singular_values = start.singular_values;
     found.take(&parameters, estimate);
+    found.warnings.splice(0..0, bias(&found, recordings));
     Ok(found)
 }
 

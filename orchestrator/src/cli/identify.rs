@@ -10,8 +10,8 @@ use identification::identify::identified::RigIdentification;
 use super::progress;
 use crate::error::Error;
 use crate::identify::{
-    EQUATION_COLUMNS, Form, HydraulicIdentification, PARAMETER_COLUMNS, Request, Summary, identify,
-    parameters,
+    CANDIDATE_COLUMNS, EQUATION_COLUMNS, Form, HydraulicIdentification, ONE_INPUT_COLUMNS,
+    OneInputIdentification, Outcome, PARAMETER_COLUMNS, Request, Summary, identify, parameters,
 };
 use crate::report::columns::aligned;
 use crate::report::number::significant;
@@ -23,7 +23,8 @@ use crate::report::number::significant;
     Columns: time, valve_command, displacement, acceleration, actuator_force and, with a specimen\n\
     on the table, specimen_acceleration; each header cell is `name [unit]` or `name (unit)`, parted\n\
     by comma, semicolon or tab. A bare table alone does not determine the actuator: measure with a\n\
-    specimen or two payloads.")]
+    specimen or two payloads. Of a rig of which command and displacement alone are recorded, a\n\
+    transfer function is found: valve_command (V) or reference (m), and displacement.")]
 pub struct Arguments {
     /// Recordings of one rig
     #[arg(value_name = "DATA.csv", required = true)]
@@ -38,6 +39,12 @@ pub struct Arguments {
     /// with it is enough; `specimen_acceleration` may then be missing
     #[arg(long, value_name = "FILE")]
     specimen: Option<PathBuf>,
+    /// What the columns are called: `channel = { column = "header", unit = "mm" }` a line
+    #[arg(long, value_name = "MAP.toml")]
+    columns: Option<PathBuf>,
+    /// Look at command and displacement alone, as where nothing else is recorded
+    #[arg(long, conflicts_with = "specimen")]
+    one_input: bool,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -62,6 +69,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         fit_part: arguments.fit_part,
         specimen: arguments.specimen.clone(),
         hydraulic_first: false,
+        columns: arguments.columns.clone(),
+        one_input: arguments.one_input,
     });
     bar.finish_and_clear();
     let identified = identified?;
@@ -69,12 +78,15 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.json {
         println!(
             "{}",
-            serde_json::to_string_pretty(&identified.summary).unwrap_or_default()
+            serde_json::to_string_pretty(identified.summary()).unwrap_or_default()
         );
     } else {
-        let text = match &identified.form {
-            Form::General(found) => text(found, &identified.summary),
-            Form::Hydraulic(own) => hydraulic_text(own, &identified.summary),
+        let text = match &identified {
+            Outcome::OneInput(own) => one_input_text(&own.own, &own.summary),
+            Outcome::Rig(own) => match &own.form {
+                Form::General(found) => text(found, &own.summary),
+                Form::Hydraulic(found) => hydraulic_text(found, &own.summary),
+            },
         };
         print!("{text}");
     }
@@ -106,7 +118,11 @@ fn check_place(arguments: &Arguments) -> Result<(), Error> {
     }
     let same =
         |path: &Path| matches!((path.canonicalize(), out.canonicalize()), (Ok(a), Ok(b)) if a == b);
-    let read = arguments.data.iter().chain(&arguments.specimen);
+    let read = arguments
+        .data
+        .iter()
+        .chain(&arguments.specimen)
+        .chain(&arguments.columns);
     if let Some(path) = read.into_iter().find(|path| same(path)) {
         return Err(fault(format!(
             "{} is read from; expected another file",
@@ -211,13 +227,42 @@ fn text(found: &RigIdentification, summary: &Summary) -> String {
     text
 }
 
+/// Four columns under their heads.
+fn table(columns: [&str; 4], rows: Vec<[String; 4]>) -> String {
+    let mut all = vec![columns.map(String::from).to_vec()];
+    all.extend(rows.into_iter().map(|row| row.to_vec()));
+    aligned(&all)
+}
+
+/// As [`text`], for command to displacement; what the reader must know stands first.
+fn one_input_text(own: &OneInputIdentification, summary: &Summary) -> String {
+    let mut text = String::new();
+    if let Some(first) = summary.warnings.first() {
+        text += &format!("{first}\n\n");
+    }
+    text += &format!("{} to displacement\n\npoles\n", own.found.input.name());
+    for own in &summary.actuator_poles_rad_s {
+        text += &format!("  {}\n", pole(own));
+    }
+    text += &format!("\n{}", table(ONE_INPUT_COLUMNS, own.parameters()));
+    text += &format!("\n{}", table(CANDIDATE_COLUMNS, own.candidates()));
+    text += &format!("\n{}\n", own.checked());
+    if summary.warnings.len() > 1 {
+        text += "\nwarnings\n";
+        for warning in &summary.warnings[1..] {
+            text += &format!("  {warning}\n");
+        }
+    }
+    text += &format!(
+        "\nwritten: {} ({:.1} s)\n",
+        summary.model.display(),
+        summary.wall_s
+    );
+    text
+}
+
 /// As [`text`], for a hydraulic rig; what the reader must know stands first.
 fn hydraulic_text(own: &HydraulicIdentification, summary: &Summary) -> String {
-    let table = |columns: [&str; 4], rows: Vec<[String; 4]>| {
-        let mut all = vec![columns.map(String::from).to_vec()];
-        all.extend(rows.into_iter().map(|row| row.to_vec()));
-        aligned(&all)
-    };
     let mut text = String::new();
     if let Some(first) = summary.warnings.first() {
         text += &format!("{first}\n\n");

@@ -3,7 +3,7 @@
 //! recordings alone.
 
 mod experiment;
-mod motions;
+pub mod motions;
 mod page;
 mod systems;
 
@@ -128,13 +128,7 @@ const BAND: (f64, f64) = (0.05, 30.0);
 pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned, Error> {
     let mut bench = Bench::new(request)?;
     let dt = bench.dt();
-    let excitation = Sines {
-        band: BAND,
-        lines: None,
-        duration: request.duration,
-        dt,
-        seed: request.seed,
-    };
+    let excitation = excitation(request, dt);
     tell("growing the excitation");
     let shape = excitation.shape();
     let (scale, growth) = grow(&mut bench, request, &shape)?;
@@ -184,6 +178,8 @@ pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned
             fit_part: 0.75,
             specimen: None,
             hydraulic_first: true,
+            columns: None,
+            one_input: false,
         },
     )?;
     warnings.splice(0..0, identified.summary.warnings.iter().cloned());
@@ -236,6 +232,17 @@ pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned
     })
 }
 
+/// What is played for the recording that is identified.
+fn excitation(request: &Request, dt: f64) -> Sines {
+    Sines {
+        band: BAND,
+        lines: None,
+        duration: request.duration,
+        dt,
+        seed: request.seed,
+    }
+}
+
 /// The recording that is identified, alone.
 ///
 /// # Errors
@@ -243,14 +250,7 @@ pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned
 pub fn record_excitation(request: &Request) -> Result<Recording, Error> {
     let mut bench = Bench::new(request)?;
     let dt = bench.dt();
-    let shape = Sines {
-        band: BAND,
-        lines: None,
-        duration: request.duration,
-        dt,
-        seed: request.seed,
-    }
-    .shape();
+    let shape = excitation(request, dt).shape();
     let (scale, _) = grow(&mut bench, request, &shape)?;
     let played = bench.play(motion(EXCITATION, &shape, scale, dt, Some(request.seed)))?;
     match played.ended {

@@ -123,13 +123,14 @@ fn in_closed_loop(
     };
     let rig = |file: &dyn Fn(&str) -> Result<PathBuf, String>| -> Result<RigFmus, String> {
         Ok(RigFmus {
-            table: (file("ShakeTable")?, Vec::new()),
+            table: file("ShakeTable")?,
             specimen: match case.nominal.specimen {
-                Some(_) => Some((file("Specimen")?, Vec::new())),
+                Some(_) => Some(file("Specimen")?),
                 None => None,
             },
             sensors: file("Instrumentation")?,
             control: file("ThreeVariableControl")?,
+            ..RigFmus::default()
         })
     };
     let before = rig(&original)?.nominal(&case.nominal);

@@ -3,19 +3,21 @@
 //! was measured. The rig is unstable without its controller, so that nothing else would compare
 //! models over a whole record.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use identification::data::{Channel, OUTPUT_NAMES, Recording, mean_and_deviation};
 use identification::diagnosis::case::{ControlLaw, Nominal};
 use identification::diagnosis::engine::resampling::{running, share_gone};
+use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
 use identification::diagnosis::{GainAgainstNoise, GainReport};
 
+use crate::extended_model::{Estimate, ExtendedModel};
 use crate::fmu::Fmu;
 use crate::master::{Algorithm, Ended, Pace, Simulation};
 use crate::motion::Motion;
 use crate::system::{ComponentFile, Origin, Quantity, SystemFile, VariableName, assemble};
-use plant::identified::nominal::{shake_table_values, specimen_values};
 
 /// Coupling steps of table and specimen in a sample, the finest that the rig's delays allow (they
 /// last at most thirty steps).
@@ -26,27 +28,33 @@ const SEEDS: [i32; 4] = [1, 2, 3, 4];
 /// The sensors' readings of [`Channel::OUTPUTS`], SI.
 pub type Channels = [Vec<f64>; 4];
 
-/// FMUs of a rig, each with the parameters that are set on top of its start values.
+/// FMUs of a rig.
 #[derive(Debug, Clone, Default)]
 pub struct RigFmus {
     /// `ShakeTable`.
-    pub table: (PathBuf, Vec<(&'static str, f64)>),
+    pub table: PathBuf,
     /// `Specimen`, if one is meant to stand on the table.
-    pub specimen: Option<(PathBuf, Vec<(&'static str, f64)>)>,
+    pub specimen: Option<PathBuf>,
     /// `Instrumentation`.
     pub sensors: PathBuf,
     /// `ThreeVariableControl`.
     pub control: PathBuf,
+    /// What is set on top of the start values, by the component's name.
+    pub values: BTreeMap<&'static str, BTreeMap<String, Estimate>>,
 }
 
 impl RigFmus {
-    /// The same FMUs with the parameters of the nominal model.
+    /// The same FMUs with the parameters of the nominal model and the effects that it knows.
     #[must_use]
     pub fn nominal(mut self, nominal: &Nominal) -> Self {
-        self.table.1 = shake_table_values(&nominal.shake_table);
-        if let (Some(own), Some(specimen)) = (&mut self.specimen, &nominal.specimen) {
-            own.1 = specimen_values(specimen);
-        }
+        let known = Estimated {
+            shake_table: nominal.shake_table,
+            specimen: nominal.specimen,
+            effects: nominal.effects,
+            sensors: nominal.sensors,
+            standard_errors: BTreeMap::new(),
+        };
+        self.values = ExtendedModel::new(&known, &[]).parameters;
         self
     }
 }
@@ -175,8 +183,15 @@ fn system(
         }
         component
     };
-    let mut table = component(&rig.table.0, &rig.table.1);
-    let mut sensors = component(&rig.sensors, &sensors).period(period);
+    let of_rig = |fmu: &Path, name: &str, parameters: &[(&str, f64)]| {
+        let mut component = component(fmu, parameters);
+        for (parameter, estimate) in rig.values.get(name).into_iter().flatten() {
+            component.set(parameter, estimate.value);
+        }
+        component
+    };
+    let mut table = of_rig(&rig.table, "ShakeTable", &[]);
+    let mut sensors = of_rig(&rig.sensors, "Instrumentation", &sensors).period(period);
     if let Some((_, seed)) = noise {
         sensors.set("seed", i64::from(seed));
     }
@@ -201,7 +216,7 @@ fn system(
     ] {
         connect(Origin::output(from, output), to, input);
     }
-    if let Some((fmu, parameters)) = &rig.specimen {
+    if let Some(fmu) = &rig.specimen {
         for (from, output, to, input) in [
             ("table", "acceleration", "specimen", "table_acceleration"),
             ("specimen", "force", "table", "specimen_force"),
@@ -214,7 +229,7 @@ fn system(
         ] {
             connect(Origin::output(from, output), to, input);
         }
-        system.add("specimen", component(fmu, parameters));
+        system.add("specimen", of_rig(fmu, "Specimen", &[]));
     } else {
         table = table.input("specimen_force", 0.0);
         sensors = sensors.input("specimen_acceleration", 0.0);

@@ -1,6 +1,8 @@
 //! A rig identified from recordings: figures, model file and report.
 
+mod columns;
 mod hydraulic;
+mod one_input;
 mod page;
 mod parameters;
 mod poles;
@@ -12,18 +14,20 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use identification::IdentificationError;
-use identification::data::Recording;
+use identification::data::{Channel, Recording};
 use identification::identify::identified::RigIdentification;
+use identification::identify::instrument::bias;
 use identification::identify::model_file::ModelFile;
 use identification::identify::rig::{self, Options};
 use identification::identify::specimen_file;
 
 pub use hydraulic::{EQUATION_COLUMNS, HydraulicIdentification, PARAMETER_COLUMNS};
+pub use one_input::{CANDIDATE_COLUMNS, ONE_INPUT_COLUMNS, OneInputIdentification};
 pub use parameters::parameters;
 pub use summary::Summary;
 
 use crate::error::Error;
-use crate::report;
+use crate::report::{self, Report};
 use crate::results::Results;
 
 /// What is identified from what.
@@ -39,6 +43,11 @@ pub struct Request {
     pub specimen: Option<PathBuf>,
     /// Whether a hydraulic rig is tried before the general form.
     pub hydraulic_first: bool,
+    /// What the files call their columns, where they call them otherwise: a file of
+    /// `channel = { column = "header", unit = "mm" }`.
+    pub columns: Option<PathBuf>,
+    /// Whether command and displacement alone are looked at.
+    pub one_input: bool,
 }
 
 /// What kind of rig explains the recordings.
@@ -58,22 +67,83 @@ pub struct Identified {
     recordings: Vec<Recording>,
 }
 
-/// Identifies a rig.
+/// What came of recordings.
+pub enum Outcome {
+    /// A rig with its forces.
+    Rig(Box<Identified>),
+    /// Command to displacement.
+    OneInput(Box<OneInputIdentified>),
+}
+
+/// Command to displacement, with what it was identified from.
+pub struct OneInputIdentified {
+    /// What was found.
+    pub own: OneInputIdentification,
+    /// Its figures.
+    pub summary: Summary,
+}
+
+impl Outcome {
+    /// The figures.
+    pub fn summary(&self) -> &Summary {
+        match self {
+            Self::Rig(own) => &own.summary,
+            Self::OneInput(own) => &own.summary,
+        }
+    }
+
+    /// Writes model and report beside each other, both or none.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn write(&self) -> Result<(), Error> {
+        match self {
+            Self::Rig(own) => own.write(),
+            Self::OneInput(own) => {
+                write(&own.summary, &own.own.text, &own.own.report(&own.summary))
+            }
+        }
+    }
+}
+
+/// Identifies a rig: with its forces where they were recorded, else from command to displacement.
 ///
 /// # Errors
 /// Data at fault.
-pub fn identify(request: &Request) -> Result<Identified, Error> {
+pub fn identify(request: &Request) -> Result<Outcome, Error> {
+    let started = Instant::now();
     let mut recordings = Vec::new();
     let mut warnings = Vec::new();
     for path in &request.data {
-        let measured = Recording::read(path, &path.display().to_string())?;
+        let measured = columns::read(path, request.columns.as_deref())?;
         let (pieces, findings) = measured.on_even_base()?;
         warnings.extend(findings.iter().map(ToString::to_string));
         recordings.extend(long_enough(pieces, &mut warnings));
     }
+    let lacks_both = |recording: &Recording| {
+        [Channel::Acceleration, Channel::ActuatorForce]
+            .iter()
+            .all(|channel| recording.channel(*channel).is_none())
+    };
+    let has_way = |recording: &Recording| recording.channel(Channel::Displacement).is_some();
+    if request.one_input || recordings.iter().all(|own| lacks_both(own) && has_way(own)) {
+        let named = match request.data.first() {
+            Some(path) => columns::named(path, request.columns.as_deref())?,
+            None => Vec::new(),
+        };
+        let own =
+            OneInputIdentification::new(&recordings, request.fit_part, &request.data, &named)?;
+        let wall = started.elapsed().as_secs_f64();
+        let mut summary = own.summary(&request.model, Vec::new(), wall);
+        summary.warnings.extend(warnings);
+        return Ok(Outcome::OneInput(Box::new(OneInputIdentified {
+            own,
+            summary,
+        })));
+    }
     let mut identified = from_recordings(recordings, request)?;
     identified.summary.warnings.extend(warnings);
-    Ok(identified)
+    Ok(Outcome::Rig(Box::new(identified)))
 }
 
 /// As [`identify`], from recordings on an even base; of `request` the data are not read.
@@ -122,7 +192,10 @@ fn form(
         return Ok(Form::Hydraulic(Box::new(own)));
     }
     let general = match rig::identify(recordings, options) {
-        Ok(found) if found.residuals.iter().all(|(_, _, test)| test.is_white()) => {
+        Ok(found)
+            if found.residuals.iter().all(|(_, _, test)| test.is_white())
+                && bias(&found, recordings).is_none() =>
+        {
             return Ok(Form::General(Box::new(found)));
         }
         // A specimen that is given is one of the general form.
@@ -177,24 +250,28 @@ impl Identified {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write(&self) -> Result<(), Error> {
-        let path = &self.summary.model;
-        let beside = path.with_extension("html");
         let page = match &self.form {
             Form::General(found) => page::report(found, &self.recordings, &self.summary),
             Form::Hydraulic(own) => own.report(&self.summary),
         };
-        let page = report::render(&page, &beside)?;
-        let model = self.model_file()?.to_toml()?;
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let mut results = Results::begin(folder)?;
-        for (file, text) in [(path, &model), (&beside, &page)] {
-            let name = file.file_name().unwrap_or_default();
-            results.write_text(&name.to_string_lossy(), text)?;
-        }
-        results.finish()?;
-        Ok(())
+        write(&self.summary, &self.model_file()?.to_toml()?, &page)
     }
+}
+
+/// Writes a model and its report beside each other, both or none.
+fn write(summary: &Summary, model: &str, page: &Report) -> Result<(), Error> {
+    let path = &summary.model;
+    let beside = path.with_extension("html");
+    let page = report::render(page, &beside)?;
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut results = Results::begin(folder)?;
+    for (file, text) in [(path.as_path(), model), (&beside, &page)] {
+        let name = file.file_name().unwrap_or_default();
+        results.write_text(&name.to_string_lossy(), text)?;
+    }
+    results.finish()?;
+    Ok(())
 }

@@ -112,9 +112,32 @@ pub(super) fn read_archive(path: &Path) -> Result<Entries, PackError> {
     read().map_err(file_error(path))
 }
 
+/// How hard archives are compressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Compression {
+    /// In milliseconds.
+    Fast,
+    /// As small as deflate allows: 4 % smaller, a second for each megabyte.
+    Smallest,
+}
+
+impl Compression {
+    /// By the scale of the `zip` crate, where zopfli's single pass follows zlib's best.
+    fn level(self) -> i64 {
+        match self {
+            Self::Fast => 9,
+            Self::Smallest => 10,
+        }
+    }
+}
+
 /// Writes an archive unless it is there with the same contents. The same contents give the same
 /// bytes; a reader never sees half an archive.
-pub(crate) fn write_archive(path: &Path, entries: &Entries) -> Result<(), PackError> {
+pub(crate) fn write_archive(
+    path: &Path,
+    entries: &Entries,
+    compression: Compression,
+) -> Result<(), PackError> {
     let mut sum = Sha256::new();
     for (name, content) in entries {
         sum.update((name.len() as u64).to_le_bytes());
@@ -134,7 +157,7 @@ pub(crate) fn write_archive(path: &Path, entries: &Entries) -> Result<(), PackEr
         return Ok(());
     }
     let draft = path.with_extension(format!("draft.{}", std::process::id()));
-    let written = write_entries(&draft, entries, stamp);
+    let written = write_entries(&draft, entries, stamp, compression);
     let moved = written.and_then(|()| fs::rename(&draft, path));
     if moved.is_err() {
         let _ = fs::remove_file(&draft);
@@ -142,19 +165,30 @@ pub(crate) fn write_archive(path: &Path, entries: &Entries) -> Result<(), PackEr
     moved.map_err(file_error(path))
 }
 
-fn write_entries(path: &Path, entries: &Entries, stamp: String) -> io::Result<()> {
-    write_to(File::create(path)?, entries, stamp)?.sync_all()
+fn write_entries(
+    path: &Path,
+    entries: &Entries,
+    stamp: String,
+    compression: Compression,
+) -> io::Result<()> {
+    write_to(File::create(path)?, entries, stamp, compression)?.sync_all()
 }
 
 /// An archive in memory.
 pub(super) fn archive_bytes(entries: &Entries) -> io::Result<Vec<u8>> {
-    Ok(write_to(Cursor::new(Vec::new()), entries, String::new())?.into_inner())
+    let memory = Cursor::new(Vec::new());
+    Ok(write_to(memory, entries, String::new(), Compression::Fast)?.into_inner())
 }
 
-fn write_to<W: Write + Seek>(writer: W, entries: &Entries, stamp: String) -> io::Result<W> {
+fn write_to<W: Write + Seek>(
+    writer: W,
+    entries: &Entries,
+    stamp: String,
+    compression: Compression,
+) -> io::Result<W> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
-        .compression_level(Some(9))
+        .compression_level(Some(compression.level()))
         .last_modified_time(DateTime::default());
     let mut archive = ZipWriter::new(writer);
     archive.set_comment(stamp).map_err(io::Error::from)?;

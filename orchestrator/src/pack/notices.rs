@@ -180,7 +180,10 @@ fn text(packages: &[&Package]) -> String {
             .into_iter()
             .map(|content| {
                 let next = texts.len() + 1;
-                let number = *texts.entry(content.clone()).or_insert(next);
+                // Texts that differ in their line breaks and capitals alone are the same.
+                let words: Vec<&str> = content.split_whitespace().collect();
+                let key = words.join(" ").to_lowercase();
+                let number = *texts.entry(key).or_insert(next);
                 if number == next {
                     ordered.push(content);
                 }

@@ -6,7 +6,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use super::archive::{Contents, PackedFmu, write_archive};
+use super::archive::{Compression, Contents, PackedFmu, write_archive};
 use super::error::{PackError, file_error};
 use super::notices::Notices;
 use super::workspace::{Component, Workspace};
@@ -20,6 +20,8 @@ pub(super) struct Form<'a> {
     pub(super) versions: &'a [FmiVersion],
     /// Which build of the sources it is, written into the description.
     pub(super) revision: Option<&'a str>,
+    /// How hard they are compressed.
+    pub(super) compression: Compression,
 }
 
 /// Packs what `components` gives, as far as it is not there already.
@@ -59,7 +61,7 @@ pub(super) fn pack(
             fs::create_dir_all(&folder).map_err(file_error(&folder))?;
             let name = contents.descriptions.name.clone();
             let path = folder.join(format!("{name}.fmu"));
-            write_archive(&path, &contents.entries(*version))?;
+            write_archive(&path, &contents.entries(*version), form.compression)?;
             packed.push(PackedFmu {
                 name,
                 version: *version,

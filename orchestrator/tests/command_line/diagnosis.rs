@@ -415,7 +415,7 @@ fn data_of_a_case_and_unknown_keys_of_its_model_are_refused() {
     fs::create_dir(folder.join("case")).unwrap();
     let arguments = ["diagnose", "case", "--data", "other.csv"];
     refused(folder, &arguments, &["--data", "identification.csv"]);
-    fs::write(folder.join("case/nominal.toml"), "units = \"SI\"\n").unwrap();
+    fs::write(folder.join("case/nominal.toml"), "units = \"metric\"\n").unwrap();
     refused(
         folder,
         &["diagnose", "case"],

@@ -153,10 +153,11 @@ fn fmus_with_an_effect_move_in_closed_loop_like_the_engine_that_finds_it() {
             found.unwrap()
         };
         let fmus = RigFmus {
-            table: (path("ShakeTable"), Vec::new()),
-            specimen: Some((path("Specimen"), Vec::new())),
+            table: path("ShakeTable"),
+            specimen: Some(path("Specimen")),
             sensors: path("Instrumentation"),
             control: path("ThreeVariableControl"),
+            ..RigFmus::default()
         };
         play(&fmus, &law, &reference, PERIOD, None).unwrap()
     };

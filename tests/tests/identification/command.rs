@@ -5,6 +5,7 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use acceptance::recordings::{Test, csv};
+use identification::data::{Channel, Recording};
 use serde_json::Value;
 
 /// The program, built once.
@@ -345,4 +346,64 @@ fn bad_data_are_refused_by_name() {
             &["--out", words],
         );
     }
+}
+
+#[test]
+fn command_and_displacement_alone_make_a_transfer_function() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let all = Test {
+        duration: 30.0,
+        specimen: None,
+        ..Test::default()
+    }
+    .record();
+    let two = [
+        Channel::Acceleration,
+        Channel::ActuatorForce,
+        Channel::Velocity,
+    ]
+    .into_iter()
+    .fold(all, Recording::without);
+    std::fs::write(folder.join("two.csv"), csv(&two)).unwrap();
+    let said = json(
+        folder,
+        &["identify", "two.csv", "--out", "two.toml", "--json"],
+    );
+    assert!(
+        said["fit_percent"]["displacement"].as_f64().unwrap() > 80.0,
+        "{said}"
+    );
+    assert_eq!(files(folder), ["two.csv", "two.html", "two.toml"]);
+    let model = std::fs::read_to_string(folder.join("two.toml")).unwrap();
+    for line in [
+        "[transfer_function]",
+        "input = \"valve_command\"",
+        "denominator = [1.0, ",
+    ] {
+        assert!(model.contains(line), "{line}: {model}");
+    }
+
+    // Columns of other names, with a map; and a map that is wrong.
+    let german = csv(&two)
+        .replace("reference [m]", "Sollweg")
+        .replace("displacement [m]", "Weg")
+        .replace("time [s]", "Zeit");
+    std::fs::write(folder.join("german.csv"), german).unwrap();
+    let map = "time = { column = \"Zeit\", unit = \"s\" }\n\
+               reference = { column = \"Sollweg\", unit = \"m\" }\n\
+               displacement = { column = \"Weg\", unit = \"m\" }\n";
+    std::fs::write(folder.join("map.toml"), map).unwrap();
+    let arguments = ["identify", "german.csv", "--columns", "map.toml", "--out"];
+    json(folder, &[&arguments[..], &["own.toml", "--json"]].concat());
+    std::fs::write(
+        folder.join("map.toml"),
+        map.replace("displacement", "displacemnt"),
+    )
+    .unwrap();
+    refused(
+        folder,
+        &[&arguments[..], &["wrong.toml"]].concat(),
+        &["map.toml", "`displacemnt` is no channel", "displacement"],
+    );
 }

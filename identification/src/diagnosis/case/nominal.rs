@@ -1,10 +1,16 @@
 //! `nominal.toml`: what the laboratory believes.
 
+use std::collections::BTreeMap;
+
+use crate::identify::model_file::{EffectSections, HydraulicSection};
 use plant::identified::actuator::IdentifiedActuator;
+use plant::identified::effects::{self, Effects};
 use plant::identified::shake_table::ShakeTable;
 use plant::identified::table::Table;
+use plant::sensors::instrumentation::Instrumentation;
 use plant::specimens::linear::LinearSpecimen;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use units::constants::{INCH, LBF, LBF_PER_INCH, LBF_S_PER_INCH, LBF_S2_PER_INCH};
 
 /// The nominal rig, SI.
@@ -25,6 +31,11 @@ pub struct Nominal {
     pub command_noise: f64,
     /// Relative standard deviation of every plant parameter.
     pub uncertainty: f64,
+    /// Effects of the rig that are known already, as an identification or an earlier diagnosis
+    /// found them.
+    pub effects: Effects,
+    /// Those of its sensors.
+    pub sensors: Instrumentation,
 }
 
 /// Relation R5: three-variable control as sampled by the rig's computer, SI.
@@ -57,12 +68,21 @@ struct File {
     #[serde(default)]
     units: Units,
     sample_rate: f64,
-    actuator: Actuator,
+    actuator: Option<Actuator>,
     table: Oscillator,
     specimen: Option<Oscillator>,
     controller: Option<Controller>,
     noise: Noise,
     uncertainty: Uncertainty,
+    command_delay: Option<f64>,
+    hydraulics: Option<HydraulicSection>,
+    #[serde(default)]
+    effects: EffectSections,
+    // What an identification says of its errors besides.
+    #[serde(rename = "covariance")]
+    _covariance: Option<IgnoredAny>,
+    #[serde(rename = "standard_errors")]
+    _standard_errors: Option<IgnoredAny>,
 }
 
 /// Units of all numbers of the file.
@@ -71,8 +91,10 @@ struct File {
 enum Units {
     /// Inch, lbf, s, V.
     #[default]
+    #[serde(alias = "inch, lbf, second, volt")]
     Laboratory,
     /// m, N, kg, s, V.
+    #[serde(alias = "SI", alias = "metre, newton, second, volt")]
     Si,
 }
 
@@ -83,8 +105,10 @@ impl File {
             return self;
         }
         let in_units = |values: &mut [f64], unit: f64| values.iter_mut().for_each(|v| *v /= unit);
-        in_units(&mut self.actuator.voltage_to_force, LBF);
-        in_units(&mut self.actuator.velocity_to_force, LBF_S_PER_INCH);
+        if let Some(actuator) = &mut self.actuator {
+            in_units(&mut actuator.voltage_to_force, LBF);
+            in_units(&mut actuator.velocity_to_force, LBF_S_PER_INCH);
+        }
         for body in [Some(&mut self.table), self.specimen.as_mut()]
             .into_iter()
             .flatten()
@@ -164,24 +188,30 @@ struct Uncertainty {
 
 impl Nominal {
     /// Reads the text of a `nominal.toml`, in inch, lbf, s, V or, where it says `units = "si"`, in SI;
-    /// a sentence says what is wrong.
+    /// a sentence says what is wrong. A model file is one, as `shakebench identify` writes it: the
+    /// effects that it knows of are then those of the nominal rig.
     ///
     /// # Errors
     /// What is no TOML or has an unknown key, with line and column; values out of range.
     pub fn parse(text: &str) -> Result<Self, String> {
         let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
         let file = file.in_laboratory_units();
-        let lead = file.actuator.denominator[0];
+        let (effects, sensors) = known_effects(&file)?;
+        let actuator = file.actuator.ok_or(
+            "no [actuator]: the data behind this file did not determine it; expected a model that \
+             was identified with a specimen or two payloads",
+        )?;
+        let lead = actuator.denominator[0];
         if lead.is_nan() || lead <= 0.0 {
             return Err("actuator.denominator: the leading coefficient must be positive".into());
         }
         let over_lead = |c: [f64; 3]| c.map(|value| value / lead);
-        let [_, a2, a1, a0] = file.actuator.denominator;
+        let [_, a2, a1, a0] = actuator.denominator;
         let shake_table = ShakeTable {
             actuator: IdentifiedActuator::from_thesis_units(
                 over_lead([a2, a1, a0]),
-                over_lead(file.actuator.voltage_to_force),
-                over_lead(file.actuator.velocity_to_force),
+                over_lead(actuator.voltage_to_force),
+                over_lead(actuator.velocity_to_force),
             ),
             table: Table::from_thesis_units(
                 file.table.mass,
@@ -241,8 +271,60 @@ impl Nominal {
             noise,
             command_noise: file.noise.valve_command.max(0.0),
             uncertainty: file.uncertainty.relative,
+            effects,
+            sensors,
         })
     }
+}
+
+/// What the file knows of delay, friction and sensors, and its `[effects]`.
+fn known_effects(file: &File) -> Result<(Effects, Instrumentation), String> {
+    let (mut effects, mut sensors) = (Effects::default(), Instrumentation::default());
+    effects.valve.command_delay = file.command_delay.unwrap_or(0.0);
+    if let Some(own) = &file.hydraulics {
+        let friction = &mut effects.friction;
+        friction.coulomb_force = own.seal_friction;
+        friction.stribeck_force = own.seal_friction * own.seal_excess;
+        friction.stribeck_velocity = own.seal_stribeck_velocity.max(1e-6);
+        sensors.acceleration.scale_error = own.accelerometer_scale - 1.0;
+        sensors.acceleration.delay = own.accelerometer_delay.max(0.0);
+    }
+    for (name, values) in &file.effects {
+        set_effect(name, values, &mut effects, &mut sensors)?;
+    }
+    effects.validate().map_err(|error| error.to_string())?;
+    sensors
+        .validate_values()
+        .map_err(|error| error.to_string())?;
+    Ok((effects, sensors))
+}
+
+/// Sets the effect of a section `[effects.name]`.
+fn set_effect(
+    name: &str,
+    values: &BTreeMap<String, f64>,
+    effects: &mut Effects,
+    sensors: &mut Instrumentation,
+) -> Result<(), String> {
+    let known = || effects::all().map(|effect| effect.name);
+    let effect = effects::find(name).ok_or_else(|| {
+        format!(
+            "[effects.{name}]: there is no such effect{}",
+            units::hint(name, known())
+        )
+    })?;
+    for (parameter, value) in values {
+        let own = || effect.parameters.iter();
+        let field = own().find(|p| p.name == parameter).and_then(|p| p.field);
+        let field = field.ok_or_else(|| {
+            format!(
+                "[effects.{name}] {parameter}: there is no such parameter{}",
+                units::hint(parameter, own().map(|p| p.name))
+            )
+        })?;
+        *field.of(effects, sensors) = *value;
+    }
+    Ok(())
 }
 
 impl ControlLaw {

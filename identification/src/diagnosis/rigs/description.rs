@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use super::{KINDS, Rig, of_kind};
@@ -27,6 +28,9 @@ pub struct Description {
     pub nominal: BTreeMap<String, Quantity>,
     /// What is left out of the fit.
     pub left_out: LeftOut,
+    /// What an identification found besides, of which a diagnosis makes no use.
+    #[serde(default)]
+    pub transfer_function: Option<IgnoredAny>,
     /// Where the description stands.
     #[serde(skip)]
     pub path: PathBuf,

@@ -206,6 +206,7 @@ impl ExtendedRig {
             columns: self.columns.clone(),
             nominal,
             left_out: LeftOut::SecondHalf(true),
+            transfer_function: None,
             path: self.path.clone(),
         }
     }

@@ -98,6 +98,14 @@ impl ModelFile {
             what,
             expected,
         };
+        let is_one_input = toml::from_str::<toml::Table>(text)
+            .is_ok_and(|all| all.contains_key("transfer_function") && !all.contains_key("table"));
+        if is_one_input {
+            return Err(wrong(
+                "[transfer_function] alone, which says nothing of mass and force".into(),
+                "a model that was identified from acceleration and actuator_force besides",
+            ));
+        }
         let file: Self = toml::from_str(text).map_err(|error| {
             let line = error
                 .span()
@@ -244,22 +252,6 @@ impl ModelFile {
         let mut actuator_errors = Self::actuator_section(&errors.shake_table.actuator, units);
         actuator_errors.denominator[0] = 0.0;
         let delay = found.physical[Physical::CommandDelay];
-        let mut noise = toml::Table::new();
-        for (i, name) in OUTPUT_NAMES.iter().enumerate() {
-            if found
-                .model
-                .experiments
-                .first()
-                .is_some_and(|e| e.measured[i])
-            {
-                let factor = if *name == "actuator_force" {
-                    units.force
-                } else {
-                    units.length
-                };
-                noise.insert((*name).to_string(), (found.noise(0, i) / factor).into());
-            }
-        }
         Self {
             units: INCH_POUND.to_string(),
             sample_rate: found
@@ -274,9 +266,11 @@ impl ModelFile {
             table: Self::body_section([table.mass, table.damping, table.stiffness], units),
             specimen: rig.specimen.map(|own| Self::body_section(body(own), units)),
             effects: EffectSections::new(),
-            noise: Some(noise),
+            noise: Some(noise(found)),
             hydraulics: None,
-            uncertainty: None,
+            uncertainty: Some(UncertaintySection {
+                relative: uncertainty(found),
+            }),
             covariance: None,
             standard_errors: Some(StandardErrors {
                 effects: EffectSections::new(),
@@ -323,6 +317,45 @@ impl ModelFile {
     }
 }
 
+/// White noise of the first recording's channels and command, in inch and pound-force: what a
+/// diagnosis takes for it.
+fn noise(found: &RigIdentification) -> toml::Table {
+    let units = Units::INCH_POUND;
+    let acceleration = found.noise(0, 1);
+    let mut noise = toml::Table::new();
+    for (i, name) in OUTPUT_NAMES.iter().enumerate() {
+        let factor = if *name == "actuator_force" {
+            units.force
+        } else {
+            units.length
+        };
+        let first = found.model.experiments.first();
+        let is_measured = first.is_some_and(|own| own.measured[i]);
+        // A channel that is missing is as noisy as the table's accelerometer: a diagnosis wants one.
+        let own = if is_measured {
+            found.noise(0, i)
+        } else {
+            acceleration
+        };
+        noise.insert((*name).to_string(), (own / factor).into());
+    }
+    noise.insert("valve_command".into(), found.command_noise(0).into());
+    noise
+}
+
+/// The largest relative standard error of what makes the loops: oil column, gain, velocity path,
+/// mass.
+fn uncertainty(found: &RigIdentification) -> f64 {
+    use Physical::*;
+    let relative = |name: Physical| found.standard_error[name] / found.physical[name].abs();
+    [A1, B1, E0, TableMass]
+        .map(relative)
+        .into_iter()
+        .filter(|error| error.is_finite())
+        .fold(0.005, f64::max)
+        .min(0.3)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -367,6 +400,8 @@ mod tests {
             error.contains("[table]: parameter `table_mass` is -21"),
             "{error}"
         );
+        let error = message("[transfer_function]\ndelay = 0.0\n");
+        assert!(error.contains("nothing of mass and force"), "{error}");
         let error = message(&format!("units = \"furlong\"\n{NOMINAL}"));
         assert!(error.contains("units = \"furlong\""), "{error}");
         let without = format!("[table]{}", NOMINAL.split("[table]").nth(1).unwrap());

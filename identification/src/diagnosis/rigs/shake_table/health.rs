@@ -63,7 +63,8 @@ fn healthy(recording: &Recording, nominal: &Nominal) -> Option<Recording> {
     let rig = IdentifiedRig {
         shake_table: nominal.shake_table,
         specimen: nominal.specimen,
-        ..IdentifiedRig::default()
+        effects: nominal.effects,
+        sensors: nominal.sensors,
     };
     let sampled = rig.sample(period, 1).ok()?;
     let mut random = ChaCha8Rng::seed_from_u64(SEED);

@@ -63,7 +63,8 @@ impl ShakeTableModel {
             nominal: IdentifiedRig {
                 shake_table: nominal.shake_table,
                 specimen: nominal.specimen,
-                ..Default::default()
+                effects: nominal.effects,
+                sensors: nominal.sensors,
             },
             uncertainty: nominal.uncertainty,
             period,
@@ -76,7 +77,7 @@ impl ShakeTableModel {
     }
 
     /// The nominal rig with `nuisance` (in standard deviations of the parameters' logarithms, so that
-    /// factors add up) and no effects.
+    /// factors add up) and no effects but those that were known.
     pub fn rig_without_effects(&self, nuisance: &[f64]) -> IdentifiedRig {
         let mut nominal = self.nominal_rig();
         for (parameter, deviation) in PARAMETERS.iter().zip(nuisance) {
@@ -253,6 +254,8 @@ mod tests {
             noise: [1.3e-5, 0.04, 1.3, 0.025],
             command_noise: 5e-4,
             uncertainty: 0.01,
+            effects: Default::default(),
+            sensors: Default::default(),
         };
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = move || -> f64 { StandardNormal.sample(&mut random) };

@@ -1,0 +1,265 @@
+//! Transfer functions with delay: how many poles and zeros, and the numbers in them.
+
+use nalgebra::{Complex, DMatrix, DVector};
+use plant::linear::{StateSpace, TransferFunction};
+
+use crate::IdentificationError;
+use crate::estimation::instrumental_variables::stabilised;
+use crate::estimation::state_variable_filter::Between;
+
+/// A model's poles and zeros by number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Structure {
+    /// Poles beside the one at zero.
+    pub poles: usize,
+    /// Zeros, fewer than poles.
+    pub zeros: usize,
+    /// Whether there is a pole at zero: a valve that opens makes a speed.
+    pub integrates: bool,
+}
+
+impl Structure {
+    /// Coefficients and delay.
+    pub fn parameters(self) -> usize {
+        self.poles + self.zeros + 2
+    }
+
+    /// Those that are tried, the simplest first.
+    pub fn candidates(may_integrate: bool) -> Vec<Self> {
+        const ZEROS: usize = 2;
+        let mut all = Vec::new();
+        for integrates in [true, false] {
+            if integrates && !may_integrate {
+                continue;
+            }
+            // A pole at zero counts.
+            let most = if may_integrate && !integrates { 5 } else { 4 };
+            for poles in 1..=most {
+                for zeros in 0..=ZEROS.min(poles - 1) {
+                    all.push(Self {
+                        poles,
+                        zeros,
+                        integrates,
+                    });
+                }
+            }
+        }
+        all.sort_by_key(|own| own.parameters());
+        all
+    }
+}
+
+/// `y = G(s) exp(-delay s) u`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DelayedTransferFunction {
+    /// Descending powers; SI of the output over that of the input.
+    pub numerator: Vec<f64>,
+    /// Monic, descending powers.
+    pub denominator: Vec<f64>,
+    /// s.
+    pub delay: f64,
+    /// How the input runs between samples.
+    pub between: Between,
+}
+
+impl DelayedTransferFunction {
+    /// Its response at `omega` (rad/s) to an input sampled every `period` s.
+    pub fn response(&self, omega: f64, period: f64) -> Complex<f64> {
+        let s = Complex::new(0.0, omega);
+        let value = |all: &[f64]| {
+            all.iter()
+                .fold(Complex::new(0.0, 0.0), |sum, c| sum * s + c)
+        };
+        let rational = value(&self.numerator) / value(&self.denominator);
+        rational * (-s * self.delay).exp() * interpolation(omega, period, self.between)
+    }
+
+    /// Poles, 1/s.
+    pub fn poles(&self) -> Vec<Complex<f64>> {
+        self.rational().poles()
+    }
+
+    fn rational(&self) -> TransferFunction {
+        TransferFunction {
+            numerator: self.numerator.clone(),
+            denominator: self.denominator.clone(),
+        }
+    }
+
+    /// The same with time counted in the mean of its time constants, and their rate in 1/s: without
+    /// it the powers of `s` would lose the matrix exponential its digits.
+    fn in_own_time(&self) -> (TransferFunction, f64) {
+        let order = self.denominator.len() - 1;
+        let last = self.denominator.iter().rposition(|c| *c != 0.0);
+        let rate = match last {
+            Some(place @ 1..) => self.denominator[place].abs().powf(1.0 / place as f64),
+            _ => 1.0,
+        };
+        let power = |i: usize| rate.powi(i as i32);
+        let numerator = self.numerator.iter().rev().enumerate();
+        let mut numerator: Vec<f64> = numerator.map(|(own, c)| c / power(order - own)).collect();
+        numerator.reverse();
+        let denominator = self.denominator.iter().enumerate();
+        let denominator = denominator.map(|(i, c)| c / power(i)).collect();
+        let rational = TransferFunction {
+            numerator,
+            denominator,
+        };
+        (rational, rate)
+    }
+
+    /// The output from rest for an input sampled every `period` s.
+    ///
+    /// # Errors
+    /// Coefficients that make no state space.
+    pub fn simulate(&self, input: &[f64], period: f64) -> Result<Vec<f64>, IdentificationError> {
+        let (rational, rate) = self.in_own_time();
+        let system = rational
+            .to_state_space()
+            .map_err(|error| IdentificationError::Unstable {
+                what: error.to_string(),
+                remedy: "record more periods of the slowest motion".into(),
+            })?;
+        let sampled = WithSlope::new(&system, period * rate);
+        let first = input.first().copied().unwrap_or(0.0);
+        let samples = self.delay / period;
+        let at = |k: usize| {
+            let place = k as f64 - samples;
+            let before = place.floor();
+            let value = |index: f64| {
+                if index < 0.0 {
+                    first
+                } else {
+                    input[(index as usize).min(input.len() - 1)]
+                }
+            };
+            let share = place - before;
+            // The mean over a sample of what is held, or the line itself.
+            (1.0 - share) * value(before) + share * value(before + 1.0)
+        };
+        let held = self.between == Between::Held;
+        let mut state = DVector::zeros(system.order());
+        let mut output = Vec::with_capacity(input.len());
+        let mut now = at(0) - first;
+        for k in 0..input.len() {
+            output.push((&system.c * &state)[(0, 0)]);
+            // A held command that arrives within a sample: its mean over that sample.
+            let next = at(k + 1) - first;
+            let (begin, end) = if held { (now, now) } else { (now, next) };
+            state = sampled.advance(&state, begin, end);
+            now = next;
+        }
+        Ok(output)
+    }
+}
+
+/// What sampling makes of a continuous signal at `omega`: the hold, or a straight line.
+fn interpolation(omega: f64, period: f64, between: Between) -> Complex<f64> {
+    let half = 0.5 * omega * period;
+    let sinc = if half == 0.0 { 1.0 } else { half.sin() / half };
+    match between {
+        Between::Held => Complex::new(0.0, -half).exp() * sinc,
+        Between::Straight => Complex::new(sinc * sinc, 0.0),
+    }
+}
+
+/// A sampled system whose input runs straight from begin to end of a sample.
+struct WithSlope {
+    a: DMatrix<f64>,
+    b: DVector<f64>,
+    slope: DVector<f64>,
+}
+
+impl WithSlope {
+    fn new(system: &StateSpace, period: f64) -> Self {
+        let n = system.order();
+        // x' = A x + B (u + t r): input and its slope as states.
+        let mut a = DMatrix::zeros(n + 1, n + 1);
+        a.view_mut((0, 0), (n, n)).copy_from(&system.a);
+        a.view_mut((0, n), (n, 1)).copy_from(&system.b.column(0));
+        let mut b = DMatrix::zeros(n + 1, 1);
+        b[(n, 0)] = 1.0 / period;
+        let whole = StateSpace {
+            a,
+            b,
+            c: DMatrix::zeros(1, n + 1),
+            d: DMatrix::zeros(1, 1),
+        }
+        .sample(period);
+        Self {
+            a: whole.a.view((0, 0), (n, n)).into_owned(),
+            b: whole.a.view((0, n), (n, 1)).column(0).into_owned(),
+            slope: whole.b.view((0, 0), (n, 1)).column(0).into_owned(),
+        }
+    }
+
+    fn advance(&self, state: &DVector<f64>, begin: f64, end: f64) -> DVector<f64> {
+        &self.a * state + &self.b * begin + &self.slope * (end - begin)
+    }
+}
+
+/// Coefficients of a [`Structure`] in powers of `s/scale`, then the delay over `1/scale`.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Coefficients {
+    pub structure: Structure,
+    /// rad/s.
+    pub scale: f64,
+    pub between: Between,
+    /// The fastest growth of a pole, 1/s: a valve-driven rig may drift off without its loop.
+    pub growth: f64,
+}
+
+impl Coefficients {
+    /// The model of these values: denominator without its 1, numerator, delay; `None` where a pole
+    /// grows faster than [`Self::growth`].
+    pub fn model(&self, values: &[f64]) -> Option<DelayedTransferFunction> {
+        let Structure {
+            poles,
+            zeros,
+            integrates,
+        } = self.structure;
+        let (own, rest) = values.split_at(poles);
+        let (numerator, delay) = rest.split_at(zeros + 1);
+        let power = |i: usize| self.scale.powi(i as i32);
+        let mut denominator = vec![1.0];
+        denominator.extend(own.iter().enumerate().map(|(i, c)| c * power(i + 1)));
+        if !grows_less(&denominator, self.growth) {
+            return None;
+        }
+        let order = poles + usize::from(integrates);
+        if integrates {
+            denominator.push(0.0);
+        }
+        let numerator = numerator.iter().enumerate();
+        let numerator = numerator
+            .map(|(i, c)| c * power(order - zeros + i))
+            .collect();
+        Some(DelayedTransferFunction {
+            numerator,
+            denominator,
+            delay: delay.first()? / self.scale,
+            between: self.between,
+        })
+    }
+
+    /// Values whose poles are mirrored into the left half plane.
+    pub fn stable(&self, values: &[f64]) -> Vec<f64> {
+        let mut denominator = vec![1.0];
+        denominator.extend(&values[..self.structure.poles]);
+        let mut all = stabilised(&denominator)[1..].to_vec();
+        all.extend(&values[self.structure.poles..]);
+        all
+    }
+}
+
+/// Whether all roots of a monic polynomial have a real part below `growth`.
+fn grows_less(denominator: &[f64], growth: f64) -> bool {
+    let poles = || {
+        TransferFunction {
+            numerator: vec![1.0],
+            denominator: denominator.to_vec(),
+        }
+        .poles()
+    };
+    denominator.iter().all(|c| c.is_finite()) && poles().iter().all(|pole| pole.re < growth)
+}
