@@ -38,7 +38,8 @@ impl CouplingError {
 /// many per cent of the peak of each continuous output of its continuous components.
 ///
 /// # Errors
-/// As [`Prepared::simulation`]; nothing that is continuous and coupled.
+/// As [`Prepared::simulation`]; nothing that is continuous and coupled; a run that ends early whatever
+/// its step.
 pub fn refine(prepared: &mut Prepared, wanted_percent: f64) -> Result<CouplingError, MasterError> {
     let order = match prepared.algorithm {
         Algorithm::Jacobi => 1,
@@ -46,11 +47,28 @@ pub fn refine(prepared: &mut Prepared, wanted_percent: f64) -> Result<CouplingEr
     };
     let signals = continuous(prepared);
     let mut steps = vec![prepared.step];
-    let mut coarse = prepared.run(prepared.algorithm)?.record;
+    let run = |prepared: &Prepared| -> Result<(Record, bool), MasterError> {
+        let outcome = prepared.run(prepared.algorithm)?;
+        Ok((outcome.record, outcome.ended.is_regular()))
+    };
+    let (mut coarse, mut came_to_its_end) = run(prepared)?;
     loop {
         prepared.step *= 0.5;
         steps.push(prepared.step);
-        let fine = prepared.run(prepared.algorithm)?.record;
+        let (fine, is_whole) = run(prepared)?;
+        let both = came_to_its_end && is_whole && coarse.len() == fine.len();
+        came_to_its_end = is_whole;
+        // A run that ended early says nothing of the rest.
+        if !both {
+            if steps.len() > MOST_HALVINGS {
+                return Err(MasterError::Step(format!(
+                    "--coupling-error: the run ends early with every coupling step down to {} ms",
+                    1e3 * prepared.step
+                )));
+            }
+            coarse = fine;
+            continue;
+        }
         let Some((percent, signal)) = estimate(&signals, &coarse, &fine, order) else {
             return Err(MasterError::Step(
                 "--coupling-error: the system has no component that is not sampled with outputs that \
