@@ -4,7 +4,9 @@
 
 use std::path::Path;
 
-use identification::data::{Channel, DataError, Pick, Recording, Sheet, TimeBase, Wanted, decode};
+use identification::data::{
+    Called, Channel, DataError, Pick, Recording, Sheet, TimeBase, Wanted, decode,
+};
 use proptest::prelude::*;
 
 fn parse(bytes: &[u8]) -> Result<Recording, DataError> {
@@ -325,4 +327,35 @@ proptest! {
     ) {
         let _ = parse(text.as_bytes()).map(Recording::on_even_base);
     }
+}
+
+#[test]
+fn channels_that_are_called_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a.csv");
+    // `position` would be the displacement, were it not said that `LVDT 1` is.
+    std::fs::write(
+        &file,
+        "t [ms],LVDT 1,position [m],LC [kN]\n0,1,7,2\n2,2,8,3\n",
+    )
+    .unwrap();
+    let called = |channel, head: &str, unit: Option<&str>| Called {
+        channel,
+        head: head.to_string(),
+        unit: unit.map(String::from),
+    };
+    let names = [
+        called(Channel::Displacement, "LVDT 1", Some("mm")),
+        called(Channel::ActuatorForce, "LC", None),
+    ];
+    let read = Recording::read_called(&file, "a", &names).unwrap();
+    assert_eq!(read.samples(Channel::Displacement), [0.001, 0.002]);
+    assert_eq!(read.samples(Channel::ActuatorForce), [2000.0, 3000.0]);
+    assert_eq!(read.stamps().unwrap()[1], 0.002);
+    let missing = [called(Channel::Velocity, "v1", None)];
+    let error = Recording::read_called(&file, "a", &missing).unwrap_err();
+    assert!(error.to_string().contains("no column `v1`"), "{error}");
+    let without = [called(Channel::Displacement, "LVDT 1", None)];
+    let error = Recording::read_called(&file, "a", &without).unwrap_err();
+    assert!(error.to_string().contains("has no unit"), "{error}");
 }

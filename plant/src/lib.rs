@@ -11,6 +11,7 @@ pub mod integration;
 pub mod linear;
 pub mod sensors;
 pub mod servo_hydraulic;
+pub mod signal_path;
 pub mod specimens;
 
 pub use error::ModelError;

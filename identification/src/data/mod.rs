@@ -14,7 +14,7 @@ mod text;
 pub use channel::{Channel, OUTPUT_NAMES};
 pub use error::DataError;
 pub use faults::Finding;
-pub use reader::{Named, Pick, known_column, named_columns};
+pub use reader::{Called, Named, Pick, known_column, named_columns};
 pub use recording::{Recording, TimeBase};
 pub use rounded_stamps::RoundedStamps;
 pub use sheet::{Sheet, Wanted};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use units::factor_meant;
+use units::{factor_meant, split_header};
 
 use super::channel::Heading;
 use super::text::Text;
@@ -21,6 +21,23 @@ pub struct Pick<'a> {
     pub head: &'a str,
     /// Its unit.
     pub unit: &'a str,
+}
+
+/// What the files of somebody call a channel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Called {
+    /// The channel.
+    pub channel: Channel,
+    /// What stands in the header, or what stands there before the unit.
+    pub head: String,
+    /// Its unit, where the file does not say it.
+    pub unit: Option<String>,
+}
+
+impl Called {
+    fn is(&self, cell: &str) -> bool {
+        self.head == cell || self.head == split_header(cell).0
+    }
 }
 
 /// The channel that a header cell names, if it is a known one, by `name [unit]`, `name (unit)`,
@@ -50,7 +67,7 @@ pub fn named_columns(file: &Path) -> Result<Vec<Named>, DataError> {
         header: HEADER,
     };
     let sheet = Sheet::read(file, wanted)?;
-    let found = columns(&sheet);
+    let found = columns(&sheet, &[])?;
     let mut all = Vec::new();
     for channel in Channel::KNOWN {
         if let Some(column) = the_one(&found, channel, &sheet)? {
@@ -87,6 +104,19 @@ impl Recording {
         Self::parse(file, read_text(file)?, name)
     }
 
+    /// As [`Self::read`], of a file in which some channels are `called` otherwise.
+    ///
+    /// # Errors
+    /// As [`Self::read`]; a column that is not there.
+    pub fn read_called(file: &Path, name: &str, called: &[Called]) -> Result<Self, DataError> {
+        let wanted = Wanted {
+            is_column: &|cell| known_column(cell).is_some() || called.iter().any(|c| c.is(cell)),
+            header: HEADER,
+        };
+        let sheet = Sheet::read(file, wanted)?;
+        Self::channels_of(&sheet, name, called)
+    }
+
     /// Reads the text of a file, as [`Self::read`] does.
     ///
     /// # Errors
@@ -104,7 +134,11 @@ impl Recording {
     /// # Errors
     /// As [`Self::read`].
     pub fn from_sheet(sheet: &Sheet, name: &str) -> Result<Self, DataError> {
-        let found = columns(sheet);
+        Self::channels_of(sheet, name, &[])
+    }
+
+    fn channels_of(sheet: &Sheet, name: &str, called: &[Called]) -> Result<Self, DataError> {
+        let found = columns(sheet, called)?;
         let mut columns = Vec::new();
         for channel in Channel::KNOWN {
             if let Some(column) = the_one(&found, channel, sheet)? {
@@ -162,27 +196,47 @@ fn assemble(
     Ok(recording)
 }
 
-fn columns(sheet: &Sheet) -> Vec<Column> {
+/// The columns of known channels; those that are `called` otherwise take the place of others.
+fn columns(sheet: &Sheet, called: &[Called]) -> Result<Vec<Column>, DataError> {
+    let below = |place: usize| {
+        let unit = sheet.unit_below(place);
+        unit.map(|(line, unit)| (line, unit.to_string()))
+    };
+    let mut found = Vec::new();
+    for own in called {
+        let heads = sheet.heads();
+        let exact = heads.iter().position(|cell| *cell == own.head);
+        let place = exact.or_else(|| heads.iter().position(|cell| own.is(cell)));
+        let place = place.map_or_else(|| sheet.place(&own.head), Ok)?;
+        let given = own.unit.as_deref().or(split_header(&heads[place]).1);
+        let given = given.map(|unit| (sheet.header_line(), unit.to_string()));
+        found.push(Column {
+            channel: own.channel,
+            place,
+            name: own.head.clone(),
+            own_name: true,
+            unit: given.or_else(|| below(place)),
+        });
+    }
     let headings = sheet.heads().iter().enumerate();
-    headings
-        .filter_map(|(place, cell)| {
-            let heading = Heading::parse(cell)?;
-            let in_header = heading.unit_text().map(|unit| (sheet.header_line(), unit));
-            let below = || {
-                sheet
-                    .unit_below(place)
-                    .map(|(line, unit)| (line, unit.into()))
-            };
-            let unit = in_header.or_else(below);
-            Some(Column {
-                channel: meant(heading.channel, heading.is_own_name(), unit.as_ref()),
-                place,
-                name: heading.name.to_string(),
-                own_name: heading.is_own_name(),
-                unit,
-            })
+    let known = headings.filter_map(|(place, cell)| {
+        let heading = Heading::parse(cell)?;
+        let in_header = heading.unit_text().map(|unit| (sheet.header_line(), unit));
+        let unit = in_header.or_else(|| below(place));
+        let channel = meant(heading.channel, heading.is_own_name(), unit.as_ref());
+        let is_taken = called
+            .iter()
+            .any(|own| own.channel == channel || own.is(cell));
+        (!is_taken).then(|| Column {
+            channel,
+            place,
+            name: heading.name.to_string(),
+            own_name: heading.is_own_name(),
+            unit,
         })
-        .collect()
+    });
+    found.extend(known);
+    Ok(found)
 }
 
 /// A command in a unit of length is the displacement that was asked for.

@@ -6,7 +6,10 @@ use super::case::{Case, CaseError};
 use super::engine::Observer;
 use super::report::DiagnosisReport;
 use super::rigs::shake_table;
-use super::rigs::{self, Description, DescriptionError, Measurement, RigDiagnosis, renamed};
+use super::rigs::{
+    self, Description, DescriptionError, Measurement, RigDiagnosis, column_map, renamed,
+};
+use crate::data::{Called, Channel};
 
 /// What is diagnosed.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,12 +35,46 @@ pub enum DiagnosisError {
          with the description of a rig (.toml) only"
     )]
     DataOfACase,
-    /// Names of columns were given with a case.
+    /// A map of columns names a channel that no case has.
     #[error(
-        "the columns of a case have the names of docs/data-files.md, or others that it lists; a map \
-         goes with the description of a rig (.toml) only"
+        "{}: `{channel}` is no channel of a case, which has {}{}",
+        map.display(), channels(), units::hint(channel, names())
     )]
-    ColumnsOfACase,
+    Channel {
+        /// The map.
+        map: PathBuf,
+        /// The name.
+        channel: String,
+    },
+}
+
+/// Names of the channels that a case may have.
+fn names() -> impl Iterator<Item = &'static str> {
+    Channel::KNOWN.into_iter().map(Channel::name)
+}
+
+fn channels() -> String {
+    names().collect::<Vec<_>>().join(", ")
+}
+
+/// What a map of columns calls the channels of a case.
+fn called(map: &Path) -> Result<Vec<Called>, DiagnosisError> {
+    let all = column_map(map)?.into_iter();
+    all.map(|(name, (head, unit))| {
+        let mut known = Channel::KNOWN.into_iter();
+        match known.find(|channel| channel.name() == name) {
+            Some(channel) => Ok(Called {
+                channel,
+                head,
+                unit,
+            }),
+            None => Err(DiagnosisError::Channel {
+                map: map.to_owned(),
+                channel: name,
+            }),
+        }
+    })
+    .collect()
 }
 
 /// What came out, in full.
@@ -63,11 +100,11 @@ pub enum Diagnosis<'a> {
 
 impl Subject {
     /// Reads the description of a rig where `path` ends in `.toml`, with `data` in place of the files
-    /// that it names if there are any, whose columns the file `columns` may name otherwise; a case
-    /// folder elsewhere.
+    /// that it names if there are any; a case folder elsewhere. The file `columns` may name the columns
+    /// otherwise.
     ///
     /// # Errors
-    /// Files that cannot be read or understood, by name and place; `data` or `columns` with a case.
+    /// Files that cannot be read or understood, by name and place; `data` with a case.
     pub fn read(
         path: &Path,
         data: &[PathBuf],
@@ -83,10 +120,9 @@ impl Subject {
             }
             let measurement = description.measurement(data)?;
             Ok(Self::Rig(Box::new((description, measurement))))
-        } else if columns.is_some() {
-            Err(DiagnosisError::ColumnsOfACase)
         } else if data.is_empty() {
-            Ok(Self::Case(Box::new(Case::read(path)?)))
+            let called = columns.map(called).transpose()?.unwrap_or_default();
+            Ok(Self::Case(Box::new(Case::read_called(path, &called)?)))
         } else {
             Err(DiagnosisError::DataOfACase)
         }

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use identification::diagnosis::DiagnosisReport;
 use identification::diagnosis::engine::{Observer, Progress};
 
 use super::progress;
-use crate::diagnosis::{diagnose, files, model, template, text};
+use crate::diagnosis::{diagnose, files, foreign, model, template, text};
 use crate::error::Error;
 use crate::results::unused;
 
@@ -19,28 +20,38 @@ use crate::results::unused;
     shakebench diagnose identification/rigs/positioning_drive.toml --out results\n  \
     shakebench diagnose --template oscillator > rig.toml\n  \
     shakebench diagnose --model results/extended_model.toml --validate later.csv\n  \
-    shakebench diagnose --model results/extended_model.toml --predict input.csv --out prediction.csv\n\n\
+    shakebench diagnose --model results/extended_model.toml --predict input.csv --out prediction.csv\n  \
+    shakebench diagnose --fmu Theirs.fmu --template map > map.toml\n  \
+    shakebench diagnose --fmu Theirs.fmu --map map.toml test.csv\n\n\
     A case is a folder with nominal.toml, identification.csv and validation.csv, and may have\n\
     small.csv and baseline.csv. Each header cell is `name [unit]`, in any order and unit; columns\n\
     of other names are left alone.")]
 pub struct Arguments {
-    /// Folder of a case (nominal.toml and records), or description of a rig (.toml)
-    #[arg(required_unless_present_any = ["template", "model"])]
-    case: Option<PathBuf>,
+    /// Folder of a case (nominal.toml and records), description of a rig (.toml), or data files of an FMU
+    #[arg(value_name = "CASE", required_unless_present_any = ["template", "model"])]
+    cases: Vec<PathBuf>,
     /// Data files in place of those that the description of a rig names
     #[arg(long, value_name = "FILE")]
     data: Vec<PathBuf>,
-    /// What the columns of a rig's files are called: `channel = "header"` or
-    /// `channel = { column = "header", unit = "mm" }` a line, in place of the description's
+    /// What the columns of the files are called: `channel = "header"` or
+    /// `channel = { column = "header", unit = "mm" }` a line, in place of the usual names or of the
+    /// description's
     #[arg(long, value_name = "MAP.toml")]
     columns: Option<PathBuf>,
     /// Print a commented description to fill in: table, actuator, drive, hysteretic device, material or
-    /// oscillator
-    #[arg(long, value_name = "KIND", conflicts_with_all = ["case", "model", "data"])]
+    /// oscillator; with --fmu, `map`
+    #[arg(long, value_name = "KIND", conflicts_with_all = ["cases", "model", "data"])]
     template: Option<String>,
     /// Extended model of a rig that a diagnosis wrote; nothing is fitted
-    #[arg(long, value_name = "EXTENDED.toml", conflicts_with_all = ["case", "data"])]
+    #[arg(long, value_name = "EXTENDED.toml", conflicts_with_all = ["cases", "data"])]
     model: Option<PathBuf>,
+    /// Diagnose a model that came as an FMU, by effects at its inputs and outputs and drifts of its
+    /// parameters, on data files in place of CASE
+    #[arg(long, value_name = "MODEL.fmu", conflicts_with_all = ["model", "columns"])]
+    fmu: Option<PathBuf>,
+    /// Which column of the data is which input and output of the FMU
+    #[arg(long, value_name = "MAP.toml", requires = "fmu")]
+    map: Option<PathBuf>,
     /// Score the model on these files
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "model")]
     validate: Vec<PathBuf>,
@@ -74,14 +85,33 @@ pub struct Arguments {
 /// What is at fault, by file and place; nothing is written then.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if let Some(kind) = &arguments.template {
-        print!("{}", template(kind)?);
+        let text = match &arguments.fmu {
+            Some(fmu) if kind.eq_ignore_ascii_case("map") => foreign::template(fmu)?,
+            Some(_) => {
+                return Err(Error::Option {
+                    option: "--template",
+                    reason: format!("`{kind}` with --fmu: expected `map`"),
+                });
+            }
+            None => template(kind)?,
+        };
+        print!("{text}");
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(path) = &arguments.model {
         return with_model(arguments, path);
     }
-    let Some(case) = &arguments.case else {
-        return Ok(ExitCode::SUCCESS);
+    let case = match (&arguments.fmu, arguments.cases.as_slice()) {
+        (Some(fmu), _) => fmu,
+        (None, [case]) => case,
+        (None, _) => {
+            return Err(Error::Option {
+                option: "CASE",
+                reason: "expected one case or description; data files in place of a description's \
+                         own go with --data"
+                    .into(),
+            });
+        }
     };
     let folder = arguments.out.clone().unwrap_or_else(|| {
         let place = std::path::absolute(case).unwrap_or_else(|_| case.clone());
@@ -108,7 +138,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     let columns = arguments.columns.as_deref();
     let observer = Observer::new(&tell);
-    let report = diagnose(case, &arguments.data, columns, &folder, observer);
+    let report = match &arguments.fmu {
+        Some(fmu) => of_fmu(arguments, fmu, &folder, observer),
+        None => diagnose(case, &arguments.data, columns, &folder, observer),
+    };
     bar.finish_and_clear();
     let report = report?;
     if arguments.json {
@@ -121,6 +154,32 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn of_fmu(
+    arguments: &Arguments,
+    fmu: &Path,
+    folder: &Path,
+    observer: Observer<'_>,
+) -> Result<DiagnosisReport, Error> {
+    let Some(map) = &arguments.map else {
+        return Err(Error::Option {
+            option: "--fmu",
+            reason: format!(
+                "expected --map MAP.toml with it; `shakebench diagnose --fmu {} --template map` prints \
+                 one to fill in",
+                fmu.display()
+            ),
+        });
+    };
+    let files = arguments.cases.iter().chain(&arguments.data);
+    foreign::diagnose(
+        fmu,
+        map,
+        &files.cloned().collect::<Vec<_>>(),
+        folder,
+        observer,
+    )
 }
 
 fn with_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {

@@ -3,6 +3,7 @@
 
 mod case;
 pub mod co_simulation;
+pub mod foreign;
 pub mod model;
 mod page;
 mod pictures;
@@ -14,6 +15,7 @@ use std::time::Instant;
 
 use identification::diagnosis::case::{CaseError, template as case_template};
 use identification::diagnosis::engine::Observer;
+use identification::diagnosis::rigs::foreign::KIND;
 use identification::diagnosis::rigs::{
     DescriptionError, KINDS, Rig, like, template as rig_template,
 };
@@ -34,7 +36,7 @@ pub const DIAGNOSIS: &str = "diagnosis.json";
 /// Diagnoses the case in folder `subject`, or the rig that the description `subject` (`.toml`)
 /// tells of, on `data` in place of its own files if there are any. Writes the extended model, its
 /// FMUs, the JSON object, the report and, of a rig, curves and pictures into `folder`, all or
-/// nothing. The file `columns` may name the columns of a rig's files otherwise. `observer` is told what
+/// nothing. The file `columns` may name the columns otherwise. `observer` is told what
 /// is tried.
 ///
 /// # Errors
@@ -81,8 +83,13 @@ pub fn files(report: &DiagnosisReport, folder: &Path) -> Vec<PathBuf> {
     let mut files = [report::FILE, DIAGNOSIS, EXTENDED_MODEL]
         .map(|name| folder.join(name))
         .to_vec();
-    if matches!(report.evidence, Evidence::Rig(_)) {
-        files.extend(rig::FILES.map(|name| folder.join(name)));
+    if let Evidence::Rig(evidence) = &report.evidence {
+        let own = match evidence.rig.kind.as_str() {
+            KIND => &foreign::FILES[..],
+            _ => &rig::FILES[..],
+        };
+        let own = own.iter().map(|name| folder.join(name));
+        files.extend(own.filter(|file| file.is_file()));
     }
     files.extend(report.extended_fmus.iter().cloned());
     files
@@ -130,7 +137,7 @@ fn fault(subject: &Path, error: DiagnosisError) -> Error {
             option: "--data",
             reason: error.to_string(),
         },
-        DiagnosisError::ColumnsOfACase => Error::Option {
+        DiagnosisError::Channel { .. } => Error::Option {
             option: "--columns",
             reason: error.to_string(),
         },

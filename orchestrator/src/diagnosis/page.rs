@@ -5,6 +5,7 @@ use std::path::Path;
 use identification::diagnosis::case::Case;
 use identification::diagnosis::engine::Verdict;
 use identification::diagnosis::rigs::curves::Curves;
+use identification::diagnosis::rigs::foreign::KIND;
 use identification::diagnosis::rigs::shake_table::Diagnosis;
 use identification::diagnosis::rigs::{NamedValue, RigDiagnosis};
 use identification::diagnosis::{DiagnosisReport, Evidence, GainReport, ShakeTableEvidence};
@@ -13,7 +14,7 @@ use super::case::Extended;
 use super::{DIAGNOSIS, pictures, rig, text};
 use crate::extended_model::ExtendedModel;
 use crate::report::number::significant;
-use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Report, Section, Table, identity};
+use crate::report::{Bar, BarGroup, Bars, Cell, Fact, Panel, Report, Section, Table, identity};
 use plant::identified::nominal::{shake_table_values, specimen_values};
 
 /// A table of `rows`, of which the first are the headings.
@@ -68,6 +69,24 @@ pub(super) fn of_rig(
     curves: &[Curves],
 ) -> Report {
     let sections = rig_sections(report, Some(curves));
+    page(name, &place.display().to_string(), report, sections)
+}
+
+/// The report on a model that came as the FMU `place`.
+pub(super) fn of_foreign(
+    name: &str,
+    place: &Path,
+    report: &DiagnosisReport,
+    panels: Vec<Panel>,
+) -> Report {
+    let mut sections = rig_sections(report, None);
+    let pictures = Section {
+        heading: "Measured and simulated".into(),
+        text: vec!["The first record that holds data left out.".into()],
+        panels,
+        ..Section::default()
+    };
+    sections.insert(sections.len().saturating_sub(1), pictures);
     page(name, &place.display().to_string(), report, sections)
 }
 
@@ -157,7 +176,12 @@ fn extended_rig(rig: &RigDiagnosis) -> Section {
     }
     Section {
         heading: "The extended model".into(),
-        text: vec!["The values of extended_model.toml. SI.".into()],
+        text: vec![match rig.kind.as_str() {
+            KIND => {
+                "What stands around the model in extended_model.toml, in the model's units.".into()
+            }
+            _ => "The values of extended_model.toml. SI.".into(),
+        }],
         tables: vec![Table::headed("", rows)],
         ..Section::default()
     }

@@ -1,5 +1,6 @@
 //! A diagnosis on the terminal, and the tables that it shares with the report.
 
+use identification::diagnosis::rigs::foreign::KIND;
 use identification::diagnosis::rigs::shake_table::{laboratory_unit, with_error};
 use identification::diagnosis::rigs::{PartReport, RigDiagnosis};
 use identification::diagnosis::{
@@ -38,6 +39,7 @@ fn interval(parameter: &ParameterReport, unit: &str) -> String {
     let size = ends[0].abs().max(ends[1].abs());
     let digits = (size / half.max(1e-300)).log10().ceil().clamp(0.0, 6.0) as usize + 2;
     let [low, high] = ends.map(|end| significant(factor * end, digits));
+    let unit = if unit == "1" { "" } else { unit };
     format!("{low} to {high} {unit}").trim_end().to_string()
 }
 
@@ -47,7 +49,9 @@ pub(super) fn parameters(report: &DiagnosisReport) -> Vec<Vec<String>> {
     let is_case = matches!(report.evidence, Evidence::ShakeTable(_));
     let mut heading = vec!["effect", "parameter"];
     heading.extend(is_case.then_some("laboratory"));
-    heading.extend(["SI", "95 % interval", "confidence"]);
+    let is_foreign = matches!(&report.evidence, Evidence::Rig(own) if own.rig.kind == KIND);
+    let value = if is_foreign { "value" } else { "SI" };
+    heading.extend([value, "95 % interval", "confidence"]);
     heading.extend((!is_case).then_some("on every part"));
     let mut rows = vec![heading.into_iter().map(String::from).collect()];
     for effect in &report.effects {

@@ -1,6 +1,7 @@
 //! Effects that a model lacks: hidden by an independent program, put on measurements, or neither.
 
 mod extended_model;
+mod foreign;
 mod hidden_effects;
 mod measured;
 mod spreadsheet_files;

@@ -10,7 +10,7 @@ pub use template::template;
 
 use std::path::{Path, PathBuf};
 
-use crate::data::{DataError, Recording};
+use crate::data::{Called, DataError, Recording};
 
 /// A folder with `nominal.toml`, `identification.csv`, `validation.csv` and, if there,
 /// `small.csv` and `baseline.csv`.
@@ -64,6 +64,14 @@ impl Case {
     /// # Errors
     /// A file that is missing or cannot be understood.
     pub fn read(folder: &Path) -> Result<Self, CaseError> {
+        Self::read_called(folder, &[])
+    }
+
+    /// As [`Self::read`], where the files call some channels otherwise.
+    ///
+    /// # Errors
+    /// As [`Self::read`]; a column that is not there.
+    pub fn read_called(folder: &Path, called: &[Called]) -> Result<Self, CaseError> {
         let file = folder.join("nominal.toml");
         let fail = |reason: String| CaseError::File {
             file: file.clone(),
@@ -71,7 +79,8 @@ impl Case {
         };
         let text = std::fs::read_to_string(&file).map_err(|error| fail(error.to_string()))?;
         let nominal = Nominal::parse(&text).map_err(fail)?;
-        let recording = |name: &str| Recording::read(&folder.join(format!("{name}.csv")), name);
+        let recording =
+            |name: &str| Recording::read_called(&folder.join(format!("{name}.csv")), name, called);
         let optional = |name: &str| {
             let there = folder.join(format!("{name}.csv")).exists();
             there.then(|| recording(name)).transpose()

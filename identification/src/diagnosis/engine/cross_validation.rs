@@ -26,8 +26,6 @@ const LEAST_DEVIATE: f64 = 3.0;
 const LEAST_GAIN: f64 = 0.05;
 /// A candidate that gains this share of what the one taken gains is its rival.
 const RIVAL: f64 = 0.9;
-/// And what it leaves is at most so many times what that leaves.
-const LEAVES: f64 = 1.5;
 /// A candidate whose fit gains less than this share of the best one's is not tested on unseen data.
 const WORTH_TESTING: f64 = 0.7;
 /// Effects in one model.
@@ -191,10 +189,10 @@ impl Inside {
     }
 }
 
-/// Whether an effect with this `gain` rivals the one `taken`: it takes away nearly as much, and leaves
-/// little more.
-fn rivals(gain: f64, taken: f64) -> bool {
-    gain > RIVAL * taken && 1.0 - gain < LEAVES * (1.0 - taken)
+/// Whether an effect with this `gain` rivals the one `taken`: it takes away nearly as much, and
+/// `leaves` at most so many times what that leaves.
+fn rivals(gain: f64, taken: f64, leaves: f64) -> bool {
+    gain > RIVAL * taken && 1.0 - gain < leaves * (1.0 - taken)
 }
 
 /// Compares two models by their errors from [`CrossValidation::crossed`].
@@ -352,7 +350,8 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         let (_, replaced) = self.fitted(without, &[rival])?.pop()?;
         let before = self.crossed(without)?;
         let gain = |fitted: &Simulated| Some(compare(&before, &self.crossed(fitted)?).gain);
-        Some(rivals(gain(&replaced)?, gain(current)?))
+        let leaves = self.model.rivals_leave();
+        Some(rivals(gain(&replaced)?, gain(current)?, leaves))
     }
 
     fn tell(&self, fitted: &Simulated, inside: &Inside) {
@@ -420,7 +419,10 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
 
     fn round(&mut self, taken: &Simulated, lost: &[Simulated]) {
         let newest = |fitted: &Simulated| fitted.point.effects.last().map(|(i, _)| *i);
-        let near = lost.iter().filter(|one| rivals(one.gain, taken.gain));
+        let leaves = self.model.rivals_leave();
+        let near = lost
+            .iter()
+            .filter(|one| rivals(one.gain, taken.gain, leaves));
         self.rivals.extend(near.filter_map(|rival| {
             Some(Rival {
                 effect: newest(rival)?,

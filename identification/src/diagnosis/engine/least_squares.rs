@@ -67,6 +67,12 @@ pub trait SimulatedModel: Sync {
         WEAK
     }
 
+    /// How many times the squared error of the effect that was taken a rival of it leaves at most; more
+    /// than little where even a right model leaves errors of its own.
+    fn rivals_leave(&self) -> f64 {
+        1.5
+    }
+
     /// The same model with its nominal parameters held near what was stated.
     #[must_use]
     fn held(&self) -> Self

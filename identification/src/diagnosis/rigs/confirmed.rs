@@ -5,11 +5,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::diagnosis::NamedValue;
-use super::measured::{EVERYTHING, Measured, Part, file};
+use super::parts::{EVERYTHING, InParts, Part, file};
 use crate::diagnosis::engine::resampling::gain_interval;
-use crate::diagnosis::engine::{
-    Point, Role, SimulatedModel, all_errors, completed, estimates, refit,
-};
+use crate::diagnosis::engine::{Point, Role, all_errors, completed, estimates, refit};
 use crate::diagnosis::report::ends_or_not_a_number;
 
 /// A parameter differs between parts where its estimates lie this many of their standard errors
@@ -54,7 +52,7 @@ pub(super) type Refused = (usize, String);
 
 /// Why an effect of `point` is not to be named: a size at its bound, or no size whose interval of 95 %
 /// leaves zero out.
-pub(super) fn unfit(measured: &Measured<'_>, point: &Point, deviations: &[f64]) -> Vec<Refused> {
+pub(super) fn unfit<M: InParts>(measured: &M, point: &Point, deviations: &[f64]) -> Vec<Refused> {
     let mut refused = Vec::new();
     let mut place = point.nuisance.len();
     for (index, internal) in &point.effects {
@@ -72,7 +70,10 @@ pub(super) fn unfit(measured: &Measured<'_>, point: &Point, deviations: &[f64]) 
             let values = candidate.parameters.iter().zip(internal);
             let own = values.into_iter().find(|(p, _)| p.name == parameter.name);
             let value = own.map_or(f64::NAN, |(p, &q)| p.scale.to_value(q));
-            let (name, unit) = (parameter.name, parameter.unit);
+            let of = candidate.parameters.iter();
+            let place = of.clone().position(|p| p.name == parameter.name);
+            let unit = measured.unit(*index, place.unwrap_or(0));
+            let name = parameter.name;
             format!("`{name}` stands at its bound of {value:.4e} {unit}")
         });
         if let Some(reason) = bound {
@@ -87,56 +88,30 @@ pub(super) fn unfit(measured: &Measured<'_>, point: &Point, deviations: &[f64]) 
     refused
 }
 
-/// Nominal parameters at `point` with standard errors.
-pub(super) fn parameters(
-    measured: &Measured<'_>,
-    point: &Point,
-    deviations: &[f64],
-) -> Vec<NamedValue> {
-    let values = measured.nominal_values(point);
-    let names = measured.uncertain_names();
-    let known = measured.rig.parameters();
-    names
-        .iter()
-        .enumerate()
-        .filter_map(|(i, name)| {
-            let place = known.iter().position(|(k, _)| k == name)?;
-            let mut moved = point.clone();
-            // A small step: the logarithm of a badly known parameter is curved.
-            moved.nuisance[i] += 1e-3;
-            let slope = (measured.nominal_values(&moved)[place] - values[place]).abs() / 1e-3;
-            Some(NamedValue {
-                name: (*name).to_owned(),
-                value: values[place],
-                unit: known[place].1.to_owned(),
-                standard_error: slope * deviations.get(i).copied().unwrap_or(f64::NAN),
-            })
-        })
-        .collect()
-}
-
-/// Parameters of the effects at `point` with standard errors.
-fn effects(
-    measured: &Measured<'_>,
+/// Parameters of the effects at `point` with standard errors, under the model's names.
+pub(super) fn effects<M: InParts>(
+    measured: &M,
     point: &Point,
     deviations: &[f64],
 ) -> Vec<(String, Vec<NamedValue>)> {
     let named = estimates(measured.candidates(), point, deviations);
-    let own = named.into_iter().map(|effect| {
-        let values = effect.parameters.into_iter().map(|p| NamedValue {
+    let own = named.into_iter().zip(&point.effects);
+    own.map(|(effect, (index, _))| {
+        let values = effect.parameters.into_iter().enumerate();
+        let values = values.map(|(i, p)| NamedValue {
             name: p.name,
             value: p.value,
-            unit: p.unit.to_owned(),
+            unit: measured.unit(*index, i),
             standard_error: p.standard_error,
         });
-        (effect.effect.to_owned(), values.collect())
-    });
-    own.collect()
+        (measured.name(*index), values.collect())
+    })
+    .collect()
 }
 
 /// All parameters of a fit, by a name for people.
-fn listed(measured: &Measured<'_>, point: &Point, deviations: &[f64]) -> Vec<NamedValue> {
-    let mut all = parameters(measured, point, deviations);
+fn listed<M: InParts>(measured: &M, point: &Point, deviations: &[f64]) -> Vec<NamedValue> {
+    let mut all = measured.parameters(point, deviations);
     for (effect, values) in effects(measured, point, deviations) {
         all.extend(values.into_iter().map(|value| NamedValue {
             name: format!("{effect}.{}", value.name),
@@ -153,7 +128,7 @@ struct Fits {
     files: Vec<(usize, Point, Vec<f64>)>,
 }
 
-fn fits(measured: &Measured<'_>, start: &Point) -> Option<Fits> {
+fn fits<M: InParts>(measured: &M, start: &Point) -> Option<Fits> {
     let (first, second) = rayon::join(
         || refit(measured, start, Part::Fitted as usize),
         || refit(measured, start, Part::LeftOut as usize),
@@ -178,8 +153,8 @@ fn fits(measured: &Measured<'_>, start: &Point) -> Option<Fits> {
 
 /// What is found beside the effects, and the model; none where it cannot be fitted. Effects of
 /// `start` that turn out to be unfit leave it, each with its reason.
-pub(super) fn confirm(
-    measured: &Measured<'_>,
+pub(super) fn confirm<M: InParts>(
+    measured: &M,
     start: &Point,
     refused: &mut Vec<Refused>,
     findings: &mut Vec<String>,
@@ -209,12 +184,12 @@ pub(super) fn confirm(
         || (origin.clone(), Vec::new()),
         |(found, deviations)| (found.point, deviations),
     );
+    let own = measured.parameters(point, deviations);
+    let count = own.len();
     let mut all = listed(measured, point, deviations);
     differences(measured, &fits, &mut all, findings);
-    surprises(measured, &all, findings);
+    surprises(measured, &all, count, findings);
     let scattered: Vec<f64> = all.iter().map(|value| value.standard_error).collect();
-    let own = parameters(measured, point, deviations);
-    let count = own.len();
     let with_errors = |values: Vec<NamedValue>, from: usize| -> Vec<NamedValue> {
         let pairs = values.into_iter().zip(&scattered[from..]);
         pairs
@@ -251,7 +226,7 @@ pub(super) fn confirm(
         ),
         refitted_error: measured.normalised_error(&refitted, EVERYTHING),
         fitted_error: measured.normalised_error(point, EVERYTHING),
-        refitted: parameters(measured, &refitted, &refitted_deviations),
+        refitted: measured.parameters(&refitted, &refitted_deviations),
         parameters: with_errors(own, 0),
         effects,
         point: point.clone(),
@@ -261,8 +236,8 @@ pub(super) fn confirm(
 
 /// Widens the standard errors of `all` to the scatter between parts and files, and tells which
 /// parameters are not the same there.
-fn differences(
-    measured: &Measured<'_>,
+fn differences<M: InParts>(
+    measured: &M,
     fits: &Fits,
     all: &mut [NamedValue],
     findings: &mut Vec<String>,
@@ -327,8 +302,14 @@ fn differences(
 }
 
 /// Tells which nominal parameters are not what was stated.
-fn surprises(measured: &Measured<'_>, all: &[NamedValue], findings: &mut Vec<String>) {
-    for (i, value) in all.iter().take(measured.uncertain()).enumerate() {
+fn surprises<M: InParts>(
+    measured: &M,
+    all: &[NamedValue],
+    count: usize,
+    findings: &mut Vec<String>,
+) {
+    // The effects' parameters follow the nominal ones.
+    for (i, value) in all.iter().take(count).enumerate() {
         let (stated, deviation) = measured.stated(i);
         let off = (value.value - stated).abs();
         if off > SURPRISING * deviation && off > SURPRISING * value.standard_error {

@@ -3,7 +3,8 @@
 use std::io::{Read, Write};
 
 use super::diagnosis::RigDiagnosis;
-use super::measured::{EVERYTHING, Measured};
+use super::measured::Measured;
+use super::parts::{EVERYTHING, InParts};
 use super::{Description, DescriptionError, Measurement, RigRecording};
 use crate::data::Channel;
 use crate::diagnosis::engine::completed;

@@ -103,49 +103,57 @@ enum Renamed {
     Column(Column),
 }
 
-/// `columns` with the names that the file `map` gives them: `channel = "header"` or
-/// `channel = { column = "header", unit = "mm" }` a line.
+/// The names that the file `map` gives channels: `channel = "header"` or
+/// `channel = { column = "header", unit = "mm" }` a line; header and unit by channel.
 ///
 /// # Errors
-/// A file that cannot be read or is no such map; a channel without a unit, by name.
-pub fn renamed(
-    columns: &BTreeMap<String, Column>,
+/// A file that cannot be read or is no such map.
+pub fn column_map(
     map: &Path,
-) -> Result<BTreeMap<String, Column>, DescriptionError> {
+) -> Result<BTreeMap<String, (String, Option<String>)>, DescriptionError> {
     let text = std::fs::read_to_string(map).map_err(|source| DescriptionError::Read {
         path: map.to_owned(),
         source,
     })?;
-    let wrong = |what: String| DescriptionError::Description {
-        path: map.to_owned(),
-        what,
+    let names: BTreeMap<String, Renamed> =
+        toml::from_str(&text).map_err(|error| DescriptionError::Description {
+            path: map.to_owned(),
+            what: format!(
+                "expected `channel = \"header\"` or `channel = {{ column = \"header\", unit = \"mm\" \
+                 }}`: {error}"
+            ),
+        })?;
+    let parts = |renamed| match renamed {
+        Renamed::Header(header) => (header, None),
+        Renamed::Column(column) => (column.column, Some(column.unit)),
     };
-    let names: BTreeMap<String, Renamed> = toml::from_str(&text).map_err(|error| {
-        wrong(format!(
-            "expected `channel = \"header\"` or `channel = {{ column = \"header\", unit = \"mm\" \
-             }}`: {error}"
-        ))
-    })?;
+    let all = names.into_iter();
+    Ok(all.map(|(channel, name)| (channel, parts(name))).collect())
+}
+
+/// `columns` with the names that the file `map` gives them, as [`column_map`] reads it.
+///
+/// # Errors
+/// As [`column_map`]; a channel without a unit, by name.
+pub fn renamed(
+    columns: &BTreeMap<String, Column>,
+    map: &Path,
+) -> Result<BTreeMap<String, Column>, DescriptionError> {
     let mut all = columns.clone();
-    for (channel, name) in names {
-        let column = match name {
-            Renamed::Column(column) => column,
-            Renamed::Header(header) => {
-                let known = columns.get(&channel).ok_or_else(|| {
-                    let names: Vec<&str> = columns.keys().map(String::as_str).collect();
-                    wrong(format!(
-                        "`{channel}` is no channel of the description, which has {}; a new one \
-                         needs its unit",
-                        listed(&names)
-                    ))
-                })?;
-                Column {
-                    column: header,
-                    unit: known.unit.clone(),
-                }
+    for (channel, (column, unit)) in column_map(map)? {
+        let known = columns.get(&channel).map(|known| known.unit.clone());
+        let unit = unit.or(known).ok_or_else(|| {
+            let names: Vec<&str> = columns.keys().map(String::as_str).collect();
+            DescriptionError::Description {
+                path: map.to_owned(),
+                what: format!(
+                    "`{channel}` is no channel of the description, which has {}; a new one needs \
+                     its unit",
+                    listed(&names)
+                ),
             }
-        };
-        all.insert(channel, column);
+        })?;
+        all.insert(channel, Column { column, unit });
     }
     Ok(all)
 }

@@ -3,13 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::super::report::{ends_or_not_a_number, or_not_a_number};
-use super::confirmed::{Confirmed, Refused, confirm, parameters, unfit};
-use super::measured::{Measured, Part};
+use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
+use super::measured::Measured;
+use super::parts::{InParts, Part};
 use super::{Description, DescriptionError, Measurement};
 use crate::diagnosis::engine::resampling::gain_interval;
 use crate::diagnosis::engine::{
-    Observer, Point, Progress, Selected, SimulatedModel, Verdict, all_errors, completed, estimates,
-    select,
+    Observer, Point, Progress, Selected, Verdict, all_errors, completed, select,
 };
 
 /// A parameter of the extended model, SI.
@@ -124,12 +124,17 @@ pub fn diagnose(
 ) -> Result<RigDiagnosis, DescriptionError> {
     let rig = description.rig()?;
     let nominal = description.nominal(rig)?;
-    let measured = Measured::new(rig, measurement, nominal);
-    let part = |fitted: Part| -> Result<PartReport, DescriptionError> {
+    let measured = Measured::new(rig, measurement, nominal).called(&description.name);
+    judge(&measured, observer).ok_or_else(|| no_output(description))
+}
+
+/// Diagnoses a model on its data; none where the nominal model cannot be simulated.
+pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<RigDiagnosis> {
+    let part = |fitted: Part| -> Option<PartReport> {
         let record = fitted as usize;
         observer.tell(|| Progress::Fitting(measured.record_name(record).to_owned()));
-        let selected = select(&measured, record, observer).ok_or_else(|| no_output(description))?;
-        Ok(part_report(&measured, fitted, &selected))
+        let selected = select(measured, record, observer)?;
+        Some(part_report(measured, fitted, &selected))
     };
     let as_described = part(Part::Fitted)?;
     let swapped = part(Part::LeftOut)?;
@@ -142,11 +147,9 @@ pub fn diagnose(
     let (here, there) = (list(&as_described), list(&swapped));
     // Effects that records of a rig cannot tell apart confirm each other.
     let alike = |name: &str, other: &str| {
+        let known = |name: &str| measured.index(name);
         name == other
-            || measured
-                .candidates()
-                .iter()
-                .any(|c| c.effect == name && c.look_alikes.contains(&other))
+            || matches!((known(name), known(other)), (Some(a), Some(b)) if measured.are_alike(a, b))
     };
     let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
     let only = here.iter().filter(|name| !in_both(name, &there));
@@ -162,10 +165,7 @@ pub fn diagnose(
         })
         .collect();
     // Of what both parts ask for, what either part gives a reason against is not named.
-    let index = |name: &str| {
-        let mut all = measured.candidates().iter();
-        all.position(|c| c.effect == name).unwrap_or(usize::MAX)
-    };
+    let index = |name: &str| measured.index(name).unwrap_or(usize::MAX);
     let mut refused: Vec<Refused> = Vec::new();
     for (part, others) in [(&as_described, &swapped), (&swapped, &as_described)] {
         for effect in &part.effects {
@@ -184,19 +184,15 @@ pub fn diagnose(
     }
     let mut start = as_described.point.clone();
     start.effects.retain(|(i, _)| {
-        let name = measured.candidates()[*i].effect.to_owned();
+        let name = measured.name(*i);
         in_both(&name, &there) && refused.iter().all(|(known, _)| known != i)
     });
     let mut findings = Vec::new();
-    let confirmed = confirm(&measured, &start, &mut refused, &mut findings)
-        .ok_or_else(|| no_output(description))?;
+    let confirmed = confirm(measured, &start, &mut refused, &mut findings)?;
     for (i, reason) in refused {
-        let effect = measured.candidates().get(i).map_or("", |c| c.effect);
+        let effect = measured.name(i);
         if set_aside.iter().all(|known| known.effect != effect) {
-            set_aside.push(SetAside {
-                effect: effect.to_owned(),
-                reason,
-            });
+            set_aside.push(SetAside { effect, reason });
         }
     }
     let named: Vec<String> = confirmed
@@ -225,10 +221,10 @@ pub fn diagnose(
         (_, _, true) => Verdict::Ambiguous,
         _ => Verdict::Named,
     };
-    Ok(RigDiagnosis {
-        name: description.name.clone(),
-        kind: description.kind.clone(),
-        output: rig.output().name().to_owned(),
+    Some(RigDiagnosis {
+        name: measured.subject().to_owned(),
+        kind: measured.kind().to_owned(),
+        output: measured.output(),
         verdict,
         named,
         not_confirmed,
@@ -248,7 +244,7 @@ fn no_output(description: &Description) -> DescriptionError {
     }
 }
 
-fn part_report(measured: &Measured<'_>, fitted: Part, selected: &Selected) -> PartReport {
+fn part_report<M: InParts>(measured: &M, fitted: Part, selected: &Selected) -> PartReport {
     let (own, tested) = (fitted as usize, fitted.other() as usize);
     let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
     // What belongs to a file and not to the rig is fitted there, for every model alike.
@@ -263,7 +259,7 @@ fn part_report(measured: &Measured<'_>, fitted: Part, selected: &Selected) -> Pa
     let found = &selected.extended.point;
     let objections = unfit(measured, found, &selected.deviations);
     let mut effects = Vec::new();
-    for (i, named) in estimates(measured.candidates(), found, &selected.deviations)
+    for (i, (effect, parameters)) in named_values(measured, found, &selected.deviations)
         .into_iter()
         .enumerate()
     {
@@ -276,30 +272,21 @@ fn part_report(measured: &Measured<'_>, fitted: Part, selected: &Selected) -> Pa
             .map(|(_, reason)| reason.clone());
         let negative = || "the other part is predicted better without it".to_owned();
         effects.push(PartEffect {
-            effect: named.effect.to_owned(),
-            parameters: named
-                .parameters
-                .into_iter()
-                .map(|p| NamedValue {
-                    name: p.name,
-                    value: p.value,
-                    unit: p.unit.to_owned(),
-                    standard_error: p.standard_error,
-                })
-                .collect(),
+            effect,
+            parameters,
             confidence: normal(selected.deviates[i]),
             share,
             objection: objection.or_else(|| (share <= 0.0).then(negative)),
         });
     }
-    let name = |i: usize| measured.candidates()[i].effect.to_owned();
+    let name = |i: usize| measured.name(i);
     PartReport {
         nominal_error: measured.normalised_error(&origin, tested),
         refitted_error: measured.normalised_error(&nominal, tested),
         extended_error: measured.normalised_error(&point, tested),
         fitted_error: measured.normalised_error(found, own),
         gain_interval: gain_interval(&refitted, &extended),
-        parameters: parameters(measured, found, &selected.deviations),
+        parameters: measured.parameters(found, &selected.deviations),
         effects,
         explained: 1.0 - after / before,
         rivals: selected

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::description::{Column, Description, DescriptionError, LeftOut, Quantity};
 use super::diagnosis::{NamedValue, RigDiagnosis};
-use super::measured::{EVERYTHING, Measured};
+use super::measured::Measured;
+use super::parts::{EVERYTHING, InParts};
 use super::{Measurement, Rig, SessionRole};
 use crate::diagnosis::engine::{Free, Point, SimulatedModel, completed, least_squares};
 use units::convert;

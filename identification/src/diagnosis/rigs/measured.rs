@@ -1,43 +1,17 @@
 //! A rig with its measurements, as the engine of the diagnosis sees it.
 
+use super::diagnosis::NamedValue;
+use super::parts::{self, EVERYTHING, File, InParts, NAMES, places};
 use super::{Effect, Measurement, Natural, Rig, SessionRole, Values};
 use crate::diagnosis::engine::{Candidate, Point, SimulatedModel, WEAK, all_errors};
-
-/// Runs into which a part is cut for the check inside it.
-const RUNS: usize = 16;
-/// Share of the output's variation that a first look must see.
-const SEEN: f64 = 0.3;
 
 /// Samples up to which more may be tried.
 const CHEAP: usize = 40_000;
 
-/// The selections of samples that can be fitted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// What the description fits.
-    Fitted = 0,
-    /// What it leaves out.
-    LeftOut = 1,
-}
-
-impl Part {
-    /// The other part.
-    pub fn other(self) -> Self {
-        match self {
-            Self::Fitted => Self::LeftOut,
-            Self::LeftOut => Self::Fitted,
-        }
-    }
-}
-
 /// Width of the priors that hold: nothing moves.
 const HELD: f64 = 1e-3;
 
-/// The record of all samples.
-pub const EVERYTHING: usize = 8;
-
-/// Records 0 and 1 are the two parts of the data, 2 to 5 the folds inside each, 6 and 7 the begin of
-/// each, [`EVERYTHING`] both; then follows a record for each file.
+/// Its records are those of [`places`].
 pub struct Measured<'a> {
     /// Its equations.
     pub rig: &'a dyn Rig,
@@ -57,23 +31,8 @@ pub struct Measured<'a> {
     holds_first: bool,
     /// How much wider than stated the priors of nominal parameters count.
     width: f64,
-}
-
-const NAMES: [&str; 9] = [
-    "fitted",
-    "left out",
-    "fitted, fold 1",
-    "fitted, fold 2",
-    "left out, fold 1",
-    "left out, fold 2",
-    "fitted, first look",
-    "left out, first look",
-    "everything",
-];
-
-/// The record of file `recording` alone.
-pub fn file(recording: usize) -> usize {
-    NAMES.len() + recording
+    /// What the rig is called.
+    name: String,
 }
 
 impl<'a> Measured<'a> {
@@ -115,25 +74,22 @@ impl<'a> Measured<'a> {
                 .map(|effect| effect.candidate.clone())
                 .collect(),
             effects,
-            places: places(measurement, rig.screened()),
+            places: {
+                let recordings = measurement.recordings.iter();
+                let files: Vec<File<'_>> = recordings
+                    .map(|one| File {
+                        output: one.output(),
+                        left_out: &one.left_out,
+                    })
+                    .collect();
+                places(&files, rig.screened())
+            },
+            name: String::new(),
             holds_first: true,
             width: WEAK,
             rig,
             measurement,
             nominal,
-        }
-    }
-
-    /// Number of uncertain nominal parameters, which come first in the nuisance.
-    pub fn uncertain(&self) -> usize {
-        self.uncertain.len()
-    }
-
-    /// The stated values.
-    pub fn origin(&self) -> Point {
-        Point {
-            nuisance: vec![0.0; SimulatedModel::nuisance(self)],
-            effects: Vec::new(),
         }
     }
 
@@ -150,11 +106,6 @@ impl<'a> Measured<'a> {
             };
         }
         values
-    }
-
-    /// Stated value and standard deviation of the uncertain parameter `i`.
-    pub fn stated(&self, i: usize) -> (f64, f64) {
-        self.nominal[self.uncertain[i]]
     }
 
     /// Names of the uncertain nominal parameters, in the order of the nuisance.
@@ -198,6 +149,13 @@ impl<'a> Measured<'a> {
         self
     }
 
+    /// The same rig under its name.
+    #[must_use]
+    pub fn called(mut self, name: &str) -> Self {
+        name.clone_into(&mut self.name);
+        self
+    }
+
     /// Puts the same parameters of a file into every one.
     pub fn set_session(&self, point: &mut Point, values: &[f64]) {
         let own = point.nuisance.iter_mut().skip(self.uncertain.len());
@@ -238,57 +196,6 @@ impl<'a> Measured<'a> {
         self.rig.simulate(recording, &values, &mut out);
         out
     }
-
-    /// `||y - m|| / ||m - mean||` on the samples of `record`, the mean taken in each recording.
-    pub fn normalised_error(&self, point: &Point, record: usize) -> f64 {
-        let errors = all_errors(self, point, record);
-        let mut size = 0.0;
-        for (s, places) in self.places[record].iter().enumerate() {
-            let measured = self.measurement.recordings[s].output();
-            let mean =
-                places.iter().map(|&k| measured[k]).sum::<f64>() / places.len().max(1) as f64;
-            size += places
-                .iter()
-                .map(|&k| (measured[k] - mean).powi(2))
-                .sum::<f64>();
-        }
-        (errors.iter().map(|e| e * e).sum::<f64>() / size).sqrt()
-    }
-}
-
-/// Places of the samples of every record that were measured.
-fn places(measurement: &Measurement, screened: usize) -> Vec<Vec<Vec<usize>>> {
-    let recordings = &measurement.recordings;
-    let mut places = vec![vec![Vec::new(); recordings.len()]; NAMES.len() + recordings.len()];
-    let is_measured =
-        |one: &super::RigRecording, k: usize| one.output().get(k).is_some_and(|y| y.is_finite());
-    for part in 0..2 {
-        let mut mine = Vec::new();
-        for (s, one) in recordings.iter().enumerate() {
-            let own = one.left_out.iter().enumerate();
-            let in_part = own.filter(|(k, out)| usize::from(**out) == part && is_measured(one, *k));
-            mine.extend(in_part.map(|(k, _)| (s, k)));
-        }
-        let output = |(s, k): &(usize, usize)| recordings[*s].output()[*k];
-        let mean = mine.iter().map(output).sum::<f64>() / mine.len().max(1) as f64;
-        let total: f64 = mine.iter().map(|own| (output(own) - mean).powi(2)).sum();
-        let mut seen = 0.0;
-        for (i, &(s, k)) in mine.iter().enumerate() {
-            places[part][s].push(k);
-            places[2 + 2 * part + (i * RUNS / mine.len()) % 2][s].push(k);
-            places[EVERYTHING][s].push(k);
-            places[file(s)][s].push(k);
-            if i < screened || seen < SEEN * total {
-                places[6 + part][s].push(k);
-            }
-            seen += (output(&(s, k)) - mean).powi(2);
-        }
-    }
-    // The parts may alternate in a file.
-    for own in places.iter_mut().flatten() {
-        own.sort_unstable();
-    }
-    places
 }
 
 impl SimulatedModel for Measured<'_> {
@@ -333,15 +240,11 @@ impl SimulatedModel for Measured<'_> {
     }
 
     fn folds(&self, record: usize) -> [usize; 2] {
-        match record {
-            0 | 1 => [2 + 2 * record, 3 + 2 * record],
-            // All data are judged by their parts.
-            _ => [0, 1],
-        }
+        parts::folds(record)
     }
 
     fn screen(&self, record: usize) -> usize {
-        if record < 2 { 6 + record } else { record }
+        parts::screen(record)
     }
 
     fn prior_width(&self) -> f64 {
@@ -359,6 +262,7 @@ impl SimulatedModel for Measured<'_> {
             candidates: self.candidates.clone(),
             places: self.places.clone(),
             holds_first: self.holds_first,
+            name: self.name.clone(),
             width: HELD,
         }
     }
@@ -401,5 +305,61 @@ impl SimulatedModel for Measured<'_> {
             .filter_map(|(name, values)| Some((place(name)?, values)))
             .filter(|(i, _)| !self.candidates[*i].starts.is_empty())
             .collect()
+    }
+}
+
+impl InParts for Measured<'_> {
+    fn subject(&self) -> &str {
+        &self.name
+    }
+
+    fn kind(&self) -> &str {
+        self.rig.kind()
+    }
+
+    fn output(&self) -> String {
+        self.rig.output().name().to_owned()
+    }
+
+    fn normalised_error(&self, point: &Point, record: usize) -> f64 {
+        let errors = all_errors(self, point, record);
+        let mut size = 0.0;
+        for (s, places) in self.places[record].iter().enumerate() {
+            let measured = self.measurement.recordings[s].output();
+            let mean =
+                places.iter().map(|&k| measured[k]).sum::<f64>() / places.len().max(1) as f64;
+            size += places
+                .iter()
+                .map(|&k| (measured[k] - mean).powi(2))
+                .sum::<f64>();
+        }
+        (errors.iter().map(|e| e * e).sum::<f64>() / size).sqrt()
+    }
+
+    fn parameters(&self, point: &Point, deviations: &[f64]) -> Vec<NamedValue> {
+        let values = self.nominal_values(point);
+        let names = self.uncertain_names();
+        let known = self.rig.parameters();
+        names
+            .iter()
+            .enumerate()
+            .filter_map(|(i, name)| {
+                let place = known.iter().position(|(k, _)| k == name)?;
+                let mut moved = point.clone();
+                // A small step: the logarithm of a badly known parameter is curved.
+                moved.nuisance[i] += 1e-3;
+                let slope = (self.nominal_values(&moved)[place] - values[place]).abs() / 1e-3;
+                Some(NamedValue {
+                    name: (*name).to_owned(),
+                    value: values[place],
+                    unit: known[place].1.to_owned(),
+                    standard_error: slope * deviations.get(i).copied().unwrap_or(f64::NAN),
+                })
+            })
+            .collect()
+    }
+
+    fn stated(&self, i: usize) -> (f64, f64) {
+        self.nominal[self.uncertain[i]]
     }
 }

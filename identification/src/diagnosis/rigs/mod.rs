@@ -12,10 +12,12 @@ mod cyclic_material;
 mod description;
 mod diagnosis;
 mod extended;
+pub mod foreign;
 mod hysteretic_device;
 mod measured;
 mod natural;
 mod oscillator;
+mod parts;
 mod positioning_drive;
 mod reading;
 mod recording;
@@ -25,12 +27,14 @@ mod template;
 mod transfer_system;
 
 pub use confirmed::Confirmed;
-pub use description::{Column, Description, DescriptionError, LeftOut, Quantity, renamed};
+pub use description::{
+    Column, Description, DescriptionError, LeftOut, Quantity, column_map, renamed,
+};
 pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
 pub use extended::{ExtendedRig, FileErrors, Prediction};
 
 pub use natural::Natural;
-pub use reading::Measurement;
+pub use reading::{Measurement, even_period};
 pub use recording::RigRecording;
 pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole, SessionTable};
 pub use template::template;

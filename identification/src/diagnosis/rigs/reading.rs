@@ -198,7 +198,7 @@ impl Description {
             return Err(DataError::file(path, what).into());
         }
         let period = match (read.stamps(), &self.time_step) {
-            (Some(stamps), _) => period(stamps).map_err(|row| {
+            (Some(stamps), _) => even_period(stamps).map_err(|row| {
                 DataError::line(path, sheet.line(row), "the times are not evenly spaced")
             })?,
             (None, Some(step)) => self.si("time_step", step, "s")?.0,
@@ -220,13 +220,17 @@ impl Description {
     }
 }
 
-/// Mean spacing of even time stamps, s, or that behind rounded ones; the row where they are uneven.
-fn period(stamps: &[f64]) -> Result<f64, usize> {
-    let last = stamps.len() - 1;
-    let mean = (stamps[last] - stamps[0]) / last as f64;
+/// Mean spacing of even time stamps, s, or that behind rounded ones.
+///
+/// # Errors
+/// The row where they are uneven.
+pub fn even_period(stamps: &[f64]) -> Result<f64, usize> {
+    let last = stamps.len().saturating_sub(1);
+    let ends = stamps.first().zip(stamps.last()).ok_or(0_usize)?;
+    let mean = (ends.1 - ends.0) / last as f64;
     let stray = |t: &[f64]| ((t[1] - t[0]) / mean - 1.0).abs() > UNEVEN;
     let uneven = stamps.windows(2).position(stray);
-    match uneven.or((mean <= 0.0).then_some(0)) {
+    match uneven.or((mean.is_nan() || mean <= 0.0).then_some(0)) {
         None => Ok(mean),
         Some(row) => RoundedStamps::of(stamps, None)
             .and_then(|rounded| rounded.period)
@@ -281,13 +285,13 @@ mod tests {
     #[test]
     fn stamps_that_were_rounded_tell_the_period_behind_them() {
         let exact: Vec<f64> = (0..400).map(|k| 0.004 * f64::from(k)).collect();
-        assert!((period(&exact).unwrap() - 0.004).abs() < 1e-12);
+        assert!((even_period(&exact).unwrap() - 0.004).abs() < 1e-12);
         let rounded: Vec<f64> = exact.iter().map(|t| (t * 100.0).round() / 100.0).collect();
-        assert!((period(&rounded).unwrap() - 0.004).abs() < 1e-9);
+        assert!((even_period(&rounded).unwrap() - 0.004).abs() < 1e-9);
         let gap: Vec<f64> = exact
             .iter()
             .map(|t| if *t > 1.0 { t + 0.1 } else { *t })
             .collect();
-        assert_eq!(period(&gap), Err(251));
+        assert_eq!(even_period(&gap), Err(251));
     }
 }

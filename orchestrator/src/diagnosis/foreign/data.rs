@@ -1,0 +1,269 @@
+//! The records that a map leads to.
+
+use std::path::{Path, PathBuf};
+
+use identification::data::{DataError, Sheet, Wanted};
+use identification::diagnosis::rigs::foreign::{Signal, Trial};
+use identification::diagnosis::rigs::{LeftOut, Quantity, even_period};
+
+use super::map::{Map, Named};
+use crate::diagnosis::file_fault;
+use crate::error::Error;
+use crate::system::Between;
+use crate::units::{convert, hint, split_header};
+
+/// Samples that a file must have at least.
+const SHORTEST: usize = 128;
+/// Samples that must be on either side of what is left out.
+const FEWEST: usize = 64;
+/// Steps of the model from sample to sample at most.
+const MOST_STEPS: f64 = 1000.0;
+
+/// Reads the `files`: the `inputs` and `outputs`, in this order, in the units of the model.
+///
+/// # Errors
+/// A file that cannot be read, a column that is not there, a cell without a number, by place; too
+/// little data on either side of what is left out.
+pub(super) fn trials(
+    map: &Map,
+    place: &Path,
+    files: &[PathBuf],
+    inputs: &[Signal],
+    outputs: &[Signal],
+) -> Result<Vec<Trial>, Error> {
+    let mut all = Vec::new();
+    for file in files {
+        all.push(trial(map, place, file, inputs, outputs)?);
+    }
+    leave_out(map, place, files, &mut all)?;
+    Ok(all)
+}
+
+fn seconds(place: &Path, what: &str, quantity: &Quantity) -> Result<f64, Error> {
+    let value = convert(quantity.value, &quantity.unit, "s")
+        .map_err(|why| file_fault(place, format!("`{what}`: {why}")))?;
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(file_fault(
+            place,
+            format!("`{what}`: {value} s, expected more than 0 s"),
+        ))
+    }
+}
+
+/// The place of a column by its header, or by what stands before the unit in it.
+fn find(sheet: &Sheet, head: &str) -> Result<usize, Error> {
+    let heads = sheet.heads();
+    let whole = heads.iter().position(|own| own == head);
+    let bare = || heads.iter().position(|own| split_header(own).0 == head);
+    whole.or_else(bare).ok_or_else(|| {
+        let reason = format!(
+            "no column `{head}` among {}{}",
+            heads.join(", "),
+            hint(head, heads.iter().map(|own| split_header(own).0))
+        );
+        DataError::line(sheet.file(), sheet.header_line(), reason).into()
+    })
+}
+
+/// The factor that brings a column into `unit`; what is in no unit is in that one.
+fn factor(sheet: &Sheet, place: usize, given: Option<&str>, unit: &str) -> Result<f64, Error> {
+    let head = &sheet.heads()[place];
+    let below = sheet.unit_below(place).map(|(_, unit)| unit);
+    let own = given.or(split_header(head).1).or(below);
+    let Some(own) = own.filter(|own| *own != unit && !unit.is_empty()) else {
+        return Ok(1.0);
+    };
+    convert(1.0, own, unit).map_err(|why| {
+        let reason = format!("column `{head}`: {why}");
+        DataError::line(sheet.file(), sheet.header_line(), reason).into()
+    })
+}
+
+fn trial(
+    map: &Map,
+    place: &Path,
+    file: &Path,
+    inputs: &[Signal],
+    outputs: &[Signal],
+) -> Result<Trial, Error> {
+    let named = map.inputs.values().chain(map.outputs.values());
+    let wanted: Vec<&str> = named
+        .chain(&map.time)
+        .map(|named| named.parts().0)
+        .collect();
+    let is_column = |cell: &str| wanted.contains(&cell) || wanted.contains(&split_header(cell).0);
+    let sheet = Sheet::read(
+        file,
+        Wanted {
+            is_column: &is_column,
+            header: &wanted.join(","),
+        },
+    )?;
+    if sheet.len() < SHORTEST {
+        let what = format!("{} rows: expected at least {SHORTEST}", sheet.len());
+        return Err(DataError::file(file, what).into());
+    }
+    let column = |named: &Named, unit: &str, is_full: bool| -> Result<Vec<f64>, Error> {
+        let (head, given) = named.parts();
+        let at = find(&sheet, head)?;
+        let factor = factor(&sheet, at, given, unit)?;
+        let values = match is_full {
+            true => sheet.full_column(at, head)?,
+            false => sheet.column(at, head)?,
+        };
+        Ok(values.into_iter().map(|value| factor * value).collect())
+    };
+    let usual = || {
+        let mut names = ["time", "t"].iter();
+        let is_there = |name: &&&str| {
+            sheet
+                .heads()
+                .iter()
+                .any(|own| split_header(own).0 == **name)
+        };
+        names
+            .find(is_there)
+            .map(|name| Named::Header((*name).to_owned()))
+    };
+    let time = map.time.clone().or_else(usual);
+    let period = match (&map.time_step, time) {
+        (Some(step), _) => seconds(place, "time_step", step)?,
+        (None, Some(time)) => {
+            let stamps = column(&time, "s", true)?;
+            even_period(&stamps).map_err(|row| {
+                DataError::line(file, sheet.line(row), "the times are not evenly spaced")
+            })?
+        }
+        (None, None) => {
+            let reason = format!(
+                "no column `time` among {}: expected `time` in the map with its column, or \
+                 `time_step`",
+                sheet.heads().join(", ")
+            );
+            return Err(DataError::line(file, sheet.header_line(), reason).into());
+        }
+    };
+    let stride = match &map.step {
+        None => 1,
+        Some(step) => {
+            let steps = period / seconds(place, "step", step)?;
+            if (steps.round() / steps - 1.0).abs() > 1e-6 || !(0.5..MOST_STEPS).contains(&steps) {
+                let reason = format!(
+                    "`step` goes {steps:.4} times into the {period} s between samples of {}: \
+                     expected a whole number below {MOST_STEPS}",
+                    file.display()
+                );
+                return Err(file_fault(place, reason));
+            }
+            steps.round() as usize
+        }
+    };
+    let measured = |of: &[Signal], by: &std::collections::BTreeMap<String, Named>, is_full| {
+        let own = of.iter().map(|signal| {
+            let named = by.get(&signal.name);
+            // The signals are those of the map.
+            let named = named.cloned().unwrap_or(Named::Header(signal.name.clone()));
+            column(&named, &signal.unit, is_full)
+        });
+        own.collect::<Result<Vec<_>, Error>>()
+    };
+    let inputs = measured(inputs, &map.inputs, true)?;
+    Ok(Trial {
+        name: file
+            .file_stem()
+            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned()),
+        step: period / stride as f64,
+        stride,
+        inputs: inputs
+            .iter()
+            .map(|own| finer(own, stride, map.between))
+            .collect(),
+        outputs: measured(outputs, &map.outputs, false)?,
+        left_out: vec![false; sheet.len()],
+    })
+}
+
+/// A value a step, from one a sample.
+fn finer(samples: &[f64], stride: usize, between: Between) -> Vec<f64> {
+    let at = |k: usize| samples.get(k).or(samples.last()).copied().unwrap_or(0.0);
+    let steps = samples.len().saturating_sub(1) * stride + 1;
+    let step = |step: usize| {
+        let (k, share) = (step / stride, (step % stride) as f64 / stride as f64);
+        match between {
+            Between::Hold => at(k),
+            // What is held over the step is the middle of it.
+            Between::Linear if stride > 1 => {
+                at(k) + (share + 0.5 / stride as f64) * (at(k + 1) - at(k))
+            }
+            Between::Linear => at(k),
+        }
+    };
+    (0..steps).map(step).collect()
+}
+
+fn leave_out(
+    map: &Map,
+    place: &Path,
+    files: &[PathBuf],
+    trials: &mut [Trial],
+) -> Result<(), Error> {
+    match map.left_out.as_ref().unwrap_or(&LeftOut::SecondHalf(true)) {
+        LeftOut::SecondHalf(true) => {
+            for trial in trials.iter_mut() {
+                let half = trial.samples() / 2;
+                trial.left_out[half..].fill(true);
+            }
+        }
+        LeftOut::SecondHalf(false) => {
+            return Err(file_fault(
+                place,
+                "`left_out.second_half` = false leaves nothing out to test on: expected true, or \
+                 `every_second_block` or `files` in its place",
+            ));
+        }
+        LeftOut::EverySecondBlock(length) => {
+            let length = seconds(place, "left_out.every_second_block", length)?;
+            for trial in trials.iter_mut() {
+                let sample = trial.step * trial.stride as f64;
+                let block = (length / sample).round().max(1.0) as usize;
+                for (k, out) in trial.left_out.iter_mut().enumerate() {
+                    *out = (k / block) % 2 == 1;
+                }
+            }
+        }
+        LeftOut::Files(names) => {
+            for name in names {
+                let found = files
+                    .iter()
+                    .position(|file| file.file_name() == name.file_name());
+                let found = found.ok_or_else(|| {
+                    let reason = format!(
+                        "`left_out.files` names {}, which is none of the data files",
+                        name.display()
+                    );
+                    file_fault(place, reason)
+                })?;
+                trials[found].left_out.fill(true);
+            }
+        }
+    }
+    let measured = |out: bool| -> usize {
+        let own = trials.iter().map(|trial| {
+            let samples = trial.left_out.iter().enumerate();
+            let is_there = |k: usize| trial.outputs.iter().any(|y| y[k].is_finite());
+            samples
+                .filter(|(k, own)| **own == out && is_there(*k))
+                .count()
+        });
+        own.sum()
+    };
+    if measured(true) < FEWEST || measured(false) < FEWEST {
+        return Err(file_fault(
+            place,
+            format!("`left_out` leaves fewer than {FEWEST} measured samples on one side"),
+        ));
+    }
+    Ok(())
+}

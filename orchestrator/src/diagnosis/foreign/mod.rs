@@ -1,0 +1,188 @@
+//! Diagnosis of a model that came as an FMU, ours or not: `shakebench diagnose --fmu`.
+
+mod data;
+mod map;
+mod pictures;
+mod simulator;
+mod written;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use identification::diagnosis::DiagnosisReport;
+use identification::diagnosis::engine::{Observer, Verdict};
+use identification::diagnosis::rigs::foreign::{self, ForeignDiagnosis, ForeignModel};
+
+use super::{DIAGNOSIS, EXTENDED_MODEL, file_fault, page};
+use crate::error::Error;
+use crate::report;
+use crate::results::Results;
+use map::Map;
+use simulator::{Alone, Mapped, mapped, open};
+
+/// Files beside those of every diagnosis.
+pub(super) const FILES: [&str; 2] = [written::TRACES, written::INPUTS];
+
+/// Diagnoses the FMU `model` on the records `files`, whose columns are those of the `map`, and writes the
+/// extended model, curves, the JSON object and the report into `folder`, all or nothing. `observer` is
+/// told what is tried.
+///
+/// # Errors
+/// What cannot be read, names that the model has not, a model that does not come to the end of a
+/// record, a folder that cannot be written.
+pub fn diagnose(
+    model: &Path,
+    map: &Path,
+    files: &[PathBuf],
+    folder: &Path,
+    observer: Observer<'_>,
+) -> Result<DiagnosisReport, Error> {
+    let begun = Instant::now();
+    Results::check(folder)?;
+    let place = map;
+    let map = Map::read(place)?;
+    let Mapped {
+        alone,
+        inputs,
+        outputs,
+        parameters,
+    } = mapped(model, &map, place)?;
+    let trials = data::trials(&map, place, files, &inputs, &outputs)?;
+    let stem = model.file_stem().unwrap_or_default().to_string_lossy();
+    let subject = ForeignModel {
+        name: map.name.clone().unwrap_or_else(|| stem.into_owned()),
+        simulator: &alone,
+        inputs,
+        outputs,
+        parameters,
+        trials,
+    };
+    let told = nominal(&alone, model, &subject)?;
+    let found = foreign::diagnose(&subject, observer).ok_or_else(|| {
+        file_fault(
+            model,
+            "what it puts out on these data is not finite everywhere",
+        )
+    })?;
+    let mut report = DiagnosisReport::from(&found.found);
+    report.sentence = sentence(&subject, &found);
+    for (name, others) in &found.equivalents {
+        for other in others {
+            let rival = vec![other.clone()];
+            if name != other && !report.alternatives.contains(&rival) {
+                report.alternatives.push(rival);
+            }
+        }
+    }
+    let alike = found
+        .equivalents
+        .iter()
+        .filter(|(_, others)| !others.is_empty());
+    report.notes.extend(alike.map(|(name, others)| {
+        format!(
+            "`{name}` and `{}` leave the same traces in these records: which of them it is only a \
+             measurement between the two can tell",
+            others.join("`, `")
+        )
+    }));
+    report.notes.extend(found.notes.iter().cloned());
+    report.notes.extend(told);
+    report.extended_model = Some(folder.join(EXTENDED_MODEL));
+    let mut results = Results::begin(folder)?;
+    results.write_text(
+        EXTENDED_MODEL,
+        &written::system(&alone, model, &subject, &found)?,
+    )?;
+    if !subject.inputs.is_empty() {
+        results.write(written::INPUTS, |file| written::inputs(&subject, file))?;
+    }
+    results.write(written::TRACES, |file| {
+        written::traces(&subject, &found, file)
+    })?;
+    report.wall_s = begun.elapsed().as_secs_f64();
+    let panels = pictures::panels(&subject, &found);
+    let page = page::of_foreign(&subject.name, model, &report, panels);
+    let page = report::render(&page, &folder.join(report::FILE))?;
+    results.write_text(report::FILE, &page)?;
+    results.write_text(DIAGNOSIS, &format!("{:#}\n", serde_json::json!(report)))?;
+    results.finish()?;
+    Ok(report)
+}
+
+/// A commented map of the FMU `model`.
+///
+/// # Errors
+/// An FMU that cannot be read.
+pub fn template(model: &Path) -> Result<String, Error> {
+    Ok(map::template(&*open(model)?))
+}
+
+/// Simulates the nominal model on every record; what is told of the runs.
+fn nominal(alone: &Alone, model: &Path, subject: &ForeignModel<'_>) -> Result<Vec<String>, Error> {
+    let mut notes = alone.notes().to_vec();
+    for trial in &subject.trials {
+        let inputs: Vec<&[f64]> = trial.inputs.iter().map(Vec::as_slice).collect();
+        let steps = trial.samples().saturating_sub(1) * trial.stride + 1;
+        let outcome = alone.run(&inputs, &[], trial.step, steps)?;
+        if !outcome.ended.is_regular() || outcome.record.len() < steps {
+            let why = outcome.ended.message();
+            return Err(file_fault(
+                model,
+                format!(
+                    "it does not come to the end of the record {}: {why}",
+                    trial.name
+                ),
+            ));
+        }
+        for note in outcome.notes {
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+    }
+    Ok(notes)
+}
+
+/// What was found, in a sentence.
+fn sentence(subject: &ForeignModel<'_>, found: &ForeignDiagnosis) -> String {
+    let of = &found.found;
+    let name = &subject.name;
+    let falls = format!(
+        "the error of {} on the data left out falls from {:.1} to {:.1} %",
+        of.output,
+        100.0 * of.as_described.nominal_error,
+        100.0 * of.confirmed.error
+    );
+    let named = of.named.join(", ");
+    match of.verdict {
+        Verdict::Adequate => format!(
+            "{name}: the model is adequate as it came; its error of {} on the data left out is \
+             {:.1} %.",
+            of.output,
+            100.0 * of.as_described.nominal_error
+        ),
+        Verdict::Named => format!("{name}: every part of the data names {named}; {falls}."),
+        Verdict::Ambiguous => {
+            let rivals = of.as_described.rivals.iter();
+            let rivals: Vec<String> = rivals
+                .map(|(rival, against)| format!("{rival} in the place of {against}"))
+                .collect();
+            format!(
+                "{name}: every part of the data names {named}, and {} would do nearly as well; \
+                 {falls}.",
+                rivals.join(", ")
+            )
+        }
+        Verdict::Unexplained if named.is_empty() => format!(
+            "{name}: nothing on the way of its signals and no drift of its parameters explains an \
+             error of {:.1} % of {} on the data left out; what is inside the model is beyond this \
+             diagnosis.",
+            100.0 * of.confirmed.error,
+            of.output
+        ),
+        Verdict::Unexplained => format!(
+            "{name}: what pays on the way of its signals and in its parameters ({named}) leaves more \
+             than noise; {falls}; what is inside the model is beyond this diagnosis."
+        ),
+    }
+}
