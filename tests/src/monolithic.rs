@@ -10,8 +10,13 @@ use shakebench::motion::Motion;
 /// Acceleration of the table (m/s²) at the samples of `motion` under three-variable control, from
 /// the exact solution of table and specimen as one system with the valve command held.
 pub fn table_acceleration(motion: &Motion, with_specimen: bool) -> Vec<f64> {
+    table_acceleration_under(motion, with_specimen.then(LinearSpecimen::appendix_a))
+}
+
+/// As [`table_acceleration`], under any linear specimen.
+pub fn table_acceleration_under(motion: &Motion, specimen: Option<LinearSpecimen>) -> Vec<f64> {
     let rig = Rig {
-        specimen: with_specimen.then(LinearSpecimen::appendix_a),
+        specimen,
         ..Rig::default()
     };
     let system = rig.state_space().sample(motion.dt);

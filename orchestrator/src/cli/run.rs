@@ -21,6 +21,7 @@ use crate::run::checkpoint::{self, Checkpoints, Unfinished};
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
+use crate::run::refinement::refine;
 use crate::run::summary::Summary;
 use crate::run::text::text;
 use crate::system::built_in;
@@ -69,6 +70,10 @@ pub struct Arguments {
     /// Coupling step, such as "0.5 ms"; controllers keep their own period [default: 2 ms]
     #[arg(long, value_name = "T")]
     step: Option<String>,
+    /// Halve the coupling step until the error of the coupling is estimated to be at most so much of
+    /// the peak of each signal, such as "0.05 %"
+    #[arg(long, value_name = "PERCENT", conflicts_with_all = ["manifest", "resume"])]
+    coupling_error: Option<String>,
     /// Play only the beginning of the motion, such as "10 s"
     #[arg(long, value_name = "T")]
     duration: Option<String>,
@@ -171,12 +176,20 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         .transpose()?;
     let known = written.as_ref();
     let known = known.or(unfinished.as_ref().map(|run| &run.manifest));
-    let request = match known {
+    let mut request = match known {
         Some(manifest) => manifest.request.clone(),
         None => request(arguments)?,
     };
     let mut prepared = prepare(&request)?;
     prepared.options = fmu_options(arguments)?;
+    let coupling_error = match &arguments.coupling_error {
+        Some(wanted) => {
+            let error = refine(&mut prepared, percent("--coupling-error", wanted)?)?;
+            request.step_s = Some(prepared.step);
+            Some(error)
+        }
+        None => None,
+    };
     let Prepared {
         system,
         motion,
@@ -234,7 +247,18 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     bar.finish_and_clear();
     prepared.judge(&mut outcome);
 
-    let summary = Summary::new(&prepared, &outcome, &manifest);
+    let mut summary = Summary::new(&prepared, &outcome, &manifest);
+    if let Some(error) = coupling_error.as_ref().filter(|error| !error.is_reached()) {
+        summary.warnings.push(format!(
+            "the error of the coupling is estimated at {:.3} % of the peak of `{}` at the smallest step \
+             that was tried, {} ms; {} % was asked for",
+            error.percent,
+            error.signal,
+            1e3 * prepared.step,
+            error.wanted_percent
+        ));
+    }
+    summary.coupling_error = coupling_error;
     let files = page::write(&folder, &prepared, &outcome, &summary, &mut manifest)?;
     let can_go_on = has_checkpoints
         && matches!(outcome.ended.kind(), Ending::Interrupted | Ending::Failed)
@@ -448,6 +472,18 @@ pub(super) fn quantity(option: &'static str, text: &str, unit: &'static str) -> 
         return Ok(value);
     }
     Err(fault(format!("`{text}` is not positive")))
+}
+
+/// A positive share, per cent.
+fn percent(option: &'static str, text: &str) -> Result<f64, Error> {
+    let number = text.trim().trim_end_matches('%').trim_end().parse::<f64>();
+    let positive = number
+        .ok()
+        .filter(|value| *value > 0.0 && value.is_finite());
+    positive.ok_or_else(|| Error::Option {
+        option,
+        reason: format!("`{text}` is no share; expected a number above 0, such as \"0.05 %\""),
+    })
 }
 
 /// A whole number above 0.

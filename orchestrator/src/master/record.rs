@@ -39,7 +39,7 @@ impl Record {
     }
 
     /// The rows from `row` on, as one: numbers, and values that numbers do not hold.
-    pub(crate) fn from_row(&self, row: usize) -> (&[f64], &[Datum]) {
+    pub(crate) fn rows_from(&self, row: usize) -> (&[f64], &[Datum]) {
         let numbers = self.values.get(row * self.columns.len()..);
         let exact = self.exact.get(row * self.exact_columns.len()..);
         (numbers.unwrap_or_default(), exact.unwrap_or_default())

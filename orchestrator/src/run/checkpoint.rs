@@ -239,7 +239,7 @@ impl Checkpoints {
     /// # Errors
     /// A disk that is full, and the like.
     pub fn keep(&mut self, checkpoint: &Checkpoint, record: &Record) -> Result<(), String> {
-        let (values, exact) = record.from_row(self.kept);
+        let (values, exact) = record.rows_from(self.kept);
         let block = Block {
             values: values.to_vec(),
             exact: exact.to_vec(),

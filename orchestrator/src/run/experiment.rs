@@ -198,8 +198,14 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
 pub fn prepare_file(request: &Request, file: &SystemFile) -> Result<Prepared, Error> {
     let mut file = file.clone();
     let algorithm = algorithm(request, &file)?;
+    let mut library = FmuLibrary::of(request.fmi, &file);
     if algorithm == Algorithm::Jacobi {
-        tuning::know_jacobi(&mut file, !is_file(&request.system));
+        // An FMU that is not found is at fault when the system is assembled.
+        let mut has = |fmu: &str, parameter: &str| {
+            let found = library.find(fmu);
+            found.is_ok_and(|fmu| fmu.description.position(parameter).is_some())
+        };
+        tuning::know_jacobi(&mut file, !is_file(&request.system), &mut has);
     }
     for path in &request.inputs {
         drive(&mut file, path)?;
@@ -214,7 +220,6 @@ pub fn prepare_file(request: &Request, file: &SystemFile) -> Result<Prepared, Er
         true => motion(request, &file)?,
         false => no_motion(),
     };
-    let mut library = FmuLibrary::of(request.fmi, &file);
     let mut system = system::assemble(&file, &request.set, &mut |name| library.find(name))?;
     if motion.is_empty() {
         motion.dt = rest_step(request, &file, &system)?;

@@ -5,6 +5,7 @@ pub mod experiment;
 pub mod identity;
 pub mod manifest;
 pub mod page;
+pub mod refinement;
 pub mod signals;
 pub mod summary;
 pub mod text;

@@ -60,8 +60,10 @@ fn about(system: &System, name: &str) -> (String, String) {
     let (component, variable) = name.split_once('.').unwrap_or(("", name));
     let component = system.components.iter().find(|own| own.name == component);
     let found = component.and_then(|component| {
-        let variables = &component.fmu.description.variables;
-        variables.iter().find(|own| own.name == variable)
+        let description = &component.fmu.description;
+        description
+            .position(variable)
+            .map(|at| &description.variables[at])
     });
     found.map_or((String::new(), String::new()), |variable| {
         let unit = variable.unit.clone().unwrap_or_default();

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::experiment::Prepared;
 use super::manifest::Manifest;
+use super::refinement::CouplingError;
 use crate::error::Error;
 use crate::json;
 use crate::master::{Ended, Ending, Outcome, RealTime, Record};
@@ -53,6 +54,9 @@ pub struct Summary {
     /// How the clock on the wall was kept; of a run in real time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub real_time: Option<RealTime>,
+    /// The error of the coupling, where it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coupling_error: Option<CouplingError>,
 }
 
 /// What stopped a run.
@@ -188,6 +192,7 @@ impl Summary {
             tracking,
             warnings,
             real_time: outcome.real_time.clone(),
+            coupling_error: None,
         }
     }
 }

@@ -31,6 +31,12 @@ pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
         significant(summary.real_time_factor, 2),
         summary.ended.word(),
     );
+    if let Some(error) = &summary.coupling_error {
+        text += &format!(
+            "error of the coupling, estimated: at most {:.3} % of the peak of a signal (`{}`)\n\n",
+            error.percent, error.signal
+        );
+    }
     if let Some(kept) = &summary.real_time {
         text += &format!(
             "in real time: {} of {} steps were not done in time, the latest by {:.2} ms; steps began \

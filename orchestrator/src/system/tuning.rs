@@ -66,7 +66,17 @@ pub struct Wanted<'a> {
 /// all components from the same values adds: one for each sampled component that a value passes
 /// between measurement and valve. What a file says itself stays, but for a built-in system, whose
 /// delay is that of its rig.
-pub fn know_jacobi(file: &mut SystemFile, is_built_in: bool) {
+///
+/// A component is one of these by its parameters: `has` says whether an FMU has one.
+pub fn know_jacobi(
+    file: &mut SystemFile,
+    is_built_in: bool,
+    has: &mut dyn FnMut(&str, &str) -> bool,
+) {
+    const LOOP: &str = "loop_delay_samples";
+    const COMMAND: &str = "command_delay_samples";
+    /// Of a law that predicts the sampled law below it: its loop begins there.
+    const LAW_BELOW: &str = "continuous_law";
     let sampled = |name: &String| {
         file.components
             .get(name)
@@ -80,26 +90,28 @@ pub fn know_jacobi(file: &mut SystemFile, is_built_in: bool) {
                 .push(&link.to.component);
         }
     }
-    let mut found: Vec<(String, i64)> = Vec::new();
+    let mut found = Vec::new();
     for (name, part) in &file.components {
-        // Sliding mode counts from the measurement, the other from the loop below it.
-        let through = match part.fmu.as_str() {
-            "SlidingMode" => true,
-            "ModelPredictive" => false,
-            _ => continue,
-        };
+        if !sampled(name) || !has(&part.fmu, LOOP) {
+            continue;
+        }
+        let through = !has(&part.fmu, LAW_BELOW);
         let longest = |start: &String| longest_path(start, &next, &sampled, name, through);
         let starts = file.components.keys().filter(|name| !sampled(name));
         let hops = starts.filter_map(longest).max();
         if let Some(hops) = hops {
-            found.push((name.clone(), hops));
+            let mut told = vec![(LOOP, hops)];
+            if has(&part.fmu, COMMAND) {
+                told.push((COMMAND, 1));
+            }
+            found.push((name.clone(), told));
         }
     }
-    for (name, hops) in found {
+    for (name, told) in found {
         let Some(part) = file.components.get_mut(&name) else {
             continue;
         };
-        for (parameter, samples) in [("loop_delay_samples", hops), ("command_delay_samples", 1)] {
+        for (parameter, samples) in told {
             let own = match part.parameters.get(parameter) {
                 Some(Setting::Integer(own)) if is_built_in => *own,
                 Some(_) => continue,

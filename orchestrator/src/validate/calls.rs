@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::Findings;
 use crate::fmu::{
-    Datum, Fmu, Instance, Interface, Isolation, Kind, Options, Processes, Progress, State,
+    Datum, Fmu, Instance, Interface, Isolation, Kind, Options, Processes, Progress, State, Variable,
 };
 
 /// Steps that are made.
@@ -119,43 +119,76 @@ fn run(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) -> Result<Row
 fn read(findings: &mut Findings, instance: &mut Instance) -> Result<Vec<Datum>, String> {
     let fmu = instance.fmu.clone();
     let mut row = Vec::new();
-    for variable in &fmu.description.variables {
-        let (element, size) = variable.element;
-        if element > 0 || !variable.kind.travels() {
+    let variables = fmu.description.variables.iter();
+    let whole = variables.filter(|variable| variable.element.0 == 0 && variable.kind.travels());
+    let whole: Vec<&Variable> = whole.collect();
+    // Numbers of one type in one call: one for each would take a while where there are many.
+    for alike in whole.chunk_by(|one, other| one.kind == other.kind && !one.kind.is_exact()) {
+        let kind = &alike[0].kind;
+        let references: Vec<u32> = alike.iter().map(|variable| variable.reference).collect();
+        let mut values = vec![0.0; alike.iter().map(|variable| variable.element.1).sum()];
+        if alike.len() > 1 && instance.get(kind, &references, &mut values).is_ok() {
+            let mut at = 0;
+            for variable in alike {
+                at += variable.element.1;
+                check_choice(findings, variable, values.get(at - 1).copied());
+            }
+            row.extend(values.into_iter().map(Datum::Number));
             continue;
         }
-        let references = [variable.reference];
-        let outcome = if variable.kind.is_exact() {
-            let mut data = vec![Datum::empty(&variable.kind); size];
-            instance
-                .get_exact(&variable.kind, &references, &mut data)
-                .map(|()| row.extend(data))
-        } else {
-            let mut values = vec![0.0; size];
-            instance
-                .get(&variable.kind, &references, &mut values)
-                .map(|()| row.extend(values.into_iter().map(Datum::Number)))
-        };
-        if let Err(error) = outcome {
-            let is_dead = error.outcome.contains("its process");
-            let message = format!("`{}`: {} {}", variable.name, error.call, error.outcome);
-            if is_dead {
-                return Err(error.to_string());
-            }
-            findings.error("library", message);
-        }
-        if let (Kind::Enumeration(items), Some(Datum::Number(value))) = (&variable.kind, row.last())
-            && !items.is_empty()
-            && !items.iter().any(|item| item.value as f64 == *value)
-        {
-            let message = format!(
-                "`{}` is {value}, which is none of its choices",
-                variable.name
-            );
-            findings.warning("library", message);
+        for variable in alike {
+            read_one(findings, instance, variable, &mut row)?;
         }
     }
     Ok(row)
+}
+
+/// Reads one variable, or one array.
+fn read_one(
+    findings: &mut Findings,
+    instance: &mut Instance,
+    variable: &Variable,
+    row: &mut Vec<Datum>,
+) -> Result<(), String> {
+    let references = [variable.reference];
+    let size = variable.element.1;
+    let outcome = if variable.kind.is_exact() {
+        let mut data = vec![Datum::empty(&variable.kind); size];
+        let read = instance.get_exact(&variable.kind, &references, &mut data);
+        read.map(|()| row.extend(data))
+    } else {
+        let mut values = vec![0.0; size];
+        let read = instance.get(&variable.kind, &references, &mut values);
+        read.map(|()| row.extend(values.into_iter().map(Datum::Number)))
+    };
+    if let Err(error) = outcome {
+        let is_dead = error.outcome.contains("its process");
+        let message = format!("`{}`: {} {}", variable.name, error.call, error.outcome);
+        if is_dead {
+            return Err(error.to_string());
+        }
+        findings.error("library", message);
+    }
+    let last = match row.last() {
+        Some(Datum::Number(value)) => Some(*value),
+        _ => None,
+    };
+    check_choice(findings, variable, last);
+    Ok(())
+}
+
+/// The value of an enumeration is one of its choices.
+fn check_choice(findings: &mut Findings, variable: &Variable, value: Option<f64>) {
+    if let (Kind::Enumeration(items), Some(value)) = (&variable.kind, value)
+        && !items.is_empty()
+        && !items.iter().any(|item| item.value as f64 == value)
+    {
+        let message = format!(
+            "`{}` is {value}, which is none of its choices",
+            variable.name
+        );
+        findings.warning("library", message);
+    }
 }
 
 /// Two instances beside each other give what one gives alone.

@@ -341,12 +341,13 @@ fn limits(findings: &mut Findings, variable: &Variable) {
         text.trim().parse::<f64>().ok()
     };
     let name = variable.name;
-    let at = place(variable.node);
+    // To count lines takes as long as the file is.
+    let at = || place(variable.node);
     let (min, max) = (number("min"), number("max"));
     if let (Some(min), Some(max)) = (min, max)
         && min > max
     {
-        findings.error(&at, format!("`{name}`: min {min} above max {max}"));
+        findings.error(&at(), format!("`{name}`: min {min} above max {max}"));
     }
     let starts = variable.typed.attribute("start").unwrap_or_default();
     for start in starts
@@ -355,7 +356,7 @@ fn limits(findings: &mut Findings, variable: &Variable) {
     {
         if min.is_some_and(|min| start < min) || max.is_some_and(|max| start > max) {
             findings.warning(
-                &at,
+                &at(),
                 format!("`{name}` starts at {start}, beyond its limits"),
             );
             break;
@@ -365,7 +366,7 @@ fn limits(findings: &mut Findings, variable: &Variable) {
         && nominal <= 0.0
     {
         findings.error(
-            &at,
+            &at(),
             format!("`{name}`: nominal {nominal}, expected more than 0"),
         );
     }

@@ -2,11 +2,11 @@
 //! FMU, call and time, with what was computed until then saved.
 
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::Path;
 use std::process::Command;
 
-use zip::{ZipWriter, write::SimpleFileOptions};
+use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 use crate::{shakebench, stderr, stdout};
 
@@ -132,6 +132,86 @@ fn an_fmu_that_ends_its_process_ends_the_run_only() {
         501,
         &["did not return within 0.5 s"],
     );
+}
+
+/// The archive with another library in it.
+fn replace_library(folder: &Path, library: &[u8]) {
+    let path = folder.join("hostile.fmu");
+    let mut sound = ZipArchive::new(File::open(&path).unwrap()).unwrap();
+    let mut description = Vec::new();
+    let mut entry = sound.by_name("modelDescription.xml").unwrap();
+    entry.read_to_end(&mut description).unwrap();
+    let mut archive = ZipWriter::new(File::create(&path).unwrap());
+    for (name, content) in [
+        ("modelDescription.xml", &description[..]),
+        ("binaries/linux64/hostile.so", library),
+    ] {
+        let options = SimpleFileOptions::default();
+        archive.start_file(name, options).unwrap();
+        archive.write_all(content).unwrap();
+    }
+    archive.finish().unwrap();
+}
+
+#[test]
+fn damaged_libraries_end_as_errors_that_name_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    pack(folder, "HONEST", "");
+    let sound = fs::read(folder.join("hostile.so")).unwrap();
+    let mut cases: Vec<(String, Vec<u8>, &[&str])> = vec![
+        ("empty".into(), Vec::new(), &["hostile.fmu"]),
+        (
+            "a text".into(),
+            b"no library\n".repeat(100),
+            &["hostile.fmu"],
+        ),
+    ];
+    // ELF: machine, class, kind of file; a system that is not this one.
+    for (what, at, value) in [
+        ("for ARM", 18, 183),
+        ("of 32 bits", 4, 1),
+        ("an object file", 16, 1),
+        ("of the other byte order", 5, 2),
+    ] {
+        let mut other = sound.clone();
+        other[at] = value;
+        cases.push((what.into(), other, &["hostile.fmu"]));
+    }
+    for tenth in 1..10 {
+        let length = sound.len() * tenth / 10;
+        let short = sound[..length].to_vec();
+        cases.push((format!("{length} of {} bytes", sound.len()), short, &[]));
+    }
+    // A function that has another name.
+    for name in ["fmi2DoStep", "fmi2Instantiate", "fmi2FreeInstance"] {
+        let mut other = sound.clone();
+        let places = (0..sound.len() - name.len())
+            .filter(|&at| sound[at..].starts_with(name.as_bytes()) && sound[at + name.len()] == 0);
+        places.for_each(|at| other[at] = b'x');
+        cases.push((format!("without {name}"), other, &["hostile.fmu"]));
+    }
+    for (what, library, words) in &cases {
+        replace_library(folder, library);
+        fs::write(folder.join("rig.toml"), ALONE).unwrap();
+        let output = shakebench(folder, &["run", "rig.toml", "--out", "out", "--force"]);
+        let said = stderr(&output);
+        // The program ends by itself, also where the loader dies of the library.
+        let status = output.status.code();
+        assert!(status.is_some(), "{what}: the program died: {said}");
+        if status != Some(0) {
+            assert!(
+                said.contains("error: ") && said.contains("`it`"),
+                "{what}: {said}"
+            );
+        }
+        if !words.is_empty() {
+            assert_eq!(status, Some(2), "{what}: {said}");
+        }
+        for word in *words {
+            assert!(said.contains(word), "{what}: `{word}` is not in {said}");
+        }
+    }
 }
 
 #[test]

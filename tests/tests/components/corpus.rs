@@ -126,6 +126,111 @@ fn spoiled(random: &mut ChaCha8Rng, sound: &BTreeMap<String, Vec<u8>>, name: &st
     zipped(&spoiled)
 }
 
+/// The same bytes with another name for an entry, of the same length.
+fn renamed(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
+    assert_eq!(from.len(), to.len());
+    let mut bytes = bytes.to_vec();
+    let mut found = 0;
+    for at in 0..bytes.len().saturating_sub(from.len()) {
+        if bytes[at..].starts_with(from.as_bytes()) {
+            bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
+            found += 1;
+        }
+    }
+    assert!(found >= 2, "in the entry's head and in the directory");
+    bytes
+}
+
+/// The same bytes with something else in the heads of all entries and in the directory: `local` and
+/// `central` are offsets from their signatures.
+fn patched(bytes: &[u8], (local, central): (usize, usize), value: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    for at in 0..bytes.len() - 46 {
+        let offset = match &bytes[at..at + 4] {
+            b"PK\x03\x04" => local,
+            b"PK\x01\x02" => central,
+            _ => continue,
+        };
+        bytes[at + offset..at + offset + value.len()].copy_from_slice(value);
+    }
+    bytes
+}
+
+/// Archives that are no mishap.
+fn hostile_archives(sound: &BTreeMap<String, Vec<u8>>) -> Vec<(&'static str, Vec<u8>)> {
+    let with = |name: &str| {
+        let mut more = sound.clone();
+        more.insert(name.to_string(), b"x".to_vec());
+        zipped(&more)
+    };
+    let place = "extra/placeholder/21";
+    let whole = zipped(sound);
+    let mut archives = vec![
+        (
+            "two descriptions",
+            renamed(&with(place), place, "modelDescription.xml"),
+        ),
+        (
+            "a zero in a name",
+            renamed(&with(place), place, "extra/place\0older/21"),
+        ),
+        ("dots", renamed(&with(place), place, "extra/../../../../21")),
+        (
+            "backslashes",
+            renamed(&with(place), place, "extra\\..\\..\\..\\..\\12"),
+        ),
+        (
+            "a drive",
+            renamed(&with(place), place, "C:/extra/placeholder"),
+        ),
+        (
+            "two slashes",
+            renamed(&with(place), place, "//server/place/hold1"),
+        ),
+        (
+            "escapes",
+            renamed(&with(place), place, "extra/\u{1b}[2Jcehold11/1"),
+        ),
+        ("encrypted", patched(&whole, (6, 8), &1_u16.to_le_bytes())),
+        (
+            "an unknown method",
+            patched(&whole, (8, 10), &99_u16.to_le_bytes()),
+        ),
+        (
+            "another checksum",
+            patched(&whole, (14, 16), &7_u32.to_le_bytes()),
+        ),
+        ("nothing inside", zipped(&BTreeMap::new())),
+        (
+            "a name of 5,000 letters",
+            with(&format!("extra/{}", "n".repeat(5000))),
+        ),
+        (
+            "200 folders deep",
+            with(&format!("extra/{}end", "d/".repeat(200))),
+        ),
+        ("a folder under a file", with("modelDescription.xml/below")),
+    ];
+    // 4 GB are said to be inside.
+    let size = (4_000_000_000_u32).to_le_bytes();
+    archives.push(("sizes that are not true", patched(&whole, (22, 24), &size)));
+    let mut linked = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default();
+    for (name, content) in sound {
+        linked.start_file(name, options).unwrap();
+        linked.write_all(content).unwrap();
+    }
+    for (name, target) in [
+        ("resources/link", "/etc/passwd"),
+        ("binaries/up", "../../.."),
+    ] {
+        linked.add_symlink(name, target, options).unwrap();
+    }
+    let linked = linked.finish().unwrap().into_inner();
+    archives.push(("links to outside", linked));
+    archives
+}
+
 #[test]
 fn damaged_and_hostile_files_are_read_or_refused_by_name() {
     println!("seed {SEED}");
@@ -161,6 +266,9 @@ fn damaged_and_hostile_files_are_read_or_refused_by_name() {
             let mut hostile = sound.clone();
             hostile.insert(name.to_string(), b"x".to_vec());
             attempt(count, &place, &zipped(&hostile), &open, name);
+        }
+        for (what, bytes) in hostile_archives(&sound) {
+            attempt(count, &place, &bytes, &open, what);
         }
         // A thousandfold bomb of a description is refused, not unpacked into memory for ever.
         let mut bomb = sound.clone();

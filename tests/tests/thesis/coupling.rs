@@ -5,10 +5,13 @@
 
 use std::path::Path;
 
-use acceptance::monolithic::{table_acceleration, worst_error};
+use acceptance::monolithic::{table_acceleration, table_acceleration_under, worst_error};
 use acceptance::shared;
+use plant::identified::shake_table::ShakeTable;
+use plant::specimens::linear::LinearSpecimen;
 use shakebench::master::{Algorithm, Ended};
 use shakebench::run::experiment::{Prepared, Request, prepare};
+use shakebench::run::refinement::refine;
 
 fn request(record: Option<&Path>, specimen: &str, step: f64) -> Prepared {
     let request = Request {
@@ -90,5 +93,52 @@ fn a_jacobi_master_couples_with_first_order() {
     println!("{errors:?}");
     for order in orders {
         assert!((order - 1.0).abs() < 0.3, "{order}");
+    }
+}
+
+/// Specimens of a tenth of the table's mass to ten times it, with the period and damping of Appendix A.
+#[test]
+fn the_step_is_halved_until_the_coupling_errs_by_less_than_asked_for() {
+    let table = ShakeTable::default().table.mass;
+    for ratio in [0.1, 1.0, 10.0] {
+        let specimen = LinearSpecimen::from_period(ratio * table, 1.0, 0.05);
+        let set = [
+            ("mass", specimen.mass),
+            ("damping", specimen.damping),
+            ("stiffness", specimen.stiffness),
+        ];
+        let units = ["kg", "N s/m", "N/m"];
+        let set = set.iter().zip(units);
+        let set = set.map(|((name, value), unit)| format!("specimen.{name}={value} {unit}"));
+        let request = Request {
+            set: set.collect(),
+            ..Request::built_in("three-variable")
+        };
+        // Under the heaviest, the loop is close to its limit, and 2 ms make it unstable.
+        let algorithms = match ratio > 1.0 {
+            true => vec![Algorithm::GaussSeidel],
+            false => vec![Algorithm::GaussSeidel, Algorithm::Iterative],
+        };
+        for algorithm in algorithms {
+            let mut prepared = prepare(&request).unwrap();
+            prepared.algorithm = algorithm;
+            let truth = table_acceleration_under(&prepared.motion, Some(specimen));
+            let before = worst_error(&truth, &coupled(&prepared, algorithm));
+            let estimated = refine(&mut prepared, 0.05).unwrap();
+            let after = worst_error(&truth, &coupled(&prepared, algorithm));
+            println!(
+                "mass {ratio} of the table's, {algorithm}: {:.4} % at 2 ms, {:.4} % at {} ms, estimated \
+                 {:.4} % of `{}`",
+                100.0 * before,
+                100.0 * after,
+                1e3 * prepared.step,
+                estimated.percent,
+                estimated.signal
+            );
+            assert!(estimated.is_reached(), "{estimated:?}");
+            assert!(after < 5e-4, "{after}");
+            // The estimate is of the signal that is most in error, so it is no smaller.
+            assert!(100.0 * after < 1.2 * estimated.percent + 1e-6, "{after}");
+        }
     }
 }
