@@ -178,8 +178,15 @@ impl Results {
             .extend(names.iter().map(|name| name.to_string()));
     }
 
-    /// Whether a file of data would change; pages, pictures and summaries follow the data.
-    fn check_existing(&self) -> Result<(), ResultsError> {
+    /// Whether a file of data that has been written so far would change one that is there; pages, pictures
+    /// and summaries follow the data. To be asked before what takes long.
+    ///
+    /// # Errors
+    /// Such a file, unless [`allow_overwriting`] was called.
+    pub fn check_existing(&self) -> Result<(), ResultsError> {
+        if may_overwrite() {
+            return Ok(());
+        }
         let is_volatile = |name: &&String| {
             let extension = Path::new(name.as_str()).extension();
             VOLATILE
@@ -207,9 +214,7 @@ impl Results {
     /// A folder that cannot be made; a file of data that is there and would change, unless
     /// [`allow_overwriting`] was called.
     pub fn finish(self) -> Result<Vec<PathBuf>, ResultsError> {
-        if !may_overwrite() {
-            self.check_existing()?;
-        }
+        self.check_existing()?;
         fs::create_dir_all(&self.folder).map_err(|source| ResultsError::Folder {
             folder: self.folder.clone(),
             source,

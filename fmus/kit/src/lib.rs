@@ -37,6 +37,8 @@
 //! }
 //! ```
 
+mod ahead;
+mod built;
 mod checksum;
 mod component;
 mod derivative;
@@ -66,6 +68,8 @@ pub mod resources;
 pub mod terminal;
 pub mod variable;
 
+pub use ahead::reference_ahead;
+pub use built::Built;
 pub use component::{Component, ComponentResult, Event};
 pub use fault::Status;
 pub use guard::collect_panics;

@@ -5,7 +5,7 @@ mod settings;
 
 use controllers::mpc::{MAXIMUM_HORIZON, Memory, ModelPredictiveControl, ModelPredictiveInput};
 use controllers::{Controller, Motion};
-use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
+use fmu_kit::{Built, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 use settings::{SOLVERS, Settings};
@@ -24,7 +24,7 @@ pub struct ModelPredictive {
     command: Motion,
     counts: Counts,
     #[serde(skip)]
-    built: Built,
+    built: Built<Settings, ModelPredictiveControl>,
 }
 
 /// Outputs about the solver.
@@ -37,44 +37,6 @@ struct Counts {
     low_level_alone: i32,
 }
 
-/// What follows from the settings alone. A copy builds its own at its next step.
-#[derive(Default)]
-struct Built(Option<Box<(Settings, ModelPredictiveControl)>>);
-
-impl Clone for Built {
-    fn clone(&self) -> Self {
-        Self(None)
-    }
-
-    fn clone_from(&mut self, _source: &Self) {}
-}
-
-impl std::fmt::Debug for Built {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_tuple("Built").field(&self.0.is_some()).finish()
-    }
-}
-
-impl Built {
-    /// The controller for these settings, built if it isn't yet.
-    fn controller(
-        &mut self,
-        settings: &Settings,
-    ) -> Result<&mut ModelPredictiveControl, plant::ModelError> {
-        if self.0.as_ref().is_some_and(|built| built.0 != *settings) {
-            self.0 = None;
-        }
-        let built = match self.0.take() {
-            Some(built) => built,
-            None => Box::new((
-                *settings,
-                ModelPredictiveControl::new(settings.parameters(ModelPredictive::STEP_SIZE)?)?,
-            )),
-        };
-        Ok(&mut self.0.insert(built).1)
-    }
-}
-
 const NOW: [&str; 6] = [
     "reference_displacement",
     "reference_velocity",
@@ -84,47 +46,8 @@ const NOW: [&str; 6] = [
     "measured_acceleration",
 ];
 
-fn ahead() -> Vec<Variable<ModelPredictive>> {
-    let array = |name, about: &str, unit, shown, nominal, field| {
-        let elements =
-            Variable::<ModelPredictive>::array(name, Causality::Input, MAXIMUM_HORIZON, field);
-        elements
-            .into_iter()
-            .enumerate()
-            .map(|(i, element)| {
-                element
-                    .about(&format!("{about} {} samples ahead, for `preview`", i + 1))
-                    .unit(unit)
-                    .shown_in(shown)
-                    .nominal(nominal)
-            })
-            .collect::<Vec<_>>()
-    };
-    let mut all = array(
-        "reference_displacement",
-        "Wanted displacement",
-        "m",
-        "in",
-        0.0381,
-        |s| &mut s.displacement_ahead,
-    );
-    all.extend(array(
-        "reference_velocity",
-        "Wanted velocity",
-        "m/s",
-        "in/s",
-        0.5,
-        |s| &mut s.velocity_ahead,
-    ));
-    all.extend(array(
-        "reference_acceleration",
-        "Wanted acceleration",
-        "m/s2",
-        "g",
-        10.0,
-        |s| &mut s.acceleration_ahead,
-    ));
-    all
+fn build(settings: &Settings) -> Result<ModelPredictiveControl, plant::ModelError> {
+    ModelPredictiveControl::new(settings.parameters(ModelPredictive::STEP_SIZE)?)
 }
 
 impl Component for ModelPredictive {
@@ -172,7 +95,14 @@ impl Component for ModelPredictive {
             input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
             input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
         };
-        let ahead = ahead();
+        let ahead = fmu_kit::reference_ahead::<Self>(
+            MAXIMUM_HORIZON,
+            [
+                |s| &mut s.displacement_ahead,
+                |s| &mut s.velocity_ahead,
+                |s| &mut s.acceleration_ahead,
+            ],
+        );
         let inputs: Vec<String> = NOW
             .iter()
             .map(|name| name.to_string())
@@ -207,7 +137,7 @@ impl Component for ModelPredictive {
     }
 
     fn initialize(&mut self) -> ComponentResult {
-        self.built.controller(&self.settings)?;
+        self.built.of(&self.settings, build)?;
         self.memory = Memory::default();
         self.command = Motion::default();
         self.counts = Counts::default();
@@ -215,7 +145,7 @@ impl Component for ModelPredictive {
     }
 
     fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
-        let control = self.built.controller(&self.settings)?;
+        let control = self.built.of(&self.settings, build)?;
         control.memory = self.memory;
         let input = ModelPredictiveInput {
             reference: std::array::from_fn(|i| match i.checked_sub(1) {

@@ -6,7 +6,7 @@ mod settings;
 use controllers::preview::feedforward::PREVIEW;
 use controllers::preview::{Memory, PreviewControl as Law, PreviewInput};
 use controllers::{Controller, Motion};
-use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Built, Component, ComponentResult, Dependency::Dependent, Variable};
 use serde::{Deserialize, Serialize};
 
 use settings::{ROLES, Settings};
@@ -24,42 +24,7 @@ pub struct PreviewControl {
     memory: Memory,
     valve_command: f64,
     #[serde(skip)]
-    built: Built,
-}
-
-/// What follows from the settings alone. A copy builds its own at its next step.
-#[derive(Default)]
-struct Built(Option<Box<(Settings, Law)>>);
-
-impl Clone for Built {
-    fn clone(&self) -> Self {
-        Self(None)
-    }
-
-    fn clone_from(&mut self, _source: &Self) {}
-}
-
-impl std::fmt::Debug for Built {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_tuple("Built").field(&self.0.is_some()).finish()
-    }
-}
-
-impl Built {
-    /// The controller for these settings, built if it isn't yet.
-    fn controller(&mut self, settings: &Settings) -> Result<&mut Law, plant::ModelError> {
-        if self.0.as_ref().is_some_and(|built| built.0 != *settings) {
-            self.0 = None;
-        }
-        let built = match self.0.take() {
-            Some(built) => built,
-            None => Box::new((
-                *settings,
-                Law::new(settings.parameters(PreviewControl::STEP_SIZE)?)?,
-            )),
-        };
-        Ok(&mut self.0.insert(built).1)
-    }
+    built: Built<Settings, Law>,
 }
 
 const NOW: [&str; 7] = [
@@ -72,46 +37,8 @@ const NOW: [&str; 7] = [
     "controller_command",
 ];
 
-fn ahead() -> Vec<Variable<PreviewControl>> {
-    let array = |name, about: &str, unit, shown, nominal, field| {
-        let elements = Variable::<PreviewControl>::array(name, Causality::Input, PREVIEW, field);
-        elements
-            .into_iter()
-            .enumerate()
-            .map(|(i, element)| {
-                element
-                    .about(&format!("{about} {} samples ahead, for `preview`", i + 1))
-                    .unit(unit)
-                    .shown_in(shown)
-                    .nominal(nominal)
-            })
-            .collect::<Vec<_>>()
-    };
-    let mut all = array(
-        "reference_displacement",
-        "Wanted displacement",
-        "m",
-        "in",
-        0.0381,
-        |s| &mut s.displacement_ahead,
-    );
-    all.extend(array(
-        "reference_velocity",
-        "Wanted velocity",
-        "m/s",
-        "in/s",
-        0.5,
-        |s| &mut s.velocity_ahead,
-    ));
-    all.extend(array(
-        "reference_acceleration",
-        "Wanted acceleration",
-        "m/s2",
-        "g",
-        10.0,
-        |s| &mut s.acceleration_ahead,
-    ));
-    all
+fn build(settings: &Settings) -> Result<Law, plant::ModelError> {
+    Law::new(settings.parameters(PreviewControl::STEP_SIZE)?)
 }
 
 impl Component for PreviewControl {
@@ -131,7 +58,14 @@ impl Component for PreviewControl {
             input("controller_command", s.command, "Another controller's command, where this compensates", "V").nominal(10.0);
             input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
         };
-        let ahead = ahead();
+        let ahead = fmu_kit::reference_ahead::<Self>(
+            PREVIEW,
+            [
+                |s| &mut s.displacement_ahead,
+                |s| &mut s.velocity_ahead,
+                |s| &mut s.acceleration_ahead,
+            ],
+        );
         let inputs: Vec<String> = NOW
             .iter()
             .map(|name| name.to_string())
@@ -153,14 +87,14 @@ impl Component for PreviewControl {
     }
 
     fn initialize(&mut self) -> ComponentResult {
-        self.built.controller(&self.settings)?;
+        self.built.of(&self.settings, build)?;
         self.memory = Memory::default();
         self.valve_command = 0.0;
         Ok(())
     }
 
     fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
-        let control = self.built.controller(&self.settings)?;
+        let control = self.built.of(&self.settings, build)?;
         control.memory = self.memory;
         let input = PreviewInput {
             reference: std::array::from_fn(|i| match i.checked_sub(1) {

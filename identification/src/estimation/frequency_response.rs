@@ -1,14 +1,12 @@
-//! Frequency responses from data, by averaged spectra (Welch, 1967), with coherence.
+//! Frequency responses from data, by averaged [spectra](super::spectra), with coherence.
 //!
 //! Under feedback the direct estimate `S_yu / S_uu` is biased towards the inverse of the
 //! controller where noise dominates. With the reference recorded, the joint input-output estimate
 //! `S_yr / S_ur` is not (Ljung 1999, Section 13.5): the reference is independent of the noise.
 
-use std::f64::consts::TAU;
-
 use nalgebra::Complex;
-use realfft::RealFftPlanner;
 
+use super::spectra::Spectra;
 use crate::IdentificationError;
 
 /// A frequency response with its quality.
@@ -24,69 +22,6 @@ pub struct FrequencyResponseEstimate {
     pub relative_error: Vec<f64>,
     /// Segments averaged.
     pub segments: usize,
-}
-
-/// Averaged spectra of several channels over Hann windows that overlap by half.
-struct Spectra {
-    frequency: Vec<f64>,
-    /// `lines[segment][channel][line]`.
-    lines: Vec<Vec<Vec<Complex<f64>>>>,
-}
-
-impl Spectra {
-    fn new(channels: &[&[f64]], period: f64, segment: usize) -> Result<Self, IdentificationError> {
-        let samples = channels.iter().map(|c| c.len()).min().unwrap_or(0);
-        if segment < 16 || samples < 2 * segment {
-            return Err(IdentificationError::TooShort {
-                recording: "frequency response".into(),
-                samples,
-                parameters: segment,
-                needed: 2 * segment.max(16),
-                seconds: 2.0 * segment.max(16) as f64 * period,
-            });
-        }
-        let window: Vec<f64> = (0..segment)
-            .map(|k| 0.5 - 0.5 * (TAU * k as f64 / segment as f64).cos())
-            .collect();
-        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(segment);
-        let mut lines = Vec::new();
-        let mut first = 0;
-        while first + segment <= samples {
-            let mut own = Vec::with_capacity(channels.len());
-            for channel in channels {
-                let piece = &channel[first..first + segment];
-                let mean = piece.iter().sum::<f64>() / segment as f64;
-                let mut input: Vec<f64> = piece
-                    .iter()
-                    .zip(&window)
-                    .map(|(value, w)| (value - mean) * w)
-                    .collect();
-                let mut output = transform.make_output_vec();
-                transform
-                    .process(&mut input, &mut output)
-                    .map_err(|error| IdentificationError::NotConverged {
-                        method: "the Fourier transform",
-                        reason: error.to_string(),
-                    })?;
-                own.push(output);
-            }
-            lines.push(own);
-            first += segment / 2;
-        }
-        Ok(Self {
-            frequency: (0..=segment / 2)
-                .map(|k| k as f64 / (segment as f64 * period))
-                .collect(),
-            lines,
-        })
-    }
-
-    fn cross(&self, a: usize, b: usize, line: usize) -> Complex<f64> {
-        self.lines
-            .iter()
-            .map(|own| own[a][line] * own[b][line].conj())
-            .sum()
-    }
 }
 
 /// Response from `input` to `output` in open loop, segments of `segment` samples.
@@ -114,29 +49,21 @@ pub fn joint_input_output(
     period: f64,
     segment: usize,
 ) -> Result<FrequencyResponseEstimate, IdentificationError> {
-    let spectra = Spectra::new(&[reference, input, output], period, segment)?;
+    let spectra = Spectra::of_two(&[reference, input, output], period, segment)?;
     let mut estimate = FrequencyResponseEstimate {
         frequency: Vec::new(),
         response: Vec::new(),
         coherence: Vec::new(),
         relative_error: Vec::new(),
-        segments: spectra.lines.len(),
+        segments: spectra.segments(),
     };
     // Half-overlapping Hann windows are worth about 0.53 segments more each (Welch).
-    let independent = 1.0 + 0.53 * (spectra.lines.len() as f64 - 1.0);
+    let independent = 1.0 + 0.53 * (spectra.segments() as f64 - 1.0);
     for line in 1..spectra.frequency.len() {
-        let power = |i: usize| spectra.cross(i, i, line).re;
-        let (input_cross, output_cross) = (spectra.cross(1, 0, line), spectra.cross(2, 0, line));
-        let response = output_cross / input_cross;
-        let coherence = |cross: Complex<f64>, of: usize| {
-            let product = power(0) * power(of);
-            if product > 0.0 {
-                (cross.norm_sqr() / product).min(1.0)
-            } else {
-                0.0
-            }
-        };
-        let quality = coherence(input_cross, 1).min(coherence(output_cross, 2));
+        let response = spectra.cross(2, 0, line) / spectra.cross(1, 0, line);
+        let quality = spectra
+            .coherence(1, 0, line)
+            .min(spectra.coherence(2, 0, line));
         estimate.frequency.push(spectra.frequency[line]);
         estimate.response.push(response);
         estimate.coherence.push(quality);
@@ -157,9 +84,9 @@ pub fn excited_band(
     segment: usize,
     part: f64,
 ) -> Result<(f64, f64, usize), IdentificationError> {
-    let spectra = Spectra::new(&[signal], period, segment)?;
+    let spectra = Spectra::of_two(&[signal], period, segment)?;
     let power: Vec<f64> = (0..spectra.frequency.len())
-        .map(|line| spectra.cross(0, 0, line).re)
+        .map(|line| spectra.power(0, line))
         .collect();
     let largest = power[1..].iter().copied().fold(0.0, f64::max);
     let lines: Vec<usize> = (1..power.len())
@@ -177,6 +104,8 @@ pub fn excited_band(
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;

@@ -8,7 +8,7 @@ use identification::diagnosis::engine::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 use plant::hybrid::{BenchmarkCase, InteractionForm};
 
-use crate::benchmark::vrths::hidden::{HiddenStudy, read_hidden};
+use crate::benchmark::vrths::hidden::{HiddenError, HiddenStudy, read_hidden};
 use crate::benchmark::vrths::motions::{self, INTENSITY, RECORDS};
 use crate::benchmark::vrths::outcome::Outcome;
 use crate::benchmark::vrths::study::{Plants, Study};
@@ -186,18 +186,25 @@ fn hidden(arguments: &Vrths, study: Study) -> Result<ExitCode, Error> {
         controllers: study.controllers,
         seed: study.seed,
     };
-    let outcome = hidden.run(Observer::none());
-    let outcome = outcome.map_err(|error| refused(error.to_string()))?;
+    let fault = |error: HiddenError| refused(error.to_string());
+    let record = hidden.record().map_err(fault)?;
+    let results = match &arguments.out {
+        Some(out) => {
+            let mut results = Results::begin(out)?;
+            results.write("record.csv", |file| record.write(file))?;
+            // A diagnosis takes minutes.
+            results.check_existing()?;
+            Some(results)
+        }
+        None => None,
+    };
+    let outcome = hidden.run(&record, Observer::none()).map_err(fault)?;
     let mut files = Vec::new();
-    if let Some(out) = &arguments.out {
-        let fault = |name: &str, reason: String| Error::File {
-            path: out.join(name),
-            reason,
-        };
-        let model = outcome.extended_model();
-        let model = model.map_err(|error| fault(EXTENDED_MODEL, error.to_string()))?;
-        let mut results = Results::begin(out)?;
-        results.write("record.csv", |file| outcome.write_record(file))?;
+    if let (Some(out), Some(mut results)) = (&arguments.out, results) {
+        let model = outcome.extended_model().map_err(|error| Error::File {
+            path: out.join(EXTENDED_MODEL),
+            reason: error.to_string(),
+        })?;
         results.write_text(EXTENDED_MODEL, &model)?;
         results.write("scores.json", |file| {
             serde_json::to_writer_pretty(file, &outcome).map_err(std::io::Error::other)

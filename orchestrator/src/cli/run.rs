@@ -14,18 +14,15 @@ use super::rig::RigArguments;
 use crate::error::Error;
 use crate::fmu::{Isolation, Options, Trace};
 use crate::live::{Scene, Server, Tap};
-use crate::master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Record, Simulation};
-use crate::metrics::laboratory::Laboratory;
-use crate::motion::{self, Motion};
-use crate::report::columns::aligned;
-use crate::report::number::significant;
-use crate::report::{Cell, UnitSystem, Units};
+use crate::master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Simulation};
+use crate::motion;
 use crate::results::{Results, allow_overwriting, unused};
 use crate::run::checkpoint::{self, Checkpoints, Unfinished};
 use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
-use crate::run::summary::{Summary, asked};
+use crate::run::summary::Summary;
+use crate::run::text::text;
 use crate::system::built_in;
 use crate::units::{self, STANDARD_GRAVITY};
 
@@ -251,7 +248,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.json {
         println!("{}", serde_json::json!(summary));
     } else {
-        print!("{}", table(&summary, &outcome.record, motion));
+        print!("{}", text(&summary, &outcome.record, motion));
         println!("\nwritten:");
         for file in files {
             println!("  {}", file.display());
@@ -379,147 +376,6 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
         trace: trace.transpose()?,
         log_categories: arguments.log.clone(),
     })
-}
-
-/// The figures as a table for people.
-fn table(summary: &Summary, record: &Record, motion: &Motion) -> String {
-    let mut text = match motion.is_empty() {
-        true => format!("{}\n", summary.system),
-        false => format!("{} on {}\n", summary.system, summary.motion.name),
-    };
-    for note in &motion.notes {
-        text += &format!("  {note}\n");
-    }
-    for (name, seed) in &summary.seeds {
-        text += &format!("  seed of the noise of `{name}`: {seed}\n");
-    }
-    text += &format!(
-        "\n{} steps of {} ms (FMI {}, {}), {} times real time, {}\n\n",
-        summary.steps,
-        significant(1e3 * summary.step_s, 3)
-            .trim_end_matches('0')
-            .trim_end_matches('.'),
-        summary.fmi,
-        summary.algorithm,
-        significant(summary.real_time_factor, 2),
-        summary.ended.word(),
-    );
-    if let Some(kept) = &summary.real_time {
-        text += &format!(
-            "in real time: {} of {} steps were not done in time, the latest by {:.2} ms; steps began \
-             {:.0} us late (median), 99 of 100 less than {:.0} us\n\n",
-            kept.missed,
-            kept.deadlines,
-            1e3 * kept.worst_s,
-            1e6 * kept.jitter_median_s,
-            1e6 * kept.jitter_p99_s,
-        );
-    }
-    let Some(tracking) = &summary.tracking else {
-        return text;
-    };
-    let asked = asked(record, motion);
-    let (motion, heading) = match &asked {
-        Some(asked) => (asked, "structure"),
-        None => (motion, "reference"),
-    };
-    let row = |name: &str, cells: [String; 3]| {
-        let mut row = vec![name.to_string()];
-        row.extend(cells);
-        row
-    };
-    let system = UnitSystem::of_text();
-    let length = |value| Cell::Quantity(value, Units::DISPLACEMENT, 4).text(system);
-    let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4).text(system);
-    let percent = |value: f64| format!("{value:.4} %");
-    text += &aligned(&[
-        row("", [heading.into(), "table".into(), "largest error".into()]),
-        row(
-            "displacement, peak",
-            [
-                length(motion.peak_displacement()),
-                length(tracking.peak_displacement),
-                length(tracking.peak_displacement_error),
-            ],
-        ),
-        row(
-            "acceleration, peak",
-            [
-                acceleration(motion.peak_acceleration()),
-                acceleration(tracking.peak_acceleration),
-                acceleration(tracking.peak_acceleration_error),
-            ],
-        ),
-    ]);
-    text += "\n";
-    let pair = |name: &str, value: String| vec![name.to_string(), value];
-    text += &aligned(&[
-        pair(
-            "normalised RMS acceleration error",
-            percent(tracking.time_domain_percent),
-        ),
-        pair(
-            "Fourier amplitude error, acceleration",
-            percent(tracking.frequency_domain_percent),
-        ),
-        pair(
-            "normalised RMS displacement error",
-            percent(tracking.displacement_percent),
-        ),
-        pair(
-            "delay of the table",
-            format!("{:.1} ms", 1e3 * tracking.delay),
-        ),
-    ]);
-    if let Some(own) = &tracking.laboratory {
-        text += "\n";
-        text += &aligned(&bands(own));
-        text += "\n";
-        text += &aligned(&[
-            pair(
-                "error over the significant duration, acceleration",
-                format!(
-                    "{} of {:.2} s",
-                    percent(own.significant_duration_percent),
-                    own.significant_duration_s
-                ),
-            ),
-            pair("peak ratio", format!("{:.4}", own.peak_ratio)),
-            pair("Arias ratio", format!("{:.4}", own.arias_ratio)),
-        ]);
-    }
-    text
-}
-
-/// Response spectra and transfer function, a row for each band.
-fn bands(own: &Laboratory) -> Vec<Vec<String>> {
-    let head = [
-        "band",
-        "response spectrum, largest",
-        "mean",
-        "gain",
-        "delay",
-        "coherence",
-    ];
-    let mut rows = vec![head.map(str::to_string).to_vec()];
-    for (n, spectrum) in own.response_spectrum_percent.iter().enumerate() {
-        let [from, to] = spectrum.band_hz;
-        let mut row = vec![
-            format!("{from} to {to} Hz"),
-            format!("{:.2} %", spectrum.largest),
-            format!("{:.2} %", spectrum.mean),
-        ];
-        row.extend(match own.coherence.as_ref().map(|bands| &bands[n]) {
-            Some(band) => [
-                format!("{:.4}", band.gain),
-                format!("{:.2} ms", 1e3 * band.delay_s),
-                format!("{:.4}", band.coherence),
-            ],
-            None => ["-", "-", "-"].map(str::to_string),
-        });
-        rows.push(row);
-    }
-    rows
 }
 
 /// Reads the options; relative paths become absolute, so that a manifest stays true elsewhere.

@@ -59,7 +59,7 @@ impl Run {
     pub(super) fn history(&self, name: &str, signal: &str, colour: usize) -> Series {
         Series::history(name, self.motion.dt, &self.column(signal))
             .coloured(colour)
-            .thinned(20_000)
+            .thinned(4_000)
     }
 }
 

@@ -3,10 +3,10 @@
 
 use std::f64::consts::TAU;
 
+use identification::estimation::spectra::Spectra;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 
-use crate::metrics::laboratory::CrossSpectrum;
 use crate::metrics::spectrum;
 use crate::motion::Motion;
 
@@ -69,22 +69,22 @@ impl Inverse {
             crossover,
             [0.0, 0.5 / dt],
         );
-        let sums = CrossSpectrum::new(&input, &output, dt, length)?;
+        let spectra = Spectra::new(&[&input, &output], dt, length).ok()?;
         let (mut sum, mut count) = (0.0, 0.0);
-        let lines = (0..sums.frequency.len())
+        let lines = (0..spectra.frequency.len())
             .map(|k| {
-                let coherence = sums.coherence(k);
-                if (band[0]..=band[1]).contains(&sums.frequency[k]) {
+                let coherence = spectra.coherence(0, 1, k);
+                if (band[0]..=band[1]).contains(&spectra.frequency[k]) {
                     sum += coherence;
                     count += 1.0;
                 }
-                let gain = sums.gain(k);
+                let gain = spectra.gain(0, 1, k);
                 let size = gain.norm().max(1.0 / MOST_GAIN);
                 coherence * gain.conj() / (size * gain.norm().max(f64::MIN_POSITIVE))
             })
             .collect();
         Some(Self {
-            step: sums.frequency.get(1).copied()?,
+            step: spectra.frequency.get(1).copied()?,
             lines,
             crossover,
             band,

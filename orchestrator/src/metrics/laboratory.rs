@@ -3,9 +3,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use realfft::num_complex::Complex64;
+use identification::estimation::spectra::Spectra;
 
-use super::{USUAL_DAMPING, pseudo_acceleration, rms, spectrum};
+use super::{USUAL_DAMPING, pseudo_acceleration, rms};
 use crate::motion::peak;
 
 /// Bands in which figures are given, Hz.
@@ -125,95 +125,32 @@ fn deviation(wanted: &[f64], found: &[f64], dt: f64, band: [f64; 2]) -> Spectrum
     }
 }
 
-/// Cross and own spectra of overlapping Hann windows (Welch, IEEE Transactions on Audio and
-/// Electroacoustics 15, 1967), summed.
-pub struct CrossSpectrum {
-    /// Frequencies, Hz.
-    pub frequency: Vec<f64>,
-    /// Power of the input.
-    pub input: Vec<f64>,
-    /// Power of the output.
-    pub output: Vec<f64>,
-    /// Conjugate of the input times the output.
-    pub cross: Vec<Complex64>,
-}
-
-impl CrossSpectrum {
-    /// Of histories with a sample every `dt` s in segments of `length` samples; none where fewer than
-    /// two segments fit.
-    #[must_use]
-    pub fn new(input: &[f64], output: &[f64], dt: f64, length: usize) -> Option<Self> {
-        let samples = input.len().min(output.len());
-        if length < 4 || samples < length + length / 2 {
-            return None;
-        }
-        let window: Vec<f64> = (0..length)
-            .map(|n| 0.5 - 0.5 * (TAU * (n as f64 + 0.5) / length as f64).cos())
-            .collect();
-        let lines = length / 2 + 1;
-        let mut sums = Self {
-            frequency: (0..lines)
-                .map(|k| k as f64 / (length as f64 * dt))
-                .collect(),
-            input: vec![0.0; lines],
-            output: vec![0.0; lines],
-            cross: vec![Complex64::new(0.0, 0.0); lines],
-        };
-        for start in (0..=samples - length).step_by(length / 2) {
-            let part = |history: &[f64]| {
-                let cut = &history[start..start + length];
-                let own: Vec<f64> = cut.iter().zip(&window).map(|(a, w)| a * w).collect();
-                spectrum(&own, length)
-            };
-            let (x, y) = (part(input), part(output));
-            for k in 0..lines {
-                sums.input[k] += x[k].norm_sqr();
-                sums.output[k] += y[k].norm_sqr();
-                sums.cross[k] += x[k].conj() * y[k];
-            }
-        }
-        Some(sums)
-    }
-
-    /// Transfer function at line `k`.
-    #[must_use]
-    pub fn gain(&self, k: usize) -> Complex64 {
-        self.cross[k] / self.input[k].max(f64::MIN_POSITIVE)
-    }
-
-    /// Coherence at line `k`.
-    #[must_use]
-    pub fn coherence(&self, k: usize) -> f64 {
-        let own = self.input[k] * self.output[k];
-        if own > 0.0 {
-            (self.cross[k].norm_sqr() / own).min(1.0)
-        } else {
-            0.0
-        }
-    }
-}
-
 fn transfer(wanted: &[f64], found: &[f64], dt: f64) -> Option<[Transfer; BANDS.len()]> {
-    let sums = CrossSpectrum::new(wanted, found, dt, (SEGMENT / dt) as usize)?;
+    const WANTED: usize = 0;
+    const FOUND: usize = 1;
+    let spectra = Spectra::new(&[wanted, found], dt, (SEGMENT / dt) as usize).ok()?;
+    let power: Vec<f64> = (0..spectra.frequency.len())
+        .map(|k| spectra.power(WANTED, k))
+        .collect();
     Some(BANDS.map(|band| {
-        let inside = |k: &usize| (band[0]..=band[1]).contains(&sums.frequency[*k]);
-        let lines: Vec<usize> = (0..sums.frequency.len()).filter(inside).collect();
-        let weight: f64 = lines.iter().map(|&k| sums.input[k]).sum();
+        let inside = |k: &usize| (band[0]..=band[1]).contains(&spectra.frequency[*k]);
+        let lines: Vec<usize> = (0..power.len()).filter(inside).collect();
+        let weight: f64 = lines.iter().map(|&k| power[k]).sum();
         let mean = |value: &dyn Fn(usize) -> f64| {
-            let sum: f64 = lines.iter().map(|&k| sums.input[k] * value(k)).sum();
+            let sum: f64 = lines.iter().map(|&k| power[k] * value(k)).sum();
             sum / weight.max(f64::MIN_POSITIVE)
         };
         // The delay that fits the phases best.
-        let omega = |k: usize| TAU * sums.frequency[k];
+        let omega = |k: usize| TAU * spectra.frequency[k];
         let phase = |k: usize| {
-            let angle = sums.cross[k].arg();
+            let angle = spectra.cross(FOUND, WANTED, k).arg();
             if angle > PI { angle - TAU } else { angle }
         };
         Transfer {
             band_hz: band,
-            gain: mean(&|k| sums.gain(k).norm()),
+            gain: mean(&|k| spectra.gain(WANTED, FOUND, k).norm()),
             delay_s: -mean(&|k| omega(k) * phase(k)) / mean(&|k| omega(k).powi(2)),
-            coherence: mean(&|k| sums.coherence(k)),
+            coherence: mean(&|k| spectra.coherence(WANTED, FOUND, k)),
         }
     }))
 }

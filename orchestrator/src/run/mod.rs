@@ -7,3 +7,4 @@ pub mod manifest;
 pub mod page;
 pub mod signals;
 pub mod summary;
+pub mod text;

@@ -72,3 +72,35 @@ fn what_cannot_be_benchmarked_is_refused() {
         refused(folder.path(), &["benchmark", "vrths", &argument], &words);
     }
 }
+
+/// A diagnosis takes minutes, so what would be lost is told before.
+#[test]
+fn a_record_that_would_be_overwritten_is_told_before_it_is_diagnosed() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("record.csv"), "mine\n").unwrap();
+    let begun = std::time::Instant::now();
+    let arguments = [
+        "benchmark",
+        "vrths",
+        "--hidden=valve_play=0.2 mm",
+        "--case=1",
+        "--motion=built-in",
+        "--out=out",
+    ];
+    let output = shakebench(folder.path(), &arguments);
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("record.csv") && said.contains("--force"),
+        "{said}"
+    );
+    println!("refused after {:.1} s", begun.elapsed().as_secs_f64());
+    let kept = std::fs::read_dir(&out).unwrap().count();
+    assert_eq!(kept, 1);
+    assert_eq!(
+        std::fs::read_to_string(out.join("record.csv")).unwrap(),
+        "mine\n"
+    );
+}

@@ -48,6 +48,42 @@ fn case() -> Option<PathBuf> {
         .find(|case| case.join("nominal.toml").is_file())
 }
 
+/// A mass on a hardening spring, recorded at 250 Hz, with what is believed of it; the description's file.
+fn described(folder: &Path) -> PathBuf {
+    use std::fmt::Write;
+    let mut record = String::from("time,force,displacement\n");
+    let (mut y, mut v) = (0.0_f64, 0.0_f64);
+    for k in 0..40_000 {
+        let t = f64::from(k) * 2.5e-4;
+        let lines = (0..20).map(|i| 0.3 + 0.31 * f64::from(i));
+        let force: f64 = lines.map(|f| 2.0 * (6.0 * f * t + f * f).sin()).sum();
+        if k % 16 == 0 {
+            // Rounded as a converter does.
+            let shown = (1e3 * y / 0.002).round() * 0.002;
+            writeln!(record, "{t},{force},{shown}").unwrap();
+        }
+        v += 2.5e-4 * (force - 40.0 * v - 5600.0 * y - 3e7 * y.powi(3)) / 8.0;
+        y += 2.5e-4 * v;
+    }
+    std::fs::write(folder.join("record.csv"), record).unwrap();
+    let description = r#"
+        name = "mass on a spring"
+        kind = "oscillator"
+        data = ["record.csv"]
+        left_out.second_half = true
+        [columns]
+        time = { column = "time", unit = "s" }
+        force = { column = "force", unit = "N" }
+        displacement = { column = "displacement", unit = "mm" }
+        [nominal]
+        mass = { value = 8.0, plus_minus = 0.2, unit = "kg" }
+        damping = { value = 36.0, plus_minus = 8.0, unit = "N s/m" }
+        stiffness = { value = 5500.0, plus_minus = 300.0, unit = "N/m" }
+    "#;
+    std::fs::write(folder.join("rig.toml"), description).unwrap();
+    folder.join("rig.toml")
+}
+
 #[test]
 fn pages_are_drawn_whole_and_tell_the_figures_of_their_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -66,7 +102,10 @@ fn pages_are_drawn_whole_and_tell_the_figures_of_their_files() {
     );
     done(folder, &["compare-runs", "mpc", "lost", "--out", "runs"], 0);
     done(folder, &["design", "--out", "design"], 0);
-    let mut pages = ["mpc", "lost", "runs", "design"]
+    done(folder, &["figures", "--out", "figures"], 0);
+    let oscillator = described(folder).display().to_string();
+    done(folder, &["diagnose", &oscillator, "--out", "rig"], 0);
+    let mut pages = ["mpc", "lost", "runs", "design", "figures", "rig"]
         .map(|name| folder.join(name).join("report.html"))
         .to_vec();
     if let Some(case) = case() {

@@ -5,4 +5,5 @@ mod foreign;
 mod hidden_effects;
 mod measured;
 mod spreadsheet_files;
+mod transfer_system;
 mod walkthrough;

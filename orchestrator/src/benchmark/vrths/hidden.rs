@@ -17,7 +17,6 @@ use serde::Serialize;
 
 use crate::report::columns::aligned;
 
-use super::criteria::Histories;
 use super::motions::Motion;
 use super::roster::{Entry, SAMPLE, entry};
 use super::simulation::{Setting, run};
@@ -39,6 +38,21 @@ pub struct HiddenStudy {
     pub controllers: Vec<Entry>,
     /// Seed of the noise.
     pub seed: u64,
+}
+
+/// What is diagnosed, a sample every [`PERIOD`].
+#[derive(Debug, Clone, Default)]
+pub struct Recorded {
+    /// Number of the case.
+    pub case: u8,
+    /// The motion.
+    pub motion: String,
+    /// Command of the controller, m.
+    pub command: Vec<f64>,
+    /// Displacement as its sensor shows it, m; may be empty.
+    pub measured: Vec<f64>,
+    /// Force as its sensor shows it, N.
+    pub force: Vec<f64>,
 }
 
 /// Why a study cannot be run.
@@ -99,24 +113,48 @@ pub struct HiddenOutcome {
     /// Time on the clock, s.
     pub wall_s: f64,
     #[serde(skip)]
-    record: Histories,
-    #[serde(skip)]
     model: ExtendedRig,
+}
+
+impl Recorded {
+    /// As CSV.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, file: impl io::Write) -> io::Result<()> {
+        let mut csv = csv::Writer::from_writer(file);
+        csv.write_record([
+            "time [s]",
+            "command [m]",
+            "measured displacement [m]",
+            "measured force [N]",
+        ])?;
+        let signals = self.command.iter().zip(&self.measured).zip(&self.force);
+        for (k, ((command, measured), force)) in signals.enumerate() {
+            let time = k as f64 * PERIOD;
+            csv.write_record([time, *command, *measured, *force].map(|v| v.to_string()))?;
+        }
+        csv.flush()
+    }
 }
 
 type Plant = (TransferSystemParameters, TransferSystemEffects);
 
 impl HiddenStudy {
-    /// Records, diagnoses, designs again and scores; `observer` is told what the diagnosis tries.
+    /// Diagnoses a record, of [`HiddenStudy::record`] or of another plant, designs again and scores on
+    /// the plant with what is hidden; `observer` is told what the diagnosis tries.
     ///
     /// # Errors
     /// A plant that cannot be, a record that cannot be diagnosed.
-    pub fn run(&self, observer: Observer<'_>) -> Result<HiddenOutcome, HiddenError> {
+    pub fn run(
+        &self,
+        record: &Recorded,
+        observer: Observer<'_>,
+    ) -> Result<HiddenOutcome, HiddenError> {
         let start = std::time::Instant::now();
         let rig = TransferSystemRig::benchmark()?;
         let plant = rig.plant(&self.hidden);
         let scenes = Scene::all(&self.cases, &self.motions)?;
-        let (record, recorded) = self.record(&plant, &scenes)?;
         let recording = rig.recording("record", record.command.clone(), record.force.clone())?;
         let measurement = Measurement {
             recordings: vec![recording],
@@ -141,39 +179,40 @@ impl HiddenStudy {
             named: diagnosis.named.clone(),
             diagnosis,
             controllers: controllers?,
-            recorded,
+            recorded: (record.case, record.motion.clone()),
             seed: self.seed,
             wall_s: start.elapsed().as_secs_f64(),
-            record,
             model,
         })
     }
 
-    /// The plant under the benchmark's own controller, which knows least.
-    fn record(
-        &self,
-        plant: &Plant,
-        scenes: &[Scene<'_>],
-    ) -> Result<(Histories, (u8, String)), HiddenError> {
+    /// Records the plant, in the first case and motion, under the benchmark's own controller, which knows
+    /// least.
+    ///
+    /// # Errors
+    /// A plant that cannot be.
+    pub fn record(&self) -> Result<Recorded, HiddenError> {
+        let plant = TransferSystemRig::benchmark()?.plant(&self.hidden);
+        let scenes = Scene::all(&self.cases, &self.motions)?;
         let (Some(scene), Some(sample)) = (scenes.first(), entry(SAMPLE)) else {
-            return Ok(Default::default());
+            return Ok(Recorded::default());
         };
         let frame = scene.case.frame();
         // Other draws than those of the scored runs.
         let noise = scene.noise(self.seed, RECORDING);
-        let setting = setting(scene, &frame, plant, &noise, &sample);
-        let mut histories = run(&setting, sample.make()?.as_mut())?;
-        for signal in [
-            &mut histories.command,
-            &mut histories.force,
-            &mut histories.measured,
-        ] {
+        let setting = setting(scene, &frame, &plant, &noise, &sample);
+        let histories = run(&setting, sample.make()?.as_mut())?;
+        let cut = |signal: &[f64]| {
             let end = RECORDED.end.min(signal.len());
-            signal.truncate(end);
-            signal.drain(..RECORDED.start.min(end));
-        }
-        let recorded = (scene.case.number(), scene.motion.name.clone());
-        Ok((histories, recorded))
+            signal[RECORDED.start.min(end)..end].to_vec()
+        };
+        Ok(Recorded {
+            case: scene.case.number(),
+            motion: scene.motion.name.clone(),
+            command: cut(&histories.command),
+            measured: cut(&histories.measured),
+            force: cut(&histories.force),
+        })
     }
 
     fn score(
@@ -307,27 +346,6 @@ impl HiddenOutcome {
     /// Numbers that TOML cannot hold.
     pub fn extended_model(&self) -> Result<String, toml::ser::Error> {
         self.model.to_toml()
-    }
-
-    /// The record that was diagnosed, as CSV.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
-    pub fn write_record(&self, file: impl io::Write) -> io::Result<()> {
-        let mut csv = csv::Writer::from_writer(file);
-        csv.write_record([
-            "time [s]",
-            "command [m]",
-            "measured displacement [m]",
-            "measured force [N]",
-        ])?;
-        let r = &self.record;
-        let signals = r.command.iter().zip(&r.measured).zip(&r.force);
-        for (k, ((command, measured), force)) in signals.enumerate() {
-            let time = k as f64 * PERIOD;
-            csv.write_record([time, *command, *measured, *force].map(|v| v.to_string()))?;
-        }
-        csv.flush()
     }
 }
 
