@@ -216,8 +216,10 @@ impl Feedback {
                 unit[basis] = 1.0;
                 let line = |age: usize| unit.rows(age * states, states).into_owned();
                 let filter = states * (late + 1);
-                let mut state = FeedbackState::default();
-                state.prediction = std::array::from_fn(|i| unit[filter + i]);
+                let mut state = FeedbackState {
+                    prediction: std::array::from_fn(|i| unit[filter + i]),
+                    ..FeedbackState::default()
+                };
                 for i in 0..self.delay {
                     state.commands[i] = unit[filter + ALL + i];
                 }
