@@ -256,18 +256,6 @@ fn no_model() -> IdentificationError {
     }
 }
 
-/// Whether the data reach down to every pole and zero but one at zero: slower ones, a pole beside a
-/// zero, serve a wiggle of the response and throw the model off where nothing was measured.
-fn is_told(model: &DelayedTransferFunction, bands: &[Own]) -> bool {
-    const BEYOND: f64 = 3.0;
-    let first = bands.iter().filter_map(|own| own.1.omega.first().copied());
-    let slowest = first.fold(f64::INFINITY, f64::min) / BEYOND;
-    let roots = model.poles().into_iter().chain(model.zeros());
-    roots
-        .into_iter()
-        .all(|root| root.norm() == 0.0 || root.norm() > slowest)
-}
-
 /// The simplest structure that predicts bands it was not fitted to as well as the best does.
 fn choose(
     between: Between,
@@ -299,8 +287,7 @@ fn choose(
                 predicted.extend(squares(&own.model, unseen));
             }
         }
-        let is_told = fit(structure, between, bands).is_some_and(|own| is_told(&own.model, bands));
-        if predicted.len() == unseen && unseen > 0 && is_told {
+        if predicted.len() == unseen && unseen > 0 {
             let mean = predicted.iter().sum::<f64>() / (2 * predicted.len()) as f64;
             let candidate = Candidate {
                 structure,

@@ -79,11 +79,6 @@ impl DelayedTransferFunction {
         self.rational().poles()
     }
 
-    /// Zeros, 1/s.
-    pub fn zeros(&self) -> Vec<Complex<f64>> {
-        self.rational().zeros()
-    }
-
     fn rational(&self) -> TransferFunction {
         TransferFunction {
             numerator: self.numerator.clone(),
