@@ -20,7 +20,7 @@ use crate::component_library::{ComponentLibrary, Descriptions};
 pub use crate::fmu::FmiVersion;
 pub use annotation::build_of;
 pub use archive::PackedFmu;
-pub(crate) use archive::{Compression, write_archive};
+pub(crate) use archive::write_archive;
 pub use error::PackError;
 pub(crate) use error::file_error;
 pub use merge::merge;
@@ -41,13 +41,14 @@ pub fn build_fmus(out: &Path, versions: &[FmiVersion]) -> Result<Vec<PackedFmu>,
     let form = Form {
         versions,
         revision: None,
-        compression: Compression::Fast,
+        smallest: false,
     };
     packing::pack(&Workspace::find()?, Workspace::published, out, form)
 }
 
 /// Packs every component from libraries that were compiled before: a folder a platform, this one's
-/// among them. `revision` says which build of the sources they are.
+/// among them. `revision` says which build of the sources they are; `smallest` compresses them as far
+/// as deflate goes, which takes seconds a library.
 ///
 /// # Errors
 /// Libraries that are missing, and as [`build_fmus`].
@@ -56,11 +57,12 @@ pub fn pack_libraries(
     out: &Path,
     versions: &[FmiVersion],
     revision: Option<&str>,
+    smallest: bool,
 ) -> Result<Vec<PackedFmu>, PackError> {
     let form = Form {
         versions,
         revision,
-        compression: Compression::Smallest,
+        smallest,
     };
     let components = |workspace: &Workspace| workspace.published_from(libraries);
     packing::pack(&Workspace::find()?, components, out, form)
@@ -89,7 +91,7 @@ pub fn build_component(
     let form = Form {
         versions,
         revision: None,
-        compression: Compression::Fast,
+        smallest: false,
     };
     packing::pack(&Workspace::find()?, component, out, form)
 }

@@ -37,6 +37,9 @@ pub struct Arguments {
     /// Which build of the sources the libraries are; goes into the descriptions
     #[arg(long, value_name = "TEXT", requires = "libraries")]
     revision: Option<String>,
+    /// Compress the libraries as far as it goes: 4 % smaller, seconds for each
+    #[arg(long, requires = "libraries")]
+    smallest: bool,
     /// Write the licences of everything that the program is linked with, and pack nothing
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fmi", "out", "libraries", "revision"])]
     notices: Option<PathBuf>,
@@ -88,7 +91,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         pack::merge(&arguments.merge, &out)?
     } else if !arguments.libraries.is_empty() {
         let revision = arguments.revision.as_deref();
-        pack::pack_libraries(&arguments.libraries, &out, versions, revision)?
+        pack::pack_libraries(
+            &arguments.libraries,
+            &out,
+            versions,
+            revision,
+            arguments.smallest,
+        )?
     } else {
         eprintln!("building the components (the first time takes a minute)...");
         pack::build_fmus(&out, versions)?

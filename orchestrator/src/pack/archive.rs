@@ -112,31 +112,40 @@ pub(super) fn read_archive(path: &Path) -> Result<Entries, PackError> {
     read().map_err(file_error(path))
 }
 
-/// How hard archives are compressed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Compression {
-    /// In milliseconds.
-    Fast,
-    /// As small as deflate allows: 4 % smaller, a second for each megabyte.
-    Smallest,
+/// Files compressed as far as deflate goes (zopfli), 4 % below the usual: seconds for each megabyte,
+/// so once for all archives that hold them.
+pub(crate) struct Smallest {
+    contents: Vec<Vec<u8>>,
+    archive: ZipArchive<Cursor<Vec<u8>>>,
 }
 
-impl Compression {
-    /// By the scale of the `zip` crate, where zopfli's single pass follows zlib's best.
-    fn level(self) -> i64 {
-        match self {
-            Self::Fast => 9,
-            Self::Smallest => 10,
+impl Smallest {
+    /// Compresses the libraries of an FMU.
+    pub(super) fn of(libraries: &[(Platform, Vec<u8>)]) -> io::Result<Self> {
+        // The `zip` crate goes on from zlib's best level with the passes of zopfli.
+        let options = file_options(0o755).compression_level(Some(10));
+        let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
+        for (place, (_, content)) in libraries.iter().enumerate() {
+            writer.start_file(place.to_string(), options)?;
+            writer.write_all(content)?;
         }
+        Ok(Self {
+            contents: libraries.iter().map(|(_, bytes)| bytes.clone()).collect(),
+            archive: ZipArchive::new(writer.finish()?)?,
+        })
+    }
+
+    fn place(&self, content: &[u8]) -> Option<usize> {
+        self.contents.iter().position(|own| own == content)
     }
 }
 
-/// Writes an archive unless it is there with the same contents. The same contents give the same
-/// bytes; a reader never sees half an archive.
+/// Writes an archive unless it is there with the same contents; what `smallest` has is taken from
+/// there. The same contents give the same bytes; a reader never sees half an archive.
 pub(crate) fn write_archive(
     path: &Path,
     entries: &Entries,
-    compression: Compression,
+    smallest: Option<&mut Smallest>,
 ) -> Result<(), PackError> {
     let mut sum = Sha256::new();
     for (name, content) in entries {
@@ -157,7 +166,7 @@ pub(crate) fn write_archive(
         return Ok(());
     }
     let draft = path.with_extension(format!("draft.{}", std::process::id()));
-    let written = write_entries(&draft, entries, stamp, compression);
+    let written = write_entries(&draft, entries, stamp, smallest);
     let moved = written.and_then(|()| fs::rename(&draft, path));
     if moved.is_err() {
         let _ = fs::remove_file(&draft);
@@ -169,32 +178,43 @@ fn write_entries(
     path: &Path,
     entries: &Entries,
     stamp: String,
-    compression: Compression,
+    smallest: Option<&mut Smallest>,
 ) -> io::Result<()> {
-    write_to(File::create(path)?, entries, stamp, compression)?.sync_all()
+    write_to(File::create(path)?, entries, stamp, smallest)?.sync_all()
 }
 
 /// An archive in memory.
 pub(super) fn archive_bytes(entries: &Entries) -> io::Result<Vec<u8>> {
     let memory = Cursor::new(Vec::new());
-    Ok(write_to(memory, entries, String::new(), Compression::Fast)?.into_inner())
+    Ok(write_to(memory, entries, String::new(), None)?.into_inner())
+}
+
+/// The same for the same file, whenever it is written.
+fn file_options(mode: u32) -> SimpleFileOptions {
+    SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .compression_level(Some(9))
+        .last_modified_time(DateTime::default())
+        .unix_permissions(mode)
 }
 
 fn write_to<W: Write + Seek>(
     writer: W,
     entries: &Entries,
     stamp: String,
-    compression: Compression,
+    mut smallest: Option<&mut Smallest>,
 ) -> io::Result<W> {
-    let options = SimpleFileOptions::default()
-        .compression_method(CompressionMethod::Deflated)
-        .compression_level(Some(compression.level()))
-        .last_modified_time(DateTime::default());
     let mut archive = ZipWriter::new(writer);
     archive.set_comment(stamp).map_err(io::Error::from)?;
     for (name, content) in entries {
         if let Some(folder) = name.strip_suffix('/') {
-            archive.add_directory(folder, options.unix_permissions(0o755))?;
+            archive.add_directory(folder, file_options(0o755))?;
+            continue;
+        }
+        if let Some(smallest) = &mut smallest
+            && let Some(place) = smallest.place(content)
+        {
+            archive.raw_copy_file_rename(smallest.archive.by_index_raw(place)?, name)?;
             continue;
         }
         let mode = if name.starts_with("binaries/") {
@@ -202,7 +222,7 @@ fn write_to<W: Write + Seek>(
         } else {
             0o644
         };
-        archive.start_file(name, options.unix_permissions(mode))?;
+        archive.start_file(name, file_options(mode))?;
         archive.write_all(content)?;
     }
     Ok(archive.finish()?)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::archive::{Compression, Entries, PackedFmu, read_archive, write_archive};
+use super::archive::{Entries, PackedFmu, read_archive, write_archive};
 use super::error::{PackError, file_error};
 use super::supply;
 use crate::fmu::FmiVersion;
@@ -47,7 +47,7 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<PackedFmu>, PackErro
         let folder = out.join(version.folder());
         fs::create_dir_all(&folder).map_err(file_error(&folder))?;
         let path = folder.join(format!("{name}.fmu"));
-        write_archive(&path, &entries, Compression::Fast)?;
+        write_archive(&path, &entries, None)?;
         written.push(PackedFmu {
             name,
             version,

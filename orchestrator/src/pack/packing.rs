@@ -6,9 +6,12 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use super::archive::{Compression, Contents, PackedFmu, write_archive};
+use rayon::prelude::*;
+
+use super::archive::{Contents, PackedFmu, Smallest, write_archive};
 use super::error::{PackError, file_error};
 use super::notices::Notices;
+use super::platform::Platform;
 use super::workspace::{Component, Workspace};
 use crate::component_library::ComponentLibrary;
 use crate::fmu::FmiVersion;
@@ -20,8 +23,8 @@ pub(super) struct Form<'a> {
     pub(super) versions: &'a [FmiVersion],
     /// Which build of the sources it is, written into the description.
     pub(super) revision: Option<&'a str>,
-    /// How hard they are compressed.
-    pub(super) compression: Compression,
+    /// Whether libraries are compressed as far as it goes.
+    pub(super) smallest: bool,
 }
 
 /// Packs what `components` gives, as far as it is not there already.
@@ -42,15 +45,16 @@ pub(super) fn pack(
     let licences = workspace.licences()?;
     let notices = Notices::read(&workspace.metadata()?)?;
     let mut packed = Vec::new();
-    for component in components(workspace)? {
-        let read = |library: &Path| fs::read(library).map_err(file_error(library));
-        let libraries: Result<Vec<_>, _> = component
-            .libraries
-            .iter()
-            .map(|(platform, library)| Ok((platform.clone(), read(library)?)))
-            .collect();
+    let components = components(workspace)?;
+    // In parallel only where it is slow: a pool's thread that waits here might take up work that
+    // waits for the lock.
+    let read: Result<Vec<_>, PackError> = match form.smallest {
+        true => components.par_iter().map(|c| read(c, true)).collect(),
+        false => components.iter().map(|c| read(c, false)).collect(),
+    };
+    for (component, (libraries, mut smallest)) in components.iter().zip(read?) {
         let contents = Contents {
-            libraries: libraries?,
+            libraries,
             descriptions: ComponentLibrary::open(&component.library)?.describe()?,
             licences: licences.clone(),
             notices: notices.of(&component.folder)?,
@@ -61,7 +65,7 @@ pub(super) fn pack(
             fs::create_dir_all(&folder).map_err(file_error(&folder))?;
             let name = contents.descriptions.name.clone();
             let path = folder.join(format!("{name}.fmu"));
-            write_archive(&path, &contents.entries(*version), form.compression)?;
+            write_archive(&path, &contents.entries(*version), smallest.as_mut())?;
             packed.push(PackedFmu {
                 name,
                 version: *version,
@@ -71,4 +75,19 @@ pub(super) fn pack(
     }
     packed.sort_by(|a, b| (&a.name, a.version).cmp(&(&b.name, b.version)));
     Ok(packed)
+}
+
+/// The libraries of a component, and on demand compressed as far as it goes.
+type Libraries = (Vec<(Platform, Vec<u8>)>, Option<Smallest>);
+
+fn read(component: &Component, smallest: bool) -> Result<Libraries, PackError> {
+    let mut libraries = Vec::new();
+    for (platform, library) in &component.libraries {
+        let content = fs::read(library).map_err(file_error(library))?;
+        libraries.push((platform.clone(), content));
+    }
+    let smallest = smallest
+        .then(|| Smallest::of(&libraries).map_err(file_error(&component.library)))
+        .transpose()?;
+    Ok((libraries, smallest))
 }

@@ -5,7 +5,7 @@ use std::{ops::Range, path::Path};
 use fmu_kit::resources::{START_VALUES, variant_token};
 use roxmltree::{Document, Node};
 
-use super::archive::{Compression, archive_bytes, read_archive, write_archive};
+use super::archive::{archive_bytes, read_archive, write_archive};
 use super::error::{PackError, file_error};
 
 /// A parameter that starts differently.
@@ -52,7 +52,7 @@ pub fn write_variant(
     let changed = change(&description, model_name, start_values, &table).map_err(fail)?;
     entries.insert("modelDescription.xml".into(), changed.into_bytes());
     entries.insert(resource, table.into_bytes());
-    write_archive(out, &entries, Compression::Fast)
+    write_archive(out, &entries, None)
 }
 
 /// The bytes of the FMU `original` with a further file in its resources.

@@ -55,7 +55,7 @@ pub fn write(system: &System, experiment: &Experiment, path: &Path) -> Result<Ve
     for (name, content) in std::mem::take(&mut writer.fmus) {
         entries.insert(format!("resources/{name}"), content.bytes);
     }
-    pack::write_archive(path, &entries, pack::Compression::Fast)?;
+    pack::write_archive(path, &entries, None)?;
     Ok(writer.notes)
 }
 

@@ -135,7 +135,7 @@ fn libraries_compiled_before_are_packed_for_their_platforms() {
     }
     let out = folder.path().join("out");
     let libraries = [(here.clone(), own), (windows.clone(), foreign.clone())];
-    let packed = pack_libraries(&libraries, &out, &FmiVersion::ALL, Some("v1 & 2")).unwrap();
+    let packed = pack_libraries(&libraries, &out, &FmiVersion::ALL, Some("v1 & 2"), false).unwrap();
     assert_eq!(packed.len(), 2 * names.len());
     for fmu in packed {
         for platform in [&here, &windows] {
@@ -150,9 +150,9 @@ fn libraries_compiled_before_are_packed_for_their_platforms() {
         assert_eq!(build_of(&document).as_deref(), Some("v1 & 2"));
     }
     fs::remove_file(foreign.join(windows.library_file("Specimen"))).unwrap();
-    let missing = pack_libraries(&libraries, &out, &FmiVersion::ALL, None).unwrap_err();
+    let missing = pack_libraries(&libraries, &out, &FmiVersion::ALL, None, false).unwrap_err();
     assert!(missing.to_string().contains("Specimen.dll"), "{missing}");
-    let lone = pack_libraries(&libraries[1..], &out, &FmiVersion::ALL, None).unwrap_err();
+    let lone = pack_libraries(&libraries[1..], &out, &FmiVersion::ALL, None, false).unwrap_err();
     assert!(lone.to_string().contains("no libraries for"), "{lone}");
 }
 
