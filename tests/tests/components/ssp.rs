@@ -333,9 +333,13 @@ fn built_in_systems_are_valid_archives_and_give_in_ecos_and_libcosim_what_jacobi
     }
     // ecos reads an output after inputs were set that it depends on directly: with a specimen, whose force
     // and the table's acceleration follow each other without a step, it is no Jacobi master.
-    // It takes no SSP 2.0 either. Neither sets an enumeration, by which the components of compensation have their role.
-    let sets_enumerations =
-        |(archive, _): &(PathBuf, PathBuf)| archive.display().to_string().contains("-compensated-");
+    // It takes no SSP 2.0 either. Neither sets an enumeration, by which preview control has its role.
+    let sets_enumerations = |(archive, _): &(PathBuf, PathBuf)| {
+        let name = archive.display().to_string();
+        ["-compensated-", "multi-metric-"]
+            .iter()
+            .any(|role| name.contains(role))
+    };
     let mut taken = [bare, loaded];
     for pairs in &mut taken {
         pairs.retain(|pair| !sets_enumerations(pair));
