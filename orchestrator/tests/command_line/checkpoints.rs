@@ -55,7 +55,8 @@ fn check_files(folder: &Path, whole: &[u8]) {
     }
 }
 
-/// Kills runs so often, each at a moment drawn over the time that a whole run takes.
+/// Kills runs so often: one after its first checkpoint, the next at a moment drawn over the time that a
+/// whole run takes.
 fn killed(kills: usize) {
     println!("seed {SEED}");
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
@@ -86,7 +87,17 @@ fn killed(kills: usize) {
                 break;
             }
             let mut child = start(folder, &arguments);
-            std::thread::sleep(takes.mul_f64(random.random_range(0.0..1.1)));
+            if count.is_multiple_of(2) {
+                // As soon as there is something to go on from.
+                while !can_resume
+                    && !place.join("checkpoint/state").is_file()
+                    && child.try_wait().unwrap().is_none()
+                {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+            } else {
+                std::thread::sleep(takes.mul_f64(random.random_range(0.0..1.1)));
+            }
             child.kill().unwrap();
             if child.wait().unwrap().success() {
                 break;
