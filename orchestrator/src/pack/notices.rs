@@ -171,7 +171,10 @@ fn is_linked(packages: &HashMap<String, Package>, node: &Node, link: &Link) -> b
 }
 
 fn text(packages: &[&Package]) -> String {
-    let mut text = format!("Linked into this library or program:\n\n{STANDARD_LIBRARY}");
+    let mut text = format!(
+        "Linked into this library or program, under the MIT licence where there is a choice with it:\n\n\
+         {STANDARD_LIBRARY}"
+    );
     // Many crates carry the same text: it stands once, under a number.
     let mut texts: BTreeMap<String, usize> = BTreeMap::new();
     let mut ordered: Vec<String> = Vec::new();
@@ -208,7 +211,16 @@ fn text(packages: &[&Package]) -> String {
     text
 }
 
-/// The texts of a crate's licence files, tidied so that equal ones are equal.
+/// Whether a crate may be taken under the MIT licence, at the user's choice.
+fn offers_mit(package: &Package) -> bool {
+    let licence = package.license.as_deref().unwrap_or("");
+    let is_choice = !licence.contains("AND") && !licence.contains('(');
+    let mut choices = licence.split(" OR ").flat_map(|one| one.split('/'));
+    is_choice && choices.any(|one| one.trim() == "MIT")
+}
+
+/// The texts of a crate's licence files, tidied so that equal ones are equal; of several licences to
+/// choose from the MIT licence, where its text is there.
 fn licence_files(package: &Package) -> Vec<String> {
     let folder = package.manifest_path.parent().unwrap_or(Path::new(""));
     let is_notice = |path: &PathBuf| {
@@ -225,6 +237,14 @@ fn licence_files(package: &Package) -> Vec<String> {
         .filter(is_notice)
         .collect();
     files.sort();
+    let named = |file: &Path, words: &[&str]| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let name = name.to_uppercase();
+        words.iter().any(|word| name.contains(word))
+    };
+    if offers_mit(package) && files.iter().any(|file| named(file, &["MIT"])) {
+        files.retain(|file| !named(file, &["APACHE", "ZLIB", "UNLICENSE", "BSL", "BOOST"]));
+    }
     files
         .iter()
         .filter_map(|file| fs::read(file).ok())
