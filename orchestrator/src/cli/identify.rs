@@ -213,18 +213,7 @@ fn text(found: &RigIdentification, summary: &Summary) -> String {
         ]);
     }
     text += &format!("\nfit on the part that was not fitted\n{}", aligned(&rows));
-    if !summary.warnings.is_empty() {
-        text += "\nwarnings\n";
-        for warning in &summary.warnings {
-            text += &format!("  {warning}\n");
-        }
-    }
-    text += &format!(
-        "\nwritten: {} ({:.1} s)\n",
-        summary.model.display(),
-        summary.wall_s
-    );
-    text
+    text + &ending(&summary.warnings, summary)
 }
 
 /// Four columns under their heads.
@@ -234,12 +223,33 @@ fn table(columns: [&str; 4], rows: Vec<[String; 4]>) -> String {
     aligned(&all)
 }
 
+/// The first warning, and those that are left for the end.
+fn beginning(summary: &Summary) -> (String, &[String]) {
+    match summary.warnings.split_first() {
+        Some((first, rest)) => (format!("{first}\n\n"), rest),
+        None => (String::new(), &[]),
+    }
+}
+
+/// What stands below every identification: warnings, and where the model lies.
+fn ending(warnings: &[String], summary: &Summary) -> String {
+    let mut text = String::new();
+    if !warnings.is_empty() {
+        text += "\nwarnings\n";
+        for warning in warnings {
+            text += &format!("  {warning}\n");
+        }
+    }
+    text + &format!(
+        "\nwritten: {} ({:.1} s)\n",
+        summary.model.display(),
+        summary.wall_s
+    )
+}
+
 /// As [`text`], for command to displacement; what the reader must know stands first.
 fn one_input_text(own: &OneInputIdentification, summary: &Summary) -> String {
-    let mut text = String::new();
-    if let Some(first) = summary.warnings.first() {
-        text += &format!("{first}\n\n");
-    }
+    let (mut text, rest) = beginning(summary);
     text += &format!("{} to displacement\n\npoles\n", own.found.input.name());
     for own in &summary.actuator_poles_rad_s {
         text += &format!("  {}\n", pole(own));
@@ -247,39 +257,14 @@ fn one_input_text(own: &OneInputIdentification, summary: &Summary) -> String {
     text += &format!("\n{}", table(ONE_INPUT_COLUMNS, own.parameters()));
     text += &format!("\n{}", table(CANDIDATE_COLUMNS, own.candidates()));
     text += &format!("\n{}\n", own.checked());
-    if summary.warnings.len() > 1 {
-        text += "\nwarnings\n";
-        for warning in &summary.warnings[1..] {
-            text += &format!("  {warning}\n");
-        }
-    }
-    text += &format!(
-        "\nwritten: {} ({:.1} s)\n",
-        summary.model.display(),
-        summary.wall_s
-    );
-    text
+    text + &ending(rest, summary)
 }
 
 /// As [`text`], for a hydraulic rig; what the reader must know stands first.
 fn hydraulic_text(own: &HydraulicIdentification, summary: &Summary) -> String {
-    let mut text = String::new();
-    if let Some(first) = summary.warnings.first() {
-        text += &format!("{first}\n\n");
-    }
+    let (mut text, rest) = beginning(summary);
     text += "hydraulic rig, with the reference as instrument\n\n";
     text += &table(PARAMETER_COLUMNS, own.parameters());
     text += &format!("\n{}", table(EQUATION_COLUMNS, own.equations()));
-    if summary.warnings.len() > 1 {
-        text += "\nwarnings\n";
-        for warning in &summary.warnings[1..] {
-            text += &format!("  {warning}\n");
-        }
-    }
-    text += &format!(
-        "\nwritten: {} ({:.1} s)\n",
-        summary.model.display(),
-        summary.wall_s
-    );
-    text
+    text + &ending(rest, summary)
 }
