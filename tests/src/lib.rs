@@ -1,5 +1,6 @@
 //! Acceptance tests: the thesis's tables, importers, hidden effects
 
+pub mod fuzz;
 pub mod hidden_suite;
 pub mod monolithic;
 pub mod native_rig;

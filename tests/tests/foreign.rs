@@ -5,11 +5,12 @@
 use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 
 use acceptance::{python, shared};
 use shakebench::fmu::{Datum, FmiVersion, Options};
 use shakebench::library::FmuLibrary;
-use shakebench::master::{Algorithm, Ended, Outcome, Pace, Simulation};
+use shakebench::master::{Algorithm, Checkpoint, Ended, Outcome, Pace, Record, Simulation};
 use shakebench::motion::Motion;
 use shakebench::system::{SystemFile, assemble};
 use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
@@ -195,6 +196,58 @@ fn model_exchange_agrees_with_cvode() {
             let largest = difference(&fmu, step, stop, "ModelExchange");
             println!("{version} {name}: differs from CVode by {largest:e}");
             assert!(largest <= within, "{version} {name}: {largest:e}");
+        }
+    }
+}
+
+#[test]
+fn model_exchange_goes_on_from_a_checkpoint_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, step, samples) in [
+        ("BouncingBall", 0.01, 250),
+        ("Stair", 0.2, 40),
+        ("VanDerPol", 0.01, 400),
+    ] {
+        for version in ["fmi2", "fmi3"] {
+            let Some(fmu) = foreign(version, name) else {
+                continue;
+            };
+            let fmu = exchange_only(&fmu, folder.path());
+            let file = SystemFile::parse("test", &alone(&fmu)).unwrap();
+            let mut library = FmuLibrary::new(FmiVersion::V3, None);
+            let system = assemble(&file, &[], &mut |name| library.find(name)).unwrap();
+            let begin = || {
+                let motion = rest(step, samples);
+                let plan = (step, samples as f64 * step);
+                let algorithm = Algorithm::GaussSeidel;
+                Simulation::with(&system, &motion, algorithm, plan, &Options::default()).unwrap()
+            };
+            let kept: Arc<Mutex<Vec<(Checkpoint, Record)>>> = Arc::default();
+            let keep = kept.clone();
+            let mut first = begin();
+            let keeper = move |checkpoint: &Checkpoint, record: &Record| {
+                keep.lock()
+                    .unwrap()
+                    .push((checkpoint.clone(), record.clone()));
+                Ok(())
+            };
+            first
+                .keep_checkpoints(samples / 5, Box::new(keeper))
+                .unwrap();
+            let whole = first.run(samples, Pace::Fastest, &mut |_| {});
+            let kept = kept.lock().unwrap();
+            assert_eq!(kept.len(), 4, "{version} {name}");
+            for (checkpoint, record) in kept.iter() {
+                let mut second = begin();
+                second.resume(checkpoint, record.clone()).unwrap();
+                let rest = second.run(samples, Pace::Fastest, &mut |_| {});
+                assert!(rest.ended.is_regular(), "{}", rest.ended.message());
+                assert!(
+                    rest.record == whole.record,
+                    "{version} {name} from {} s",
+                    checkpoint.time
+                );
+            }
         }
     }
 }

@@ -168,10 +168,10 @@ fn words(system: &system::System, operation: &Operation) -> String {
                 .map(|&output| system.variable_name(*component, output).to_string());
             format!("read {}", names.collect::<Vec<_>>().join(", "))
         }
-        Operation::Iterate(parts) => {
-            let parts = parts.iter().map(|part| words(system, part));
+        Operation::Iterate { operations, .. } => {
+            let parts = operations.iter().map(|part| words(system, part));
             format!(
-                "repeat until settled: {}",
+                "solve together: {}",
                 parts.collect::<Vec<_>>().join("; ")
             )
         }

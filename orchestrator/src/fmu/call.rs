@@ -182,6 +182,12 @@ functions! {
     GetIntervalDecimal = 30, "", "GetIntervalDecimal";
     /// Values: shifts, s.
     GetShiftDecimal = 31, "", "GetShiftDecimal";
+    /// `references`: unknowns, then knowns; `handle`: how many unknowns. Values: changes of the knowns
+    /// (`count` of them), then places for those of the unknowns. Gives status 2 where there is none.
+    GetDirectionalDerivative = 35, "GetDirectionalDerivative", "GetDirectionalDerivative";
+    /// As [`Function::GetDirectionalDerivative`], the values the other way round: `count` weights of the
+    /// unknowns, then places for those of the knowns.
+    GetAdjointDerivative = 36, "", "GetAdjointDerivative";
 }
 
 fn kind(scalar: Scalar, version: FmiVersion) -> &'static str {
@@ -224,8 +230,21 @@ pub(super) enum Values<'a> {
     None,
     In(&'a [u8]),
     Out(&'a mut [u8]),
+    /// What goes in, and places for what comes out behind it.
+    Both(&'a mut [u8]),
     TextsIn(&'a Texts),
     TextsOut(&'a mut Texts),
+}
+
+impl Values<'_> {
+    /// How many Float64 they hold room for.
+    pub(super) fn numbers(&self) -> usize {
+        match self {
+            Self::In(bytes) => bytes.len() / 8,
+            Self::Out(bytes) | Self::Both(bytes) => bytes.len() / 8,
+            Self::None | Self::TextsIn(_) | Self::TextsOut(_) => 0,
+        }
+    }
 }
 
 impl Call<'_> {
@@ -241,6 +260,11 @@ impl Call<'_> {
             handle: 0,
             culprit: None,
         }
+    }
+
+    /// How many of the references are unknowns of a derivative.
+    pub(super) fn unknowns(&self) -> usize {
+        usize::try_from(self.handle).map_or(0, |count| count.min(self.references.len()))
     }
 }
 

@@ -77,6 +77,11 @@ fn arguments(call: &Call, version: FmiVersion) -> String {
             format!("start {a}, stop {stop}, tolerance {tolerance}")
         }
         Function::DoStep => format!("{a}, {b}"),
+        Function::GetDirectionalDerivative | Function::GetAdjointDerivative => {
+            let (unknowns, knowns) = call.references.split_at(call.unknowns());
+            let seed = values(call, Scalar::Float64, version);
+            format!("{}, {}, {seed}", list(unknowns), list(knowns))
+        }
         Function::SetTime => a.to_string(),
         Function::SetContinuousStates => values(call, Scalar::Float64, version),
         Function::SetState | Function::FreeState | Function::SizeOfState | Function::WriteState => {
@@ -123,6 +128,9 @@ fn given(call: &Call, version: FmiVersion) -> String {
         Function::CompletedIntegratorStep => {
             format!(" event {}, terminate {}", call.flags[0], call.flags[1])
         }
+        Function::GetDirectionalDerivative | Function::GetAdjointDerivative => {
+            format!(" {}", sensitivities(call))
+        }
         Function::GetState | Function::ReadState => format!(" {:#x}", call.handle),
         Function::SizeOfState => format!(" {} bytes", call.handle),
         Function::GetTerminated => format!(" {}", call.flags[0]),
@@ -142,7 +150,7 @@ fn list(references: &[u32]) -> String {
 fn values(call: &Call, scalar: Scalar, version: FmiVersion) -> String {
     let bytes: &[u8] = match &call.values {
         Values::In(bytes) => bytes,
-        Values::Out(bytes) => bytes,
+        Values::Out(bytes) | Values::Both(bytes) => bytes,
         Values::TextsIn(texts) => return shown(texts),
         Values::TextsOut(texts) => return shown(texts),
         Values::None => return String::new(),
@@ -152,6 +160,19 @@ fn values(call: &Call, scalar: Scalar, version: FmiVersion) -> String {
         .chunks_exact(size)
         .take(call.count)
         .map(|bytes| super::convert::text(scalar, bytes))
+        .collect();
+    format!("[{}]", all.join(" "))
+}
+
+/// What comes out behind what goes in.
+fn sensitivities(call: &Call) -> String {
+    let Values::Both(bytes) = &call.values else {
+        return String::new();
+    };
+    let all: Vec<String> = bytes
+        .chunks_exact(8)
+        .skip(call.count)
+        .map(|bytes| super::convert::text(Scalar::Float64, bytes))
         .collect();
     format!("[{}]", all.join(" "))
 }

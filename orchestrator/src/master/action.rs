@@ -1,11 +1,12 @@
 //! What is done at a tick, prepared for doing it many times.
 
+use super::algebraic::AlgebraicLoop;
 use super::signals::Signals;
 use super::transfer::{Inputs, Outputs};
 use super::{MasterError, Part};
 
 /// The largest number of passes of a fixed-point iteration.
-pub(super) const MOST_PASSES: usize = 100;
+const MOST_PASSES: usize = 100;
 /// Values that change by less than this part of their size have converged.
 const TOLERANCE: f64 = 1e-12;
 
@@ -19,13 +20,8 @@ pub(super) enum Action {
     },
     /// Set the inputs of a sampled component, step it over its period, read its outputs.
     Call { part: usize },
-    /// Repeat until the values converge.
-    Iterate {
-        actions: Vec<Action>,
-        /// Sampled components among them, whose state is kept for the repetition.
-        called: Vec<usize>,
-        last: Vec<f64>,
-    },
+    /// Find values that agree with each other.
+    Solve(AlgebraicLoop),
 }
 
 /// When and how actions are carried out.
@@ -77,35 +73,7 @@ impl Action {
                     part.read(signals)?;
                 }
             }
-            Self::Iterate {
-                actions,
-                called,
-                last,
-            } => {
-                for &part in called.iter().filter(|_| at.calls) {
-                    let part = &mut parts[part];
-                    if part.failure.is_some() {
-                        continue;
-                    }
-                    part.instance.save_state(&mut part.state)?;
-                }
-                for pass in 1.. {
-                    last.copy_from_slice(&signals.numbers);
-                    for action in actions.iter_mut() {
-                        action.perform(at, parts, signals, names)?;
-                    }
-                    if converged(at.time, pass, last, &signals.numbers, names)? {
-                        break;
-                    }
-                    for &part in called.iter().filter(|_| at.calls) {
-                        let part = &mut parts[part];
-                        if part.failure.is_some() {
-                            continue;
-                        }
-                        part.instance.restore_state(&part.state)?;
-                    }
-                }
-            }
+            Self::Solve(of_loop) => of_loop.solve(at, parts, signals, names)?,
         }
         Ok(())
     }
@@ -117,7 +85,7 @@ impl Action {
         match self {
             Self::Read { .. } => true,
             Self::Call { .. } => false,
-            Self::Iterate { actions, .. } => actions.iter().all(Self::is_continuous),
+            Self::Solve(of_loop) => of_loop.is_continuous(),
         }
     }
 }

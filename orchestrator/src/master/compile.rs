@@ -5,6 +5,8 @@ use std::ops::Range;
 use std::time::Duration;
 
 use super::action::Action;
+use super::algebraic::AlgebraicLoop;
+use super::iterative::Coupling;
 use super::reference::Reference;
 use super::signals::{Place, Signals};
 use super::transfer::{Drive, Inputs, Outputs};
@@ -41,13 +43,22 @@ impl Simulation {
         options: &Options,
     ) -> Result<Self, MasterError> {
         // A Jacobi master sets, steps and reads: every FMU bears that.
-        let (system, notes) = match algorithm {
+        let (system, mut notes) = match algorithm {
             Algorithm::Jacobi => (system.clone(), Vec::new()),
             _ => order::bearable(system, step, stop, options),
         };
         let system = &system;
         let ticks_per_row = ticks(motion.dt, step, "the sample time of the motion")?;
-        let schedule = system.schedule(algorithm == Algorithm::Iterative)?;
+        // A Jacobi master meets loops of direct feedthrough at the beginning only.
+        let schedule = system.schedule(algorithm != Algorithm::GaussSeidel)?;
+        let repeats_calls = |component: usize| {
+            schedule.operations.iter().any(|operation| match operation {
+                Operation::Iterate { operations, .. } => {
+                    operations.contains(&Operation::Call { component })
+                }
+                _ => false,
+            })
+        };
         let mut reference = Reference::new(motion, &system.tables);
         // A system without a motion has no columns of one.
         for quantity in Quantity::ALL.into_iter().filter(|_| !motion.is_empty()) {
@@ -68,7 +79,8 @@ impl Simulation {
         let mut processes = Processes::new(options);
         let mut parts = Vec::with_capacity(system.components.len());
         for (index, component) in system.components.iter().enumerate() {
-            if algorithm == Algorithm::Iterative && !component.fmu.description.saves_state {
+            let saves_state = component.fmu.description.saves_state;
+            if algorithm == Algorithm::Iterative && repeats_calls(index) && !saves_state {
                 return Err(MasterError::NoState(component.name.clone()));
             }
             let may_fail =
@@ -95,7 +107,7 @@ impl Simulation {
         let actions = schedule
             .operations
             .iter()
-            .map(|operation| plan.action(&mut reference, operation))
+            .map(|operation| plan.action(&mut reference, operation, &parts))
             .collect();
         // What ends a run is Boolean, and its cause an enumeration: both are numbers.
         let number = |place: &(usize, usize)| match plan.places.get(place) {
@@ -146,8 +158,19 @@ impl Simulation {
             numbers: vec![0.0; plan.names.len()],
             exact,
         };
+        let coupling = Coupling::new(&parts);
+        if algorithm == Algorithm::Iterative {
+            notes.extend(coupling.explicit(&parts).into_iter().map(|at| {
+                format!(
+                    "`{}` cannot save its state (its FMU does not offer it), so its steps are not \
+                     repeated: its inputs are extrapolated over each, as with --algorithm gauss-seidel",
+                    parts[at].instance.name
+                )
+            }));
+        }
         let mut simulation = Self {
             algorithm,
+            coupling,
             begin: system.start,
             step,
             tick: 0,
@@ -257,8 +280,8 @@ impl<'a> Plan<'a> {
     /// Gives the outputs of an operation their signals, those of one type side by side.
     fn place(&mut self, operation: &Operation) {
         let (component, outputs) = match operation {
-            Operation::Iterate(parts) => {
-                parts.iter().for_each(|part| self.place(part));
+            Operation::Iterate { operations, .. } => {
+                operations.iter().for_each(|part| self.place(part));
                 return;
             }
             Operation::Read { component, outputs } => (*component, outputs.clone()),
@@ -379,7 +402,12 @@ impl<'a> Plan<'a> {
         inputs
     }
 
-    fn action(&self, reference: &mut Reference, operation: &Operation) -> Action {
+    fn action(
+        &self,
+        reference: &mut Reference,
+        operation: &Operation,
+        parts: &[Part],
+    ) -> Action {
         match operation {
             Operation::Call { component } => Action::Call { part: *component },
             Operation::Read { component, outputs } => {
@@ -398,19 +426,11 @@ impl<'a> Plan<'a> {
                     outputs: self.groups.get(&group).cloned().unwrap_or_default(),
                 }
             }
-            Operation::Iterate(parts) => {
-                let called = parts.iter().filter_map(|part| match part {
-                    Operation::Call { component } => Some(*component),
-                    _ => None,
-                });
-                Action::Iterate {
-                    called: called.collect(),
-                    actions: parts
-                        .iter()
-                        .map(|part| self.action(reference, part))
-                        .collect(),
-                    last: vec![0.0; self.names.len()],
-                }
+            Operation::Iterate { operations, round } => {
+                let actions = operations.iter();
+                let actions = actions.map(|inner| self.action(reference, inner, parts));
+                let actions = actions.collect();
+                Action::Solve(AlgebraicLoop::new(actions, parts, round.clone()))
             }
         }
     }

@@ -20,10 +20,11 @@ pub enum MasterError {
     /// Steps and periods that do not fit together.
     #[error("{0}")]
     Step(String),
-    /// A component that must be repeated but cannot save its state.
+    /// A sampled component in a loop of direct feedthrough that cannot save its state.
     #[error(
-        "--algorithm iterative repeats steps, but `{0}` cannot save its state \
-         (its FMU does not offer it); choose --algorithm gauss-seidel"
+        "--algorithm iterative repeats the call of the sampled component `{0}`, which is part of a loop \
+         of direct feedthrough, but it cannot save its state (its FMU does not offer it); break the \
+         loop with a component that has no direct feedthrough"
     )]
     NoState(String),
     /// A component whose state cannot be kept in a file.
@@ -58,6 +59,25 @@ pub enum MasterError {
         error: f64,
         /// Largest displacement asked for, m.
         peak: f64,
+    },
+    /// A loop of direct feedthrough without a solution.
+    #[error(
+        "the loop {round} has no solution at {time} s that can be found: the closest is \
+         `{variable}` = {value}, and {back} comes back; {reason}"
+    )]
+    Loop {
+        /// Time, s.
+        time: f64,
+        /// The variables round the loop.
+        round: String,
+        /// The variable that is furthest from what comes back.
+        variable: String,
+        /// The closest that was found of it.
+        value: f64,
+        /// What comes back.
+        back: f64,
+        /// Why, as far as it is known, and what to do.
+        reason: String,
     },
     /// An iteration that does not settle.
     #[error(

@@ -20,9 +20,10 @@ pub(super) fn observe(simulation: &mut Simulation) -> Result<(), MasterError> {
 /// `y_k` would be half a step late and of first.
 pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     let (tick, time, step) = (simulation.tick, simulation.time(), simulation.step);
-    let (now, last) = (&mut simulation.signals, &mut simulation.last_signals);
+    let (now, last) = (&simulation.signals, &mut simulation.last_signals);
+    let coupling = &simulation.coupling;
     if tick == 0 {
-        last.copy_from(now);
+        coupling.copy(now, last);
     }
     for part in simulation
         .parts
@@ -33,6 +34,6 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
             .transfer_between(now, last, -0.5, &mut part.instance)?;
         part.step(time, step)?;
     }
-    last.copy_from(now);
+    coupling.copy(now, last);
     Ok(())
 }

@@ -6,6 +6,7 @@
 //! holds the outputs at `t_k` together with the commands computed from them.
 
 mod action;
+mod algebraic;
 mod checkpoint;
 mod clock;
 mod compile;
@@ -13,6 +14,7 @@ mod error;
 mod gauss_seidel;
 mod iterative;
 mod jacobi;
+mod newton;
 mod order;
 mod record;
 mod reference;
@@ -60,8 +62,9 @@ pub enum Algorithm {
     /// In dependency order, with no delay added.
     #[default]
     GaussSeidel,
-    /// In dependency order; loops of direct feedthrough and the coupling over a step are repeated
-    /// until the values converge (the FMUs must be able to save their state).
+    /// In dependency order; loops of direct feedthrough and the coupling over a step are solved, by
+    /// Newton's method where repeating does not settle quickly (coupled FMUs must be able to save
+    /// their state).
     Iterative,
 }
 
@@ -114,8 +117,10 @@ pub struct Simulation {
     end: Option<EndSignals>,
     /// The part and input that is set when a sampled component fails.
     stop: Option<(usize, u32)>,
-    /// The signals at the tick before; in [`Algorithm::Iterative`] those of the last repetition.
+    /// The signals at the tick before.
     last_signals: Signals,
+    /// What continuous components give each other, for [`Algorithm::Iterative`].
+    coupling: iterative::Coupling,
     /// Signals at the end of the step, for [`Algorithm::Iterative`].
     next_signals: Signals,
     /// Who watches.
@@ -189,11 +194,23 @@ impl Part {
         Ok(())
     }
 
+    /// Goes back to the state that was kept, to repeat its step.
+    fn go_back(&mut self) -> Result<(), MasterError> {
+        if self.failure.is_none() {
+            self.ended = None;
+            self.instance.restore_state(&self.state)?;
+        }
+        Ok(())
+    }
+
     /// Reads its outputs into the signals; a failure that may be is kept instead of given.
     fn read(&mut self, signals: &mut Signals) -> Result<(), MasterError> {
-        match self.outputs.read(signals, &mut self.instance) {
-            Err(error) if self.may_fail => self.failure = Some(error.into()),
-            done => done?,
+        if !self.may_fail {
+            return Ok(self.outputs.read(signals, &mut self.instance)?);
+        }
+        let read = self.outputs.read_all_or_none(signals, &mut self.instance);
+        if let Err(error) = read {
+            self.failure = Some(error.into());
         }
         Ok(())
     }

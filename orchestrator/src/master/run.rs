@@ -382,7 +382,8 @@ impl Simulation {
         let numbers = &self.signals.numbers;
         // All of them, so that nothing branches.
         let fits = |all, value: &f64| all & (value.abs() < DIVERGED);
-        if numbers.iter().fold(true, fits) {
+        let mut kept = self.kept.iter();
+        if kept.all(|places| numbers[places.clone()].iter().fold(true, fits)) {
             return Ok(());
         }
         let place = numbers.iter().position(|value| value.abs() >= DIVERGED);

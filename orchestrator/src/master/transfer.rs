@@ -18,11 +18,22 @@ pub(super) struct Inputs {
 struct InputGroup {
     kind: Kind,
     references: Vec<u32>,
-    /// One for each driven value.
+    /// Driven values that are taken as they are and do not change between samples.
+    copies: Vec<Copied>,
+    /// The other driven values.
     sources: Vec<InputSource>,
     values: Vec<f64>,
     /// Whether some of it may only change at events.
     is_discrete: bool,
+}
+
+/// Values side by side that are those of signals side by side.
+struct Copied {
+    /// Place of the first among the values.
+    place: usize,
+    /// The first signal.
+    signal: usize,
+    count: usize,
 }
 
 struct InputSource {
@@ -85,6 +96,7 @@ impl Inputs {
             self.groups.push(InputGroup {
                 kind: variable.kind.clone(),
                 references: Vec::new(),
+                copies: Vec::new(),
                 sources: Vec::new(),
                 values: Vec::new(),
                 is_discrete: false,
@@ -96,12 +108,7 @@ impl Inputs {
         group.is_discrete |= variable.variability != Variability::Continuous;
         for (drive, value) in elements {
             if let Some(drive) = drive {
-                group.sources.push(InputSource {
-                    place: group.values.len(),
-                    signal: drive.signal,
-                    passage: drive.passage.clone(),
-                    is_smooth: drive.is_smooth,
-                });
+                group.drive(drive);
             }
             group.values.push(value.number());
         }
@@ -134,6 +141,7 @@ impl Inputs {
     /// Sets the inputs from the signals.
     pub(super) fn transfer(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
         for group in &mut self.groups {
+            group.copy(signals);
             for source in &group.sources {
                 group.values[source.place] = source.passage.of(source.now(signals));
             }
@@ -152,6 +160,7 @@ impl Inputs {
         instance: &mut Instance,
     ) -> Outcome {
         for group in &mut self.groups {
+            group.copy(now);
             for source in &group.sources {
                 let at = source.now(now);
                 let change = source.now(other) - at;
@@ -163,7 +172,48 @@ impl Inputs {
         self.transfer_exact(now, instance)
     }
 
-    #[inline]
+    /// The numbers that drive it.
+    pub(super) fn sources(&self) -> impl Iterator<Item = usize> + '_ {
+        let groups = self.groups.iter();
+        groups.flat_map(|group| {
+            let copies = group.copies.iter();
+            let copied = copies.flat_map(|it| it.signal..it.signal + it.count);
+            copied.chain(group.sources.iter().filter_map(InputSource::number))
+        })
+    }
+
+    /// The numbers that drive it and change between samples.
+    pub(super) fn smooth_sources(&self) -> impl Iterator<Item = usize> + '_ {
+        let all = self.groups.iter().flat_map(|group| &group.sources);
+        all.filter(|source| source.is_smooth)
+            .filter_map(InputSource::number)
+    }
+
+    /// How its Float64 inputs change with the signals, with their references; none where an input of
+    /// another type does.
+    pub(super) fn change(&self, signals: &[f64]) -> Option<(Vec<u32>, Vec<f64>)> {
+        let (mut references, mut changes) = (Vec::new(), Vec::new());
+        for group in &self.groups {
+            let mut all = vec![0.0; group.values.len()];
+            for it in &group.copies {
+                let places = it.place..it.place + it.count;
+                all[places].copy_from_slice(&signals[it.signal..it.signal + it.count]);
+            }
+            for source in &group.sources {
+                let of_signal = source.number().map_or(0.0, |signal| signals[signal]);
+                all[source.place] = source.passage.slope() * of_signal;
+            }
+            if group.kind == Kind::Float64 {
+                references.extend_from_slice(&group.references);
+                changes.extend(all);
+            } else if all.iter().any(|change| *change != 0.0) {
+                return None;
+            }
+        }
+        Some((references, changes))
+    }
+
+    #[inline(always)]
     fn transfer_exact(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
         if self.exact.is_empty() {
             return Ok(());
@@ -171,6 +221,7 @@ impl Inputs {
         self.transfer_all_exact(signals, instance)
     }
 
+    #[cold]
     fn transfer_all_exact(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
         for group in &mut self.exact {
             for &(place, signal) in &group.sources {
@@ -190,6 +241,49 @@ impl Inputs {
 }
 
 impl InputGroup {
+    /// Lets a signal drive the value that is added next.
+    fn drive(&mut self, drive: &Drive) {
+        let place = self.values.len();
+        if let Place::Number(signal) = drive.signal
+            && !drive.is_smooth
+            && drive.passage.is_nothing()
+        {
+            match self.copies.last_mut() {
+                Some(last)
+                    if last.place + last.count == place && last.signal + last.count == signal =>
+                {
+                    last.count += 1;
+                }
+                _ => self.copies.push(Copied {
+                    place,
+                    signal,
+                    count: 1,
+                }),
+            }
+            return;
+        }
+        self.sources.push(InputSource {
+            place,
+            signal: drive.signal,
+            passage: drive.passage.clone(),
+            is_smooth: drive.is_smooth,
+        });
+    }
+
+    #[inline]
+    fn copy(&mut self, signals: &Signals) {
+        for it in &self.copies {
+            // Most are single, for which copying a slice costs more than the value.
+            if it.count == 1 {
+                self.values[it.place] = signals.numbers[it.signal];
+                continue;
+            }
+            let from = &signals.numbers[it.signal..it.signal + it.count];
+            self.values[it.place..it.place + it.count].copy_from_slice(from);
+        }
+    }
+
+    #[inline]
     fn set(&self, instance: &mut Instance) -> Outcome {
         if self.is_discrete {
             instance.begin_event()?;
@@ -203,6 +297,15 @@ impl InputGroup {
 }
 
 impl InputSource {
+    #[inline]
+    fn number(&self) -> Option<usize> {
+        match self.signal {
+            Place::Number(signal) => Some(signal),
+            Place::Exact(_) => None,
+        }
+    }
+
+    #[inline]
     fn now(&self, signals: &Signals) -> f64 {
         match self.signal {
             Place::Number(signal) => signals.numbers[signal],
@@ -237,8 +340,67 @@ impl Outputs {
         self.exact.extend(other.exact.iter().cloned());
     }
 
-    /// Reads the outputs into the signals, which keep their values where the instance fails.
-    pub(super) fn read(&mut self, signals: &mut Signals, instance: &mut Instance) -> Outcome {
+    /// The numbers that it gives.
+    pub(super) fn signals(&self) -> impl Iterator<Item = usize> + '_ {
+        let all = self.groups.iter();
+        all.flat_map(|group| group.first..group.first + group.values.len())
+    }
+
+    /// The numbers that it gives and that may take any value.
+    pub(super) fn real_signals(&self) -> impl Iterator<Item = usize> + '_ {
+        let all = self.groups.iter();
+        let real = all.filter(|group| matches!(group.kind, Kind::Float64 | Kind::Float32));
+        real.flat_map(|group| group.first..group.first + group.values.len())
+    }
+
+    /// Notes how the outputs change with inputs among the changes of signals, as the FMU says; false
+    /// where it does not. What is not real does not change.
+    pub(super) fn change(
+        &self,
+        (references, changes): (&[u32], &[f64]),
+        signals: &mut [f64],
+        instance: &mut Instance,
+    ) -> Result<bool, Box<CallError>> {
+        for group in &self.groups {
+            let (first, count) = (group.first, group.values.len());
+            let into = &mut signals[first..first + count];
+            into.fill(0.0);
+            if changes.iter().all(|change| *change == 0.0) {
+                continue;
+            }
+            match group.kind {
+                Kind::Float64 => {}
+                Kind::Float32 => return Ok(false),
+                _ => continue,
+            }
+            let unknowns = (&group.references[..], into);
+            if !instance.derivative(unknowns, (references, changes))? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Reads the outputs into the signals.
+    #[inline]
+    pub(super) fn read(&self, signals: &mut Signals, instance: &mut Instance) -> Outcome {
+        for group in &self.groups {
+            let into = &mut signals.numbers[group.first..group.first + group.values.len()];
+            instance.get(&group.kind, &group.references, into)?;
+        }
+        for group in &self.exact {
+            let data = &mut signals.exact[group.first..group.first + group.count];
+            instance.get_exact(&group.kind, &group.references, data)?;
+        }
+        Ok(())
+    }
+
+    /// As [`Outputs::read`], but the signals keep their values where the instance fails.
+    pub(super) fn read_all_or_none(
+        &mut self,
+        signals: &mut Signals,
+        instance: &mut Instance,
+    ) -> Outcome {
         for group in &mut self.groups {
             instance.get(&group.kind, &group.references, &mut group.values)?;
         }

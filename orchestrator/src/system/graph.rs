@@ -26,8 +26,13 @@ pub enum Operation {
         /// The component.
         component: usize,
     },
-    /// Repeat these until their values converge.
-    Iterate(Vec<Operation>),
+    /// Find values for these that agree with each other.
+    Iterate {
+        /// What is done in a pass.
+        operations: Vec<Operation>,
+        /// The variables round a loop among them, the first one again at the end.
+        round: Vec<String>,
+    },
 }
 
 /// What is done at a sample, in order; afterwards the continuous components step.
@@ -78,7 +83,10 @@ fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
         let own = |p: &usize| group.binary_search(p).is_ok();
         let is_loop = group.len() > 1 || predecessors[group[0]].contains(&group[0]);
         if is_loop && !iterate {
-            return Err(cycle(&graph, &predecessors, &group));
+            return Err(SystemError::Cycle {
+                system: system.name.clone(),
+                variables: variables_round(&graph, &predecessors, &group),
+            });
         }
         let before = group
             .iter()
@@ -90,7 +98,12 @@ fn schedule(system: &System, iterate: bool) -> Result<Schedule, SystemError> {
         }
         let mut parts: Vec<_> = group.iter().map(|&n| operation(&nodes[n])).collect();
         if is_loop {
-            operations.push((at, Operation::Iterate(parts)));
+            let round = variables_round(&graph, &predecessors, &group);
+            let of_loop = Operation::Iterate {
+                operations: parts,
+                round,
+            };
+            operations.push((at, of_loop));
         } else {
             operations.push((at, parts.remove(0)));
         }
@@ -254,7 +267,9 @@ fn order(operation: &Operation) -> (usize, usize) {
     match operation {
         Operation::Read { component, outputs } => (*component, outputs[0]),
         Operation::Call { component } => (*component, 0),
-        Operation::Iterate(parts) => parts.iter().map(order).min().unwrap_or_default(),
+        Operation::Iterate { operations, .. } => {
+            operations.iter().map(order).min().unwrap_or_default()
+        }
     }
 }
 
@@ -320,7 +335,7 @@ fn strongly_connected(predecessors: &[Vec<usize>]) -> Vec<Vec<usize>> {
 }
 
 /// Names the variables round a loop in the group, in the direction in which values travel.
-fn cycle(graph: &Graph, predecessors: &[Vec<usize>], group: &[usize]) -> SystemError {
+fn variables_round(graph: &Graph, predecessors: &[Vec<usize>], group: &[usize]) -> Vec<String> {
     // Walk against the direction of the values until a node comes again.
     let mut path = vec![group[0]];
     let start = loop {
@@ -348,8 +363,5 @@ fn cycle(graph: &Graph, predecessors: &[Vec<usize>], group: &[usize]) -> SystemE
         }
     }
     variables.extend(variables.first().cloned());
-    SystemError::Cycle {
-        system: system.name.clone(),
-        variables,
-    }
+    variables
 }

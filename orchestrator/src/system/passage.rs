@@ -81,6 +81,23 @@ impl Passage {
     }
 }
 
+impl Passage {
+    /// Whether values stay as they are, to the bit.
+    #[must_use]
+    pub fn is_nothing(&self) -> bool {
+        self.map.is_empty() && self.factor == 1.0 && self.offset == 0.0
+    }
+
+    /// How much what comes of a value changes with it.
+    #[must_use]
+    pub fn slope(&self) -> f64 {
+        match self.map.is_empty() {
+            true => self.factor,
+            false => 0.0,
+        }
+    }
+}
+
 /// An end of a way: its type, its unit and what that is in SI, as its FMU describes it.
 #[derive(Debug, Clone, Copy)]
 pub struct End<'a> {

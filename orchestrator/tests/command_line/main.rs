@@ -14,6 +14,7 @@ mod failures;
 mod hostile;
 mod installation;
 mod iteration;
+mod loops;
 mod motions;
 mod physical_rig;
 mod reports;

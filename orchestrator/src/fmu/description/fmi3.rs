@@ -117,8 +117,16 @@ pub(super) fn read(text: &str, sizes: &Sizes) -> Result<Description, String> {
         ),
         needs_execution_tool: flag(|it| it.needsExecutionTool, |it| it.needsExecutionTool),
         log_categories: file.logCategories.iter().map(|c| c.name.clone()).collect(),
-        saves_state: flag(|it| it.canGetAndSetFMUState, |_| false),
-        writes_state: flag(|it| it.canSerializeFMUState, |_| false),
+        saves_state: flag(|it| it.canGetAndSetFMUState, |it| it.canGetAndSetFMUState),
+        writes_state: flag(|it| it.canSerializeFMUState, |it| it.canSerializeFMUState),
+        directional_derivatives: flag(
+            |it| it.providesDirectionalDerivatives,
+            |it| it.providesDirectionalDerivatives,
+        ),
+        adjoint_derivatives: flag(
+            |it| it.providesAdjointDerivatives,
+            |it| it.providesAdjointDerivatives,
+        ),
         variable_step: steps.is_none_or(|it| it.canHandleVariableCommunicationStepSize),
         offers_model_exchange: exchange.is_some(),
         event_indicators: file.eventIndicators.len(),

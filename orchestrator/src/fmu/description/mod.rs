@@ -167,6 +167,10 @@ pub struct Description {
     pub saves_state: bool,
     /// Whether a saved state can be written to a file and read again.
     pub writes_state: bool,
+    /// Whether it gives derivatives of outputs along changes of inputs.
+    pub directional_derivatives: bool,
+    /// Whether it gives derivatives of weighted outputs by inputs.
+    pub adjoint_derivatives: bool,
     /// Whether it offers model exchange, too.
     pub offers_model_exchange: bool,
     /// Continuous states, as far as the description tells (arrays count once).

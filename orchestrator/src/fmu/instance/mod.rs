@@ -1,6 +1,7 @@
 //! One instance of an FMU, the same for FMI 2.0 and 3.0.
 
 mod calling;
+mod derivatives;
 mod stepping;
 mod values;
 

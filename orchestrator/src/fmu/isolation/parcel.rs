@@ -38,6 +38,7 @@ pub(super) const IN: u32 = 1;
 pub(super) const OUT: u32 = 2;
 pub(super) const TEXTS_IN: u32 = 3;
 pub(super) const TEXTS_OUT: u32 = 4;
+pub(super) const BOTH: u32 = 5;
 
 const HEAD: usize = size_of::<Head>();
 
@@ -54,6 +55,7 @@ impl Head {
             Values::None => (NONE, 0),
             Values::In(bytes) => (IN, bytes.len()),
             Values::Out(bytes) => (OUT, bytes.len()),
+            Values::Both(bytes) => (BOTH, bytes.len()),
             Values::TextsIn(texts) => (TEXTS_IN, texts.iter().map(|text| 8 + text.len()).sum()),
             Values::TextsOut(_) => (TEXTS_OUT, 0),
         };
@@ -109,6 +111,7 @@ fn write(bytes: &mut [u8], head: &Head, call: &Call) {
     let at = head.values_at();
     match &call.values {
         Values::In(values) => bytes[at..at + values.len()].copy_from_slice(values),
+        Values::Both(values) => bytes[at..at + values.len()].copy_from_slice(values),
         Values::TextsIn(texts) => write_texts(&mut bytes[at..], texts),
         _ => {}
     }
@@ -183,6 +186,7 @@ pub(super) fn carry_out(
         values: match head.kind {
             IN => Values::In(&values[..length]),
             OUT => Values::Out(&mut values[..length]),
+            BOTH => Values::Both(&mut values[..length]),
             TEXTS_IN => {
                 texts = read_texts(&values[..length], count).unwrap_or_default();
                 Values::TextsIn(&texts)
@@ -254,7 +258,7 @@ pub(super) fn give_back(bytes: &[u8], head: &Head, call: &mut Call) {
     }
     let at = head.values_at();
     match &mut call.values {
-        Values::Out(values) => {
+        Values::Out(values) | Values::Both(values) => {
             let length = values.len().min(bytes.len() - at);
             values[..length].copy_from_slice(&bytes[at..at + length]);
         }

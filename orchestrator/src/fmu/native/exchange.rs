@@ -6,6 +6,7 @@
 use bytemuck::{cast_slice, cast_slice_mut};
 
 use super::super::call::{Call, Culprit, Endpoint, Function, Lost, Scalar, Values};
+use super::solver_state::{KeptStates, SolverState};
 
 /// Error of a step relative to the states.
 const TOLERANCE: f64 = 1e-9;
@@ -19,14 +20,8 @@ pub(super) struct Stepped {
     fmu: Box<dyn Endpoint>,
     /// The standard's version has functions that count states and indicators.
     counts: bool,
-    states: Vec<f64>,
-    indicators: Vec<f64>,
-    next_event: Option<f64>,
-    /// The last good step, s; where the next one begins.
-    step: f64,
-    /// Whether it is in continuous-time mode.
-    is_running: bool,
-    inputs_changed: bool,
+    now: SolverState,
+    kept: KeptStates,
 }
 
 /// A call that did not go well: its outcome, and which it was.
@@ -54,12 +49,12 @@ impl Stepped {
         Self {
             fmu,
             counts,
-            states: vec![0.0; states],
-            indicators: vec![0.0; indicators],
-            next_event: None,
-            step: 0.0,
-            is_running: false,
-            inputs_changed: false,
+            now: SolverState {
+                states: vec![0.0; states],
+                indicators: vec![0.0; indicators],
+                ..SolverState::default()
+            },
+            kept: KeptStates::default(),
         }
     }
 
@@ -105,7 +100,7 @@ impl Stepped {
     }
 
     fn indicators(&mut self, time: f64, states: &[f64]) -> Done<Vec<f64>> {
-        let mut values = vec![0.0; self.indicators.len()];
+        let mut values = vec![0.0; self.now.indicators.len()];
         if !values.is_empty() {
             self.set(time, states)?;
             self.read(Function::GetEventIndicators, &mut values)?;
@@ -118,7 +113,7 @@ impl Stepped {
         for _ in 0..MOST_EVENTS {
             let call = self.plain(Function::UpdateDiscreteStates)?;
             let [again, end, _, _, defined] = call.flags;
-            self.next_event = defined.then_some(call.numbers[0]);
+            self.now.next_event = defined.then_some(call.numbers[0]);
             if end {
                 return Ok(true);
             }
@@ -133,14 +128,14 @@ impl Stepped {
     /// From event mode on.
     fn resume(&mut self) -> Done {
         self.plain(Function::EnterContinuousTimeMode)?;
-        self.is_running = true;
-        let mut states = std::mem::take(&mut self.states);
+        self.now.is_running = true;
+        let mut states = std::mem::take(&mut self.now.states);
         let done = self.read(Function::GetContinuousStates, &mut states);
-        self.states = states;
+        self.now.states = states;
         done?;
-        let mut values = std::mem::take(&mut self.indicators);
+        let mut values = std::mem::take(&mut self.now.indicators);
         let done = self.read(Function::GetEventIndicators, &mut values);
-        self.indicators = values;
+        self.now.indicators = values;
         done
     }
 
@@ -149,8 +144,8 @@ impl Stepped {
         if self.counts {
             let states = self.plain(Function::GetNumberOfContinuousStates)?.handle;
             let indicators = self.plain(Function::GetNumberOfEventIndicators)?.handle;
-            self.states = vec![0.0; states as usize];
-            self.indicators = vec![0.0; indicators as usize];
+            self.now.states = vec![0.0; states as usize];
+            self.now.indicators = vec![0.0; indicators as usize];
         }
         let end = self.settle()?;
         if !end {
@@ -162,7 +157,7 @@ impl Stepped {
     /// Handles an event; gives whether the run ends.
     fn event(&mut self) -> Done<bool> {
         self.plain(Function::EnterEventMode)?;
-        self.is_running = false;
+        self.now.is_running = false;
         if self.settle()? {
             return Ok(true);
         }
@@ -172,24 +167,24 @@ impl Stepped {
 
     /// Steps from `time` to `end`; gives where it was ended, if it was.
     fn advance(&mut self, time: f64, end: f64) -> Done<Option<f64>> {
-        if !self.is_running {
+        if !self.now.is_running {
             return Ok(Some(time));
         }
         let mut now = time;
-        if self.inputs_changed {
+        if self.now.inputs_changed {
             // What has been set may have moved an indicator without an event in time.
-            self.inputs_changed = false;
-            let states = self.states.clone();
+            self.now.inputs_changed = false;
+            let states = self.now.states.clone();
             let fresh = self.indicators(now, &states)?;
-            if crossed(&self.indicators, &fresh) && self.event()? {
+            if crossed(&self.now.indicators, &fresh) && self.event()? {
                 return Ok(Some(now));
             }
-            self.indicators = self.indicators(now, &self.states.clone())?;
+            self.now.indicators = self.indicators(now, &self.now.states.clone())?;
         }
         let mut events = 0;
         let small = 1e-12 * end.abs().max(1e-3);
         while end - now > small {
-            let stop = self.next_event.map_or(end, |next| next.min(end));
+            let stop = self.now.next_event.map_or(end, |next| next.min(end));
             let reached = match stop > now + small {
                 true => self.integrate(now, stop)?,
                 false => Reached::End,
@@ -203,7 +198,7 @@ impl Stepped {
                 }
                 Reached::End => {
                     now = stop.max(now);
-                    self.next_event.is_some_and(|next| next <= now + small)
+                    self.now.next_event.is_some_and(|next| next <= now + small)
                 }
             };
             if is_event && self.event()? {
@@ -215,19 +210,19 @@ impl Stepped {
                 return Err(Failed(Function::DoStep, Err(Lost(reason))));
             }
         }
-        let states = self.states.clone();
+        let states = self.now.states.clone();
         self.set(end, &states)?;
         Ok(None)
     }
 
     /// Integrates from `from` to `to` or the first state event.
     fn integrate(&mut self, from: f64, to: f64) -> Done<Reached> {
-        let n = self.states.len();
-        let (mut time, mut state) = (from, self.states.clone());
+        let n = self.now.states.len();
+        let (mut time, mut state) = (from, self.now.states.clone());
         let mut slopes = vec![vec![0.0; n]; 7];
         self.derivatives(time, &state, &mut slopes[0])?;
-        let mut step = if self.step > 0.0 {
-            self.step
+        let mut step = if self.now.step > 0.0 {
+            self.now.step
         } else {
             1e-3 * (to - from)
         };
@@ -265,12 +260,12 @@ impl Stepped {
             }
             let end = if is_last { to } else { time + size };
             let indicators = self.indicators(end, &next)?;
-            if crossed(&self.indicators, &indicators) {
+            if crossed(&self.now.indicators, &indicators) {
                 let (at, located) = self.locate(time, size, &state, &slopes)?;
                 self.set(at, &located)?;
-                self.indicators = self.indicators(at, &located)?;
-                self.states = located;
-                self.step = size;
+                self.now.indicators = self.indicators(at, &located)?;
+                self.now.states = located;
+                self.now.step = size;
                 let done = self.completed()?;
                 return Ok(if done[1] {
                     Reached::Terminated(at)
@@ -280,10 +275,10 @@ impl Stepped {
             }
             self.set(end, &next)?;
             let [event, terminate, ..] = self.completed()?;
-            self.indicators = indicators;
-            self.states.copy_from_slice(&next);
+            self.now.indicators = indicators;
+            self.now.states.copy_from_slice(&next);
             if !is_last {
-                self.step = size;
+                self.now.step = size;
             }
             if terminate {
                 return Ok(Reached::Terminated(end));
@@ -319,7 +314,7 @@ impl Stepped {
         slopes: &[Vec<f64>],
     ) -> Done<(f64, Vec<f64>)> {
         let (mut low, mut high) = (0.0, 1.0);
-        let before = self.indicators.clone();
+        let before = self.now.indicators.clone();
         while high - low > 1e-14_f64.max(1e-15 * time.abs() / size) {
             let middle = 0.5 * (low + high);
             let there = between(state, slopes, size, middle);
@@ -360,6 +355,10 @@ fn between(state: &[f64], slopes: &[Vec<f64>], size: f64, theta: f64) -> Vec<f64
 
 impl Endpoint for Stepped {
     fn call(&mut self, call: &mut Call) -> Result<i32, Lost> {
+        let fmu = self.fmu.as_mut();
+        if let Some(outcome) = self.kept.carry_out(call, fmu, &mut self.now) {
+            return outcome;
+        }
         let done = match call.function {
             Function::ExitInitializationMode => {
                 let status = self.fmu.call(call)?;
@@ -377,8 +376,8 @@ impl Endpoint for Stepped {
                     Some(())
                 })
             }
-            Function::Set(scalar) if self.is_running => {
-                self.inputs_changed = true;
+            Function::Set(scalar) if self.now.is_running => {
+                self.now.inputs_changed = true;
                 if scalar == Scalar::Float64 || scalar == Scalar::Float32 {
                     return self.fmu.call(call);
                 }

@@ -10,9 +10,10 @@ use super::super::FmiVersion;
 use super::super::call::{Call, Endpoint, Function, Lost, Scalar, Stepped, Values};
 use super::callbacks::{Callbacks, Environment};
 use super::library::Functions;
+use super::state::StateFunctions;
 use super::{
-    FATAL, Handle, Kept, Mode, Setup, Sink, copy_strings, missing, pointer, text_for_c, unknown,
-    with_strings,
+    DISCARD, FATAL, Handle, Kept, Mode, Setup, Sink, copy_strings, derivative, missing, pointer,
+    text_for_c, unknown, with_strings,
 };
 
 type Instantiate = unsafe extern "C" fn(
@@ -28,17 +29,21 @@ type Simple = unsafe extern "C" fn(*mut c_void) -> c_int;
 type SetupExperiment = unsafe extern "C" fn(*mut c_void, c_int, f64, f64, c_int, f64) -> c_int;
 type Access = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void) -> c_int;
 type DoStep = unsafe extern "C" fn(*mut c_void, f64, f64, c_int) -> c_int;
-type State = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
-type SetState = unsafe extern "C" fn(*mut c_void, *mut c_void) -> c_int;
-type SizeOfState = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut usize) -> c_int;
-type WriteState = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut c_void, usize) -> c_int;
-type ReadState = unsafe extern "C" fn(*mut c_void, *mut c_void, usize, *mut *mut c_void) -> c_int;
 type Logging = unsafe extern "C" fn(*mut c_void, c_int, usize, *const *const c_char) -> c_int;
 type BooleanStatus = unsafe extern "C" fn(*mut c_void, c_int, *mut c_int) -> c_int;
 type RealStatus = unsafe extern "C" fn(*mut c_void, c_int, *mut f64) -> c_int;
 type SetTime = unsafe extern "C" fn(*mut c_void, f64) -> c_int;
 type Reals = unsafe extern "C" fn(*mut c_void, *mut c_void, usize) -> c_int;
 type Discrete = unsafe extern "C" fn(*mut c_void, *mut EventInfo) -> c_int;
+type Derivative = unsafe extern "C" fn(
+    *mut c_void,
+    *const u32,
+    usize,
+    *const u32,
+    usize,
+    *const f64,
+    *mut f64,
+) -> c_int;
 type Completed = unsafe extern "C" fn(*mut c_void, c_int, *mut c_int, *mut c_int) -> c_int;
 
 /// `fmi2EventInfo`.
@@ -64,12 +69,7 @@ struct Table {
     do_step: Option<DoStep>,
     get: [Option<Access>; 4],
     set: [Option<Access>; 4],
-    get_state: Option<State>,
-    set_state: Option<SetState>,
-    free_state: Option<State>,
-    size_of_state: Option<SizeOfState>,
-    write_state: Option<WriteState>,
-    read_state: Option<ReadState>,
+    state: StateFunctions,
     logging: Option<Logging>,
     boolean_status: Option<BooleanStatus>,
     real_status: Option<RealStatus>,
@@ -83,6 +83,7 @@ struct Table {
     derivatives: Option<Reals>,
     indicators: Option<Reals>,
     nominals: Option<Reals>,
+    directional: Option<Derivative>,
 }
 
 /// An instance of an FMI 2.0 FMU.
@@ -124,12 +125,7 @@ impl Fmi2 {
                 reset: f.optional("Reset"),
                 get: names.map(|name| f.optional(&format!("Get{name}"))),
                 set: names.map(|name| f.optional(&format!("Set{name}"))),
-                get_state: f.optional("GetFMUstate"),
-                set_state: f.optional("SetFMUstate"),
-                free_state: f.optional("FreeFMUstate"),
-                size_of_state: f.optional("SerializedFMUstateSize"),
-                write_state: f.optional("SerializeFMUstate"),
-                read_state: f.optional("DeSerializeFMUstate"),
+                state: StateFunctions::of(&f, FmiVersion::V2),
                 logging: f.optional("SetDebugLogging"),
                 boolean_status: f.optional("GetBooleanStatus"),
                 real_status: f.optional("GetRealStatus"),
@@ -143,6 +139,7 @@ impl Fmi2 {
                 derivatives: f.optional("GetDerivatives"),
                 indicators: f.optional("GetEventIndicators"),
                 nominals: f.optional("GetNominalsOfContinuousStates"),
+                directional: f.optional("GetDirectionalDerivative"),
             };
             (instantiate, table)
         };
@@ -245,43 +242,6 @@ impl Fmi2 {
                     call.flags = [event != 0, terminate != 0, false, false, false];
                     Ok(status)
                 }
-                Function::GetState => {
-                    let mut state = call.handle as usize as *mut c_void;
-                    let status = table.get_state.ok_or_else(missing)?(c, &raw mut state);
-                    call.handle = state as usize as u64;
-                    Ok(status)
-                }
-                Function::SetState => {
-                    let state = call.handle as usize as *mut c_void;
-                    Ok(table.set_state.ok_or_else(missing)?(c, state))
-                }
-                Function::FreeState => {
-                    let mut state = call.handle as usize as *mut c_void;
-                    let status = table.free_state.ok_or_else(missing)?(c, &raw mut state);
-                    call.handle = 0;
-                    Ok(status)
-                }
-                Function::SizeOfState => {
-                    let state = call.handle as usize as *mut c_void;
-                    let mut size = 0;
-                    let size_of = table.size_of_state.ok_or_else(missing)?;
-                    let status = size_of(c, state, &raw mut size);
-                    call.handle = size as u64;
-                    Ok(status)
-                }
-                Function::WriteState => {
-                    let state = call.handle as usize as *mut c_void;
-                    let write = table.write_state.ok_or_else(missing)?;
-                    Ok(write(c, state, pointer(&mut call.values), call.count))
-                }
-                Function::ReadState => {
-                    let mut state = std::ptr::null_mut();
-                    let read = table.read_state.ok_or_else(missing)?;
-                    let bytes = pointer(&mut call.values);
-                    let status = read(c, bytes, call.count, &raw mut state);
-                    call.handle = state as usize as u64;
-                    Ok(status)
-                }
                 Function::SetDebugLogging => {
                     let logging = table.logging.ok_or_else(missing)?;
                     let on = c_int::from(call.flags[0]);
@@ -319,7 +279,30 @@ impl Fmi2 {
                     let function = function.ok_or_else(missing)?;
                     Ok(function(c, pointer(&mut call.values), call.count))
                 }
-                _ => Err(unknown(call, FmiVersion::V2)),
+                Function::GetDirectionalDerivative => {
+                    let (unknowns, knowns) = call.references.split_at(call.unknowns());
+                    let (n, count) = (unknowns.len(), knowns.len());
+                    let (Some(derivative), Some(values)) =
+                        (table.directional, derivative(call, count, n))
+                    else {
+                        return Ok(DISCARD);
+                    };
+                    let (seed, sensitivity) = values;
+                    let (unknowns, knowns) = (unknowns.as_ptr(), knowns.as_ptr());
+                    Ok(derivative(
+                        c,
+                        unknowns,
+                        n,
+                        knowns,
+                        count,
+                        seed,
+                        sensitivity,
+                    ))
+                }
+                _ => match table.state.carry_out(call, &self.instance) {
+                    Some(outcome) => outcome,
+                    None => Err(unknown(call, FmiVersion::V2)),
+                },
             }
         }
     }

@@ -7,9 +7,10 @@ use super::super::FmiVersion;
 use super::super::call::{Call, Endpoint, Function, Lost, Scalar, Stepped, Values};
 use super::callbacks::{Environment, log_message};
 use super::library::Functions;
+use super::state::StateFunctions;
 use super::{
-    FATAL, Handle, Kept, Mode, Setup, Sink, copy_strings, missing, pointer, text_for_c, unknown,
-    with_strings,
+    DISCARD, FATAL, Handle, Kept, Mode, Setup, Sink, copy_strings, derivative, missing, pointer,
+    text_for_c, unknown, with_strings,
 };
 
 type LogMessage = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
@@ -51,11 +52,6 @@ type Clock = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void) -
 // Truth values that an FMU writes are bytes here: any bits may come.
 type DoStep =
     unsafe extern "C" fn(*mut c_void, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64) -> c_int;
-type State = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
-type SetState = unsafe extern "C" fn(*mut c_void, *mut c_void) -> c_int;
-type SizeOfState = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut usize) -> c_int;
-type WriteState = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut c_void, usize) -> c_int;
-type ReadState = unsafe extern "C" fn(*mut c_void, *mut c_void, usize, *mut *mut c_void) -> c_int;
 type Logging = unsafe extern "C" fn(*mut c_void, bool, usize, *const *const c_char) -> c_int;
 type SetTime = unsafe extern "C" fn(*mut c_void, f64) -> c_int;
 type Reals = unsafe extern "C" fn(*mut c_void, *mut c_void, usize) -> c_int;
@@ -70,6 +66,17 @@ type Discrete = unsafe extern "C" fn(
 ) -> c_int;
 type Completed = unsafe extern "C" fn(*mut c_void, bool, *mut u8, *mut u8) -> c_int;
 type Number = unsafe extern "C" fn(*mut c_void, *mut usize) -> c_int;
+type Derivative = unsafe extern "C" fn(
+    *mut c_void,
+    *const u32,
+    usize,
+    *const u32,
+    usize,
+    *const f64,
+    usize,
+    *mut f64,
+    usize,
+) -> c_int;
 type Interval =
     unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_void, *mut c_int) -> c_int;
 
@@ -89,12 +96,7 @@ struct Table {
     set_clock: Option<Clock>,
     interval: Option<Interval>,
     shift: Option<Clock>,
-    get_state: Option<State>,
-    set_state: Option<SetState>,
-    free_state: Option<State>,
-    size_of_state: Option<SizeOfState>,
-    write_state: Option<WriteState>,
-    read_state: Option<ReadState>,
+    state: StateFunctions,
     logging: Option<Logging>,
     enter_configuration_mode: Option<Simple>,
     exit_configuration_mode: Option<Simple>,
@@ -111,6 +113,8 @@ struct Table {
     nominals: Option<Reals>,
     number_of_states: Option<Number>,
     number_of_indicators: Option<Number>,
+    directional: Option<Derivative>,
+    adjoint: Option<Derivative>,
 }
 
 /// An instance of an FMI 3.0 FMU.
@@ -154,12 +158,7 @@ impl Fmi3 {
                 set_clock: f.optional("SetClock"),
                 interval: f.optional("GetIntervalDecimal"),
                 shift: f.optional("GetShiftDecimal"),
-                get_state: f.optional("GetFMUState"),
-                set_state: f.optional("SetFMUState"),
-                free_state: f.optional("FreeFMUState"),
-                size_of_state: f.optional("SerializedFMUStateSize"),
-                write_state: f.optional("SerializeFMUState"),
-                read_state: f.optional("DeserializeFMUState"),
+                state: StateFunctions::of(&f, FmiVersion::V3),
                 logging: f.optional("SetDebugLogging"),
                 enter_configuration_mode: f.optional("EnterConfigurationMode"),
                 exit_configuration_mode: f.optional("ExitConfigurationMode"),
@@ -176,6 +175,8 @@ impl Fmi3 {
                 nominals: f.optional("GetNominalsOfContinuousStates"),
                 number_of_states: f.optional("GetNumberOfContinuousStates"),
                 number_of_indicators: f.optional("GetNumberOfEventIndicators"),
+                directional: f.optional("GetDirectionalDerivative"),
+                adjoint: f.optional("GetAdjointDerivative"),
             }
         };
         let environment = Environment::new(sink);
@@ -303,43 +304,6 @@ impl Fmi3 {
                     call.flags = truth([event, terminate, 0, 0, 0]);
                     Ok(status)
                 }
-                Function::GetState => {
-                    let mut state = call.handle as usize as *mut c_void;
-                    let status = table.get_state.ok_or_else(missing)?(c, &raw mut state);
-                    call.handle = state as usize as u64;
-                    Ok(status)
-                }
-                Function::SetState => {
-                    let state = call.handle as usize as *mut c_void;
-                    Ok(table.set_state.ok_or_else(missing)?(c, state))
-                }
-                Function::FreeState => {
-                    let mut state = call.handle as usize as *mut c_void;
-                    let status = table.free_state.ok_or_else(missing)?(c, &raw mut state);
-                    call.handle = 0;
-                    Ok(status)
-                }
-                Function::SizeOfState => {
-                    let state = call.handle as usize as *mut c_void;
-                    let mut size = 0;
-                    let size_of = table.size_of_state.ok_or_else(missing)?;
-                    let status = size_of(c, state, &raw mut size);
-                    call.handle = size as u64;
-                    Ok(status)
-                }
-                Function::WriteState => {
-                    let state = call.handle as usize as *mut c_void;
-                    let write = table.write_state.ok_or_else(missing)?;
-                    Ok(write(c, state, pointer(&mut call.values), call.count))
-                }
-                Function::ReadState => {
-                    let mut state = std::ptr::null_mut();
-                    let read = table.read_state.ok_or_else(missing)?;
-                    let bytes = pointer(&mut call.values);
-                    let status = read(c, bytes, call.count, &raw mut state);
-                    call.handle = state as usize as u64;
-                    Ok(status)
-                }
                 Function::SetDebugLogging => {
                     let logging = table.logging.ok_or_else(missing)?;
                     let on = call.flags[0];
@@ -395,7 +359,35 @@ impl Fmi3 {
                         values,
                     ))
                 }
-                _ => Err(unknown(call, FmiVersion::V3)),
+                Function::GetDirectionalDerivative | Function::GetAdjointDerivative => {
+                    let (unknowns, knowns) = call.references.split_at(call.unknowns());
+                    let function = match call.function {
+                        Function::GetDirectionalDerivative => table.directional,
+                        _ => table.adjoint,
+                    };
+                    let given = call.count;
+                    let sought = call.values.numbers().saturating_sub(given);
+                    let (Some(function), Some((seed, sensitivity))) =
+                        (function, derivative(call, given, sought))
+                    else {
+                        return Ok(DISCARD);
+                    };
+                    Ok(function(
+                        c,
+                        unknowns.as_ptr(),
+                        unknowns.len(),
+                        knowns.as_ptr(),
+                        knowns.len(),
+                        seed,
+                        given,
+                        sensitivity,
+                        sought,
+                    ))
+                }
+                _ => match table.state.carry_out(call, &self.instance) {
+                    Some(outcome) => outcome,
+                    None => Err(unknown(call, FmiVersion::V3)),
+                },
             }
         }
     }

@@ -10,6 +10,8 @@ mod fmi2;
 mod fmi3;
 mod library;
 pub(super) mod printing;
+mod solver_state;
+mod state;
 
 use std::ffi::{CString, c_char, c_void};
 use std::path::PathBuf;
@@ -59,6 +61,7 @@ pub(super) struct Setup {
 
 /// Status codes that are treated apart; the numbers are the same in both versions.
 pub(super) const FATAL: i32 = 4;
+pub(super) const DISCARD: i32 = 2;
 
 /// Loads the library and makes an instance.
 ///
@@ -108,10 +111,21 @@ fn text_for_c(text: &str) -> Result<CString, String> {
 /// The first of the values, in the layout of C.
 fn pointer(values: &mut Values) -> *mut c_void {
     match values {
-        Values::Out(bytes) => bytes.as_mut_ptr().cast(),
+        Values::Out(bytes) | Values::Both(bytes) => bytes.as_mut_ptr().cast(),
         Values::In(bytes) => bytes.as_ptr().cast_mut().cast(),
         _ => std::ptr::null_mut(),
     }
+}
+
+/// Where `given` numbers go into a derivative, and where the `sought` ones behind them come out; none
+/// where the call has other values.
+fn derivative(call: &mut Call, given: usize, sought: usize) -> Option<(*const f64, *mut f64)> {
+    let Values::Both(bytes) = &mut call.values else {
+        return None;
+    };
+    let numbers: &mut [f64] = bytemuck::try_cast_slice_mut(bytes).ok()?;
+    let (seed, sensitivity) = numbers.split_at_mut_checked(given)?;
+    (sensitivity.len() == sought).then_some((seed.as_ptr(), sensitivity.as_mut_ptr()))
 }
 
 fn missing() -> Lost {

@@ -1,0 +1,521 @@
+//! Values that travel round a loop and must come back as they were sent: by substitution while that
+//! settles quickly, by a damped Newton method otherwise (Kelley, *Solving Nonlinear Equations with
+//! Newton's Method*, SIAM 2003, chapters 1 and 2).
+
+use nalgebra::linalg::FullPivLU;
+use nalgebra::{DMatrix, DVector, Dyn};
+
+use super::MasterError;
+
+/// Values that change by less than this part of their size, or by so much in their unit, have settled.
+const EXACTLY: (f64, f64) = (1e-12, f64::MIN_POSITIVE);
+/// The same where nothing comes closer: some FMUs compute with a tolerance of their own.
+const ATTAINABLE: (f64, f64) = (1e-9, 1e-12);
+/// Substitution goes on as long as each pass brings the values so much closer, and a derivative serves
+/// as long as its steps do.
+const QUICKLY: f64 = 0.1;
+/// Newton steps at most.
+const MOST_STEPS: usize = 50;
+/// Halvings of a Newton step at most.
+const MOST_HALVINGS: u32 = 10;
+/// Passes of substitution at most, where there is nothing to differentiate.
+const MOST_PASSES: usize = 100;
+/// Size of a finite difference, relative to the value.
+const DIFFERENCE: f64 = 1e-6;
+/// A loop gives back what it is given where its gain is so close to one.
+const UNIT_GAIN: f64 = 1e-6;
+
+/// What sends values round a loop.
+pub(super) trait Round {
+    /// Sends the values round, and gives what comes back.
+    ///
+    /// # Errors
+    /// A call that an FMU did not complete.
+    fn send(&mut self, values: &[f64], back: &mut [f64]) -> Result<(), MasterError>;
+
+    /// What comes back changes by, per change of the value at `place`, as the FMUs themselves say;
+    /// none where they do not, and a difference is taken. The values are those that were sent last.
+    ///
+    /// # Errors
+    /// As [`Round::send`].
+    fn derivative(
+        &mut self,
+        _place: usize,
+        _values: &[f64],
+        _change: &mut [f64],
+    ) -> Result<bool, MasterError> {
+        Ok(false)
+    }
+}
+
+/// Why the values of a loop were not found.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Unsolved {
+    /// How often values were sent round.
+    pub passes: usize,
+    /// The value that is furthest from what comes back.
+    pub place: usize,
+    /// The closest that was found of it.
+    pub value: f64,
+    /// What comes back.
+    pub back: f64,
+    /// How much larger a change of the values comes back (the real eigenvalue of the derivative that
+    /// is closest to one); none where it is not known.
+    pub gain: Option<f64>,
+}
+
+impl Unsolved {
+    /// Whether a change comes back as large as it was, so that no value fits, or any.
+    pub(super) fn is_singular(&self) -> bool {
+        self.gain
+            .is_some_and(|gain| (gain - 1.0).abs() < 1e3 * UNIT_GAIN)
+    }
+}
+
+impl Unsolved {
+    /// Why there are none, as far as it is known, and what to do.
+    pub(super) fn reason(&self) -> String {
+        let why = match self.gain {
+            _ if self.is_singular() => "a change of the values comes back as large as it was (the \
+                                        gain round the loop is 1), so that no value fits, or any"
+                .to_string(),
+            Some(gain) => format!(
+                "a change of the values comes back {gain:.4} times as large there, and Newton's \
+                 method comes no closer"
+            ),
+            None => format!("after {} rounds they still change", self.passes),
+        };
+        format!(
+            "{why}: check the equations and parameters of the components, or break the loop with one \
+             that has no direct feedthrough or a `period`"
+        )
+    }
+}
+
+/// The values of a loop while they are sought.
+struct Search<'a, R> {
+    round: &'a mut R,
+    /// Places of the smooth ones.
+    free: Vec<usize>,
+    back: Vec<f64>,
+    passes: usize,
+}
+
+/// Seeks values that come back as they were sent, beginning with those given; on success they are the
+/// last that were sent. `smooth` says which of them may take any value (numbers that are not whole).
+///
+/// # Errors
+/// A call that an FMU did not complete. The result within says why there are none.
+pub(super) fn solve(
+    round: &mut impl Round,
+    values: &mut [f64],
+    smooth: &[bool],
+) -> Result<Result<(), Unsolved>, MasterError> {
+    let places = |smooth_ones: bool| (0..smooth.len()).filter(move |&at| smooth[at] == smooth_ones);
+    let mut search = Search {
+        round,
+        free: places(true).collect(),
+        back: vec![0.0; values.len()],
+        passes: 0,
+    };
+    let switched: Vec<usize> = places(false).collect();
+    search.send(values)?;
+    if search.substitute(values)? {
+        return Ok(Ok(()));
+    }
+    if search.free.is_empty() {
+        return Ok(Err(search.unsolved(values, None)));
+    }
+    for _ in 0..MOST_PASSES {
+        let mut solved = search.newton(values, true)?;
+        // An FMU whose derivatives are wrong is not believed twice.
+        if let Err((_, true)) = solved {
+            solved = search.newton(values, false)?;
+        }
+        if let Err((unsolved, _)) = solved {
+            return Ok(Err(unsolved));
+        }
+        // What is not smooth stood still meanwhile.
+        if switched.iter().all(|&at| values[at] == search.back[at]) {
+            return Ok(Ok(()));
+        }
+        for &at in &switched {
+            values[at] = search.back[at];
+        }
+        search.send(values)?;
+    }
+    Ok(Err(search.unsolved(values, None)))
+}
+
+impl<R: Round> Search<'_, R> {
+    fn send(&mut self, values: &[f64]) -> Result<(), MasterError> {
+        self.passes += 1;
+        self.round.send(values, &mut self.back)
+    }
+
+    /// Size of the value at a place.
+    fn size(&self, values: &[f64], at: usize) -> f64 {
+        values[at].abs().max(self.back[at].abs())
+    }
+
+    /// Whether all values are what comes back, so closely.
+    fn has_settled(
+        &self,
+        mut places: impl Iterator<Item = usize>,
+        values: &[f64],
+        (tolerance, negligible): (f64, f64),
+    ) -> bool {
+        places.all(|at| {
+            let change = (self.back[at] - values[at]).abs();
+            change <= tolerance * self.size(values, at) + negligible
+        })
+    }
+
+    /// How far the values are from what comes back, over these sizes, at most.
+    fn distance(&self, values: &[f64], sizes: &[f64]) -> f64 {
+        (0..values.len()).fold(0.0, |most: f64, at| {
+            let size = sizes[at].max(f64::MIN_POSITIVE);
+            most.max((self.back[at] - values[at]).abs() / size)
+        })
+    }
+
+    /// Sends what came back as long as that settles quickly, or as nothing else can be done; gives
+    /// whether it has settled. Where it runs away the values are those at which it began.
+    fn substitute(&mut self, values: &mut [f64]) -> Result<bool, MasterError> {
+        let sizes: Vec<f64> = (0..values.len()).map(|at| self.size(values, at)).collect();
+        let begun = values.to_vec();
+        let first = self.distance(values, &sizes);
+        let mut before = f64::INFINITY;
+        loop {
+            if self.has_settled(0..values.len(), values, EXACTLY) {
+                return Ok(true);
+            }
+            let distance = self.distance(values, &sizes);
+            let goes_on = match self.free.is_empty() {
+                true => self.passes < MOST_PASSES,
+                false => distance <= QUICKLY * before,
+            };
+            if !goes_on {
+                if distance > first && !self.free.is_empty() {
+                    values.copy_from_slice(&begun);
+                    self.send(values)?;
+                }
+                return Ok(false);
+            }
+            before = distance;
+            values.copy_from_slice(&self.back);
+            self.send(values)?;
+        }
+    }
+
+    /// Newton's method, with the FMUs' own derivatives where `own` allows them; without a solution
+    /// the second is whether they were used.
+    #[allow(clippy::type_complexity, reason = "a result within a result")]
+    fn newton(
+        &mut self,
+        values: &mut [f64],
+        own: bool,
+    ) -> Result<Result<(), (Unsolved, bool)>, MasterError> {
+        let (mut matrix, mut used) = self.derivative(values, own)?;
+        let mut is_fresh = true;
+        for _ in 0..MOST_STEPS {
+            let Some(step) = self.step(values, &matrix) else {
+                let gain = gain(&matrix);
+                return Ok(Err((self.unsolved(values, gain), used)));
+            };
+            let sizes: Vec<f64> = (0..values.len())
+                .map(|at| self.size(values, at).max(step[at].abs()))
+                .collect();
+            let is_small = |(tolerance, negligible): (f64, f64)| {
+                (0..step.len()).all(|at| step[at].abs() <= tolerance * sizes[at] + negligible)
+            };
+            if is_small(EXACTLY) {
+                return Ok(Ok(()));
+            }
+            match self.descend(values, &step, &sizes)? {
+                Some(_) if self.has_settled(self.free.iter().copied(), values, EXACTLY) => {
+                    return Ok(Ok(()));
+                }
+                Some(ratio) if ratio <= QUICKLY => is_fresh = false,
+                // An old derivative may be the reason.
+                outcome if outcome.is_some() || !is_fresh => {
+                    (matrix, used) = self.derivative(values, own)?;
+                    is_fresh = true;
+                }
+                _ if is_small(ATTAINABLE) => return Ok(Ok(())),
+                _ => {
+                    let gain = gain(&matrix);
+                    return Ok(Err((self.unsolved(values, gain), used)));
+                }
+            }
+        }
+        let gain = gain(&matrix);
+        Ok(Err((self.unsolved(values, gain), used)))
+    }
+
+    /// Goes along a step as far as it brings the smooth values closer; gives how much closer, none
+    /// where it does not, with the values where they were.
+    fn descend(
+        &mut self,
+        values: &mut [f64],
+        step: &[f64],
+        sizes: &[f64],
+    ) -> Result<Option<f64>, MasterError> {
+        let begun = values.to_vec();
+        let before = self.merit(values, sizes);
+        let mut share = 1.0;
+        let mut refused = None;
+        for _ in 0..=MOST_HALVINGS {
+            for at in 0..values.len() {
+                values[at] = begun[at] + share * step[at];
+            }
+            match self.send(values) {
+                Ok(()) => {
+                    refused = None;
+                    let after = self.merit(values, sizes);
+                    if after < (1.0 - 1e-4 * share) * before {
+                        return Ok(Some(after / before));
+                    }
+                }
+                // A value outside of what a model is made for.
+                Err(error) => refused = Some(error),
+            }
+            share *= 0.5;
+        }
+        values.copy_from_slice(&begun);
+        match refused {
+            Some(error) => Err(error),
+            None => {
+                self.send(values)?;
+                Ok(None)
+            }
+        }
+    }
+
+    /// As [`Search::distance`], of the smooth values.
+    fn merit(&self, values: &[f64], sizes: &[f64]) -> f64 {
+        self.free.iter().fold(0.0, |most: f64, &at| {
+            let size = sizes[at].max(f64::MIN_POSITIVE);
+            most.max((self.back[at] - values[at]).abs() / size)
+        })
+    }
+
+    /// What the Newton step changes; none where the derivative cannot be solved for it.
+    fn step(&self, values: &[f64], matrix: &DMatrix<f64>) -> Option<Vec<f64>> {
+        let scale = |at: usize| match self.size(values, at) {
+            size if size > 0.0 => size,
+            _ => 1.0,
+        };
+        let free = &self.free;
+        let n = free.len();
+        let left = DMatrix::from_fn(n, n, |i, j| {
+            let unit = if i == j { 1.0 } else { 0.0 };
+            (unit - matrix[(i, j)]) * scale(free[j]) / scale(free[i])
+        });
+        let right = DVector::from_fn(n, |i, _| {
+            let at = free[i];
+            (self.back[at] - values[at]) / scale(at)
+        });
+        let solved: DVector<f64> = FullPivLU::<f64, Dyn, Dyn>::new(left).solve(&right)?;
+        if !solved.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let mut step = vec![0.0; values.len()];
+        for (i, &at) in free.iter().enumerate() {
+            step[at] = solved[i] * scale(at);
+        }
+        Some(step)
+    }
+
+    /// The derivative of what comes back, among the smooth values, and whether FMUs gave some of it.
+    fn derivative(
+        &mut self,
+        values: &[f64],
+        own: bool,
+    ) -> Result<(DMatrix<f64>, bool), MasterError> {
+        let n = self.free.len();
+        let mut matrix = DMatrix::zeros(n, n);
+        let (mut used, mut is_moved) = (false, false);
+        let mut column = vec![0.0; values.len()];
+        let mut moved = values.to_vec();
+        let there = self.back.clone();
+        for j in 0..n {
+            let at = self.free[j];
+            if own && self.round.derivative(at, values, &mut column)? {
+                used = true;
+            } else {
+                let size = self.size(values, at);
+                let difference = DIFFERENCE * if size > 0.0 { size } else { 1.0 };
+                moved[at] = values[at] + difference;
+                let exact = moved[at] - values[at];
+                self.passes += 1;
+                self.round.send(&moved, &mut column)?;
+                moved[at] = values[at];
+                is_moved = true;
+                for (column, there) in column.iter_mut().zip(&there) {
+                    *column = (*column - there) / exact;
+                }
+            }
+            for i in 0..n {
+                matrix[(i, j)] = column[self.free[i]];
+            }
+        }
+        if is_moved {
+            self.send(values)?;
+        }
+        Ok((matrix, used))
+    }
+
+    fn unsolved(&self, values: &[f64], gain: Option<f64>) -> Unsolved {
+        let far = |at: &usize| {
+            let size = self.size(values, *at).max(f64::MIN_POSITIVE);
+            (self.back[*at] - values[*at]).abs() / size
+        };
+        let place = (0..values.len()).max_by(|a, b| far(a).total_cmp(&far(b)));
+        let place = place.unwrap_or(0);
+        Unsolved {
+            passes: self.passes,
+            place,
+            value: values.get(place).copied().unwrap_or(0.0),
+            back: self.back.get(place).copied().unwrap_or(0.0),
+            gain,
+        }
+    }
+}
+
+/// The real eigenvalue closest to one.
+fn gain(matrix: &DMatrix<f64>) -> Option<f64> {
+    if !matrix.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    let all = matrix.complex_eigenvalues();
+    let real = all
+        .iter()
+        .filter(|value| value.im.abs() <= UNIT_GAIN * value.norm().max(1.0));
+    let real = real.map(|value| value.re);
+    real.min_by(|a, b| (a - 1.0).abs().total_cmp(&(b - 1.0).abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Function<F> {
+        of: F,
+        sent: usize,
+    }
+
+    impl<F: Fn(&[f64], &mut [f64])> Round for Function<F> {
+        fn send(&mut self, values: &[f64], back: &mut [f64]) -> Result<(), MasterError> {
+            self.sent += 1;
+            (self.of)(values, back);
+            Ok(())
+        }
+    }
+
+    fn seek(
+        of: impl Fn(&[f64], &mut [f64]),
+        from: &[f64],
+        smooth: &[bool],
+    ) -> (Vec<f64>, Result<(), Unsolved>, usize) {
+        let mut round = Function { of, sent: 0 };
+        let mut values = from.to_vec();
+        let solved = solve(&mut round, &mut values, smooth).unwrap();
+        (values, solved, round.sent)
+    }
+
+    #[test]
+    fn gains_that_substitution_cannot_bear_are_solved() {
+        for gain in [-1e6, -5.0, -1.0, 0.05, 0.99, 3.0, 1e6] {
+            let (values, solved, sent) = seek(|x, y| y[0] = gain * x[0] + 1.0, &[0.0], &[true]);
+            assert_eq!(solved, Ok(()), "{gain}");
+            let exact = 1.0 / (1.0 - gain);
+            assert!((values[0] / exact - 1.0).abs() < 1e-9, "{gain}: {values:?}");
+            assert!(sent < 12, "{gain}: {sent}");
+        }
+    }
+
+    #[test]
+    fn values_of_very_different_sizes_are_solved_together() {
+        // A pressure in Pa and a displacement in m.
+        let round = |x: &[f64], y: &mut [f64]| {
+            y[0] = 1e7 - 3e10 * x[1];
+            y[1] = 2e-10 * x[0];
+        };
+        let (values, solved, _) = seek(round, &[0.0, 0.0], &[true, true]);
+        assert_eq!(solved, Ok(()));
+        let exact = 1e7 / 7.0;
+        assert!((values[0] / exact - 1.0).abs() < 1e-10, "{values:?}");
+    }
+
+    #[test]
+    fn a_curved_loop_is_solved_from_afar() {
+        // x = 3 - x^3 / 2, by hand 1.3744378...: substitution runs away.
+        let (values, solved, _) = seek(|x, y| y[0] = 3.0 - 0.5 * x[0].powi(3), &[20.0], &[true]);
+        assert_eq!(solved, Ok(()));
+        let x = values[0];
+        assert!((x + 0.5 * x.powi(3) - 3.0).abs() < 1e-10, "{x}");
+    }
+
+    #[test]
+    fn a_switch_in_the_loop_is_substituted() {
+        let round = |x: &[f64], y: &mut [f64]| {
+            y[0] = f64::from(x[1] > 0.5);
+            y[1] = -4.0 * x[1] + 5.0 * x[0] + 5.0;
+        };
+        let (values, solved, _) = seek(round, &[0.0, 0.0], &[false, true]);
+        assert_eq!(solved, Ok(()));
+        assert!(
+            values[0] == 1.0 && (values[1] - 2.0).abs() < 1e-10,
+            "{values:?}"
+        );
+    }
+
+    #[test]
+    fn a_loop_that_gives_back_what_it_is_given_and_more_has_no_solution() {
+        let (_, solved, _) = seek(|x, y| y[0] = x[0] + 1.0, &[0.0], &[true]);
+        let unsolved = solved.unwrap_err();
+        assert!(unsolved.is_singular(), "{unsolved:?}");
+    }
+
+    #[test]
+    fn the_closest_that_was_found_is_told() {
+        // x = x^2 + 1 has none; the two come closest at 1/2.
+        let (_, solved, _) = seek(|x, y| y[0] = x[0] * x[0] + 1.0, &[3.0], &[true]);
+        let unsolved = solved.unwrap_err();
+        assert!((unsolved.value - 0.5).abs() < 0.1, "{unsolved:?}");
+        assert!((unsolved.back - unsolved.value - 0.75).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_loop_with_a_tolerance_of_its_own_is_solved_within_it() {
+        // What comes back is rounded to 1e-10.
+        let round = |x: &[f64], y: &mut [f64]| y[0] = ((1.0 - 2.0 * x[0]) * 1e10).round() / 1e10;
+        let (values, solved, _) = seek(round, &[0.0], &[true]);
+        assert_eq!(solved, Ok(()));
+        assert!((values[0] - 1.0 / 3.0).abs() < 1e-9, "{values:?}");
+    }
+
+    #[test]
+    fn derivatives_that_are_wrong_are_not_believed_twice() {
+        struct Wrong;
+        impl Round for Wrong {
+            fn send(&mut self, values: &[f64], back: &mut [f64]) -> Result<(), MasterError> {
+                back[0] = 1.0 - 5.0 * values[0];
+                Ok(())
+            }
+            fn derivative(
+                &mut self,
+                _: usize,
+                _: &[f64],
+                change: &mut [f64],
+            ) -> Result<bool, MasterError> {
+                change[0] = 50.0;
+                Ok(true)
+            }
+        }
+        let mut values = [0.0];
+        assert_eq!(solve(&mut Wrong, &mut values, &[true]).unwrap(), Ok(()));
+        assert!((values[0] - 1.0 / 6.0).abs() < 1e-12);
+    }
+}
