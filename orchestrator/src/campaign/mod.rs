@@ -1,0 +1,3 @@
+//! Studies of many runs: factors, a design, runs on all cores, a table, and what it says.
+
+pub mod table;
