@@ -234,29 +234,40 @@ fn a_run_that_fails_is_a_row_with_its_reason() {
     // The second motion does not fit into the stroke, which is known before the first run.
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("seed = 3"), "{}", stderr(&output));
-    // A step that breaks the plant is not.
+    // That one of all combinations does not is found when it is run.
     let study = r#"
         [study]
         design = "full"
         [fixed]
-        controller = "displacement-pid"
         plant = "identified"
         duration = "2 s"
         [factors]
-        "control.proportional_gain" = ["1 V/in", "1e9 V/in"]
+        seed = [1, 3]
+        pga = ["0.15 g", "0.22 g"]
     "#;
     write(folder.path(), "study.toml", study);
     let said = carried(folder.path(), "study.toml", "out", &[]);
     assert_eq!(
         (&said["runs"], &said["failed"]),
-        (&2.into(), &1.into()),
+        (&4.into(), &1.into()),
         "{said}"
     );
     let (head, rows) = cells(folder.path(), "out");
-    let reason = head.iter().position(|name| name == "reason").unwrap();
-    assert_eq!(rows[0][reason], "");
-    assert!(!rows[1][reason].is_empty());
-    assert_eq!(rows[1][reason - 2], "failed");
+    let place = |name: &str| head.iter().position(|own| own == name).unwrap();
+    let failed: Vec<_> = rows
+        .iter()
+        .filter(|row| row[place("ended")] == "failed")
+        .collect();
+    assert_eq!(failed.len(), 1);
+    assert_eq!(
+        (
+            failed[0][place("pga [g]")].as_str(),
+            failed[0][place("seed")].as_str()
+        ),
+        ("0.22", "3")
+    );
+    assert!(failed[0][place("reason")].contains("exceeds the stroke"));
+    assert_eq!(failed[0][place("time_domain_percent")], "");
 }
 
 #[test]
