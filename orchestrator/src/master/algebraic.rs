@@ -1,7 +1,7 @@
 //! A loop of direct feedthrough: outputs that depend on each other at the same instant.
 
 use super::action::{Action, Moment};
-use super::newton::{self, Round, Unsolved};
+use super::newton::{self, Round, Solver, Unsolved};
 use super::signals::Signals;
 use super::{MasterError, Part};
 
@@ -12,8 +12,7 @@ pub(super) struct AlgebraicLoop {
     called: Vec<usize>,
     /// The signals at the cut.
     cut: Vec<usize>,
-    /// Which of them may take any value.
-    smooth: Vec<bool>,
+    solver: Solver,
     /// The variables round the loop, for people.
     round: Vec<String>,
     values: Vec<f64>,
@@ -54,13 +53,14 @@ impl AlgebraicLoop {
         cut.sort_unstable();
         cut.dedup();
         let real = |signal: &usize| given.iter().any(|(_, real)| real.contains(signal));
+        let smooth: Vec<bool> = cut.iter().map(real).collect();
         let called = actions.iter().filter_map(|action| match action {
             Action::Call { part } => Some(*part),
             _ => None,
         });
         Self {
             called: called.collect(),
-            smooth: cut.iter().map(real).collect(),
+            solver: Solver::new(&smooth),
             values: vec![0.0; cut.len()],
             cut,
             actions,
@@ -102,7 +102,7 @@ impl AlgebraicLoop {
             names,
             is_first: true,
         };
-        match newton::solve(&mut pass, &mut self.values, &self.smooth)? {
+        match newton::solve(&mut self.solver, &mut pass, &mut self.values)? {
             Ok(()) => Ok(()),
             Err(unsolved) => Err(self.explain(at.time, &unsolved, names)),
         }

@@ -4,7 +4,7 @@
 //! Gauss-Seidel order, which is of second order, too.
 
 use super::action::{Action, Moment};
-use super::newton::{self, Round};
+use super::newton::{self, Round, Solver};
 use super::signals::Signals;
 use super::{MasterError, Part, Simulation};
 
@@ -46,7 +46,7 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     next.copy_from(signals);
     let Coupling {
         sources,
-        smooth,
+        solver,
         values,
         repeats,
     } = coupling;
@@ -65,7 +65,7 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
         names,
         is_first: true,
     };
-    newton::solve(&mut pass, values, smooth)?.map_err(|unsolved| {
+    newton::solve(solver, &mut pass, values)?.map_err(|unsolved| {
         let signal = sources.get(unsolved.place).copied().unwrap_or_default();
         MasterError::NotConverged {
             time,
@@ -80,7 +80,7 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
 #[derive(Default)]
 pub(super) struct Coupling {
     sources: Vec<usize>,
-    smooth: Vec<bool>,
+    solver: Solver,
     values: Vec<f64>,
     /// Which components repeat their steps: continuous ones with such inputs that save their states.
     repeats: Vec<bool>,
@@ -119,7 +119,7 @@ impl Coupling {
         });
         Self {
             repeats: repeats.collect(),
-            smooth: vec![true; sources.len()],
+            solver: Solver::new(&vec![true; sources.len()]),
             values: vec![0.0; sources.len()],
             sources,
         }

@@ -92,35 +92,67 @@ impl Unsolved {
     }
 }
 
+/// Room for seeking the values of a loop, made once, so that substitution allocates nothing.
+#[derive(Debug, Default)]
+pub(super) struct Solver {
+    /// Places of the values that may take any value.
+    free: Vec<usize>,
+    /// Places of the others.
+    switched: Vec<usize>,
+    back: Vec<f64>,
+    begun: Vec<f64>,
+    sizes: Vec<f64>,
+}
+
 /// The values of a loop while they are sought.
 struct Search<'a, R> {
     round: &'a mut R,
     /// Places of the smooth ones.
-    free: Vec<usize>,
-    back: Vec<f64>,
+    free: &'a [usize],
+    back: &'a mut Vec<f64>,
     passes: usize,
 }
 
+impl Solver {
+    /// For values of which these are smooth: they may take any value, for they are not whole numbers.
+    pub(super) fn new(smooth: &[bool]) -> Self {
+        let places = |wanted: bool| (0..smooth.len()).filter(move |&at| smooth[at] == wanted);
+        let room = vec![0.0; smooth.len()];
+        Self {
+            free: places(true).collect(),
+            switched: places(false).collect(),
+            back: room.clone(),
+            begun: room.clone(),
+            sizes: room,
+        }
+    }
+}
+
 /// Seeks values that come back as they were sent, beginning with those given; on success they are the
-/// last that were sent. `smooth` says which of them may take any value (numbers that are not whole).
+/// last that were sent.
 ///
 /// # Errors
 /// A call that an FMU did not complete. The result within says why there are none.
 pub(super) fn solve(
+    solver: &mut Solver,
     round: &mut impl Round,
     values: &mut [f64],
-    smooth: &[bool],
 ) -> Result<Result<(), Unsolved>, MasterError> {
-    let places = |smooth_ones: bool| (0..smooth.len()).filter(move |&at| smooth[at] == smooth_ones);
+    let Solver {
+        free,
+        switched,
+        back,
+        begun,
+        sizes,
+    } = solver;
     let mut search = Search {
         round,
-        free: places(true).collect(),
-        back: vec![0.0; values.len()],
+        free,
+        back,
         passes: 0,
     };
-    let switched: Vec<usize> = places(false).collect();
     search.send(values)?;
-    if search.substitute(values)? {
+    if search.substitute(values, begun, sizes)? {
         return Ok(Ok(()));
     }
     if search.free.is_empty() {
@@ -139,7 +171,7 @@ pub(super) fn solve(
         if switched.iter().all(|&at| values[at] == search.back[at]) {
             return Ok(Ok(()));
         }
-        for &at in &switched {
+        for &at in switched.iter() {
             values[at] = search.back[at];
         }
         search.send(values)?;
@@ -150,7 +182,7 @@ pub(super) fn solve(
 impl<R: Round> Search<'_, R> {
     fn send(&mut self, values: &[f64]) -> Result<(), MasterError> {
         self.passes += 1;
-        self.round.send(values, &mut self.back)
+        self.round.send(values, self.back)
     }
 
     /// Size of the value at a place.
@@ -181,29 +213,36 @@ impl<R: Round> Search<'_, R> {
 
     /// Sends what came back as long as that settles quickly, or as nothing else can be done; gives
     /// whether it has settled. Where it runs away the values are those at which it began.
-    fn substitute(&mut self, values: &mut [f64]) -> Result<bool, MasterError> {
-        let sizes: Vec<f64> = (0..values.len()).map(|at| self.size(values, at)).collect();
-        let begun = values.to_vec();
-        let first = self.distance(values, &sizes);
+    fn substitute(
+        &mut self,
+        values: &mut [f64],
+        begun: &mut [f64],
+        sizes: &mut [f64],
+    ) -> Result<bool, MasterError> {
+        begun.copy_from_slice(values);
+        for (at, size) in sizes.iter_mut().enumerate() {
+            *size = self.size(values, at);
+        }
+        let first = self.distance(values, sizes);
         let mut before = f64::INFINITY;
         loop {
             if self.has_settled(0..values.len(), values, EXACTLY) {
                 return Ok(true);
             }
-            let distance = self.distance(values, &sizes);
+            let distance = self.distance(values, sizes);
             let goes_on = match self.free.is_empty() {
                 true => self.passes < MOST_PASSES,
                 false => distance <= QUICKLY * before,
             };
             if !goes_on {
                 if distance > first && !self.free.is_empty() {
-                    values.copy_from_slice(&begun);
+                    values.copy_from_slice(begun);
                     self.send(values)?;
                 }
                 return Ok(false);
             }
             before = distance;
-            values.copy_from_slice(&self.back);
+            values.copy_from_slice(self.back);
             self.send(values)?;
         }
     }
@@ -306,7 +345,7 @@ impl<R: Round> Search<'_, R> {
             size if size > 0.0 => size,
             _ => 1.0,
         };
-        let free = &self.free;
+        let free = self.free;
         let n = free.len();
         let left = DMatrix::from_fn(n, n, |i, j| {
             let unit = if i == j { 1.0 } else { 0.0 };
@@ -420,7 +459,8 @@ mod tests {
     ) -> (Vec<f64>, Result<(), Unsolved>, usize) {
         let mut round = Function { of, sent: 0 };
         let mut values = from.to_vec();
-        let solved = solve(&mut round, &mut values, smooth).unwrap();
+        let mut solver = Solver::new(smooth);
+        let solved = solve(&mut solver, &mut round, &mut values).unwrap();
         (values, solved, round.sent)
     }
 
@@ -515,7 +555,8 @@ mod tests {
             }
         }
         let mut values = [0.0];
-        assert_eq!(solve(&mut Wrong, &mut values, &[true]).unwrap(), Ok(()));
+        let mut solver = Solver::new(&[true]);
+        assert_eq!(solve(&mut solver, &mut Wrong, &mut values).unwrap(), Ok(()));
         assert!((values[0] - 1.0 / 6.0).abs() < 1e-12);
     }
 }
