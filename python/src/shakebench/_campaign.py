@@ -54,6 +54,7 @@ def campaign(
             from ._dask import collect
 
             measured = collect(client, study, results, batch, options(more))
+            more.pop("force", None)
         named = options({"jobs": jobs, "shard": shard, **more})
         values = call(["campaign", text(study), *named, "--out", str(results), "--json"])
         if measured is not None:

@@ -43,6 +43,11 @@ def collect(
     if batch is not None and batch < 1:
         raise InputError(f"batch={batch}: expected 1 or more")
     plan = call(["campaign", text(study), "--plan", "--out", str(out), "--json", *more])
+    if "--force" in more:
+        # What `--force` does in the program; there it would take away what the workers bring.
+        for old in (out / "journal").glob("*.jsonl"):
+            old.unlink()
+        more = [option for option in more if option != "--force"]
     archive, place = _packed(Path(study), plan["files"])
     with _connected(client) as connected, Journal(out, "dask") as journal:
         _check(connected)
@@ -137,10 +142,8 @@ class _Study:
         self._place = place
         self._more = more
         self._name = hashlib.sha256(archive).hexdigest()[:16]
-        self._head: Optional[bytes] = None
-        self._head_of = ""
-        ranges = plan.get("missing", [[0, plan["runs"]]])
-        self._rows = Rows([(begin, end) for begin, end in ranges])
+        self._head: Dict[str, Any] = plan["head"]
+        self._rows = Rows([(begin, end) for begin, end in plan["missing"]])
         self._batches = Batches(batch, self._rows.left)
         self._task = make()
         self._unique = os.urandom(4).hex()
@@ -156,7 +159,7 @@ class _Study:
         begun = time.monotonic()
         given: Dict[Any, Tuple[int, int]] = {}
         workers = set()
-        completed = as_completed()
+        completed = as_completed(loop=self._client.loop)
         try:
             self._give(given, completed)
             while given:
@@ -224,7 +227,10 @@ class _Study:
                 f"short of memory? Try `shakebench campaign STUDY --rows {begin}-{end}` there"
             ) from error
         except CancelledError as error:
-            raise Error(f"rows {begin} to {end - 1} were cancelled: has the scheduler gone?") from error
+            raise Error(
+                f"rows {begin} to {end - 1} were cancelled: has the scheduler ended? What came is kept, and "
+                "the same call goes on"
+            ) from error
         except Exception as error:
             raise Error(f"rows {begin} to {end - 1}, tried {RETRIES + 1} times: {error}") from error
         problem = done.get("problem")
@@ -234,26 +240,32 @@ class _Study:
             raise InputError(f"worker {done['worker']}: {done['text']}")
         if problem is not None:
             raise Error(f"worker {done['worker']}: {done['text']}")
-        if self._head is None:
-            self._head, self._head_of = done["head"], done["worker"]
-        elif done["head"] != self._head:
+        head = json.loads(done["head"])
+        if head != self._head:
             raise Error(
-                f"workers {self._head_of} and {done['worker']} do not run the same: "
-                + _difference(self._head, done["head"])
+                f"worker {done['worker']} does not run what is installed here: "
+                f"{_difference(head, self._head)}; install the same on both"
             )
         return done
 
 
-def _difference(one: bytes, other: bytes) -> str:
-    """What two heads disagree on."""
-    first, second = json.loads(one), json.loads(other)
-    names = [name for name in {**first, **second} if first.get(name) != second.get(name)]
+def _difference(there: Dict[str, Any], here: Dict[str, Any]) -> str:
+    """What two heads of journals disagree on."""
     parts = []
-    for name in names:
-        a, b = first.get(name), second.get(name)
-        if isinstance(a, dict) and isinstance(b, dict):
-            keys = [key for key in {**a, **b} if a.get(key) != b.get(key)]
-            a = {key: a.get(key) for key in keys}
-            b = {key: b.get(key) for key in keys}
-        parts.append(f"{name} is {json.dumps(a)} and {json.dumps(b)}")
+    for name in {**there, **here}:
+        one, other = there.get(name), here.get(name)
+        if one == other:
+            continue
+        if name == "components" and isinstance(one, dict) and isinstance(other, dict):
+            fmus = [fmu for fmu in {**one, **other} if one.get(fmu) != other.get(fmu)]
+            short = [
+                f"{fmu} {str(one.get(fmu))[:12]} there, {str(other.get(fmu))[:12]} here"
+                for fmu in fmus[:3]
+            ]
+            more = f" and {len(fmus) - 3} more" if len(fmus) > 3 else ""
+            parts.append("FMU " + ", ".join(short) + more)
+        elif isinstance(one, str) and isinstance(other, str):
+            parts.append(f"{name} is {one} there, {other} here")
+        else:
+            parts.append(f"{name} differ")
     return "; ".join(parts)
