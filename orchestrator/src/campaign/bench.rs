@@ -181,15 +181,12 @@ impl<'a> Bench<'a> {
             }
         }
         let columns = self.columns()?;
-        let known = |name: &str| {
-            let mut columns = columns.iter();
-            match columns.find(|column| column.name == name) {
-                Some(column) if column.kind == Kind::Number => Ok(()),
-                Some(_) => Err(format!("`{name}` is no number")),
-                None => {
-                    let known = columns.map(|column| column.name.as_str());
-                    Err(format!("`{name}` is no column{}", hint(name, known)))
-                }
+        let known = |name: &str| match columns.iter().find(|column| column.name == name) {
+            Some(column) if column.kind == Kind::Number => Ok(()),
+            Some(_) => Err(format!("`{name}` is no number")),
+            None => {
+                let known = columns.iter().map(|column| column.name.as_str());
+                Err(format!("`{name}` is no column{}", hint(name, known)))
             }
         };
         known(&self.study.intensity)

@@ -131,3 +131,69 @@ fn present<'a, T>(
     let there = there.collect();
     (values, there)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::Field;
+
+    #[test]
+    fn parquet_holds_what_the_table_does() {
+        let column = |name: &str, role, kind| Column {
+            name: name.to_string(),
+            unit: (kind == Kind::Number && role == Role::Factor).then(|| "N/m".to_string()),
+            role,
+            kind,
+        };
+        let columns = vec![
+            column("number", Role::Run, Kind::Number),
+            column("controller", Role::Factor, Kind::Text),
+            column("specimen.stiffness", Role::Factor, Kind::Number),
+            column("reason", Role::Ending, Kind::Text),
+        ];
+        let rows = (0..1000).map(|n| {
+            let missing = n % 7 == 0;
+            vec![
+                Cell::Number(f64::from(n)),
+                Cell::from(if n % 2 == 0 { "mpc" } else { "größer" }),
+                Cell::Number(0.1 * f64::from(n)),
+                if missing {
+                    Cell::Missing
+                } else {
+                    Cell::from(format!("{n}"))
+                },
+            ]
+        });
+        let table = Table {
+            columns,
+            rows: rows.collect(),
+        };
+        let mut file = tempfile::tempfile().unwrap();
+        parquet(&table, &mut file).unwrap();
+        let reader = SerializedFileReader::new(file).unwrap();
+        let keys = reader
+            .metadata()
+            .file_metadata()
+            .key_value_metadata()
+            .unwrap();
+        assert_eq!(
+            keys[0].value.as_deref(),
+            Some("{\"specimen.stiffness\":\"N/m\"}")
+        );
+        let mut count = 0;
+        for (row, expected) in reader.get_row_iter(None).unwrap().zip(&table.rows) {
+            let row = row.unwrap();
+            let found = row.get_column_iter().map(|(_, field)| match field {
+                Field::Long(number) => Cell::Number(*number as f64),
+                Field::Double(number) => Cell::Number(*number),
+                Field::Str(text) => Cell::Text(text.clone()),
+                Field::Null => Cell::Missing,
+                other => panic!("{other}"),
+            });
+            assert_eq!(&found.collect::<Vec<_>>(), expected);
+            count += 1;
+        }
+        assert_eq!(count, 1000);
+    }
+}
