@@ -155,27 +155,45 @@ class Tasks(unittest.TestCase):
         rows = [begun + start + run * (k + 1) for k in range(runs)]
         return {"begun": begun, "rows": rows, "ended": rows[-1]}
 
+    def play(self, runs, threads, start, run, gap):
+        """A study on threads that take exactly these times; its figures and the time of the last end."""
+        batches, left = Batches(None, runs), runs
+        free = {str(thread): 0.0 for thread in range(threads)}
+        under_way = []
+        while left or under_way:
+            while left and len(under_way) < threads:
+                size = batches.size(left, threads)
+                left -= size
+                thread = min(free.keys() - {name for name, _ in under_way}, key=free.get)
+                under_way.append((thread, self.times(free[thread] + gap, size, start, run)))
+            under_way.sort(key=lambda task: task[1]["ended"])
+            thread, times = under_way.pop(0)
+            free[thread] = times["ended"]
+            batches.note(thread, times)
+        return batches.figures(), max(free.values()), min(free.values())
+
     def test_start_and_scheduler_take_less_than_their_share(self):
-        batches = Batches(None, 100_000)
-        self.assertEqual(batches.size(100_000, 4), 2)
-        batches.note("a", self.times(0.0, 2))
-        batches.note("a", self.times(0.44, 2))
-        self.assertAlmostEqual(batches.run_s, 0.1)
-        self.assertAlmostEqual(batches.start_s, 0.2)
-        self.assertAlmostEqual(batches.gap_s, 0.04)
-        runs = batches.size(100, 4)
-        share = 0.24 / (0.24 + 0.1 * runs)
-        self.assertLessEqual(share, OVERHEAD)
-        # Many runs: longer tasks at first, but each thread has several of them.
-        self.assertGreater(batches.size(100_000, 4), runs)
-        self.assertLessEqual(batches.size(1000, 4), 1000 // 16)
-        self.assertAlmostEqual(batches.figures()["overhead"], 0.44 / 0.84)
+        for runs, threads, start, run in (
+            (512, 2, 0.9, 0.19),
+            (100_000, 4, 0.2, 0.1),
+            (5000, 3, 0.05, 0.5),
+            (100_000, 100, 0.3, 0.07),
+        ):
+            with self.subTest(runs=runs, threads=threads):
+                figures, last, first = self.play(runs, threads, start, run, 0.01)
+                self.assertEqual(figures["runs"], runs)
+                self.assertAlmostEqual(figures["run_s"], run)
+                self.assertAlmostEqual(figures["start_s"], start)
+                self.assertAlmostEqual(figures["gap_s"], 0.01)
+                self.assertLess(figures["overhead"], OVERHEAD)
+                # All threads end together, but for a part of a task.
+                self.assertGreaterEqual(figures["tasks"], 2 * threads)
+                self.assertLess(last - first, 0.2 * last)
 
     def test_few_runs_are_shared_by_all(self):
-        batches = Batches(None, 8)
-        self.assertEqual(batches.size(8, 4), 2)
-        batches.note("a", self.times(0.0, 2))
-        self.assertLessEqual(batches.size(6, 4), 2)
+        figures, last, _ = self.play(8, 4, 0.2, 0.1, 0.01)
+        self.assertEqual((figures["tasks"], figures["runs"]), (4, 8))
+        self.assertAlmostEqual(last, 0.41)
         self.assertEqual(Batches(5, 8).size(3, 4), 3)
 
     def test_rows_are_given_out_once(self):

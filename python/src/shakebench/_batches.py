@@ -22,14 +22,14 @@ class Batches:
     """Measures tasks as they come back and sizes the next ones.
 
     Tasks get smaller as the end comes near (guided self-scheduling, Polychronopoulos and Kuck 1987), but
-    not so small that start and gap take more than :data:`OVERHEAD`.
+    not so small that start and gap take more than :data:`OVERHEAD` of the whole study.
     """
 
     def __init__(self, fixed: Optional[int], runs: int) -> None:
         self._fixed = fixed
         self._runs = runs
-        self._tasks = 0
-        self._of_run: List[float] = []
+        self._given = 0
+        self._part: Optional[int] = None
         self._starts: List[float] = []
         self._gaps: List[float] = []
         self._running = 0.0
@@ -39,21 +39,20 @@ class Batches:
     @property
     def measured(self) -> bool:
         """Whether a task has come back."""
-        return self._tasks > 0
+        return self._done > 0
 
     def note(self, thread: str, times: Dict[str, Any]) -> None:
         """Takes in the times of a task: when it was begun, had each row, and ended."""
         rows: Sequence[float] = times["rows"]
-        between = (rows[-1] - rows[0]) / (len(rows) - 1) if len(rows) > 1 else None
-        known = between if between is not None else self.run_s
-        # A lone first run cannot be told from the start of its process.
         whole = times["ended"] - times["begun"]
-        run = whole if known is None else known
-        self._of_run.append(run)
+        if len(rows) > 1:
+            run = (rows[-1] - rows[0]) / (len(rows) - 1)
+        else:
+            # A lone run cannot be told from the start of its process.
+            run = whole if self.run_s is None else min(self.run_s, whole)
         self._starts.append(max(whole - run * len(rows), 0.0))
         self._running += run * len(rows)
         self._done += len(rows)
-        self._tasks += 1
         if thread in self._last:
             self._gaps.append(max(times["begun"] - self._last[thread], 0.0))
         self._last[thread] = times["ended"]
@@ -73,32 +72,46 @@ class Batches:
         """Seconds between two tasks of a thread: the scheduler and the way to it."""
         return median(self._gaps) if self._gaps else GAP
 
+    @property
+    def lost_s(self) -> float:
+        """Seconds of all threads that no run had."""
+        return sum(self._starts) + sum(self._gaps)
+
     def size(self, left: int, threads: int) -> int:
-        """Runs of the next task when ``left`` are not given out yet."""
+        """Runs of the next task when ``left`` are not given out yet; the task counts as given."""
+        wanted = self._wanted(left, threads)
+        self._given += 1
+        return max(1, min(wanted, left))
+
+    def _wanted(self, left: int, threads: int) -> int:
         if self._fixed is not None:
-            return min(self._fixed, left)
+            return self._fixed
         if not self.measured:
-            return max(1, min(PROBE, left // threads))
+            return min(PROBE, self._runs // threads)
         run = max(self.run_s or 0.0, 1e-6)
         cost = self.start_s + self.gap_s
-        cheap = math.ceil(cost * (1.0 - OVERHEAD) / (OVERHEAD * run))
-        # Where there are not runs enough for cheap tasks, every thread gets its part all the same.
-        least = max(1, min(cheap, self._runs // threads))
+        under_way = self._given - len(self._starts)
+        allowed = OVERHEAD / (1.0 - OVERHEAD) * run * self._runs - self.lost_s - cost * under_way
+        tasks = allowed / cost
+        if self._part is None and tasks < 2 * threads:
+            # Not enough for two more tasks a thread: all that is left is shared out evenly, once.
+            self._part = math.ceil(left / threads)
+        if self._part is not None:
+            return self._part
         balanced = min(left // (TASKS_LEFT * threads), int(LONGEST / run))
-        return min(max(least, balanced), left)
+        return max(math.ceil(left / tasks), math.ceil(cost / run), balanced)
 
     def figures(self) -> Dict[str, Any]:
         """What ``result["dask"]`` says of them."""
-        lost = sum(self._starts) + sum(self._gaps)
-        every = lost + self._running
+        tasks, every = len(self._starts), self.lost_s + self._running
         return {
-            "tasks": self._tasks,
+            "tasks": tasks,
             "runs": self._done,
-            "runs_per_task": self._done / self._tasks if self._tasks else None,
+            "runs_per_task": self._done / tasks if tasks else None,
             "run_s": self.run_s,
             "start_s": median(self._starts) if self._starts else None,
             "gap_s": median(self._gaps) if self._gaps else None,
-            "overhead": lost / every if every else None,
+            "overhead": self.lost_s / every if every else None,
         }
 
 
