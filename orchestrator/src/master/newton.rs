@@ -230,9 +230,13 @@ impl<R: Round> Search<'_, R> {
                 return Ok(true);
             }
             let distance = self.distance(values, sizes);
+            // Near the end a value that passes through zero stands out, though all are good.
+            if distance >= before && self.has_settled(0..values.len(), values, ATTAINABLE) {
+                return Ok(true);
+            }
             let goes_on = match self.free.is_empty() {
                 true => self.passes < MOST_PASSES,
-                false => distance <= QUICKLY * before,
+                false => distance <= QUICKLY * before || distance < before.min(ATTAINABLE.0),
             };
             if !goes_on {
                 if distance > first && !self.free.is_empty() {
