@@ -195,7 +195,7 @@ pub fn fault(parser: &Parser, path: &Path) -> Option<String> {
     if took > LIMIT {
         return Some(format!("takes {took:?}"));
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
     match outcome {
         Err(_) => Some("panics".to_string()),
         Ok(Err(message)) if !message.contains(&*name) && parser.name != "nominal" => {
@@ -273,9 +273,9 @@ const SPECIMEN: &str =
 
 fn accelerogram() -> String {
     let mut text = String::from(
-        "RECORD\nEVENT, STATION, 90\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS=   60, DT=   .0100 SEC\n",
+        "RECORD\nEVENT, STATION, 90\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS=  500, DT=   .0100 SEC\n",
     );
-    for k in 0..60 {
+    for k in 0..500 {
         let value = (0.1 * f64::from(k)).sin();
         text += &format!("{value:15.7E}{}", if k % 5 == 4 { "\n" } else { "" });
     }
@@ -290,7 +290,7 @@ fn tables() -> Vec<Vec<u8>> {
         "# made by hand\ntime [s],reference_displacement [in],command_voltage [V],displacement [in],\
          acceleration [g],force [lbf]\n",
     );
-    for k in 0..40 {
+    for k in 0..400 {
         let (t, value) = (0.01 * f64::from(k), (0.3 * f64::from(k)).sin());
         plain += &format!("{t},{value}\n");
         comma += &format!("{:.1};{value:.4};{value:.4}\n", 1e3 * t).replace('.', ",");

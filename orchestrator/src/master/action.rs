@@ -3,7 +3,7 @@
 use super::algebraic::AlgebraicLoop;
 use super::signals::Signals;
 use super::transfer::{Inputs, Outputs};
-use super::{MasterError, Part};
+use super::{MasterError, Part, comes};
 
 /// The largest number of passes of a fixed-point iteration.
 const MOST_PASSES: usize = 100;
@@ -58,7 +58,7 @@ impl Action {
             }
             Self::Call { part } => {
                 let part = &mut parts[*part];
-                let Some(every) = part.every.filter(|every| at.tick.is_multiple_of(*every)) else {
+                let Some(every) = part.every.filter(|every| comes(at.tick, *every)) else {
                     return Ok(());
                 };
                 if part.failure.is_some() {

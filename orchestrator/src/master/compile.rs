@@ -402,12 +402,7 @@ impl<'a> Plan<'a> {
         inputs
     }
 
-    fn action(
-        &self,
-        reference: &mut Reference,
-        operation: &Operation,
-        parts: &[Part],
-    ) -> Action {
+    fn action(&self, reference: &mut Reference, operation: &Operation, parts: &[Part]) -> Action {
         match operation {
             Operation::Call { component } => Action::Call { part: *component },
             Operation::Read { component, outputs } => {

@@ -171,6 +171,13 @@ struct Part {
 /// One in so many steps of a component is timed: looking at the clock costs as much as a short step.
 const TIMED: u32 = 64;
 
+/// Whether what comes every so many ticks comes at this one. Most comes at every tick, and a division
+/// takes longer than many a call of an FMU.
+#[inline]
+fn comes(tick: usize, every: usize) -> bool {
+    every == 1 || tick.is_multiple_of(every)
+}
+
 impl Part {
     /// Steps it; a failure that may be is kept instead of given.
     fn step(&mut self, time: f64, length: f64) -> Result<(), MasterError> {
@@ -222,7 +229,7 @@ impl Part {
     }
 
     fn is_due(&self, tick: usize) -> bool {
-        self.every.is_none_or(|every| tick.is_multiple_of(every))
+        self.every.is_none_or(|every| comes(tick, every))
     }
 }
 
@@ -236,6 +243,15 @@ impl Simulation {
     pub fn time(&self) -> f64 {
         let since = self.tick as f64 * self.step;
         self.begin + since
+    }
+
+    /// The sample of the motion at or before the present tick.
+    #[inline]
+    fn sample(&self) -> usize {
+        match self.ticks_per_row {
+            1 => self.tick,
+            ticks => self.tick / ticks,
+        }
     }
 
     /// Coupling step, s.
@@ -258,7 +274,7 @@ impl Simulation {
     /// # Errors
     /// A call that an FMU did not complete, or a loop that does not converge.
     pub fn observe(&mut self) -> Result<(), MasterError> {
-        let (sample, time) = (self.tick / self.ticks_per_row, self.time());
+        let (sample, time) = (self.sample(), self.time());
         self.reference
             .sample(sample, time, &mut self.signals.numbers);
         match self.algorithm {

@@ -11,8 +11,9 @@ use super::MasterError;
 const EXACTLY: (f64, f64) = (1e-12, f64::MIN_POSITIVE);
 /// The same where nothing comes closer: some FMUs compute with a tolerance of their own.
 const ATTAINABLE: (f64, f64) = (1e-9, 1e-12);
-/// Substitution goes on as long as each pass brings the values so much closer, and a derivative serves
-/// as long as its steps do.
+/// Substitution goes on as long as each pass brings the values so much closer.
+const SETTLING: f64 = 0.3;
+/// A derivative serves as long as its steps bring the values so much closer.
 const QUICKLY: f64 = 0.1;
 /// Newton steps at most.
 const MOST_STEPS: usize = 50;
@@ -236,7 +237,7 @@ impl<R: Round> Search<'_, R> {
             }
             let goes_on = match self.free.is_empty() {
                 true => self.passes < MOST_PASSES,
-                false => distance <= QUICKLY * before || distance < before.min(ATTAINABLE.0),
+                false => distance <= SETTLING * before || distance < before.min(ATTAINABLE.0),
             };
             if !goes_on {
                 if distance > first && !self.free.is_empty() {

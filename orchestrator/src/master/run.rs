@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::action::Moment;
 use super::clock::{Clock, RealTime};
-use super::{EndSignals, MasterError, Record, Simulation};
+use super::{EndSignals, MasterError, Record, Simulation, comes};
 use crate::fmu::{Kind, Message};
 
 /// A run with a value of this size diverges.
@@ -256,9 +256,9 @@ impl Simulation {
                 self.keep_checkpoint(record, stopwatch.read())?;
             }
             self.observe()?;
-            if self.tick.is_multiple_of(self.ticks_per_row) {
-                let sample = self.tick / self.ticks_per_row;
-                if sample.is_multiple_of(self.keep_every) {
+            if comes(self.tick, self.ticks_per_row) {
+                let sample = self.sample();
+                if comes(sample, self.keep_every) {
                     self.keep(self.time(), record);
                 }
                 self.check_bounds()?;
@@ -414,7 +414,7 @@ impl Simulation {
                 step: self.step,
                 calls: false,
             };
-            let sample = self.tick / self.ticks_per_row;
+            let sample = self.sample();
             self.reference
                 .sample(sample, time, &mut self.signals.numbers);
             for action in &mut self.actions {

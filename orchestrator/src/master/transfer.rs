@@ -20,6 +20,8 @@ struct InputGroup {
     references: Vec<u32>,
     /// Driven values that are taken as they are and do not change between samples.
     copies: Vec<Copied>,
+    /// Driven values that are taken as they are and change between samples.
+    smooth: Vec<Smooth>,
     /// The other driven values.
     sources: Vec<InputSource>,
     values: Vec<f64>,
@@ -43,6 +45,13 @@ struct InputSource {
     passage: Passage,
     /// It changes between samples.
     is_smooth: bool,
+}
+
+/// A number that another continuous component gives, taken as it is.
+struct Smooth {
+    /// Place among the values.
+    place: usize,
+    signal: usize,
 }
 
 struct ExactGroup {
@@ -97,6 +106,7 @@ impl Inputs {
                 kind: variable.kind.clone(),
                 references: Vec::new(),
                 copies: Vec::new(),
+                smooth: Vec::new(),
                 sources: Vec::new(),
                 values: Vec::new(),
                 is_discrete: false,
@@ -142,6 +152,9 @@ impl Inputs {
     pub(super) fn transfer(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
         for group in &mut self.groups {
             group.copy(signals);
+            for it in &group.smooth {
+                group.values[it.place] = signals.numbers[it.signal];
+            }
             for source in &group.sources {
                 group.values[source.place] = source.passage.of(source.now(signals));
             }
@@ -161,6 +174,10 @@ impl Inputs {
     ) -> Outcome {
         for group in &mut self.groups {
             group.copy(now);
+            for it in &group.smooth {
+                let at = now.numbers[it.signal];
+                group.values[it.place] = at + share * (other.numbers[it.signal] - at);
+            }
             for source in &group.sources {
                 let at = source.now(now);
                 let change = source.now(other) - at;
@@ -178,15 +195,19 @@ impl Inputs {
         groups.flat_map(|group| {
             let copies = group.copies.iter();
             let copied = copies.flat_map(|it| it.signal..it.signal + it.count);
-            copied.chain(group.sources.iter().filter_map(InputSource::number))
+            let smooth = group.smooth.iter().map(|it| it.signal);
+            let others = group.sources.iter().filter_map(InputSource::number);
+            copied.chain(smooth).chain(others)
         })
     }
 
     /// The numbers that drive it and change between samples.
     pub(super) fn smooth_sources(&self) -> impl Iterator<Item = usize> + '_ {
-        let all = self.groups.iter().flat_map(|group| &group.sources);
-        all.filter(|source| source.is_smooth)
-            .filter_map(InputSource::number)
+        self.groups.iter().flat_map(|group| {
+            let others = group.sources.iter().filter(|source| source.is_smooth);
+            let plain = group.smooth.iter().map(|it| it.signal);
+            plain.chain(others.filter_map(InputSource::number))
+        })
     }
 
     /// How its Float64 inputs change with the signals, with their references; none where an input of
@@ -198,6 +219,9 @@ impl Inputs {
             for it in &group.copies {
                 let places = it.place..it.place + it.count;
                 all[places].copy_from_slice(&signals[it.signal..it.signal + it.count]);
+            }
+            for it in &group.smooth {
+                all[it.place] = signals[it.signal];
             }
             for source in &group.sources {
                 let of_signal = source.number().map_or(0.0, |signal| signals[signal]);
@@ -245,9 +269,12 @@ impl InputGroup {
     fn drive(&mut self, drive: &Drive) {
         let place = self.values.len();
         if let Place::Number(signal) = drive.signal
-            && !drive.is_smooth
             && drive.passage.is_nothing()
         {
+            if drive.is_smooth {
+                self.smooth.push(Smooth { place, signal });
+                return;
+            }
             match self.copies.last_mut() {
                 Some(last)
                     if last.place + last.count == place && last.signal + last.count == signal =>
