@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 pub use draw::Rig;
+pub(crate) use statistics::percentile;
 pub use statistics::{Pair, Spread, Standing};
 
 use crate::commission::{self, record_excitation};

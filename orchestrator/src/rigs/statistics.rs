@@ -64,7 +64,7 @@ fn error(row: &Row, controller: &str, design: DesignedOn) -> f64 {
 }
 
 /// The percentile `part` by linear interpolation between the sorted values.
-fn percentile(sorted: &[f64], part: f64) -> f64 {
+pub(crate) fn percentile(sorted: &[f64], part: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else {
         return f64::NAN;
     };
