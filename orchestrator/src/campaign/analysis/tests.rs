@@ -37,8 +37,8 @@ fn columns() -> Vec<Column> {
     ]
 }
 
-/// Twice the probability that the displacement limit, 2 in, is exceeded has median 0.5 g under `mpc`,
-/// 0.35 g under `three-variable`, dispersion 0.4, of which 0.2 between motions.
+/// Runs whose specimen exceeds 2 in with a median of 0.5 g under `mpc`, of 0.35 g under `three-variable`, and
+/// a dispersion of 0.4, of which 0.2 is between motions.
 pub(crate) fn study(runs: usize, motions: usize, seed: u64) -> Table {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let normal = |random: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(random) };
@@ -161,7 +161,14 @@ fn a_study_tells_what_it_was_made_of() {
         find(&found.fragility, None, "mpc").fit,
         Fit::Never { .. }
     ));
-    // What decides over the error: the controller (2 % against 4 %), then the scale.
+    // What decides over the error: the controller (2 % against 4 %), then the scale. That they do not
+    // depend on each other holds while no run is stopped.
+    let mut all = table.clone();
+    let ended = all.place("ended").unwrap();
+    let whole = |row: &&mut Vec<Cell>| row[ended].text() == Some("interlock");
+    let stopped = all.rows.iter_mut().filter(whole);
+    stopped.for_each(|row| row[ended] = "complete".into());
+    let found = analyse(&all, &settings(), &command);
     let error = &found.importance[0];
     assert_eq!(error.column.as_deref(), Some(ERROR));
     let names: Vec<&str> = error

@@ -74,7 +74,7 @@ fn fragility(table: &Table, settings: &Settings, findings: &Findings) -> Section
         text: vec![words::fragility(findings)],
         notes: words::without_curve(findings, &settings.intensity),
         panels: pictures::fragility(table, settings, findings),
-        tables: vec![tables::fragility(table, settings, findings)],
+        tables: tables::fragility(table, settings, findings),
         ..Section::default()
     }
 }
@@ -94,7 +94,7 @@ fn importance(findings: &Findings) -> Option<Section> {
             .iter()
             .map(pictures::importance)
             .collect(),
-        tables: vec![tables::importance(findings)],
+        tables: tables::importance(findings),
         ..Section::default()
     })
 }

@@ -142,10 +142,6 @@ pub(super) fn fragility(table: &Table, settings: &Settings, findings: &Findings)
         if !curves.iter().any(is_mixed) {
             continue;
         }
-        let title = match &curves[0].limit {
-            Some(limit) => format!("{limit} above {}", words::above(&curves[0])),
-            None => "Stopped by the interlock".into(),
-        };
         let colour = |own: &Fragility| {
             let controller = own.controller.as_deref();
             let place = names.iter().position(|name| Some(*name) == controller);
@@ -174,7 +170,7 @@ pub(super) fn fragility(table: &Table, settings: &Settings, findings: &Findings)
             series.push(dots.styled(Style::Points).coloured(colour(own)));
         }
         panels.push(Panel {
-            title,
+            title: words::limit(&curves[0]),
             x: intensity_axis(table, settings),
             y: Axis::linear("share of runs", Units::NONE).between(0.0, 1.0),
             series,

@@ -1,7 +1,9 @@
 //! Tables and large figures.
 
 use super::words;
-use crate::campaign::analysis::{ERROR, Ended, Findings, Fit, Group, Quantiles, Settings};
+use crate::campaign::analysis::{
+    ERROR, Ended, Findings, Fit, Group, Importance, Method, Quantiles, Settings,
+};
 use crate::campaign::table::Table as Study;
 use crate::report::{Cell, Fact, Table, Units};
 
@@ -11,12 +13,15 @@ const MOST_VALUES: usize = 40;
 fn optional(value: Option<f64>, units: &Units) -> Cell {
     match value {
         Some(value) => Cell::Quantity(value, units.clone(), 3),
-        None => "–".into(),
+        None => NOTHING,
     }
 }
 
+/// Shown as a dash.
+const NOTHING: Cell = Cell::Number(f64::NAN, 1);
+
 fn whole(number: usize) -> Cell {
-    Cell::Text(words::count(number))
+    Cell::Number(number as f64, number.to_string().len())
 }
 
 /// Shares of the endings.
@@ -140,13 +145,12 @@ fn compared_figures(findings: &Findings) -> Vec<&str> {
     all
 }
 
-/// The curves' medians and dispersions.
-pub(super) fn fragility(study: &Study, settings: &Settings, findings: &Findings) -> Table {
+/// The curves' medians and dispersions, a table a limit.
+pub(super) fn fragility(study: &Study, settings: &Settings, findings: &Findings) -> Vec<Table> {
     let units = super::pictures::intensity_units(study, settings);
     let heads = [
-        "limit",
-        "controller",
-        "runs",
+        "runs of",
+        "number",
         "exceed",
         "unknown",
         "median",
@@ -156,62 +160,61 @@ pub(super) fn fragility(study: &Study, settings: &Settings, findings: &Findings)
         "from",
         "to",
     ];
-    let mut rows = vec![heads.map(Cell::from).to_vec()];
-    for own in &findings.fragility {
-        let limit = match &own.limit {
-            Some(limit) => format!("{limit} above {}", words::above(own)),
-            None => "stopped by the interlock".into(),
-        };
-        let mut row = vec![
-            Cell::from(limit),
-            own.controller.as_deref().unwrap_or("all").into(),
-            whole(own.runs),
-            words::percent(own.exceeded, own.runs).into(),
-            whole(own.unknown),
-        ];
-        match &own.fit {
-            Fit::Lognormal(fit) => {
-                let [low, high] = fit.median_band;
-                row.extend([fit.median, low, high].map(|own| optional(Some(own), &units)));
-                let [low, high] = fit.dispersion_band;
-                row.extend([fit.dispersion, low, high].map(|own| Cell::Number(own, 3)));
-            }
-            _ => row.extend([(); 6].map(|()| Cell::from("–"))),
-        }
-        rows.push(row);
-    }
-    Table::headed(
-        "Median: the intensity at which half exceed; dispersion: of its logarithm; 95 % intervals",
-        rows,
-    )
+    let limits = findings.fragility.chunk_by(|a, b| a.limit == b.limit);
+    limits
+        .map(|curves| {
+            let mut rows = vec![heads.map(Cell::from).to_vec()];
+            rows.extend(curves.iter().map(|own| {
+                let mut row = vec![
+                    Cell::from(own.controller.as_deref().unwrap_or("all")),
+                    whole(own.runs),
+                    words::percent(own.exceeded, own.runs).into(),
+                    whole(own.unknown),
+                ];
+                if let Fit::Lognormal(fit) = &own.fit {
+                    let [low, high] = fit.median_band;
+                    row.extend([fit.median, low, high].map(|own| optional(Some(own), &units)));
+                    let [low, high] = fit.dispersion_band;
+                    row.extend([fit.dispersion, low, high].map(|own| Cell::Number(own, 3)));
+                } else {
+                    row.extend([NOTHING; 6]);
+                }
+                row
+            }));
+            let caption = format!(
+                "{}: intensity at which half exceed, and deviation of its logarithm, with 95 % intervals",
+                words::limit(&curves[0])
+            );
+            Table::headed(&caption, rows)
+        })
+        .collect()
 }
 
-/// The shares of every factor in every outcome.
-pub(super) fn importance(findings: &Findings) -> Table {
-    let heads = [
-        "outcome", "factor", "alone", "from", "to", "total", "from", "to",
-    ];
-    let mut rows = vec![heads.map(Cell::from).to_vec()];
+/// The shares of every factor, a table an outcome.
+pub(super) fn importance(findings: &Findings) -> Vec<Table> {
     let percent = |share: f64| Cell::Quantity(100.0 * share, Units::PERCENT, 3);
-    for own in &findings.importance {
-        for factor in &own.factors {
-            let mut row = vec![
-                Cell::from(words::outcome(own)),
-                factor.factor.as_str().into(),
-                percent(factor.alone),
-            ];
-            row.extend(factor.alone_band.map(percent));
-            match (factor.total, factor.total_band) {
-                (Some(total), Some(band)) => {
-                    row.push(percent(total));
-                    row.extend(band.map(percent));
-                }
-                _ => row.extend([(); 3].map(|()| Cell::from("–"))),
-            }
-            rows.push(row);
+    let table = |own: &Importance| {
+        let mut heads = vec!["factor", "alone", "from", "to"];
+        if own.method == Method::Sobol {
+            heads.extend(["in total", "from", "to"]);
         }
-    }
-    Table::headed("Share of the variance, with 95 % intervals", rows)
+        let mut rows = vec![heads.into_iter().map(Cell::from).collect()];
+        rows.extend(own.factors.iter().map(|factor| {
+            let mut row = vec![Cell::from(factor.factor.as_str()), percent(factor.alone)];
+            row.extend(factor.alone_band.map(percent));
+            if let (Some(total), Some(band)) = (factor.total, factor.total_band) {
+                row.push(percent(total));
+                row.extend(band.map(percent));
+            }
+            row
+        }));
+        let outcome = words::capital(&words::outcome(own));
+        Table::headed(
+            &format!("{outcome}: share of its variance, with 95 % intervals"),
+            rows,
+        )
+    };
+    findings.importance.iter().map(table).collect()
 }
 
 /// The worst runs and their commands.

@@ -161,7 +161,7 @@ pub fn summary(findings: &Findings) -> String {
     if !told.is_empty() && is_new {
         text += &format!(" Of all {} runs {told}.", count(all.endings.runs));
     }
-    if let Some(limit) = limit(findings, groups[0]) {
+    if let Some(limit) = half(findings, groups[0]) {
         text += &format!(" {limit}");
     }
     if let Some(factor) = decides(findings) {
@@ -187,7 +187,7 @@ fn early(endings: Endings, before: &str) -> String {
 }
 
 /// Where half of the runs of the best controller exceed the first limit that has a curve.
-fn limit(findings: &Findings, best: &Group) -> Option<String> {
+fn half(findings: &Findings, best: &Group) -> Option<String> {
     findings.fragility.iter().find_map(|own| {
         let (Fit::Lognormal(curve), Some(limit)) = (&own.fit, &own.limit) else {
             return None;
@@ -208,6 +208,14 @@ fn limit(findings: &Findings, best: &Group) -> Option<String> {
             )
         })
     })
+}
+
+/// What is exceeded, as a heading.
+pub(super) fn limit(own: &Fragility) -> String {
+    match &own.limit {
+        Some(limit) => format!("{limit} above {}", above(own)),
+        None => "Stopped by the interlock".to_string(),
+    }
 }
 
 /// The limit with its unit.
@@ -308,13 +316,9 @@ pub(super) fn fragility(findings: &Findings) -> String {
 /// The limits that have no curve, and why.
 pub(super) fn without_curve(findings: &Findings, intensity: &str) -> Vec<String> {
     let told = findings.fragility.iter().filter_map(|own| {
-        let what = match &own.limit {
-            Some(limit) => format!("{limit} above {}", above(own)),
-            None => "stopped by the interlock".to_string(),
-        };
         let under = own.controller.as_ref();
-        let what = under.map_or(what.clone(), |name| format!("{what}, {name}"));
-        without(own, intensity).map(|why| format!("{}: {why}", capital(&what)))
+        let under = under.map_or(String::new(), |name| format!(", {name}"));
+        without(own, intensity).map(|why| format!("{}{under}: {why}", limit(own)))
     });
     told.collect()
 }
