@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
+use super::analysis;
 use super::design::{Design, Points};
 use super::factor::Values;
 use super::setting::{self, Key};
@@ -239,6 +240,23 @@ impl Study {
     #[must_use]
     pub fn runs(&self) -> u64 {
         self.points.count() * self.crossings()
+    }
+
+    /// How the rows came about, as the analysis asks.
+    pub(super) fn analysed(&self) -> analysis::Design {
+        let names = |places: &[usize]| -> Vec<String> {
+            let places = places.iter();
+            places
+                .map(|&place| self.factors[place].name.clone())
+                .collect()
+        };
+        match self.design {
+            Design::Saltelli => analysis::Design::Saltelli {
+                sampled: names(&self.sampled),
+                crossed: names(&self.crossed),
+            },
+            _ => analysis::Design::Other,
+        }
     }
 
     /// Runs at each point of the design.

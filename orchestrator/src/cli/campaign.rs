@@ -116,10 +116,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let carried = carried?;
     let summary = &carried.summary;
     let is_whole = summary.missing == 0;
-    let files = match is_whole {
-        true => campaign::write(&study, &carried, &folder)?,
-        false => Vec::new(),
-    };
+    let mut files = Vec::new();
+    let mut said = String::new();
+    if is_whole {
+        let findings = campaign::findings(&study, &carried)?;
+        files = campaign::write(&study, &carried, &findings, &folder)?;
+        said = campaign::page::summary(&findings);
+    }
     if arguments.json {
         println!("{}", serde_json::json!(summary));
     } else {
@@ -136,6 +139,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 summary.missing,
                 folder.display()
             );
+        }
+        if !said.is_empty() {
+            println!("\n{said}");
         }
         if !files.is_empty() {
             println!("\nwritten:");

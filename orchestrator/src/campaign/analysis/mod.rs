@@ -70,6 +70,10 @@ pub enum Design {
 pub struct Findings {
     /// All runs together, then the runs of each value of each factor that is a list.
     pub groups: Vec<Group>,
+    /// Column against which fragility is drawn.
+    pub intensity: String,
+    /// Its unit.
+    pub intensity_unit: Option<String>,
     /// Share of runs beyond each limit, and of runs that were stopped, against intensity.
     pub fragility: Vec<Fragility>,
     /// Which factor matters, for the error and whatever else varies.
@@ -83,8 +87,13 @@ pub struct Findings {
 /// What `table` says. `command` gives the command that repeats the run of a number.
 pub fn analyse(table: &Table, settings: &Settings, command: &dyn Fn(usize) -> String) -> Findings {
     let runs = Runs::of(table);
+    let mut columns = table.columns.iter();
+    let intensity = columns.find(|column| column.name == settings.intensity);
+    let unit = intensity.and_then(|column| column.unit.as_ref());
     Findings {
         groups: groups::groups(&runs, &settings.intensity),
+        intensity: settings.intensity.clone(),
+        intensity_unit: unit.cloned(),
         fragility: fragility::fragility(&runs, settings),
         importance: importance::importance(&runs, settings),
         worst: worst::worst(&runs, command),

@@ -4,7 +4,7 @@ mod pictures;
 mod tables;
 mod words;
 
-use super::analysis::{Findings, Method, Settings};
+use super::analysis::{Findings, Method};
 use super::table::Table;
 use crate::report::{Cell, Report, Section};
 
@@ -21,11 +21,11 @@ pub struct About {
     pub footer: String,
 }
 
-/// The page of what `table` says, as [`super::analysis::analyse`] found it with `settings`.
+/// The page of what `table` says, as [`super::analysis::analyse`] found it.
 #[must_use]
-pub fn report(table: &Table, settings: &Settings, findings: &Findings, about: About) -> Report {
-    let mut sections = vec![error(table, settings, findings)];
-    sections.push(fragility(table, settings, findings));
+pub fn report(table: &Table, findings: &Findings, about: About) -> Report {
+    let mut sections = vec![error(table, findings)];
+    sections.push(fragility(findings));
     sections.extend(importance(findings));
     sections.push(Section {
         heading: "The worst runs".into(),
@@ -53,7 +53,7 @@ pub fn report(table: &Table, settings: &Settings, findings: &Findings, about: Ab
     }
 }
 
-fn error(table: &Table, settings: &Settings, findings: &Findings) -> Section {
+fn error(table: &Table, findings: &Findings) -> Section {
     Section {
         heading: "Tracking".into(),
         text: vec![
@@ -62,19 +62,19 @@ fn error(table: &Table, settings: &Settings, findings: &Findings) -> Section {
                 .into(),
         ],
         bars: pictures::errors(findings).into_iter().collect(),
-        panels: pictures::scatter(table, settings).into_iter().collect(),
+        panels: pictures::scatter(table, findings).into_iter().collect(),
         tables: vec![tables::standings(findings)],
         ..Section::default()
     }
 }
 
-fn fragility(table: &Table, settings: &Settings, findings: &Findings) -> Section {
+fn fragility(findings: &Findings) -> Section {
     Section {
         heading: "Fragility".into(),
         text: vec![words::fragility(findings)],
-        notes: words::without_curve(findings, &settings.intensity),
-        panels: pictures::fragility(table, settings, findings),
-        tables: tables::fragility(table, settings, findings),
+        notes: words::without_curve(findings),
+        panels: pictures::fragility(findings),
+        tables: tables::fragility(findings),
         ..Section::default()
     }
 }

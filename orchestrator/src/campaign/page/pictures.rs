@@ -5,7 +5,7 @@ use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
 use super::words;
-use crate::campaign::analysis::{ERROR, Findings, Fit, Fragility, Importance, Settings};
+use crate::campaign::analysis::{ERROR, Findings, Fit, Fragility, Importance};
 use crate::campaign::table::Table;
 use crate::master::Ending;
 use crate::report::{Abscissa, Axis, Bar, BarGroup, Bars, Panel, Series, Style, Units};
@@ -17,16 +17,10 @@ const MOST_BANDS: usize = 3;
 /// Errors this many times the median get a logarithmic axis.
 const FAR: f64 = 20.0;
 
-pub(super) fn intensity_units(table: &Table, settings: &Settings) -> Units {
-    let place = table.place(&settings.intensity);
-    let unit = place.and_then(|place| table.columns[place].unit.as_deref());
-    words::units(&settings.intensity, unit)
-}
-
-fn intensity_axis(table: &Table, settings: &Settings) -> Axis {
+fn intensity_axis(findings: &Findings) -> Axis {
     Axis::linear(
-        &words::label(&settings.intensity),
-        intensity_units(table, settings),
+        &words::label(&findings.intensity),
+        words::intensity_units(findings),
     )
 }
 
@@ -78,8 +72,8 @@ fn controllers(table: &Table) -> (Vec<&str>, Vec<&str>) {
 }
 
 /// The error of each run against its intensity.
-pub(super) fn scatter(table: &Table, settings: &Settings) -> Option<Panel> {
-    let (intensity, errors) = (table.numbers(&settings.intensity), table.numbers(ERROR));
+pub(super) fn scatter(table: &Table, findings: &Findings) -> Option<Panel> {
+    let (intensity, errors) = (table.numbers(&findings.intensity), table.numbers(ERROR));
     let ended = table.texts("ended");
     let mut rows: Vec<usize> = (0..table.rows.len())
         .filter(|&run| {
@@ -93,7 +87,7 @@ pub(super) fn scatter(table: &Table, settings: &Settings) -> Option<Panel> {
     }
     let of = rows.len();
     if of > MOST_DOTS {
-        let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
+        let mut random = ChaCha8Rng::seed_from_u64(findings.seed);
         let picked = index::sample(&mut random, of, MOST_DOTS);
         rows = picked.into_iter().map(|n| rows[n]).collect();
     }
@@ -123,7 +117,7 @@ pub(super) fn scatter(table: &Table, settings: &Settings) -> Option<Panel> {
     };
     Some(Panel {
         title: format!("Acceleration error of the runs that were played to their end{shown}"),
-        x: intensity_axis(table, settings),
+        x: intensity_axis(findings),
         y: match is_wide {
             true => Axis::logarithmic("acceleration error", Units::PERCENT),
             false => Axis::linear("acceleration error", Units::PERCENT),
@@ -133,8 +127,11 @@ pub(super) fn scatter(table: &Table, settings: &Settings) -> Option<Panel> {
 }
 
 /// A picture for each limit that some run exceeded and some did not.
-pub(super) fn fragility(table: &Table, settings: &Settings, findings: &Findings) -> Vec<Panel> {
-    let (names, _) = controllers(table);
+pub(super) fn fragility(findings: &Findings) -> Vec<Panel> {
+    let names: Vec<&str> = words::compared(findings)
+        .iter()
+        .map(|own| own.value.as_str())
+        .collect();
     let mut panels: Vec<Panel> = Vec::new();
     let curves = findings.fragility.chunk_by(|a, b| a.limit == b.limit);
     for curves in curves {
@@ -171,7 +168,7 @@ pub(super) fn fragility(table: &Table, settings: &Settings, findings: &Findings)
         }
         panels.push(Panel {
             title: words::limit(&curves[0]),
-            x: intensity_axis(table, settings),
+            x: intensity_axis(findings),
             y: Axis::linear("share of runs", Units::NONE).between(0.0, 1.0),
             series,
         });

@@ -2,9 +2,8 @@
 
 use super::words;
 use crate::campaign::analysis::{
-    ERROR, Ended, Findings, Fit, Group, Importance, Method, Quantiles, Settings,
+    ERROR, Ended, Findings, Fit, Group, Importance, Method, Quantiles,
 };
-use crate::campaign::table::Table as Study;
 use crate::report::{Cell, Fact, Table, Units};
 
 /// Values of one factor that get a row each.
@@ -146,8 +145,8 @@ fn compared_figures(findings: &Findings) -> Vec<&str> {
 }
 
 /// The curves' medians and dispersions, a table a limit.
-pub(super) fn fragility(study: &Study, settings: &Settings, findings: &Findings) -> Vec<Table> {
-    let units = super::pictures::intensity_units(study, settings);
+pub(super) fn fragility(findings: &Findings) -> Vec<Table> {
+    let units = words::intensity_units(findings);
     let heads = [
         "runs of",
         "number",

@@ -11,7 +11,7 @@ fn made(runs: usize) -> (Table, Findings, Report) {
         title: "A study".into(),
         ..About::default()
     };
-    let page = report(&table, &settings, &findings, about);
+    let page = report(&table, &findings, about);
     (table, findings, page)
 }
 
@@ -23,7 +23,8 @@ fn the_sentence_says_what_came_of_it() {
         "mpc stays below",
         "three-variable stays below",
         "of 1,000 runs",
-        "Half of the runs exceed 2.00 in of specimen.displacement under mpc at an intensity of 0.",
+        "Half of the runs exceed 2.00 in of specimen.displacement under mpc at 0.",
+        " g of peak ground acceleration",
         "The error depends most on controller: alone",
     ] {
         assert!(page.summary.contains(part), "{}", page.summary);
@@ -56,7 +57,7 @@ fn few_runs_and_one_controller_make_a_page_too() {
         let (mut table, settings) = (study(runs, 2, 3), settings());
         table.rows.retain(|row| row[2].text() == Some("mpc"));
         let findings = analyse(&table, &settings, &command);
-        let page = report(&table, &settings, &findings, About::default());
+        let page = report(&table, &findings, About::default());
         assert!(crate::report::html(&page).is_ok());
         assert!(!page.summary.is_empty());
         serde_json::to_string(&findings).unwrap();

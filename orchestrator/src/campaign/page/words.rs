@@ -17,7 +17,7 @@ pub(super) const SOBOL: &str = "Sobol' indices: alone is the share of the varian
      factor does together with others. Intervals of 95 %, by resampling the base samples.";
 pub(super) const ALONE: &str = "Alone is the share of the variance between the values of the factor (numbers in bins of equal \
      counts); 0 where shuffled values give as much. The rest is interactions, and what \
-     the bins do not resolve; a study of design `saltelli` tells these apart. Intervals of 95 %, by resampling \
+     the bins do not resolve; the design saltelli tells these apart. Intervals of 95 %, by resampling \
      the runs.";
 
 /// `12345` as `12,345`.
@@ -81,6 +81,11 @@ pub(super) fn units(column: &str, unit: Option<&str>) -> Units {
     let mut ends = ends.into_iter();
     ends.find(|(end, _)| column.ends_with(end))
         .map_or(Units::NONE, |(_, units)| units)
+}
+
+/// Units of the intensity.
+pub(super) fn intensity_units(findings: &Findings) -> Units {
+    units(&findings.intensity, findings.intensity_unit.as_deref())
 }
 
 /// A value with its unit, for a sentence.
@@ -157,7 +162,8 @@ pub fn summary(findings: &Findings) -> String {
     }
     text.push('.');
     let told = early(all.endings, "");
-    let is_new = groups.len() > 1 || at(groups[0], true).is_some();
+    // What the clauses have not said.
+    let is_new = groups.iter().all(|group| at(group, true).is_some());
     if !told.is_empty() && is_new {
         text += &format!(" Of all {} runs {told}.", count(all.endings.runs));
     }
@@ -198,13 +204,14 @@ fn half(findings: &Findings, best: &Group) -> Option<String> {
             .is_none_or(|name| *name == best.value);
         let under = own.controller.as_ref();
         let under = under.map_or(String::new(), |name| format!(" under {name}"));
+        let units = intensity_units(findings);
+        let [median, low, high] = [curve.median, curve.median_band[0], curve.median_band[1]]
+            .map(|at| quantity(at, &units));
         is_best.then(|| {
             format!(
-                "Half of the runs exceed {} of {limit}{under} at an intensity of {} ({} to {}).",
+                "Half of the runs exceed {} of {limit}{under} at {median} of {} ({low} to {high}).",
                 above(own),
-                significant(curve.median, 3),
-                significant(curve.median_band[0], 3),
-                significant(curve.median_band[1], 3)
+                label(&findings.intensity)
             )
         })
     })
@@ -314,17 +321,17 @@ pub(super) fn fragility(findings: &Findings) -> String {
 }
 
 /// The limits that have no curve, and why.
-pub(super) fn without_curve(findings: &Findings, intensity: &str) -> Vec<String> {
+pub(super) fn without_curve(findings: &Findings) -> Vec<String> {
     let told = findings.fragility.iter().filter_map(|own| {
         let under = own.controller.as_ref();
         let under = under.map_or(String::new(), |name| format!(", {name}"));
-        without(own, intensity).map(|why| format!("{}{under}: {why}", limit(own)))
+        without(own, &findings.intensity).map(|why| format!("{}{under}: {why}", limit(own)))
     });
     told.collect()
 }
 
 /// Why there is no curve.
-pub(super) fn without(own: &Fragility, intensity: &str) -> Option<String> {
+fn without(own: &Fragility, intensity: &str) -> Option<String> {
     let share = |share: f64| significant(100.0 * share, 2);
     Some(match own.fit {
         Fit::Lognormal(_) => return None,
