@@ -15,9 +15,10 @@ pub mod table;
 use std::path::{Path, PathBuf};
 
 pub use bench::{Bench, Row};
-pub use carry_out::{Carried, Plan, Progress, Shard, Summary, carry_out, rows};
+pub use carry_out::{Carried, Left, Plan, Progress, Shard, Summary, carry_out, rows};
 pub use design::{Design, Points};
 pub use factor::{Distribution, Drawn, Values};
+pub use journal::Head;
 pub use study::{Factor, Limit, Study};
 
 use crate::error::Error;
