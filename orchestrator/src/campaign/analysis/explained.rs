@@ -15,6 +15,8 @@ use crate::rigs::percentile;
 const SHUFFLES: usize = 100;
 /// Draws of the bootstrap.
 const DRAWS: usize = 400;
+/// Values that are drawn in all, about: of a million runs, whose bands are narrow, fewer draws do.
+const MOST_DRAWN: usize = 20_000_000;
 /// Bins of a number, at most.
 const MOST_BINS: usize = 20;
 
@@ -43,9 +45,10 @@ pub(super) fn share(values: &[f64], groups: &[usize], seed: u64) -> Option<Bande
     let count = groups.iter().max()? + 1;
     let every: Vec<usize> = (0..values.len()).collect();
     let value = epsilon_squared(values, groups, count, &every)?;
+    let few = |most: usize| most.min((MOST_DRAWN / values.len()).max(20));
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut shuffled = groups.to_vec();
-    let by_chance = (0..SHUFFLES).any(|_| {
+    let by_chance = (0..few(SHUFFLES)).any(|_| {
         shuffled.shuffle(&mut random);
         epsilon_squared(values, &shuffled, count, &every).is_none_or(|own| own >= value)
     });
@@ -55,7 +58,7 @@ pub(super) fn share(values: &[f64], groups: &[usize], seed: u64) -> Option<Bande
             band: [0.0; 2],
         });
     }
-    let mut drawn: Vec<f64> = (0..DRAWS)
+    let mut drawn: Vec<f64> = (0..few(DRAWS))
         .filter_map(|_| {
             let picked: Vec<usize> = every
                 .iter()

@@ -33,6 +33,27 @@ fn the_sentence_says_what_came_of_it() {
     assert_eq!(none.summary, "No run.");
 }
 
+#[test]
+fn shares_have_the_places_they_need() {
+    let told = [
+        (0, 10),
+        (10, 10),
+        (1, 3),
+        (1, 300),
+        (9999, 10_000),
+        (299, 300),
+    ];
+    let told = told.map(|(part, of)| words::percent(part, of));
+    assert_eq!(
+        told,
+        ["0 %", "100 %", "33 %", "0.33 %", "99.99 %", "99.7 %"]
+    );
+    assert_eq!(
+        [7, 1234, 1_234_567].map(words::count),
+        ["7", "1,234", "1,234,567"]
+    );
+}
+
 /// To look at it: SHAKEBENCH_PICTURES=FOLDER.
 #[test]
 fn a_page_of_ten_thousand_runs_is_small() {

@@ -38,7 +38,12 @@ pub(super) fn percent(part: usize, of: usize) -> String {
     let share = 100.0 * part as f64 / of.max(1) as f64;
     match share {
         share if part == 0 || part == of => format!("{share:.0} %"),
-        share if !(1.0..99.0).contains(&share) => format!("{} %", significant(share, 2)),
+        share if share < 1.0 => format!("{} %", significant(share, 2)),
+        share if share > 99.0 => {
+            // As many places as what is missing needs.
+            let places = (100.0 - share).log10().floor().abs() as usize;
+            format!("{share:.places$} %")
+        }
         share => format!("{share:.0} %"),
     }
 }
