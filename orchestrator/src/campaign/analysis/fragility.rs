@@ -244,7 +244,7 @@ fn fit(runs: usize, exceeded: usize, placed: &[(f64, bool, usize)], motions: Opt
         })
     };
     let [all, no, yes] = [ends(None), ends(Some(false)), ends(Some(true))];
-    if !(all[1] > all[0] * (1.0 + 1e-9)) || !no[0].is_finite() || !yes[0].is_finite() {
+    if all[1] <= all[0] * (1.0 + 1e-9) || !no[0].is_finite() || !yes[0].is_finite() {
         let why = Why::SameIntensity;
         return Fit::None { why };
     }

@@ -76,7 +76,7 @@ fn estimate(rows: &[Vec<f64>], factors: usize, picked: &[usize]) -> Option<Vec<[
     let count = ends.len() as f64;
     let mean = ends.iter().sum::<f64>() / count;
     let variance = ends.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / count;
-    if !(variance > 0.0) {
+    if variance.is_nan() || variance <= 0.0 {
         return None;
     }
     let of = |factor: usize| {
