@@ -51,7 +51,7 @@ pub fn findings(study: &Study, carried: &Carried) -> Result<Findings, Error> {
                 above,
             })
             .collect(),
-        design: study.analysed(),
+        design: study.analysed(&carried.table),
         seed: study.seed,
     };
     let command = |number: usize| bench.command(number as u64);
