@@ -20,7 +20,7 @@ use crate::system::tuning::Rules;
 use crate::system::{Component, Link, Setting, System, SystemFile};
 use crate::units::{STANDARD_GRAVITY, hint};
 
-use super::factor::setting as with_unit;
+use super::factor::with_unit;
 
 /// The figures of a run, and their units.
 const FIGURES: [(&str, &str); 11] = [
@@ -169,7 +169,7 @@ impl<'a> Bench<'a> {
             }
         }
         for settings in &tried {
-            let prepared = self.prepare(settings).map_err(|error| {
+            let prepared = self.prepare(settings, &[]).map_err(|error| {
                 let all = self.study.factors.iter().zip(settings);
                 let all: Vec<String> = all
                     .map(|(factor, value)| format!("{} = {value}", factor.name))
@@ -276,8 +276,14 @@ impl<'a> Bench<'a> {
     /// Carries a run out; one that fails is a row too.
     #[must_use]
     pub fn run(&self, number: u64) -> Row {
+        self.run_with(number, &[])
+    }
+
+    /// As [`Bench::run`], with parameters as `--set` takes them besides the study's own.
+    #[must_use]
+    pub fn run_with(&self, number: u64, also: &[String]) -> Row {
         let settings = self.study.settings(number);
-        let done = catch_unwind(AssertUnwindSafe(|| self.outcome(&settings)));
+        let done = catch_unwind(AssertUnwindSafe(|| self.outcome(&settings, also)));
         let factors = self.factors(&settings);
         let mut cells = factors.unwrap_or_else(|_| vec![Cell::Missing; settings.len()]);
         let signals = self
@@ -303,8 +309,8 @@ impl<'a> Bench<'a> {
     }
 
     /// The cells of a run behind its factors.
-    fn outcome(&self, settings: &[Setting]) -> Result<Vec<Cell>, Error> {
-        let prepared = self.prepare(settings)?;
+    fn outcome(&self, settings: &[Setting], also: &[String]) -> Result<Vec<Cell>, Error> {
+        let prepared = self.prepare(settings, also)?;
         let outcome = prepared.run(prepared.algorithm)?;
         let mut cells = Vec::new();
         cells.extend(figures(&prepared, &outcome));
@@ -325,9 +331,29 @@ impl<'a> Bench<'a> {
         Ok(cells)
     }
 
-    fn prepare(&self, settings: &[Setting]) -> Result<Prepared, Error> {
-        let (request, assembled) = self.request(settings)?;
+    fn prepare(&self, settings: &[Setting], also: &[String]) -> Result<Prepared, Error> {
+        let (mut request, assembled) = self.request(settings)?;
+        request.set.extend_from_slice(also);
         prepare_shared(&request, &assembled.file, &assembled.library, &self.motions)
+    }
+
+    /// The request of a run and the system that it names.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn request_of(&self, number: u64) -> Result<(Request, SystemFile), Error> {
+        let (request, assembled) = self.request(&self.study.settings(number))?;
+        Ok((request, assembled.file.clone()))
+    }
+
+    /// The value of a variable that the study does not touch, and its unit.
+    ///
+    /// # Errors
+    /// A variable that its systems have not, or one that is no number.
+    pub fn nominal(&self, name: &str) -> Result<(f64, String), String> {
+        let request = self.request(&self.study.settings(0));
+        let (_, assembled) = request.map_err(|error| error.to_string())?;
+        nominal(&assembled.system, name)
     }
 
     /// The request of a run, with its system.
@@ -371,8 +397,15 @@ impl<'a> Bench<'a> {
                 .map_err(|reason| self.study.fault(&reason))?;
         }
         for (name, value) in times {
-            let nominal =
-                nominal(&plain.system, name).map_err(|reason| self.study.fault(&reason))?;
+            let nominal = nominal(&plain.system, name).and_then(|nominal| match nominal.0 {
+                0.0 => Err(format!(
+                    "`{name}` is 0 in {}: times that is 0 always; expected a distribution that is not \
+                     relative",
+                    plain.system.name
+                )),
+                _ => Ok(nominal),
+            });
+            let nominal = nominal.map_err(|reason| self.study.fault(&reason))?;
             let factor = match value {
                 Setting::Number(factor) => *factor,
                 _ => 1.0,
@@ -582,14 +615,8 @@ fn nominal(system: &System, name: &str) -> Result<(f64, String), String> {
     })?;
     let variable = &component.fmu.description.variables[position];
     match component.start_value(&component.given(), position) {
-        Datum::Number(number) if number != 0.0 => {
-            Ok((number, variable.unit.clone().unwrap_or_default()))
-        }
-        Datum::Number(_) => Err(format!(
-            "`{name}` is 0 in {}: times that is 0 always; expected a distribution that is not relative",
-            system.name
-        )),
-        _ => Err(format!("`{name}` is no number; `relative` needs one")),
+        Datum::Number(number) => Ok((number, variable.unit.clone().unwrap_or_default())),
+        _ => Err(format!("`{name}` is no number")),
     }
 }
 

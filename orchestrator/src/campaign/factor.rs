@@ -177,7 +177,7 @@ impl Written {
                 false => low + (high - low) * step as f64 / (steps - 1) as f64,
             };
             return Ok(Values::List(
-                (0..steps).map(|step| setting(value(step), &unit)).collect(),
+                (0..steps).map(|step| with_unit(value(step), &unit)).collect(),
             ));
         }
         if let Some([low, high]) = integers {
@@ -238,7 +238,7 @@ impl Drawn {
             let count = (high - low) as f64 + 1.0;
             return Setting::Integer(low.saturating_add((at * count) as i64).min(high));
         }
-        setting(self.distribution.quantile(at), &self.unit)
+        with_unit(self.distribution.quantile(at), &self.unit)
     }
 }
 
@@ -260,7 +260,7 @@ impl Distribution {
 }
 
 /// A number in a unit as a setting.
-pub(super) fn setting(value: f64, unit: &str) -> Setting {
+pub(crate) fn with_unit(value: f64, unit: &str) -> Setting {
     match unit {
         "" => Setting::Number(value),
         unit => Setting::Text(format!("{value:?} {unit}")),

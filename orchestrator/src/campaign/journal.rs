@@ -289,7 +289,7 @@ pub fn read(folder: &Path, head: &Head) -> Result<HashMap<String, Vec<Cell>>, Er
 }
 
 /// Columns before the cells of a row: number and name.
-pub(super) const IDENTITY: usize = 2;
+pub(crate) const IDENTITY: usize = 2;
 
 /// Takes the journals of a folder away.
 pub fn remove(folder: &Path) {

@@ -15,7 +15,10 @@ use std::path::{Path, PathBuf};
 pub use bench::{Bench, Row};
 pub use carry_out::{Carried, Plan, Progress, Shard, Summary, carry_out, rows};
 pub use design::{Design, Points};
+pub(crate) use factor::with_unit;
 pub use factor::{Distribution, Drawn, Values};
+pub(crate) use journal::IDENTITY;
+pub use setting::Key;
 pub use study::{Factor, Limit, Study};
 
 use crate::error::Error;

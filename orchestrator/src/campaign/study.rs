@@ -25,6 +25,7 @@ struct Written {
     factors: BTreeMap<String, toml::Value>,
     #[serde(default)]
     limits: BTreeMap<String, Setting>,
+    tune: Option<toml::Table>,
 }
 
 #[derive(Deserialize)]
@@ -93,6 +94,8 @@ pub struct Study {
     pub intensity: String,
     /// Figures that are asked for by other programs.
     pub results: Vec<String>,
+    /// What is searched, for `shakebench tune`.
+    pub tune: Option<toml::Table>,
     /// Places in `factors` of those that are crossed with every point.
     crossed: Vec<usize>,
     /// Places in `factors` of the others, a dimension of the points each.
@@ -218,6 +221,7 @@ impl Study {
             limits: limits.collect(),
             intensity: written.study.intensity,
             results: written.study.results,
+            tune: written.tune,
             crossed,
             sampled,
             points,
@@ -228,7 +232,7 @@ impl Study {
     }
 
     /// An error of this study.
-    pub(super) fn fault(&self, reason: &str) -> Error {
+    pub(crate) fn fault(&self, reason: &str) -> Error {
         Error::File {
             path: self.path.clone(),
             reason: reason.to_string(),
