@@ -2,10 +2,12 @@
 
 mod bench;
 mod carry_out;
+mod command;
 mod design;
 mod factor;
 mod files;
 mod journal;
+mod row;
 mod setting;
 mod study;
 pub mod table;
@@ -13,10 +15,11 @@ pub mod table;
 use std::path::{Path, PathBuf};
 
 pub use bench::{Bench, Row};
-pub use carry_out::{Carried, Plan, Progress, Shard, Summary, carry_out, rows};
+pub use carry_out::{Carried, Plan, Progress, Runs, Shard, Summary, carry_out, rows};
 pub use design::{Design, Points};
 pub(crate) use factor::with_unit;
 pub use factor::{Distribution, Drawn, Values};
+pub use journal::Head;
 pub(crate) use journal::IDENTITY;
 pub use setting::Key;
 pub use study::{Factor, Limit, Study};

@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt;
-use crate::campaign::{self, Bench, Plan, Progress, Shard, Study, carry_out};
+use crate::campaign::{self, Bench, Plan, Progress, Runs, Shard, Study, carry_out};
 use crate::error::Error;
 use crate::results::{Results, unused};
 
@@ -103,15 +103,20 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         jobs: arguments.jobs.map(usize::from),
     };
     let is_shown = std::sync::Once::new();
-    let carried = carry_out(&study, &how, asked, &|Progress { done, of }| {
-        is_shown.call_once(|| {
-            bar.set_length(of);
+    let carried = carry_out(
+        &Bench::new(&study),
+        &how,
+        asked,
+        &|Progress { done, of }| {
+            is_shown.call_once(|| {
+                bar.set_length(of);
+                bar.set_position(done);
+                bar.reset_eta();
+                bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
+            });
             bar.set_position(done);
-            bar.reset_eta();
-            bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
-        });
-        bar.set_position(done);
-    });
+        },
+    );
     bar.finish_and_clear();
     let carried = carried?;
     let summary = &carried.summary;

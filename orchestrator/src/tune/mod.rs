@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub use margins::{Held, held};
 
-use crate::campaign::{Bench, Key, Study, Values, with_unit};
+use crate::campaign::{Bench, Key, Runs, Study, Values, with_unit};
 use crate::error::Error;
 use crate::report;
 use crate::results::Results;
@@ -281,6 +281,9 @@ impl Search<'_> {
             // Both see an unstable loop.
             constraints.extend([&gain as &dyn Func<()>, &phase]);
         }
+        let first = self.trial(before)?;
+        tell(&first);
+        trials.borrow_mut().push(first);
         let mut start = self.coordinates(before);
         let bounds = vec![(0.0, 1.0); start.len()];
         let mut ended = String::new();
@@ -554,7 +557,7 @@ fn asked(study: &Study, bench: &Bench) -> Result<Asked, Error> {
             unit,
             low,
             high,
-            before: before.clamp(low, high),
+            before,
             after: before,
         });
     }
