@@ -1,6 +1,6 @@
 //! A study from its file to its table: runs that are missing are carried out on all cores.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -200,6 +200,40 @@ pub fn carry_out(
         missing: runs.count() - there,
     };
     Ok(Carried { table, summary })
+}
+
+/// What is left of a study.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Left {
+    /// Under what its rows are made here; those from elsewhere have to be made under the same.
+    pub head: Head,
+    /// Numbers of the runs that no journal has, as ranges: from the first to before the second.
+    pub missing: Vec<[u64; 2]>,
+}
+
+impl Left {
+    /// What the journals in `folder` lack; without a folder, or where its files are replaced, all runs.
+    ///
+    /// # Errors
+    /// A study at fault; a journal that is damaged, or was made by another version.
+    pub fn new(study: &Study, folder: Option<&Path>) -> Result<Self, Error> {
+        let head = Head::new(Bench::new(study).columns()?)?;
+        let rows = match folder {
+            Some(folder) if !may_overwrite() => journal::read(folder, &head)?,
+            _ => HashMap::new(),
+        };
+        let mut missing: Vec<[u64; 2]> = Vec::new();
+        for number in 0..study.runs() {
+            if rows.contains_key(&study.name(&study.settings(number))) {
+                continue;
+            }
+            match missing.last_mut() {
+                Some([_, end]) if *end == number => *end += 1,
+                _ => missing.push([number, number + 1]),
+            }
+        }
+        Ok(Self { head, missing })
+    }
 }
 
 /// Carries out the runs of these numbers on this thread and writes them as a journal.

@@ -15,7 +15,7 @@ pub mod table;
 use std::path::{Path, PathBuf};
 
 pub use bench::{Bench, Row};
-pub use carry_out::{Carried, Plan, Progress, Runs, Shard, Summary, carry_out, rows};
+pub use carry_out::{Carried, Left, Plan, Progress, Runs, Shard, Summary, carry_out, rows};
 pub use design::{Design, Points};
 pub(crate) use factor::with_unit;
 pub use factor::{Distribution, Drawn, Values};

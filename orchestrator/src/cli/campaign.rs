@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt;
-use crate::campaign::{self, Bench, Plan, Progress, Runs, Shard, Study, carry_out};
+use crate::campaign::{self, Bench, Left, Plan, Progress, Runs, Shard, Study, carry_out};
 use crate::error::Error;
 use crate::results::{Results, unused};
 
@@ -68,7 +68,7 @@ fn range(text: &str) -> Result<std::ops::Range<u64>, String> {
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let study = Study::read(&arguments.study)?;
     if arguments.plan {
-        return plan(&study, arguments.json);
+        return plan(&study, arguments.out.as_deref(), arguments.json);
     }
     if let Some(rows) = &arguments.rows {
         if rows.end > study.runs() {
@@ -157,12 +157,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn plan(study: &Study, json: bool) -> Result<ExitCode, Error> {
+fn plan(study: &Study, folder: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
     let bench = Bench::new(study);
     bench.check()?;
+    if let Some(folder) = folder {
+        Results::check(folder)?;
+    }
     let columns = bench.columns()?;
     let files: Vec<&PathBuf> = study.files().keys().collect();
     if json {
+        let Left { head, missing } = Left::new(study, folder)?;
         println!(
             "{}",
             serde_json::json!({
@@ -172,6 +176,8 @@ fn plan(study: &Study, json: bool) -> Result<ExitCode, Error> {
                 "folder": study.folder(),
                 "files": files,
                 "columns": columns,
+                "head": head,
+                "missing": missing,
             })
         );
         return Ok(ExitCode::SUCCESS);
