@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -49,6 +50,22 @@ pub struct Shard {
     pub part: u64,
     /// Of how many.
     pub of: u64,
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    /// Reads `I/N`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = "expected I/N with 1 <= I <= N, such as 1/4";
+        let (part, of) = text.split_once('/').ok_or(expected)?;
+        let part = part.trim().parse().map_err(|_| expected)?;
+        let of = of.trim().parse().map_err(|_| expected)?;
+        match (1..=of).contains(&part) {
+            true => Ok(Self { part, of }),
+            false => Err(expected.to_string()),
+        }
+    }
 }
 
 impl Shard {
