@@ -102,7 +102,7 @@ def table(program, folder, rows):
         found[count] = finish([program, "campaign", study, "--out", out, "--json"])[0]
     sizes = {name: sum(f.stat().st_size for f in out.glob(name)) / rows
              for name in ("journal/*.jsonl", "runs.csv", "runs.parquet")}
-    write = (found[rows] - found[rows // 10]) / (rows - rows // 10)
+    write = max(found[rows] - found[rows // 10], 0.0) / (rows - rows // 10)
     # Rows of other runs, many more than are made here, which it reads and keeps.
     journal = out / "journal/all.jsonl"
     line = journal.read_bytes().splitlines(keepends=True)[-1]
