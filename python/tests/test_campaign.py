@@ -278,12 +278,14 @@ class Driver(Folder):
             ("two\n", "expected the number of parameters"),
             ("", "is empty"),
             ("2\nscale nan\nspecimen_stiffness 99\n", "expected a finite number"),
+            ("2\nscale -1\nspecimen_stiffness 99\n", "studies/study.toml: `scale`: `-1.0` is not positive"),
         ):
             Path("params.in").write_text(params)
             Path("results.out").write_text("1 2\n")
             status, said = self.drive()
             self.assertEqual(status, 2, said)
             self.assertIn(expected, said)
+            self.assertNotIn("/shakebench-", said)
             self.assertFalse(Path("results.out").exists())
         Path("params.in").unlink()
         status, said = self.drive()

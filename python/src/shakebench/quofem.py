@@ -245,7 +245,11 @@ def evaluate(
             ),
             encoding="utf-8",
         )
-        plan = call(["campaign", text(file), "--plan", "--json"])
+        try:
+            plan = call(["campaign", text(file), "--plan", "--json"])
+        except InputError as error:
+            # The user knows the study under another name.
+            raise InputError(str(error).replace(text(file), text(study))) from None
         columns = [column["name"] for column in plan["columns"]]
         for quantity in wanted:
             if quantity not in columns:
@@ -288,6 +292,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     options = parser.parse_args(arguments)
     part = options.results.with_name(options.results.name + ".part")
     try:
+        if not options.results.absolute().parent.is_dir():
+            raise InputError(f"{options.results}: there is no such folder")
         # What an earlier run left would be taken for this one's.
         options.results.unlink(missing_ok=True)
         figures = evaluate(
