@@ -242,11 +242,10 @@ impl Search<'_> {
         // One evaluation gives objective and margins.
         let evaluate = |at: &[f64]| -> Option<Trial> {
             let values = self.values(at);
-            let known = trials
-                .borrow()
-                .iter()
-                .find(|own| own.values == values)
-                .cloned();
+            let is_near = |a: &f64, b: &f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+            let is_known =
+                |own: &&Trial| own.values.iter().zip(&values).all(|(a, b)| is_near(a, b));
+            let known = trials.borrow().iter().find(is_known).cloned();
             if known.is_some() {
                 return known;
             }

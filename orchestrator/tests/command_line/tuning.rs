@@ -21,7 +21,7 @@ gain_margin = "8 dB"
 phase_margin = "40 deg"
 [tune.parameters]
 "control.proportional_gain" = ["2 V/in", "20 V/in"]
-"control.velocity_feedforward_gain" = ["0.02 V s/in", "0.5 V s/in"]
+"control.acceleration_feedforward_gain" = ["-0.005 V s2/in", "0.005 V s2/in"]
 "#;
 
 fn tuned(study: &str) -> serde_json::Value {
