@@ -122,8 +122,13 @@ def single_run(study: Dict[str, Any], values: Dict[str, str], folder: Path) -> D
             raise InputError(f"`{name}`: {key} is given twice")
         written = factors.pop(key) if key in factors else fixed.pop(key)
         run[key] = _value(key, written, value)
+        if isinstance(written, dict) and "of" in written:
+            # Several variables that are one factor.
+            values_of = run[key] if isinstance(run[key], dict) else {"list": run[key]}
+            run[key] = {**values_of, "of": written["of"]}
     for key, written in factors.items():
-        if not isinstance(written, list) or len(written) != 1:
+        single = written.get("list") if isinstance(written, dict) else written
+        if not isinstance(single, list) or len(single) != 1:
             raise InputError(
                 f"[factors] {key} is not among the parameters; give it there, or its value in [fixed]"
             )
@@ -167,7 +172,8 @@ def _value(key: str, written: Any, value: str) -> Any:
     sample = written
     while isinstance(sample, (dict, list)):
         if isinstance(sample, dict):
-            sample = [part for name, part in sample.items() if name not in ("steps", "relative")]
+            others = ("steps", "relative", "of")
+            sample = [part for name, part in sample.items() if name not in others]
         sample = sample[0] if sample else None
     unit = ""
     if isinstance(sample, str):
