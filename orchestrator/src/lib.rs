@@ -30,5 +30,6 @@ pub mod run;
 pub mod run_comparison;
 pub mod ssp;
 pub mod system;
+pub mod tune;
 pub mod validate;
 pub use units;

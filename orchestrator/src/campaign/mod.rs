@@ -3,11 +3,13 @@
 pub mod analysis;
 mod bench;
 mod carry_out;
+mod command;
 mod design;
 mod factor;
 mod files;
 mod journal;
 pub mod page;
+mod row;
 mod setting;
 mod study;
 pub mod table;
@@ -15,10 +17,13 @@ pub mod table;
 use std::path::{Path, PathBuf};
 
 pub use bench::{Bench, Row};
-pub use carry_out::{Carried, Left, Plan, Progress, Shard, Summary, carry_out, rows};
+pub use carry_out::{Carried, Left, Plan, Progress, Runs, Shard, Summary, carry_out, rows};
 pub use design::{Design, Points};
+pub(crate) use factor::with_unit;
 pub use factor::{Distribution, Drawn, Values};
 pub use journal::Head;
+pub(crate) use journal::IDENTITY;
+pub use setting::Key;
 pub use study::{Factor, Limit, Study};
 
 use crate::error::Error;

@@ -27,6 +27,7 @@ struct Written {
     factors: BTreeMap<String, toml::Value>,
     #[serde(default)]
     limits: BTreeMap<String, Setting>,
+    tune: Option<toml::Table>,
 }
 
 #[derive(Deserialize)]
@@ -95,6 +96,8 @@ pub struct Study {
     pub intensity: String,
     /// Figures that are asked for by other programs.
     pub results: Vec<String>,
+    /// What is searched, for `shakebench tune`.
+    pub tune: Option<toml::Table>,
     /// Places in `factors` of those that are crossed with every point.
     crossed: Vec<usize>,
     /// Places in `factors` of the others, a dimension of the points each.
@@ -144,12 +147,16 @@ impl Study {
         let mut factors: Vec<Factor> = Vec::new();
         for (name, value) in written.factors {
             let at = at("factors", &name);
-            let key = Key::of(&name).map_err(&at)?;
-            let mut values = Values::read(&value).map_err(&at)?;
+            let (mut values, of) = Values::read(&value).map_err(&at)?;
+            let key = match of {
+                Some(variables) => Key::together(&name, variables),
+                None => Key::of(&name),
+            };
+            let key = key.map_err(&at)?;
             if key == Key::Record {
                 values = whole_folders(values, &folder).map_err(&at)?;
             }
-            if values.is_relative() && !matches!(key, Key::Variable(_)) {
+            if values.is_relative() && key.variables().is_empty() {
                 return Err(at(
                     "`relative` belongs to a variable of an instance".to_string()
                 ));
@@ -220,6 +227,7 @@ impl Study {
             limits: limits.collect(),
             intensity: written.study.intensity,
             results: written.study.results,
+            tune: written.tune,
             crossed,
             sampled,
             points,
@@ -230,7 +238,7 @@ impl Study {
     }
 
     /// An error of this study.
-    pub(super) fn fault(&self, reason: &str) -> Error {
+    pub(crate) fn fault(&self, reason: &str) -> Error {
         Error::File {
             path: self.path.clone(),
             reason: reason.to_string(),
@@ -314,18 +322,13 @@ impl Study {
                 text.clone_from(sum);
             }
             let how = if relative { "*=" } else { "=" };
+            let name = match key.variables() {
+                [] => name.to_string(),
+                variables => variables.join(" "),
+            };
             sum.update(format!("{name}{how}{text}\n").as_bytes());
         };
-        let mut all: Vec<(&str, &Key, &Setting, bool)> = self
-            .fixed
-            .iter()
-            .map(|(name, key, value)| (name.as_str(), key, value, false))
-            .collect();
-        let varied = self.factors.iter().zip(settings);
-        all.extend(varied.map(|(factor, value)| {
-            let is_relative = factor.values.is_relative();
-            (factor.name.as_str(), &factor.key, value, is_relative)
-        }));
+        let mut all: Vec<(&str, &Key, &Setting, bool)> = self.all_values(settings).collect();
         all.sort_by_key(|(name, ..)| *name);
         for (name, key, value, relative) in all {
             add(name, key, value, relative);
@@ -347,6 +350,20 @@ impl Study {
     #[must_use]
     pub fn folder(&self) -> PathBuf {
         folder(&self.path)
+    }
+
+    /// Every key with its value in a run with these factors, and whether that is times the system's own.
+    pub(super) fn all_values<'a>(
+        &'a self,
+        settings: &'a [Setting],
+    ) -> impl Iterator<Item = (&'a str, &'a Key, &'a Setting, bool)> {
+        let fixed = self.fixed.iter();
+        let fixed = fixed.map(|(name, key, value)| (name.as_str(), key, value, false));
+        let varied = self.factors.iter().zip(settings);
+        fixed.chain(varied.map(|(factor, value)| {
+            let is_relative = factor.values.is_relative();
+            (factor.name.as_str(), &factor.key, value, is_relative)
+        }))
     }
 
     /// Every key with each of its values in the study.

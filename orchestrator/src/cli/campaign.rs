@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt;
-use crate::campaign::{self, Bench, Left, Plan, Progress, Shard, Study, carry_out};
+use crate::campaign::{self, Bench, Left, Plan, Progress, Runs, Shard, Study, carry_out};
 use crate::error::Error;
 use crate::results::{Results, unused};
 
@@ -23,7 +23,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Carry out the I-th of N parts of the study; without this, the parts in the folder are collected
-    #[arg(long, value_name = "I/N", value_parser = shard)]
+    #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Runs at a time [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -37,17 +37,6 @@ pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
-}
-
-fn shard(text: &str) -> Result<Shard, String> {
-    let expected = "expected I/N with 1 <= I <= N, such as 1/4";
-    let (part, of) = text.split_once('/').ok_or(expected)?;
-    let part = part.trim().parse().map_err(|_| expected)?;
-    let of = of.trim().parse().map_err(|_| expected)?;
-    match (1..=of).contains(&part) {
-        true => Ok(Shard { part, of }),
-        false => Err(expected.to_string()),
-    }
 }
 
 fn range(text: &str) -> Result<std::ops::Range<u64>, String> {
@@ -103,15 +92,20 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         jobs: arguments.jobs.map(usize::from),
     };
     let is_shown = std::sync::Once::new();
-    let carried = carry_out(&study, &how, asked, &|Progress { done, of }| {
-        is_shown.call_once(|| {
-            bar.set_length(of);
+    let carried = carry_out(
+        &Bench::new(&study),
+        &how,
+        asked,
+        &|Progress { done, of }| {
+            is_shown.call_once(|| {
+                bar.set_length(of);
+                bar.set_position(done);
+                bar.reset_eta();
+                bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
+            });
             bar.set_position(done);
-            bar.reset_eta();
-            bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
-        });
-        bar.set_position(done);
-    });
+        },
+    );
     bar.finish_and_clear();
     let carried = carried?;
     let summary = &carried.summary;

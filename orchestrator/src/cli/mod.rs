@@ -34,6 +34,7 @@ mod rig;
 pub mod rigs;
 pub mod run;
 mod terminal;
+pub mod tune;
 pub mod validate;
 
 use std::path::PathBuf;
@@ -127,6 +128,8 @@ enum Command {
     Rigs(rigs::Arguments),
     /// Run a system on a motion
     Run(Box<run::Arguments>),
+    /// Search a controller's parameters over a study, within stability margins
+    Tune(tune::Arguments),
     /// Say what is wrong with an FMU or an SSP archive
     Validate(validate::Arguments),
 }
@@ -168,6 +171,7 @@ pub fn main() -> ExitCode {
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
         Some(Command::Rigs(arguments)) => rigs::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
+        Some(Command::Tune(arguments)) => tune::execute(&arguments),
         Some(Command::Validate(arguments)) => validate::execute(&arguments),
     };
     let status = done.unwrap_or_else(|error| {
