@@ -4,6 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
+use super::percentile::percentile;
 use crate::campaign::table::Table;
 use crate::master::Ending;
 
@@ -87,24 +88,31 @@ impl Runs {
     }
 }
 
-/// Ranks the values of `factor` by `figure` over points that they share: `crossings` runs follow each other
-/// at each point, one for each combination of the crossed factors. Those named in `among` part the
-/// comparison; over others the mean is taken.
+/// What is ranked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ranked {
+    /// The factor, one that is crossed with every point.
+    pub factor: String,
+    /// Other crossed factors that part the comparison; over the rest the mean is taken.
+    pub among: Vec<String>,
+    /// Runs at each point, which follow each other.
+    pub crossings: u64,
+}
+
+/// Ranks the values of a factor by `figure` over points that they share.
 #[must_use]
-pub fn ranking(
-    table: &Table,
-    factor: &str,
-    among: &[&str],
-    figure: &str,
-    crossings: u64,
-    seed: u64,
-) -> Ranking {
+pub fn ranking(table: &Table, ranked: &Ranked, figure: &str, seed: u64) -> Ranking {
+    let Ranked {
+        factor,
+        among,
+        crossings,
+    } = ranked;
     let numbers = table.numbers("number");
     let values = table.texts(factor);
     let others: Vec<Vec<&str>> = among.iter().map(|name| table.texts(name)).collect();
     let errors = table.numbers(figure);
     let ended = table.texts("ended");
-    let points = numbers.iter().map(|n| (*n as u64) / crossings.max(1));
+    let points = numbers.iter().map(|n| (*n as u64) / (*crossings).max(1));
     let points: Vec<usize> = points.map(|point| point as usize).collect();
     let count = points.iter().max().map_or(0, |last| last + 1);
     // In the order in which they come.
@@ -181,8 +189,8 @@ pub fn ranking(
         }
     }
     Ranking {
-        factor: factor.to_string(),
-        among: among.iter().map(|name| (*name).to_string()).collect(),
+        factor: factor.clone(),
+        among: among.clone(),
         points: count,
         standings,
         pairs,
@@ -214,21 +222,6 @@ fn sorted(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted
-}
-
-/// The percentile `part` of sorted values, straight between neighbours.
-fn percentile(sorted: &[f64], part: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else {
-        return f64::NAN;
-    };
-    let place = part * last as f64;
-    let (low, rest) = (place.floor() as usize, place.fract());
-    let high = (low + 1).min(last);
-    // Of two infinite ones there is no difference.
-    if rest == 0.0 || sorted[low] == sorted[high] {
-        return sorted[low];
-    }
-    sorted[low] + rest * (sorted[high] - sorted[low])
 }
 
 #[cfg(test)]
@@ -274,14 +267,22 @@ mod tests {
             ],
             rows,
         };
-        let found = ranking(&table, "controller", &["control_model"], "error", 4, 3);
+        let ranked = Ranked {
+            factor: "controller".to_string(),
+            among: vec!["control_model".to_string()],
+            crossings: 4,
+        };
+        let found = ranking(&table, &ranked, "error", 3);
         assert_eq!(found.points, 40);
         let b = &found.standings[0];
         assert_eq!((b.value.as_str(), b.among[0].as_str()), ("b", "own"));
         assert_eq!((b.complete, b.tripped, b.failed), (39, 1, 0));
         assert!((b.error_percent.p50.unwrap() - 7.61).abs() < 0.02);
         let pair = &found.pairs[0];
-        assert_eq!((pair.better.as_str(), pair.worse.as_str(), pair.part), ("a", "b", 1.0));
+        assert_eq!(
+            (pair.better.as_str(), pair.worse.as_str(), pair.part),
+            ("a", "b", 1.0)
+        );
         assert!(pair.difference_percent[0] > 2.0);
     }
 }
