@@ -25,7 +25,6 @@ pub mod pack;
 pub mod program;
 pub mod report;
 pub mod results;
-pub mod rigs;
 pub mod run;
 pub mod run_comparison;
 pub mod ssp;

@@ -39,6 +39,8 @@ pub struct Row {
 pub struct Bench<'a> {
     study: &'a Study,
     systems: Mutex<HashMap<String, Arc<Assembled>>>,
+    /// FMUs of the built-in systems, by version.
+    libraries: Mutex<HashMap<String, Arc<Mutex<FmuLibrary>>>>,
     motions: Motions,
     /// Rules on the recordings of each rig, by what makes it.
     rigs: Mutex<HashMap<String, Arc<Mutex<Option<Tuned>>>>>,
@@ -49,7 +51,7 @@ type Tuned = Result<Arc<Rules>, String>;
 /// A system whose FMUs are open.
 struct Assembled {
     file: SystemFile,
-    library: Mutex<FmuLibrary>,
+    library: Arc<Mutex<FmuLibrary>>,
     /// As it is without what the study varies.
     system: System,
 }
@@ -61,6 +63,7 @@ impl<'a> Bench<'a> {
         Self {
             study,
             systems: Mutex::default(),
+            libraries: Mutex::default(),
             motions: Motions::default(),
             rigs: Mutex::default(),
         }
@@ -319,11 +322,26 @@ impl<'a> Bench<'a> {
             return Ok(found.clone());
         }
         let file = system_file(request, None)?;
-        let mut library = FmuLibrary::of(*fmi, &file);
-        let system = assemble(&file, &[], &mut |name| library.find(name))?;
+        let library = || Arc::new(Mutex::new(FmuLibrary::of(*fmi, &file)));
+        let library = match file.directory.is_none() && file.package.is_none() {
+            // Built-in systems have most of their components in common.
+            true => {
+                let libraries = self.libraries.lock();
+                let mut libraries = libraries.unwrap_or_else(PoisonError::into_inner);
+                libraries
+                    .entry(fmi.to_string())
+                    .or_insert_with(library)
+                    .clone()
+            }
+            false => library(),
+        };
+        let system = {
+            let mut library = library.lock().unwrap_or_else(PoisonError::into_inner);
+            assemble(&file, &[], &mut |name| library.find(name))?
+        };
         let found = Arc::new(Assembled {
             file,
-            library: Mutex::new(library),
+            library,
             system,
         });
         Ok(open().entry(key).or_insert(found).clone())

@@ -57,6 +57,7 @@ pub fn findings(study: &Study, carried: &Carried) -> Result<Findings, Error> {
             })
             .collect(),
         design: study.analysed(&carried.table),
+        ranked: study.ranked(),
         seed: study.seed,
     };
     let command = |number: usize| bench.command(number as u64);

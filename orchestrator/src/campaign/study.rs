@@ -108,11 +108,16 @@ pub struct Study {
 }
 
 impl Study {
-    /// Reads a study; paths in it count from its folder.
+    /// Reads a study; paths in it count from its folder. A name without an ending is that of a study that
+    /// comes with the program, where there is no such file.
     ///
     /// # Errors
     /// The place and what was expected there.
     pub fn read(path: &Path) -> Result<Self, Error> {
+        let built_in = BUILT_IN.iter().find(|(name, _)| Path::new(name) == path);
+        if let (Some((_, text)), false) = (built_in, path.exists()) {
+            return Self::parse(path, (*text).to_string());
+        }
         let text = std::fs::read_to_string(path).map_err(|error| Error::File {
             path: path.to_path_buf(),
             reason: match error.kind() {
@@ -276,6 +281,23 @@ impl Study {
         }
     }
 
+    /// What is ranked on points that it shares: the controllers where they are crossed, otherwise the first
+    /// crossed factor that chooses a component.
+    pub(super) fn ranked(&self) -> Option<analysis::Ranked> {
+        let crossed = self.crossed.iter().map(|&place| &self.factors[place]);
+        let choosing: Vec<&Factor> = crossed
+            .filter(|factor| factor.key.is_structural())
+            .collect();
+        let controllers = choosing.iter().find(|factor| factor.key == Key::System);
+        let ranked = controllers.or(choosing.first())?;
+        let others = choosing.iter().filter(|factor| factor.name != ranked.name);
+        Some(analysis::Ranked {
+            factor: ranked.name.clone(),
+            among: others.map(|factor| factor.name.clone()).collect(),
+            crossings: self.crossings(),
+        })
+    }
+
     /// Runs at each point of the design.
     fn crossings(&self) -> u64 {
         let counts = self
@@ -401,6 +423,9 @@ impl Study {
         Ok(sums)
     }
 }
+
+/// The studies that come with the program.
+const BUILT_IN: [(&str, &str); 1] = [("rigs", include_str!("../../studies/rigs.toml"))];
 
 /// How the name of a column begins that holds the peak of a signal.
 pub(super) const PEAK: &str = "peak.";

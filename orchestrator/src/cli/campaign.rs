@@ -9,15 +9,18 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::interrupt;
 use crate::campaign::{self, Bench, Left, Plan, Progress, Runs, Shard, Study, carry_out};
 use crate::error::Error;
+use crate::report::columns::aligned;
 use crate::results::{Results, unused};
 
 /// Options of `shakebench campaign`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
-    shakebench campaign STUDY.toml --out RUNS\n\n\
+    shakebench campaign STUDY.toml --out RUNS\n  \
+    shakebench campaign rigs --shard 1/8 --out RIGS\n\n\
     The same command goes on where it was stopped. A study that was extended runs what is new.")]
 pub struct Arguments {
-    /// The study: what is fixed, what varies, and how (docs/campaigns.md)
+    /// The study: what is fixed, what varies, and how (docs/campaigns.md); or `rigs`, the controllers on 200
+    /// rigs that are not the one they were designed for
     study: PathBuf,
     /// Folder for runs.parquet, runs.csv and report.html [default: shakebench-results/STUDY]
     #[arg(long, value_name = "DIR")]
@@ -116,6 +119,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let findings = campaign::findings(&study, &carried)?;
         files = campaign::write(&study, &carried, &findings, &folder)?;
         said = campaign::page::summary(&findings);
+        if let Some(ranking) = &findings.ranking {
+            said += &format!("\n\n{}", aligned(&campaign::page::standings(ranking)));
+            for line in campaign::page::sentences(ranking) {
+                said += &format!("\n{line}");
+            }
+        }
     }
     if arguments.json {
         println!("{}", serde_json::json!(summary));

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub use margins::{Held, held};
 
+use crate::campaign::analysis::percentile;
 use crate::campaign::{Bench, Key, Runs, Study, Values, with_unit};
 use crate::error::Error;
 use crate::report;
@@ -367,10 +368,12 @@ impl Search<'_> {
             .collect();
         let mut all: Vec<f64> = rows.iter().map(|own| own.unwrap_or(STOPPED)).collect();
         let mut complete: Vec<f64> = rows.iter().copied().flatten().collect();
+        all.sort_by(f64::total_cmp);
+        complete.sort_by(f64::total_cmp);
         let stopped = all.len() - complete.len();
         Ok(Score {
-            quantile: quantile(&mut all, self.asked.quantile),
-            median: quantile(&mut complete, 0.5),
+            quantile: percentile(&all, self.asked.quantile),
+            median: percentile(&complete, 0.5),
             stopped,
             runs: rows.len(),
         })
@@ -427,18 +430,6 @@ fn margin(trial: Option<Trial>, own: impl Fn(&Held) -> Option<f64>, asked: f64) 
         Some(held) if held.is_stable => own(&held).map_or(MUCH, |own| own - asked),
         _ => -MUCH,
     }
-}
-
-/// The value below which a share of all lies, straight between neighbours; NaN of none.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let Some(last) = values.len().checked_sub(1) else {
-        return f64::NAN;
-    };
-    let at = share * last as f64;
-    let low = (at as usize).min(last);
-    let high = (low + 1).min(last);
-    values[low] + (values[high] - values[low]) * (at - low as f64)
 }
 
 /// Runs that the search sees, runs that it does not, and by what they are told apart: the last values of the
@@ -597,15 +588,6 @@ impl Tuned {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn quantiles_lie_between_neighbours() {
-        let mut values = [4.0, 1.0, 3.0, 2.0, 5.0];
-        assert_eq!(quantile(&mut values, 0.5), 3.0);
-        assert_eq!(quantile(&mut values, 0.95), 4.8);
-        assert_eq!(quantile(&mut values, 1.0), 5.0);
-        assert!(quantile(&mut [], 0.5).is_nan());
-    }
 
     /// What the optimiser calls a constraint that is kept: one that is not negative.
     #[test]

@@ -8,8 +8,8 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::percentile::percentile;
 use super::sobol_indices::Banded;
-use crate::rigs::percentile;
 
 /// Shuffles; a share that one of them reaches is chance.
 const SHUFFLES: usize = 100;

@@ -5,8 +5,10 @@ mod explained;
 mod fragility;
 mod groups;
 mod importance;
+mod percentile;
 mod probit;
 mod quantiles;
+mod ranking;
 mod sobol_indices;
 mod worst;
 
@@ -16,7 +18,9 @@ pub use endings::{Ended, Endings};
 pub use fragility::{Curve, Fit, Fragility, Lognormal, Observed, Why};
 pub use groups::Group;
 pub use importance::{Importance, Method, Share};
+pub(crate) use percentile::percentile;
 pub use quantiles::{Over, Quantiles};
+pub use ranking::{Pair, Ranked, Ranking, Spread, Standing};
 pub use worst::Worst;
 
 use super::table::Table;
@@ -34,6 +38,8 @@ pub struct Settings {
     pub limits: Vec<Limit>,
     /// How the rows came about.
     pub design: Design,
+    /// Which factor's values are ranked, where one is crossed with every point.
+    pub ranked: Option<Ranked>,
     /// Seed of resampling and shuffling.
     pub seed: u64,
 }
@@ -83,6 +89,8 @@ pub struct Findings {
     pub fragility: Vec<Fragility>,
     /// Which factor matters, for the error and whatever else varies.
     pub importance: Vec<Importance>,
+    /// The values of a crossed factor on the points that they share.
+    pub ranking: Option<Ranking>,
     /// The ten worst runs, the worst first.
     pub worst: Vec<Worst>,
     /// Seed of what was resampled.
@@ -101,6 +109,10 @@ pub fn analyse(table: &Table, settings: &Settings, command: &dyn Fn(usize) -> St
         intensity_unit: unit.cloned(),
         fragility: fragility::fragility(&runs, settings),
         importance: importance::importance(&runs, settings),
+        ranking: settings
+            .ranked
+            .as_ref()
+            .map(|ranked| ranking::ranking(table, ranked, ERROR, settings.seed)),
         worst: worst::worst(&runs, command),
         seed: settings.seed,
     }

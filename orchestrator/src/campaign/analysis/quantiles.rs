@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::endings::{Ended, Runs};
+use super::percentile::percentile;
 use crate::campaign::table::{Kind, Role};
-use crate::rigs::percentile;
 
 /// Figures of the motion that was played, not of how it was followed.
 const OF_THE_MOTION: [&str; 2] = ["pga_g", "peak_reference_m"];

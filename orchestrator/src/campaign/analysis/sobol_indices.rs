@@ -8,7 +8,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::rigs::percentile;
+use super::percentile::percentile;
 
 /// Draws of the bootstrap.
 const DRAWS: usize = 1000;

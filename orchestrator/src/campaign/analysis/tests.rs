@@ -102,6 +102,7 @@ pub(crate) fn settings() -> Settings {
             above: 0.0508,
         }],
         design: Design::Other,
+        ranked: None,
         seed: 1,
     }
 }

@@ -1,6 +1,7 @@
 //! The page of a study: the sentence first, then pictures, then tables.
 
 mod pictures;
+mod ranking;
 mod tables;
 mod words;
 
@@ -8,6 +9,7 @@ use super::analysis::{Findings, Method};
 use super::table::Table;
 use crate::report::{Cell, Report, Section};
 
+pub use ranking::{sentences, standings};
 pub use words::summary;
 
 /// What the page says beside the findings.
@@ -25,6 +27,7 @@ pub struct About {
 #[must_use]
 pub fn report(table: &Table, findings: &Findings, about: About) -> Report {
     let mut sections = vec![error(table, findings)];
+    sections.extend(findings.ranking.as_ref().map(ranking::section));
     sections.push(fragility(findings));
     sections.extend(importance(findings));
     sections.push(Section {
