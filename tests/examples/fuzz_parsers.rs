@@ -3,7 +3,7 @@
 //! `cargo run --release -p acceptance --example fuzz_parsers -- MINUTES [SEED] [PARSER...]`
 //!
 //! What panics, takes long, fills the memory or is refused without its file's name is kept in
-//! `tests/corpus/found/PARSER/`, where the test `components corpus` reads it ever after. What ends the
+//! `tests/corpus/found/PARSER/`. What ends the
 //! process (a stack that overflows) is in the folder that is printed first.
 
 use std::collections::BTreeMap;

@@ -170,10 +170,7 @@ fn words(system: &system::System, operation: &Operation) -> String {
         }
         Operation::Iterate { operations, .. } => {
             let parts = operations.iter().map(|part| words(system, part));
-            format!(
-                "solve together: {}",
-                parts.collect::<Vec<_>>().join("; ")
-            )
+            format!("solve together: {}", parts.collect::<Vec<_>>().join("; "))
         }
     }
 }

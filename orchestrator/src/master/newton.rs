@@ -11,8 +11,9 @@ use super::MasterError;
 const EXACTLY: (f64, f64) = (1e-12, f64::MIN_POSITIVE);
 /// The same where nothing comes closer: some FMUs compute with a tolerance of their own.
 const ATTAINABLE: (f64, f64) = (1e-9, 1e-12);
-/// Substitution goes on as long as each pass brings the values so much closer.
-const SETTLING: f64 = 0.3;
+/// Substitution goes on as long as two passes bring the values so much closer: where two components
+/// take what the other gave in the pass before, every other pass may bring nothing.
+const SETTLING: f64 = 0.5;
 /// A derivative serves as long as its steps bring the values so much closer.
 const QUICKLY: f64 = 0.1;
 /// Newton steps at most.
@@ -225,19 +226,20 @@ impl<R: Round> Search<'_, R> {
             *size = self.size(values, at);
         }
         let first = self.distance(values, sizes);
-        let mut before = f64::INFINITY;
+        let (mut before, mut earlier) = (f64::INFINITY, f64::INFINITY);
         loop {
             if self.has_settled(0..values.len(), values, EXACTLY) {
                 return Ok(true);
             }
             let distance = self.distance(values, sizes);
             // Near the end a value that passes through zero stands out, though all are good.
-            if distance >= before && self.has_settled(0..values.len(), values, ATTAINABLE) {
+            let stands = distance >= before.min(earlier);
+            if stands && self.has_settled(0..values.len(), values, ATTAINABLE) {
                 return Ok(true);
             }
             let goes_on = match self.free.is_empty() {
                 true => self.passes < MOST_PASSES,
-                false => distance <= SETTLING * before || distance < before.min(ATTAINABLE.0),
+                false => distance <= SETTLING * earlier || distance < earlier.min(ATTAINABLE.0),
             };
             if !goes_on {
                 if distance > first && !self.free.is_empty() {
@@ -246,7 +248,7 @@ impl<R: Round> Search<'_, R> {
                 }
                 return Ok(false);
             }
-            before = distance;
+            (earlier, before) = (before, distance);
             values.copy_from_slice(self.back);
             self.send(values)?;
         }

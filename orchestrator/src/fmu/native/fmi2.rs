@@ -289,15 +289,7 @@ impl Fmi2 {
                     };
                     let (seed, sensitivity) = values;
                     let (unknowns, knowns) = (unknowns.as_ptr(), knowns.as_ptr());
-                    Ok(derivative(
-                        c,
-                        unknowns,
-                        n,
-                        knowns,
-                        count,
-                        seed,
-                        sensitivity,
-                    ))
+                    Ok(derivative(c, unknowns, n, knowns, count, seed, sensitivity))
                 }
                 _ => match table.state.carry_out(call, &self.instance) {
                     Some(outcome) => outcome,

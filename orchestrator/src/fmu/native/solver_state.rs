@@ -120,12 +120,7 @@ impl KeptStates {
         Ok((status, inner.handle))
     }
 
-    fn set(
-        &self,
-        call: &Call,
-        fmu: &mut dyn Endpoint,
-        now: &mut SolverState,
-    ) -> Result<i32, Lost> {
+    fn set(&self, call: &Call, fmu: &mut dyn Endpoint, now: &mut SolverState) -> Result<i32, Lost> {
         let (status, _) = self.pass_on(call, fmu)?;
         if let Some((_, kept)) = self.all.get(&call.handle) {
             now.clone_from(kept);
