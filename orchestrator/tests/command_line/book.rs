@@ -209,6 +209,11 @@ fn campaigns() {
 }
 
 #[test]
+fn tuning() {
+    run_page("tuning.md");
+}
+
+#[test]
 fn iterative_control() {
     run_page("iterative-control.md");
 }
