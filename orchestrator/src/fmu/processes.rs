@@ -80,7 +80,7 @@ impl<'a> Processes<'a> {
 /// What to do where a library takes Python's functions from whoever loads it, as PythonFMU's does.
 const PYTHON: &str = "it runs Python, and the library of Python has to be loaded before it: set \
                       LD_PRELOAD to the file that `python3 -c \"import sysconfig as s; \
-                      print(s.get_config_var('LIBDIR') + '/' + s.get_config_var('LDLIBRARY'))\"` prints";
+                      print(s.get_config_var('LIBDIR') + '/' + s.get_config_var('INSTSONAME'))\"` prints";
 
 /// Whether a library could not be loaded for want of Python's.
 fn lacks_python(reason: &str) -> bool {
