@@ -1,6 +1,7 @@
 //! Hydraulic shake tables as FMI components, co-simulated
 
 pub mod benchmark;
+pub mod campaign;
 pub mod cli;
 pub mod commission;
 pub mod comparison;

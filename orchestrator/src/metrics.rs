@@ -92,6 +92,22 @@ pub fn tracking(
     displacement: &[f64],
     acceleration: &[f64],
 ) -> Result<Tracking, MetricsError> {
+    let mut figures = errors(reference, displacement, acceleration)?;
+    let wanted = &reference.acceleration[..acceleration.len()];
+    let moves = peak(wanted) > 0.0;
+    figures.laboratory = moves.then(|| Laboratory::new(wanted, acceleration, reference.dt));
+    Ok(figures)
+}
+
+/// As [`tracking`], without what laboratories read off a test, which takes most of the time.
+///
+/// # Errors
+/// As [`tracking`].
+pub fn errors(
+    reference: &Motion,
+    displacement: &[f64],
+    acceleration: &[f64],
+) -> Result<Tracking, MetricsError> {
     let samples = acceleration.len();
     if displacement.len() != samples || samples > reference.len() {
         return Err(MetricsError::Lengths {
@@ -126,7 +142,7 @@ pub fn tracking(
         peak_acceleration_error: peak(&a_error),
         correlation: correlation(a_ref, acceleration),
         delay: delay(a_ref, acceleration, reference.dt),
-        laboratory: (peak(a_ref) > 0.0).then(|| Laboratory::new(a_ref, acceleration, reference.dt)),
+        laboratory: None,
     })
 }
 

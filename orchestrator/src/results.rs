@@ -77,6 +77,8 @@ pub struct Results {
     names: Vec<String>,
     /// Files of an earlier run that do not stay.
     replaced: Vec<String>,
+    /// Whether files that differ are replaced: what they were made of is kept elsewhere.
+    supersedes: bool,
 }
 
 impl Results {
@@ -105,6 +107,7 @@ impl Results {
             staging,
             names: Vec::new(),
             replaced: Vec::new(),
+            supersedes: false,
         })
     }
 
@@ -178,13 +181,18 @@ impl Results {
             .extend(names.iter().map(|name| name.to_string()));
     }
 
+    /// These files replace those of the same names: what the others were made of is kept elsewhere.
+    pub fn supersede(&mut self) {
+        self.supersedes = true;
+    }
+
     /// Whether a file of data that has been written so far would change one that is there; pages, pictures
     /// and summaries follow the data. To be asked before what takes long.
     ///
     /// # Errors
     /// Such a file, unless [`allow_overwriting`] was called.
     pub fn check_existing(&self) -> Result<(), ResultsError> {
-        if may_overwrite() {
+        if self.supersedes || may_overwrite() {
             return Ok(());
         }
         let is_volatile = |name: &&String| {

@@ -1,5 +1,6 @@
 //! Pythons with what `tests/importers` pins, made once under `target/`: the importers of
-//! `requirements.txt`, and SIPPY of `requirements-sippy.txt` apart from them.
+//! `requirements.txt`, and apart from them SIPPY of `requirements-sippy.txt` and Dask of
+//! `requirements-dask.txt`.
 
 use std::{
     ffi::OsStr,
@@ -48,6 +49,17 @@ pub fn sippy() -> Command {
     match make_environment("sippy", "requirements-sippy.txt") {
         Ok(environment) => Command::new(program(&environment)),
         Err(problem) => panic!("no Python with SIPPY: {problem}"),
+    }
+}
+
+/// A command that runs Python with Dask installed, and fmpy beside it.
+///
+/// # Panics
+/// When the environment cannot be made, with what to install.
+pub fn dask() -> Command {
+    match make_environment("dask", "requirements-dask.txt") {
+        Ok(environment) => Command::new(program(&environment)),
+        Err(problem) => panic!("no Python with Dask: {problem}"),
     }
 }
 

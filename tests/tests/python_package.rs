@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use acceptance::python::{importers, python};
+use acceptance::python::{dask, importers, python};
 use shakebench::pack::{self, FmiVersion};
 
 fn root() -> PathBuf {
@@ -22,20 +22,30 @@ fn program() -> PathBuf {
     program
 }
 
-#[test]
-fn package_runs_the_program_and_returns_what_it_computed() {
+/// Runs a module of the package's tests.
+fn unittest(mut python: Command, module: &str) {
     pack::all_fmus().unwrap();
-    let mut command = python();
-    command
-        .args(["-m", "unittest", "-v", "test_package"])
+    python
+        .args(["-m", "unittest", "-v", module])
         .env("PYTHONPATH", root().join("python/src"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
         .env("SHAKEBENCH_PROGRAM", program())
         .env("SHAKEBENCH_FMUS", pack::default_folder().unwrap())
         .current_dir(root().join("python/tests"));
-    let output = command.output().unwrap();
+    let output = python.output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     assert!(said.contains("\nOK"), "{said}");
+}
+
+#[test]
+fn package_runs_the_program_and_returns_what_it_computed() {
+    unittest(python(), "test_package");
+}
+
+#[test]
+fn a_study_on_dask_is_that_of_the_program_though_a_worker_is_killed() {
+    unittest(dask(), "test_campaign");
 }
 
 /// A loop of the importers' pages; what it printed.

@@ -15,6 +15,7 @@ macro_rules! eprintln {
 
 pub mod benchmark;
 pub mod build;
+pub mod campaign;
 pub mod commission;
 pub mod compare;
 pub mod compare_runs;
@@ -82,6 +83,8 @@ enum Command {
     Benchmark(benchmark::Arguments),
     /// Build the components and pack them as FMUs
     Build(build::Arguments),
+    /// Carry out a study of many runs and say what they show
+    Campaign(campaign::Arguments),
     /// Record, identify and validate a rig, and design all controllers on the result
     Commission(commission::Arguments),
     /// Run controllers on records and print the thesis's tables beside the results
@@ -144,6 +147,7 @@ pub fn main() -> ExitCode {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
         Some(Command::Build(arguments)) => build::execute(&arguments),
+        Some(Command::Campaign(arguments)) => campaign::execute(&arguments),
         Some(Command::Commission(arguments)) => commission::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
         Some(Command::CompareRuns(arguments)) => compare_runs::execute(&arguments),

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use controllers::Controller;
 use controllers::pid::PidInput;
 use identification::closed_loop::simulation::Simulation;
+use identification::closed_loop::{Settings, identify};
 use identification::data::{Channel, Recording};
 use serde::Serialize;
 
@@ -25,8 +26,11 @@ use crate::identify::{Form, Identified, from_recordings};
 use crate::report;
 use crate::report::number::significant;
 use crate::results::Results;
+use crate::system::built_in;
 use crate::system::control_model::ControlModel;
+use crate::system::tuning::Rules;
 use crate::units::STANDARD_GRAVITY;
+use crate::units::constants::STROKE;
 
 pub use self::experiment::CONTROLLER;
 
@@ -257,6 +261,34 @@ pub fn record_excitation(request: &Request) -> Result<Recording, Error> {
         None => Ok(played.recording),
         Some(reason) => Err(does_not_run(&reason)),
     }
+}
+
+/// The rules of the controllers on the recording of a bare rig whose components have these parameters; a
+/// sentence says why there are none.
+///
+/// # Errors
+/// A rig that does not run or is not identified, a model that a rule refuses.
+pub fn rules_on_recordings(
+    plant: &str,
+    set: Vec<String>,
+    duration: f64,
+    seed: u64,
+) -> Result<Rules, String> {
+    let asked = Request {
+        plant: plant.to_string(),
+        specimen: built_in::NONE.to_string(),
+        set,
+        level: 0.3 * STANDARD_GRAVITY,
+        stroke: STROKE,
+        duration,
+        seed,
+        fmi: FmiVersion::V3,
+    };
+    let recording = record_excitation(&asked).map_err(|error| error.to_string())?;
+    let found = identify(&[recording], Settings::default()).map_err(|error| error.to_string())?;
+    let file = found.model_file().map_err(|error| error.to_string())?;
+    let model = ControlModel::new(&file, "the rig's model")?;
+    Rules::new(model).map_err(|error| error.to_string())
 }
 
 fn does_not_run(reason: &str) -> Error {

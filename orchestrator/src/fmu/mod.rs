@@ -104,7 +104,7 @@ impl Fmu {
             path: path.to_path_buf(),
             file: file.to_path_buf(),
             description,
-            sha256: hexadecimal(&Sha256::digest(&bytes)),
+            sha256: digest(&bytes),
             is_own: false,
             platforms,
             unpacked: Arc::new(unpacked),
@@ -148,6 +148,11 @@ impl Fmu {
     pub fn file_name(&self) -> String {
         archive::file_name(&self.path)
     }
+}
+
+/// The SHA-256 of bytes, in hexadecimal.
+pub(crate) fn digest(bytes: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(bytes))
 }
 
 /// Bytes as lower-case hexadecimal digits.

@@ -22,10 +22,10 @@ pub use error::MotionError;
 pub use options::{Options, Scaling};
 pub use playable::Motion;
 pub(crate) use playable::peak;
-pub use process::process;
+pub use process::{Unscaled, process};
 pub use record::read_record;
 pub use reference::load_reference;
-pub use source::{built_in, load};
+pub use source::{built_in, built_in_unscaled, load, load_unscaled};
 
 #[cfg(test)]
 mod tests;

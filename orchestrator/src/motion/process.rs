@@ -48,6 +48,59 @@ const MOST_SAMPLES: f64 = 2e7;
 /// # Errors
 /// Options that make no sense, a record that is zero throughout, or a motion beyond the stroke.
 pub fn process(record: &Record, options: &Options) -> Result<Motion, MotionError> {
+    Unscaled::new(record, options)?.scaled(options)
+}
+
+/// A record made playable but for its scale.
+#[derive(Debug, Clone)]
+pub struct Unscaled {
+    name: String,
+    seed: Option<u64>,
+    notes: Vec<String>,
+    /// Displacement, velocity and acceleration, SI.
+    histories: [Vec<f64>; 3],
+}
+
+impl Unscaled {
+    /// Processes a record but for its scale, which is all that is not used of `options`.
+    ///
+    /// # Errors
+    /// Options that make no sense, a record that is zero throughout.
+    pub fn new(record: &Record, options: &Options) -> Result<Self, MotionError> {
+        unscaled(record, options)
+    }
+
+    /// The motion at the scale of `options`, whose other values are those with which it was made.
+    ///
+    /// # Errors
+    /// A motion beyond the stroke, a record at rest.
+    pub fn scaled(&self, options: &Options) -> Result<Motion, MotionError> {
+        let [displacement, velocity, acceleration] = &self.histories;
+        let scaling = options.scaling.unwrap_or(Options::DEFAULT_SCALING);
+        let factor = scaling.factor(&self.name, peak(acceleration), peak(displacement))?;
+        let scaled = |history: &[f64]| history.iter().map(|value| value * factor).collect();
+        let mut motion = Motion {
+            name: self.name.clone(),
+            dt: options.sample_time,
+            displacement: scaled(displacement),
+            velocity: scaled(velocity),
+            acceleration: scaled(acceleration),
+            notes: self.notes.clone(),
+            seed: self.seed,
+        };
+        motion.notes.push(format!(
+            "scaled by {factor:.4} ({}): peak {:.3} g, {:.2} in/s, {:.3} in",
+            scaling.describe(),
+            motion.peak_acceleration() / STANDARD_GRAVITY,
+            peak(&motion.velocity) / INCH,
+            motion.peak_displacement() / INCH
+        ));
+        check_stroke(&motion, options.stroke, factor)?;
+        Ok(motion)
+    }
+}
+
+fn unscaled(record: &Record, options: &Options) -> Result<Unscaled, MotionError> {
     check_options(&record.name, options)?;
     let fault = |reason: String| MotionError::Option {
         name: record.name.clone(),
@@ -112,33 +165,12 @@ pub fn process(record: &Record, options: &Options) -> Result<Motion, MotionError
         "tapered over {} s at either end, so that it starts and ends at rest",
         options.taper
     ));
-    let [mut displacement, mut velocity, mut acceleration] = histories;
-
-    let scaling = options.scaling.unwrap_or(Options::DEFAULT_SCALING);
-    let factor = scaling.factor(&record.name, peak(&acceleration), peak(&displacement))?;
-    for history in [&mut displacement, &mut velocity, &mut acceleration] {
-        history.iter_mut().for_each(|value| *value *= factor);
-    }
-    notes.push(format!(
-        "scaled by {factor:.4} ({}): peak {:.3} g, {:.2} in/s, {:.3} in",
-        scaling.describe(),
-        peak(&acceleration) / STANDARD_GRAVITY,
-        peak(&velocity) / INCH,
-        peak(&displacement) / INCH
-    ));
-    let name = record.name.clone();
-    let seed = record.seed;
-    let motion = Motion {
-        name,
-        dt: h,
-        displacement,
-        velocity,
-        acceleration,
+    Ok(Unscaled {
+        name: record.name.clone(),
+        seed: record.seed,
         notes,
-        seed,
-    };
-    check_stroke(&motion, options.stroke, factor)?;
-    Ok(motion)
+        histories,
+    })
 }
 
 /// The record without its least-squares line; also the mean, m/s^2, and slope, m/s^3, of the line.

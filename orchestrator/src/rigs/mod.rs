@@ -9,17 +9,15 @@ mod statistics;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use identification::closed_loop::{Settings, identify};
 use rayon::prelude::*;
 use serde::Serialize;
 
 pub use draw::Rig;
 pub use statistics::{Pair, Spread, Standing};
 
-use crate::commission::{self, record_excitation};
+use crate::commission;
 use crate::comparison::Played;
 use crate::error::Error;
-use crate::fmu::FmiVersion;
 use crate::master::{Algorithm, Ending};
 use crate::metrics;
 use crate::motion::Motion;
@@ -29,7 +27,6 @@ use crate::run::experiment::{self, Prepared, prepare_file};
 use crate::system::built_in;
 use crate::system::control_model::ControlModel;
 use crate::system::tuning::{Rules, Wanted};
-use crate::units::{INCH, STANDARD_GRAVITY};
 
 /// The plant that is varied.
 const PLANT: &str = "servohydraulic";
@@ -155,7 +152,7 @@ fn row(
 ) -> Result<Row, Error> {
     let rig = Rig::draw(request.seed, number);
     let set = rig.settings();
-    let own = commissioned(request, &set);
+    let own = commission::rules_on_recordings(PLANT, set.clone(), request.duration, request.seed);
     let not_commissioned = own.as_ref().err().cloned();
     let mut runs = Vec::new();
     let designs = [
@@ -188,25 +185,6 @@ fn row(
         not_commissioned,
         runs,
     })
-}
-
-/// The rules on the rig's own recordings; a sentence says why there are none.
-fn commissioned(request: &Request, set: &[String]) -> Result<Rules, String> {
-    let asked = commission::Request {
-        plant: PLANT.to_string(),
-        specimen: "none".to_string(),
-        set: set.to_vec(),
-        level: 0.3 * STANDARD_GRAVITY,
-        stroke: 1.5 * INCH,
-        duration: request.duration,
-        seed: request.seed,
-        fmi: FmiVersion::V3,
-    };
-    let recording = record_excitation(&asked).map_err(|error| error.to_string())?;
-    let found = identify(&[recording], Settings::default()).map_err(|error| error.to_string())?;
-    let file = found.model_file().map_err(|error| error.to_string())?;
-    let model = ControlModel::new(&file, "the rig's model")?;
-    Rules::new(model).map_err(|error| error.to_string())
 }
 
 fn run(

@@ -1,6 +1,8 @@
 //! What is run: a system on a motion, from what was asked for to what has been checked.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
@@ -10,9 +12,9 @@ use crate::error::Error;
 use crate::fmu::{FmiVersion, Options};
 use crate::library::FmuLibrary;
 use crate::master::{Algorithm, Ended, MasterError, Outcome, Pace, Simulation};
-use crate::motion::{self, Motion, Scaling};
+use crate::motion::{self, Motion, Scaling, Unscaled};
 use crate::ssp;
-use crate::system::tuning::{self, Tuning, Wanted};
+use crate::system::tuning::{self, Rules, Tuning, Wanted};
 use crate::system::{
     self, Between, InputTable, Link, Origin, Quantity, System, SystemFile, VariableName, built_in,
 };
@@ -184,11 +186,7 @@ const MOST_SAMPLES: f64 = 1e10;
 /// # Errors
 /// Whatever is at fault.
 pub fn prepare(request: &Request) -> Result<Prepared, Error> {
-    let mut file = system_file(request)?;
-    if let Some(structure) = &request.structure {
-        built_in::add_structure(&mut file, structure, &request.plant)?;
-    }
-    prepare_file(request, &file)
+    prepare_file(request, &system_file(request, None)?)
 }
 
 /// As [`prepare`], of a system that has been read or put together.
@@ -196,13 +194,31 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
 /// # Errors
 /// Whatever is at fault.
 pub fn prepare_file(request: &Request, file: &SystemFile) -> Result<Prepared, Error> {
+    let library = Mutex::new(FmuLibrary::of(request.fmi, file));
+    prepare_shared(request, file, &library, &Motions::default())
+}
+
+/// As [`prepare_file`], with FMUs and motions that other requests have opened already; `library` is
+/// one of `file`.
+///
+/// # Errors
+/// Whatever is at fault.
+pub fn prepare_shared(
+    request: &Request,
+    file: &SystemFile,
+    library: &Mutex<FmuLibrary>,
+    motions: &Motions,
+) -> Result<Prepared, Error> {
     let mut file = file.clone();
     let algorithm = algorithm(request, &file)?;
-    let mut library = FmuLibrary::of(request.fmi, &file);
+    let find = |name: &str| {
+        let mut library = library.lock().unwrap_or_else(PoisonError::into_inner);
+        library.find(name)
+    };
     if algorithm == Algorithm::Jacobi {
         // An FMU that is not found is at fault when the system is assembled.
         let mut has = |fmu: &str, parameter: &str| {
-            let found = library.find(fmu);
+            let found = find(fmu);
             found.is_ok_and(|fmu| fmu.description.position(parameter).is_some())
         };
         tuning::know_jacobi(&mut file, !is_file(&request.system), &mut has);
@@ -217,10 +233,10 @@ pub fn prepare_file(request: &Request, file: &SystemFile) -> Result<Prepared, Er
         || file.experiment.reference.is_some()
         || file.connections.iter().any(follows);
     let mut motion = match has_motion {
-        true => motion(request, &file)?,
+        true => motions.find(request, &file)?,
         false => no_motion(),
     };
-    let mut system = system::assemble(&file, &request.set, &mut |name| library.find(name))?;
+    let mut system = system::assemble(&file, &request.set, &mut |name| find(name))?;
     if motion.is_empty() {
         motion.dt = rest_step(request, &file, &system)?;
     }
@@ -267,8 +283,19 @@ pub fn prepare_file(request: &Request, file: &SystemFile) -> Result<Prepared, Er
     })
 }
 
-/// The system that a request names.
-fn system_file(request: &Request) -> Result<SystemFile, Error> {
+/// The system that a request names; `rules` tune a built-in one's controllers, where there are some.
+///
+/// # Errors
+/// Unknown names, a file at fault, a model that a rule refuses.
+pub fn system_file(request: &Request, rules: Option<&Rules>) -> Result<SystemFile, Error> {
+    let mut file = named(request, rules)?;
+    if let Some(structure) = &request.structure {
+        built_in::add_structure(&mut file, structure, &request.plant)?;
+    }
+    Ok(file)
+}
+
+fn named(request: &Request, rules: Option<&Rules>) -> Result<SystemFile, Error> {
     let name = &request.system;
     if ssp::is_ssp(name) {
         return Ok(ssp::read(name)?);
@@ -282,7 +309,7 @@ fn system_file(request: &Request) -> Result<SystemFile, Error> {
     let wanted = Wanted {
         tuning: request.tuning,
         model: request.control_model.as_deref(),
-        rules: None,
+        rules,
     };
     Ok(built_in::system(
         name,
@@ -415,41 +442,80 @@ fn rest_until(motion: &mut Motion, samples: usize) {
     motion.acceleration.resize(samples, 0.0);
 }
 
-fn motion(request: &Request, file: &SystemFile) -> Result<Motion, Error> {
-    let usual = motion::Options::default();
-    let options = motion::Options {
-        sample_time: file.sampling()?.unwrap_or(usual.sample_time),
-        scaling: request.scaling.map(|scale| match scale {
-            Scale::Factor(factor) => Scaling::Factor(factor),
-            Scale::PeakAcceleration(peak) => Scaling::PeakAcceleration(peak),
-            Scale::PeakDisplacement(peak) => Scaling::PeakDisplacement(peak),
-        }),
-        ..usual
-    };
+/// Records that have been made playable but for their scale, for requests that play the same.
+#[derive(Debug, Default)]
+pub struct Motions(Mutex<HashMap<String, Arc<Unscaled>>>);
+
+impl Motions {
+    /// More are not kept.
+    const MOST: usize = 256;
+
+    fn find(&self, request: &Request, file: &SystemFile) -> Result<Motion, Error> {
+        let usual = motion::Options::default();
+        let options = motion::Options {
+            sample_time: file.sampling()?.unwrap_or(usual.sample_time),
+            scaling: request.scaling.map(|scale| match scale {
+                Scale::Factor(factor) => Scaling::Factor(factor),
+                Scale::PeakAcceleration(peak) => Scaling::PeakAcceleration(peak),
+                Scale::PeakDisplacement(peak) => Scaling::PeakDisplacement(peak),
+            }),
+            ..usual
+        };
+        let record = match source(request, file)? {
+            Source::Reference(path) => return Ok(motion::load_reference(&path, &options)?),
+            Source::Record(path) => Some(path),
+            Source::Seed => None,
+        };
+        let key = format!("{record:?} {} {}", request.seed, options.sample_time);
+        let open = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = open().get(&key).cloned();
+        if let Some(unscaled) = known {
+            return Ok(unscaled.scaled(&options)?);
+        }
+        let unscaled = Arc::new(match &record {
+            Some(path) => motion::load_unscaled(path, &options)?,
+            None => motion::built_in_unscaled(request.seed, &options)?,
+        });
+        let mut known = open();
+        if known.len() >= Self::MOST {
+            known.clear();
+        }
+        known.insert(key, unscaled.clone());
+        drop(known);
+        Ok(unscaled.scaled(&options)?)
+    }
+}
+
+/// What is played.
+enum Source {
+    Record(PathBuf),
+    Reference(PathBuf),
+    /// The built-in motion.
+    Seed,
+}
+
+/// What a request plays: what it names, or what its system does.
+fn source(request: &Request, file: &SystemFile) -> Result<Source, Error> {
     let beside = |path: &String| {
         file.directory
             .as_deref()
             .unwrap_or(Path::new(""))
             .join(path)
     };
+    let experiment = &file.experiment;
     let own = request.record.is_none() && request.reference.is_none();
-    if own && file.experiment.record.is_some() && file.experiment.reference.is_some() {
+    if own && experiment.record.is_some() && experiment.reference.is_some() {
         let reason = "record and reference are both given; which one shall be played?".to_string();
         return Err(file.at_fault("experiment", reason).into());
     }
     let record = request.record.clone();
-    let record = record.or(file.experiment.record.as_ref().filter(|_| own).map(beside));
+    let record = record.or(experiment.record.as_ref().filter(|_| own).map(beside));
     let reference = request.reference.clone();
-    let reference = reference.or(file
-        .experiment
-        .reference
-        .as_ref()
-        .filter(|_| own)
-        .map(beside));
+    let reference = reference.or(experiment.reference.as_ref().filter(|_| own).map(beside));
     Ok(match (record, reference) {
-        (_, Some(path)) => motion::load_reference(&path, &options)?,
-        (Some(path), None) => motion::load(&path, &options)?,
-        (None, None) => motion::built_in(request.seed, &options)?,
+        (_, Some(path)) => Source::Reference(path),
+        (Some(path), None) => Source::Record(path),
+        (None, None) => Source::Seed,
     })
 }
 

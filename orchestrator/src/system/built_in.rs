@@ -63,7 +63,7 @@ const SPECIMENS: [(Part, Known); 3] = [
 /// Computed structures between the ground and the specimen.
 const STRUCTURES: [Part; 1] = [part!("structure/", "two-storeys")];
 /// No specimen, no structure.
-const NONE: &str = "none";
+pub const NONE: &str = "none";
 
 /// The system run when none is named.
 pub const DEFAULT_SYSTEM: &str = "three-variable";

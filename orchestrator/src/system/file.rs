@@ -272,6 +272,27 @@ impl ComponentFile {
 }
 
 impl SystemFile {
+    /// The files that it refers to.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        let folder = self.directory.as_deref().unwrap_or(Path::new(""));
+        let fmus = self.components.values().map(|part| &part.fmu);
+        let fmus = fmus.filter(|fmu| fmu.ends_with(".fmu"));
+        let models = self
+            .components
+            .values()
+            .filter_map(|part| part.model.as_ref());
+        let models = models.filter(|model| model.ends_with(".toml"));
+        let tables = self.tables.values().map(|table| &table.file);
+        let motions = self
+            .experiment
+            .record
+            .iter()
+            .chain(&self.experiment.reference);
+        let all = fmus.chain(models).chain(tables).chain(motions);
+        all.map(|file| folder.join(file)).collect()
+    }
+
     /// A system without components.
     #[must_use]
     pub fn new(name: &str) -> Self {

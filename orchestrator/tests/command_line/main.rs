@@ -6,6 +6,7 @@ mod archives;
 mod benchmark;
 mod book;
 mod browser;
+mod campaign;
 mod checkpoints;
 mod commissioning;
 mod contract;

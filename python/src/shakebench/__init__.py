@@ -11,6 +11,7 @@ computed: :class:`Result` reads like the JSON object that the program prints, an
 (2501,)
 """
 
+from ._campaign import campaign
 from ._commands import compare, design, diagnose, doctor, identify, run
 from ._fmus import fmu, fmus
 from ._program import Error, InputError, ProgramMissing, program, version
@@ -21,6 +22,7 @@ __all__ = [
     "InputError",
     "ProgramMissing",
     "Result",
+    "campaign",
     "compare",
     "design",
     "diagnose",

@@ -29,12 +29,14 @@ class Result(Mapping):
         folder: Path,
         traces: Optional[str] = None,
         temporary: Optional[Path] = None,
+        rows: Optional[str] = None,
     ) -> None:
         #: The JSON object.
         self.json: Dict[str, Any] = values
         #: Folder of the files. Without ``out`` it is a temporary one, removed with this object.
         self.folder: Path = folder
         self._file = traces
+        self._rows = rows
         self._traces: Optional[Dict[str, np.ndarray]] = None
         if temporary is not None:
             weakref.finalize(self, shutil.rmtree, temporary, ignore_errors=True)
@@ -59,7 +61,8 @@ class Result(Mapping):
         return self._traces
 
     def frame(self) -> "pandas.DataFrame":
-        """The table of the result: the traces with ``time`` as index, or the rows of a comparison.
+        """The table of the result: the traces with ``time`` as index, or the rows of a comparison
+        or a campaign.
 
         Needs pandas.
         """
@@ -67,6 +70,8 @@ class Result(Mapping):
             import pandas
         except ImportError:
             raise Error("frame() needs pandas: pip install pandas") from None
+        if self._rows is not None:
+            return pandas.read_csv(self.folder / self._rows)
         if "rows" in self.json:
             return pandas.DataFrame(self.json["rows"])
         if not self.traces:

@@ -1,0 +1,427 @@
+//! A study file, and the runs that it asks for.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+
+use super::design::{Design, Points};
+use super::factor::Values;
+use super::setting::{self, Key};
+use crate::error::Error;
+use crate::fmu::hexadecimal;
+use crate::system::Setting;
+use crate::units::hint;
+
+/// The study as written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    study: WrittenStudy,
+    #[serde(default)]
+    fixed: BTreeMap<String, Setting>,
+    #[serde(default)]
+    factors: BTreeMap<String, toml::Value>,
+    #[serde(default)]
+    limits: BTreeMap<String, Setting>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenStudy {
+    design: Option<String>,
+    runs: Option<u64>,
+    #[serde(default = "one")]
+    seed: u64,
+    #[serde(default)]
+    cross: Vec<String>,
+    #[serde(default = "usual_intensity")]
+    intensity: String,
+    #[serde(default)]
+    results: Vec<String>,
+}
+
+fn one() -> u64 {
+    1
+}
+
+fn usual_intensity() -> String {
+    "pga_g".to_string()
+}
+
+/// A factor.
+#[derive(Debug, Clone)]
+pub struct Factor {
+    /// As it is called in the study.
+    pub name: String,
+    /// What it sets.
+    pub key: Key,
+    /// What it may be.
+    pub values: Values,
+}
+
+/// What a run may not exceed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limit {
+    /// The column that is compared: a figure, or `peak.instance.variable`.
+    pub column: String,
+    /// The signal whose peak that is; none for a figure.
+    pub signal: Option<String>,
+    /// As written.
+    pub written: Setting,
+}
+
+/// A study: what is fixed, what varies, and how.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// Its file.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+    /// How the factors' space is filled.
+    pub design: Design,
+    /// Seed of what is drawn.
+    pub seed: u64,
+    /// What is the same in all runs.
+    pub fixed: Vec<(String, Key, Setting)>,
+    /// What varies, by name.
+    pub factors: Vec<Factor>,
+    /// What a run may not exceed.
+    pub limits: Vec<Limit>,
+    /// The column against which a share of runs is drawn.
+    pub intensity: String,
+    /// Figures that are asked for by other programs.
+    pub results: Vec<String>,
+    /// Places in `factors` of those that are crossed with every point.
+    crossed: Vec<usize>,
+    /// Places in `factors` of the others, a dimension of the points each.
+    sampled: Vec<usize>,
+    points: Points,
+    /// Checksums of files by path, so that a run's name says what it plays.
+    files: BTreeMap<PathBuf, String>,
+}
+
+impl Study {
+    /// Reads a study; paths in it count from its folder.
+    ///
+    /// # Errors
+    /// The place and what was expected there.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|error| Error::File {
+            path: path.to_path_buf(),
+            reason: match error.kind() {
+                std::io::ErrorKind::InvalidData => "is no text in UTF-8".to_string(),
+                _ => format!("cannot be read: {error}"),
+            },
+        })?;
+        Self::parse(path, text)
+    }
+
+    /// As [`Study::read`], of a text that is taken for the file at `path`.
+    ///
+    /// # Errors
+    /// As [`Study::read`].
+    pub fn parse(path: &Path, text: String) -> Result<Self, Error> {
+        let fault = |reason: String| Error::File {
+            path: path.to_path_buf(),
+            reason,
+        };
+        let at = |place: &str, name: &str| {
+            let place = format!("[{place}] {name}");
+            move |reason: String| fault(format!("{place}: {reason}"))
+        };
+        let written: Written = toml::from_str(&text)
+            .map_err(|error| fault(error.to_string().trim_end().to_string()))?;
+        let folder = folder(path);
+        let mut fixed = Vec::new();
+        for (name, value) in written.fixed {
+            let key = Key::of(&name).map_err(at("fixed", &name))?;
+            fixed.push((name, key, value));
+        }
+        let mut factors: Vec<Factor> = Vec::new();
+        for (name, value) in written.factors {
+            let at = at("factors", &name);
+            let key = Key::of(&name).map_err(&at)?;
+            let mut values = Values::read(&value).map_err(&at)?;
+            if key == Key::Record {
+                values = whole_folders(values, &folder).map_err(&at)?;
+            }
+            if values.is_relative() && !matches!(key, Key::Variable(_)) {
+                return Err(at(
+                    "`relative` belongs to a variable of an instance".to_string()
+                ));
+            }
+            factors.push(Factor { name, key, values });
+        }
+        if factors.is_empty() {
+            return Err(fault(
+                "[factors] is missing: nothing varies; expected such as controller = [\"three-variable\", \
+                 \"mpc\"]"
+                    .to_string(),
+            ));
+        }
+        exclusive(&fixed, &factors).map_err(fault)?;
+        let mut crossed = Vec::new();
+        for name in &written.study.cross {
+            let at = at("study", "cross");
+            let place = factors.iter().position(|factor| factor.name == *name);
+            let Some(place) = place else {
+                let known = factors.iter().map(|factor| factor.name.as_str());
+                return Err(at(format!("`{name}` is no factor{}", hint(name, known))));
+            };
+            if factors[place].values.count().is_none() {
+                return Err(at(format!("`{name}` is no list")));
+            }
+            crossed.push(place);
+        }
+        let all_lists = factors.iter().all(|factor| factor.values.count().is_some());
+        let design = match &written.study.design {
+            Some(name) => clap::ValueEnum::from_str(name, false).map_err(|_| {
+                let known = ["full", "latin-hypercube", "sobol", "random", "saltelli"];
+                let hint = hint(name, known);
+                let reason = format!(
+                    "`{name}` is unknown{hint}; expected one of {}",
+                    known.join(", ")
+                );
+                at("study", "design")(reason)
+            })?,
+            None if all_lists && written.study.runs.is_none() => Design::Full,
+            None => Design::Sobol,
+        };
+        let sampled: Vec<usize> = (0..factors.len())
+            .filter(|place| !crossed.contains(place))
+            .collect();
+        let counts = sampled
+            .iter()
+            .map(|&place| factors[place].values.count())
+            .collect();
+        let points = Points::new(design, counts, written.study.runs, written.study.seed)
+            .map_err(at("study", "design"))?;
+        let limits = written.limits.into_iter().map(|(name, written)| {
+            let signal = name.contains('.').then(|| name.clone());
+            Limit {
+                column: signal
+                    .as_ref()
+                    .map_or(name, |signal| format!("{PEAK}{signal}")),
+                signal,
+                written,
+            }
+        });
+        let mut study = Self {
+            path: path.to_path_buf(),
+            text,
+            design,
+            seed: written.study.seed,
+            fixed,
+            factors,
+            limits: limits.collect(),
+            intensity: written.study.intensity,
+            results: written.study.results,
+            crossed,
+            sampled,
+            points,
+            files: BTreeMap::new(),
+        };
+        study.files = study.checksums()?;
+        Ok(study)
+    }
+
+    /// An error of this study.
+    pub(super) fn fault(&self, reason: &str) -> Error {
+        Error::File {
+            path: self.path.clone(),
+            reason: reason.to_string(),
+        }
+    }
+
+    /// How many runs there are.
+    #[must_use]
+    pub fn runs(&self) -> u64 {
+        self.points.count() * self.crossings()
+    }
+
+    /// Runs at each point of the design.
+    fn crossings(&self) -> u64 {
+        let counts = self
+            .crossed
+            .iter()
+            .map(|&place| self.factors[place].values.count());
+        counts.map(|count| count.unwrap_or(1) as u64).product()
+    }
+
+    /// What the factors are in a run, in their order.
+    #[must_use]
+    pub fn settings(&self, number: u64) -> Vec<Setting> {
+        let crossings = self.crossings();
+        let point = self.points.at(number / crossings);
+        let mut at = vec![0.0; self.factors.len()];
+        for (&place, coordinate) in self.sampled.iter().zip(point) {
+            at[place] = coordinate;
+        }
+        let mut rest = number % crossings;
+        for &place in self.crossed.iter().rev() {
+            let count = self.factors[place].values.count().unwrap_or(1) as u64;
+            at[place] = ((rest % count) as f64 + 0.5) / count as f64;
+            rest /= count;
+        }
+        self.factors
+            .iter()
+            .zip(at)
+            .map(|(factor, at)| factor.values.value(at))
+            .collect()
+    }
+
+    /// The name of a run with these factors: what it is, not where it stands in the study. Files count by
+    /// what they hold.
+    #[must_use]
+    pub fn name(&self, settings: &[Setting]) -> String {
+        let folder = folder(&self.path);
+        let mut sum = Sha256::new();
+        let mut add = |name: &str, key: &Key, value: &Setting, relative: bool| {
+            let mut text = value.to_string();
+            if let Setting::Text(path) = value
+                && key.is_path(path)
+                && let Some(sum) = self.files.get(&folder.join(path))
+            {
+                text.clone_from(sum);
+            }
+            let how = if relative { "*=" } else { "=" };
+            sum.update(format!("{name}{how}{text}\n").as_bytes());
+        };
+        let mut all: Vec<(&str, &Key, &Setting, bool)> = self
+            .fixed
+            .iter()
+            .map(|(name, key, value)| (name.as_str(), key, value, false))
+            .collect();
+        let varied = self.factors.iter().zip(settings);
+        all.extend(varied.map(|(factor, value)| {
+            let is_relative = factor.values.is_relative();
+            (factor.name.as_str(), &factor.key, value, is_relative)
+        }));
+        all.sort_by_key(|(name, ..)| *name);
+        for (name, key, value, relative) in all {
+            add(name, key, value, relative);
+        }
+        for limit in self.limits.iter().filter_map(|limit| limit.signal.as_ref()) {
+            // A row without that peak is another.
+            sum.update(format!("{PEAK}{limit}\n").as_bytes());
+        }
+        hexadecimal(&sum.finalize())[..16].to_string()
+    }
+
+    /// The files that its runs read, by path, with their checksums.
+    #[must_use]
+    pub fn files(&self) -> &BTreeMap<PathBuf, String> {
+        &self.files
+    }
+
+    /// The folder from which its paths count.
+    #[must_use]
+    pub fn folder(&self) -> PathBuf {
+        folder(&self.path)
+    }
+
+    /// Every key with each of its values in the study.
+    pub(super) fn every_value(&self) -> impl Iterator<Item = (&str, &Key, &Setting)> {
+        let fixed = self.fixed.iter();
+        let fixed = fixed.map(|(name, key, value)| (name.as_str(), key, value));
+        let lists = self
+            .factors
+            .iter()
+            .filter_map(|factor| match &factor.values {
+                Values::List(list) => Some(
+                    list.iter()
+                        .map(|value| (factor.name.as_str(), &factor.key, value)),
+                ),
+                Values::Drawn(_) => None,
+            });
+        fixed.chain(lists.flatten())
+    }
+
+    fn checksums(&self) -> Result<BTreeMap<PathBuf, String>, Error> {
+        let folder = self.folder();
+        let mut sums = BTreeMap::new();
+        for (name, key, value) in self.every_value() {
+            for path in setting::files(key, value, &folder) {
+                if sums.contains_key(&path) {
+                    continue;
+                }
+                let bytes = std::fs::read(&path).map_err(|error| Error::File {
+                    path: self.path.clone(),
+                    reason: format!("`{name}`: {}: {error}", path.display()),
+                })?;
+                sums.insert(path, crate::fmu::digest(&bytes));
+            }
+        }
+        Ok(sums)
+    }
+}
+
+/// How the name of a column begins that holds the peak of a signal.
+pub(super) const PEAK: &str = "peak.";
+
+fn folder(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    absolute.parent().map(Path::to_path_buf).unwrap_or_default()
+}
+
+/// Folders in a list of records stand for all records in them.
+fn whole_folders(values: Values, folder: &Path) -> Result<Values, String> {
+    let Values::List(list) = values else {
+        return Err("a record is a file; expected a list of files or folders".to_string());
+    };
+    let mut all = Vec::new();
+    for value in list {
+        let Setting::Text(name) = &value else {
+            return Err(format!("`{value}` is no file"));
+        };
+        if !folder.join(name).is_dir() {
+            all.push(value);
+            continue;
+        }
+        let found = crate::comparison::Played::records_in(&folder.join(name));
+        for played in found.map_err(|error| error.to_string())? {
+            if let crate::comparison::Played::Record(path) = played
+                && let Some(file) = path.file_name()
+            {
+                let path = Path::new(name).join(file);
+                all.push(Setting::Text(path.display().to_string()));
+            }
+        }
+    }
+    Ok(Values::List(all))
+}
+
+/// A thing is fixed or varies, and is said once.
+fn exclusive(fixed: &[(String, Key, Setting)], factors: &[Factor]) -> Result<(), String> {
+    let mut known: Vec<(&str, &Key)> = Vec::new();
+    let all = fixed.iter().map(|(name, key, _)| (name.as_str(), key));
+    for (name, key) in all.chain(
+        factors
+            .iter()
+            .map(|factor| (factor.name.as_str(), &factor.key)),
+    ) {
+        if let Some((other, _)) = known.iter().find(|(_, one)| *one == key) {
+            return Err(match *other == name {
+                true => format!("`{name}` is fixed and varies; expected one of the two"),
+                false => format!("`{other}` and `{name}` are the same; expected one of them"),
+            });
+        }
+        known.push((name, key));
+    }
+    for group in [
+        &[Key::Record, Key::Reference, Key::Seed][..],
+        &[Key::Scale, Key::PeakAcceleration, Key::PeakDisplacement],
+    ] {
+        let given: Vec<&str> = known
+            .iter()
+            .filter(|(_, key)| group.contains(key))
+            .map(|(name, _)| *name)
+            .collect();
+        if let [one, other, ..] = given[..] {
+            return Err(format!("`{one}` and `{other}` exclude each other"));
+        }
+    }
+    Ok(())
+}

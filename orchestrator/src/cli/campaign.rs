@@ -1,0 +1,189 @@
+//! `shakebench campaign`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::interrupt;
+use crate::campaign::{self, Bench, Left, Plan, Progress, Shard, Study, carry_out};
+use crate::error::Error;
+use crate::results::{Results, unused};
+
+/// Options of `shakebench campaign`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    shakebench campaign STUDY.toml --out RUNS\n\n\
+    The same command goes on where it was stopped. A study that was extended runs what is new.")]
+pub struct Arguments {
+    /// The study: what is fixed, what varies, and how (docs/campaigns.md)
+    study: PathBuf,
+    /// Folder for runs.parquet, runs.csv and report.html [default: shakebench-results/STUDY]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Carry out the I-th of N parts of the study; without this, the parts in the folder are collected
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<Shard>,
+    /// Runs at a time [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Check the study, say how many runs it has, and carry none out
+    #[arg(long, conflicts_with_all = ["shard", "rows"])]
+    plan: bool,
+    /// Carry out the runs A to B - 1 and print them as a journal
+    #[arg(long, value_name = "A-B", value_parser = range, conflicts_with = "shard")]
+    rows: Option<std::ops::Range<u64>>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+fn shard(text: &str) -> Result<Shard, String> {
+    let expected = "expected I/N with 1 <= I <= N, such as 1/4";
+    let (part, of) = text.split_once('/').ok_or(expected)?;
+    let part = part.trim().parse().map_err(|_| expected)?;
+    let of = of.trim().parse().map_err(|_| expected)?;
+    match (1..=of).contains(&part) {
+        true => Ok(Shard { part, of }),
+        false => Err(expected.to_string()),
+    }
+}
+
+fn range(text: &str) -> Result<std::ops::Range<u64>, String> {
+    let expected = "expected A-B with A < B, such as 0-64";
+    let (from, to) = text.split_once('-').ok_or(expected)?;
+    let from = from.trim().parse().map_err(|_| expected)?;
+    let to = to.trim().parse().map_err(|_| expected)?;
+    match from < to {
+        true => Ok(from..to),
+        false => Err(expected.to_string()),
+    }
+}
+
+/// Carries out a study and writes its table.
+///
+/// # Errors
+/// Input at fault; nothing is written then.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let study = Study::read(&arguments.study)?;
+    if arguments.plan {
+        return plan(&study, arguments.out.as_deref(), arguments.json);
+    }
+    if let Some(rows) = &arguments.rows {
+        if rows.end > study.runs() {
+            return Err(Error::Option {
+                option: "--rows",
+                reason: format!("the study has the runs 0 to {}", study.runs() - 1),
+            });
+        }
+        let mut output = std::io::stdout().lock();
+        campaign::rows(&study, rows.clone(), &mut output)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let folder = arguments.out.clone().unwrap_or_else(|| {
+        let name = arguments.study.file_stem().unwrap_or_default();
+        let is_same = |place: &Path| {
+            let before = std::fs::read_to_string(place.join(campaign::STUDY));
+            before.is_ok_and(|before| before == study.text)
+        };
+        unused(&Path::new("shakebench-results").join(name), is_same)
+    });
+    Results::check(&folder)?;
+    let bar = ProgressBar::hidden();
+    let style = ProgressStyle::with_template("{bar:40} {pos} of {len} runs, {eta} left");
+    // A template that cannot be read leaves the plain bar.
+    if let Ok(style) = style {
+        bar.set_style(style);
+    }
+    let asked = interrupt::heed();
+    let how = Plan {
+        folder: folder.clone(),
+        shard: arguments.shard,
+        jobs: arguments.jobs.map(usize::from),
+    };
+    let is_shown = std::sync::Once::new();
+    let carried = carry_out(&study, &how, asked, &|Progress { done, of }| {
+        is_shown.call_once(|| {
+            bar.set_length(of);
+            bar.set_position(done);
+            bar.reset_eta();
+            bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
+        });
+        bar.set_position(done);
+    });
+    bar.finish_and_clear();
+    let carried = carried?;
+    let summary = &carried.summary;
+    let is_whole = summary.missing == 0;
+    let files = match is_whole {
+        true => campaign::write(&study, &carried, &folder)?,
+        false => Vec::new(),
+    };
+    if arguments.json {
+        println!("{}", serde_json::json!(summary));
+    } else {
+        println!(
+            "{} runs: {} complete, {} stopped by the interlock, {} failed; {:.1} s",
+            summary.runs, summary.complete, summary.interlock, summary.failed, summary.wall_s
+        );
+        if summary.from_before > 0 {
+            println!("{} of them were there already", summary.from_before);
+        }
+        if !is_whole {
+            println!(
+                "{} runs are missing; results are written once all are in {}",
+                summary.missing,
+                folder.display()
+            );
+        }
+        if !files.is_empty() {
+            println!("\nwritten:");
+        }
+        for file in files {
+            println!("  {}", file.display());
+        }
+    }
+    let is_done = is_whole || arguments.shard.is_some();
+    if asked.load(std::sync::atomic::Ordering::Relaxed) && !is_done {
+        eprintln!("error: interrupted; the same command goes on");
+        return Ok(ExitCode::from(1));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn plan(study: &Study, folder: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+    let bench = Bench::new(study);
+    bench.check()?;
+    if let Some(folder) = folder {
+        Results::check(folder)?;
+    }
+    let columns = bench.columns()?;
+    let files: Vec<&PathBuf> = study.files().keys().collect();
+    if json {
+        let Left { head, missing } = Left::new(study, folder)?;
+        println!(
+            "{}",
+            serde_json::json!({
+                "runs": study.runs(),
+                "design": study.design,
+                "seed": study.seed,
+                "folder": study.folder(),
+                "files": files,
+                "columns": columns,
+                "head": head,
+                "missing": missing,
+            })
+        );
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("{} runs; nothing is wrong with the study", study.runs());
+    for column in &columns {
+        let unit = column
+            .unit
+            .as_ref()
+            .map_or(String::new(), |unit| format!(" [{unit}]"));
+        println!("  {}{unit}", column.name);
+    }
+    Ok(ExitCode::SUCCESS)
+}
