@@ -257,6 +257,23 @@ class Driver(Folder):
         self.assertAlmostEqual(figures[0], nominal, places=9)
         self.assertNotAlmostEqual(figures[1], nominal, places=3)
 
+    def test_numbers_take_the_unit_and_the_variables_of_their_factor(self):
+        factors = {
+            "specimen.stiffness": {"uniform": ["80 lbf/in", "120 lbf/in"]},
+            "scale": {"range": [0.2, 1.0], "steps": 5},
+            "seed": [1, 2],
+            "springs": {"of": ["a.k", "b.k"], "normal": ["2 lbf/in", "5 %"]},
+            "masses": {"lognormal": [1.0, 0.1], "relative": True, "of": ["a.m", "b.m"]},
+            "plant": ["identified"],
+        }
+        values = {"specimen_stiffness": "99", "scale": "0.5", "seed": "2", "springs": "3", "masses": "1.5"}
+        run = quofem.single_run({"factors": factors}, values, Path())["factors"]
+        self.assertEqual(run["specimen.stiffness"], ["99.0 lbf/in"])
+        self.assertEqual((run["scale"], run["seed"], run["plant"]), ([0.5], [2], ["identified"]))
+        self.assertEqual(run["springs"], {"list": ["3.0 lbf/in"], "of": ["a.k", "b.k"]})
+        self.assertEqual(run["masses"]["of"], ["a.m", "b.m"])
+        self.assertEqual(run["masses"]["uniform"][0], 1.5)
+
     def test_files_of_dakota_are_read(self):
         for text in (
             "  2 variables\n 0.75 scale\n 99.5 specimen_stiffness\n 1 functions\n 1 ASV_1:response\n",
@@ -278,12 +295,14 @@ class Driver(Folder):
             ("two\n", "expected the number of parameters"),
             ("", "is empty"),
             ("2\nscale nan\nspecimen_stiffness 99\n", "expected a finite number"),
+            ("2\nscale -1\nspecimen_stiffness 99\n", "studies/study.toml: `scale`: `-1.0` is not positive"),
         ):
             Path("params.in").write_text(params)
             Path("results.out").write_text("1 2\n")
             status, said = self.drive()
             self.assertEqual(status, 2, said)
             self.assertIn(expected, said)
+            self.assertNotIn("/shakebench-", said)
             self.assertFalse(Path("results.out").exists())
         Path("params.in").unlink()
         status, said = self.drive()

@@ -20,7 +20,7 @@ import time
 import zipfile
 from pathlib import Path
 
-from campaign_speed import STUDY, used
+from campaign_speed import STUDY
 from distributed import Client, LocalCluster, as_completed
 
 # The share of a thread's time that start and scheduler may take, as the package holds it.
@@ -42,10 +42,9 @@ scale = {{ uniform = [0.1, 0.25] }}
 """
 
 
-def finish(command, **more):
+def finish(command):
     """Processor seconds and peak memory (bytes) of a program."""
-    before = used()
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, **more)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     output = process.stdout.read()
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
@@ -103,7 +102,7 @@ def table(program, folder, rows):
         found[count] = finish([program, "campaign", study, "--out", out, "--json"])[0]
     sizes = {name: sum(f.stat().st_size for f in out.glob(name)) / rows
              for name in ("journal/*.jsonl", "runs.csv", "runs.parquet")}
-    write = (found[rows] - found[rows // 10]) / (rows - rows // 10)
+    write = max(found[rows] - found[rows // 10], 0.0) / (rows - rows // 10)
     # Rows of other runs, many more than are made here, which it reads and keeps.
     journal = out / "journal/all.jsonl"
     line = journal.read_bytes().splitlines(keepends=True)[-1]

@@ -121,7 +121,7 @@ def _check(client: "Client") -> None:
 def _same_version(worker: str, has: Optional[str]) -> None:
     own = version()
     if has is None:
-        raise Error(f"worker {worker} has no shakebench; install {own} there, as here")
+        raise Error(f"worker {worker} has no shakebench; install the same there as here ({own})")
     if has != own:
         raise Error(f"worker {worker} has shakebench {has}, here it is {own}; install the same")
 

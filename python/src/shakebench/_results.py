@@ -71,7 +71,10 @@ class Result(Mapping):
         except ImportError:
             raise Error("frame() needs pandas: pip install pandas") from None
         if self._rows is not None:
-            return pandas.read_csv(self.folder / self._rows)
+            rows = self.folder / self._rows
+            if not rows.is_file():
+                raise Error(f"{rows} is not there: other parts of the study are missing")
+            return pandas.read_csv(rows)
         if "rows" in self.json:
             return pandas.DataFrame(self.json["rows"])
         if not self.traces:

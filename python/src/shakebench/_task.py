@@ -74,7 +74,7 @@ def make() -> Callable[..., Dict[str, Any]]:
             with subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said
             ) as process:
-                for line in process.stdout:
+                for line in process.stdout or ():
                     lines.append(line)
                     arrived.append(time.monotonic())
             said.seek(0)

@@ -122,8 +122,13 @@ def single_run(study: Dict[str, Any], values: Dict[str, str], folder: Path) -> D
             raise InputError(f"`{name}`: {key} is given twice")
         written = factors.pop(key) if key in factors else fixed.pop(key)
         run[key] = _value(key, written, value)
+        if isinstance(written, dict) and "of" in written:
+            # Several variables that are one factor.
+            values_of = run[key] if isinstance(run[key], dict) else {"list": run[key]}
+            run[key] = {**values_of, "of": written["of"]}
     for key, written in factors.items():
-        if not isinstance(written, list) or len(written) != 1:
+        single = written.get("list") if isinstance(written, dict) else written
+        if not isinstance(single, list) or len(single) != 1:
             raise InputError(
                 f"[factors] {key} is not among the parameters; give it there, or its value in [fixed]"
             )
@@ -167,7 +172,8 @@ def _value(key: str, written: Any, value: str) -> Any:
     sample = written
     while isinstance(sample, (dict, list)):
         if isinstance(sample, dict):
-            sample = [part for name, part in sample.items() if name not in ("steps", "relative")]
+            others = ("steps", "relative", "of")
+            sample = [part for name, part in sample.items() if name not in others]
         sample = sample[0] if sample else None
     unit = ""
     if isinstance(sample, str):
@@ -245,7 +251,11 @@ def evaluate(
             ),
             encoding="utf-8",
         )
-        plan = call(["campaign", text(file), "--plan", "--json"])
+        try:
+            plan = call(["campaign", text(file), "--plan", "--json"])
+        except InputError as error:
+            # The user knows the study under another name.
+            raise InputError(str(error).replace(text(file), text(study))) from None
         columns = [column["name"] for column in plan["columns"]]
         for quantity in wanted:
             if quantity not in columns:
@@ -288,6 +298,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     options = parser.parse_args(arguments)
     part = options.results.with_name(options.results.name + ".part")
     try:
+        if not options.results.absolute().parent.is_dir():
+            raise InputError(f"{options.results}: there is no such folder")
         # What an earlier run left would be taken for this one's.
         options.results.unlink(missing_ok=True)
         figures = evaluate(
