@@ -137,8 +137,6 @@ impl Pushed {
         let mut y = DVector::zeros(outputs.nrows());
         let mut line: VecDeque<f64> = vec![0.0; rig.delay + 2].into();
         let mut commands = Vec::with_capacity(count);
-        // Largest command in each quarter of the time.
-        let mut largest = [0.0_f64; 4];
         let mut stable = true;
         for k in 0..count {
             y.gemv(1.0, outputs, &x, 0.0);
@@ -154,8 +152,6 @@ impl Pushed {
             let push = if k == 0 { PUSH } else { 0.0 };
             let u = law(&heard) + push;
             commands.push(u / PUSH);
-            let quarter = &mut largest[4 * k / count];
-            *quarter = quarter.max(u.abs());
             if !u.is_finite() || u.abs() > 1e3 * PUSH {
                 stable = false;
                 break;
@@ -167,12 +163,22 @@ impl Pushed {
             next.axpy(line[rig.delay + 1], &rig.before, 1.0);
             std::mem::swap(&mut x, &mut next);
         }
-        // What grows slowly has grown from the second quarter to the last.
-        stable &= largest[3] < largest[1].max(1e-6 * PUSH);
+        stable &= has_died_out(&commands, 1e-6);
         Self {
             commands,
             period,
             stable,
+        }
+    }
+
+    /// The commands that followed a unit push, as they were measured every `period` s; what stays below
+    /// a hundredth is taken for noise.
+    pub fn measured(commands: Vec<f64>, period: f64) -> Self {
+        let bounded = commands.iter().all(|u| u.abs() < 1e3);
+        Self {
+            stable: bounded && has_died_out(&commands, 1e-2),
+            commands,
+            period,
         }
     }
 
@@ -199,6 +205,16 @@ impl Pushed {
             .collect();
         OpenLoop { omega, values }
     }
+}
+
+/// Whether a push has died out: what grows slowly has grown from the second quarter to the last.
+fn has_died_out(commands: &[f64], noise: f64) -> bool {
+    let quarter = commands.len().div_ceil(4).max(1);
+    let largest = |part: usize| {
+        let own = commands.iter().skip(part * quarter).take(quarter);
+        own.fold(0.0_f64, |most, u| most.max(u.abs()))
+    };
+    largest(3) < largest(1).max(noise)
 }
 
 const POINTS_PER_DECADE: f64 = 120.0;

@@ -111,6 +111,12 @@ class OnDask(Folder):
             longer = shakebench.campaign(self.study, self.client, out="dask")
             self.assertEqual(longer["dask"]["runs"], 8)
             self.assert_same_results("longer", "dask")
+        with self.subTest("nothing is left, and all is made anew"):
+            again = shakebench.campaign(self.study, self.client, out="dask")
+            self.assertEqual((again["dask"]["runs"], again["from_before"]), (0, 56))
+            anew = shakebench.campaign(self.study, self.client, out="dask", force=True)
+            self.assertEqual(anew["dask"]["runs"], 56)
+            self.assert_same_results("longer", "dask")
 
     def test_workers_that_run_something_else_are_named(self):
         def with_variable(name, value):

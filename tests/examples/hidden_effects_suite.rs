@@ -1,15 +1,19 @@
-//! Hides effects in fresh cases, diagnoses them and prints what came of it.
+//! Hides effects in fresh cases, diagnoses them and prints what came of it. With `--out` the cases are
+//! kept as those of a study: the same command goes on where it was stopped, and `--shard I/N` carries out
+//! a part.
 //!
 //! `cargo run --release -p acceptance --example hidden_effects_suite -- [--one N] [--effect NAME]
 //! [--two N] [--nothing N] [--outside N] [--noise F,...] [--mismatch F,...] [--seed S] [--verbose 1]
-//! [--world plain|open|noisy]`
+//! [--world plain|open|noisy] [--out DIR] [--shard I/N]`
 
 use std::env;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use acceptance::hidden_suite::{Plan, line, run_all, table};
+use acceptance::hidden_suite::{Plan, run_all, table};
 use hidden_effects::World;
 use hidden_effects::catalogue::entry;
+use shakebench::campaign::{Progress, Shard};
 
 fn main() -> ExitCode {
     let mut plan = Plan {
@@ -24,6 +28,7 @@ fn main() -> ExitCode {
         world: World::Plain,
         verbose: false,
     };
+    let (mut out, mut shard) = (None, None);
     let mut arguments = env::args().skip(1);
     while let Some(option) = arguments.next() {
         let text = arguments.next().unwrap_or_default();
@@ -50,6 +55,20 @@ fn main() -> ExitCode {
             }
             continue;
         }
+        if option == "--out" {
+            out = Some(PathBuf::from(text));
+            continue;
+        }
+        if option == "--shard" {
+            match text.parse::<Shard>() {
+                Ok(part) => shard = Some(part),
+                Err(reason) => {
+                    eprintln!("--shard: {reason}");
+                    return ExitCode::from(2);
+                }
+            }
+            continue;
+        }
         let list: Result<Vec<f64>, _> = text.split(',').map(str::parse::<f64>).collect();
         let Some((value, list)) = list.ok().and_then(|list| Some((*list.first()?, list))) else {
             eprintln!("{option}: expected a number after it (of noise and mismatch several: 1,3)");
@@ -67,21 +86,26 @@ fn main() -> ExitCode {
             _ => {
                 eprintln!(
                     "{option} is unknown; expected --one, --effect, --two, --nothing, --outside, --noise, \
-                     --mismatch, --seed, --world or --verbose"
+                     --mismatch, --seed, --world, --out, --shard or --verbose"
                 );
                 return ExitCode::from(2);
             }
         }
     }
     println!("{plan:?}");
-    let results = run_all(&plan, |scored| {
-        eprintln!(
-            "{}, {:.1} s, {:?}",
-            line(scored),
-            scored.seconds,
-            scored.errors
-        );
+    let temporary = tempfile::tempdir().expect("a temporary folder");
+    let folder = out.unwrap_or_else(|| temporary.path().to_path_buf());
+    let results = run_all(&plan, &folder, shard, &|Progress { done, of }| {
+        eprintln!("{done} of {of} cases");
     });
-    println!("{}", table(&results));
-    ExitCode::SUCCESS
+    match results {
+        Ok(results) => {
+            println!("{}", table(&results));
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
 }

@@ -2,14 +2,20 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use std::time::UNIX_EPOCH;
 
 use hidden_effects::score::{Estimate, NamedEffect, outcome, parameter_errors, wilson};
 use hidden_effects::{Case, Kind, Outcome, Settings, Truth, Verdict, World};
 use identification::diagnosis::case::Case as Laboratory;
-use identification::diagnosis::engine::{Observer, Progress};
+use identification::diagnosis::engine::{self, Observer};
 use identification::diagnosis::rigs::shake_table::{Diagnosis, diagnose};
-use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use shakebench::campaign::table::{Cell, Column, Kind as ColumnKind, Role};
+use shakebench::campaign::{self, Head, Progress, Row, Runs, Shard, carry_out};
+use shakebench::error::Error;
+use shakebench::master::Ending;
 
 /// How many cases of each kind, and from which seed.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,12 +43,12 @@ pub struct Plan {
 }
 
 /// One case with its outcome.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scored {
     /// The seed it came from.
     pub seed: u64,
     /// `one`, `two`, `nothing` or `outside`.
-    pub kind: &'static str,
+    pub kind: String,
     /// What was hidden.
     pub truth: Truth,
     /// What was said.
@@ -68,7 +74,7 @@ pub fn run(seed: u64, kind: &'static str, settings: &Settings, verbose: bool) ->
         .expect("a case that can be written");
     let laboratory = Laboratory::read(folder.path()).expect("a case that can be read");
     let begin = core_seconds();
-    let told = |event: &Progress| eprintln!("{event}");
+    let told = |event: &engine::Progress| eprintln!("{event}");
     let observer = if verbose {
         Observer::new(&told)
     } else {
@@ -88,7 +94,7 @@ pub fn run(seed: u64, kind: &'static str, settings: &Settings, verbose: bool) ->
     };
     Scored {
         seed,
-        kind,
+        kind: kind.to_string(),
         outcome: outcome(&case.truth, &verdict),
         errors: parameter_errors(&case.truth, &verdict, |value, from, to| {
             shakebench::units::convert(value, from, to).ok()
@@ -139,38 +145,129 @@ pub fn as_scored(diagnosis: &Diagnosis) -> Verdict {
     }
 }
 
-/// All cases of a plan, in parallel; `progress` is told of each.
-pub fn run_all(plan: &Plan, progress: impl Fn(&Scored) + Sync) -> Vec<Scored> {
-    let kinds = [
-        ("one", plan.effect.map_or(Kind::One, Kind::This), plan.one),
-        ("two", Kind::Two, plan.two),
-        ("nothing", Kind::Nothing, plan.nothing),
-        ("outside", Kind::Outside, plan.outside),
-    ];
-    let cases: Vec<(&'static str, Kind)> = kinds
+impl Plan {
+    /// Kind and settings of the case of a number.
+    fn case(&self, number: u64) -> Option<(&'static str, Settings)> {
+        let number = usize::try_from(number).ok()?;
+        let mut first = 0;
+        let (name, kind) = self.kinds().into_iter().find_map(|(name, kind, count)| {
+            first += count;
+            (number < first).then_some((name, kind))
+        })?;
+        let plain = Settings::new(kind);
+        let in_turn = |values: &[f64], turn: usize, otherwise: f64| {
+            let place = turn.checked_rem(values.len());
+            place.map_or(otherwise, |place| values[place])
+        };
+        let settings = Settings {
+            mismatch: in_turn(
+                &self.mismatch,
+                number / self.noise.len().max(1),
+                plain.mismatch,
+            ),
+            noise: in_turn(&self.noise, number, plain.noise),
+            world: self.world,
+            ..plain
+        };
+        Some((name, settings))
+    }
+
+    fn kinds(&self) -> [(&'static str, Kind, usize); 4] {
+        [
+            ("one", self.effect.map_or(Kind::One, Kind::This), self.one),
+            ("two", Kind::Two, self.two),
+            ("nothing", Kind::Nothing, self.nothing),
+            ("outside", Kind::Outside, self.outside),
+        ]
+    }
+}
+
+/// The cases as the runs of a study: with its journal, shards and table.
+impl Runs for Plan {
+    fn check(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn head(&self) -> Result<Head, Error> {
+        let column = |name: &str, role, kind| Column {
+            name: name.to_string(),
+            unit: None,
+            role,
+            kind,
+        };
+        // What another program diagnosed is diagnosed again.
+        let program = std::env::current_exe().and_then(std::fs::read);
+        let program = program.map(|bytes| shakebench::fmu::digest(&bytes));
+        Ok(Head::of(
+            BTreeMap::from([("diagnosis".to_string(), program.unwrap_or_default())]),
+            vec![
+                column("number", Role::Run, ColumnKind::Number),
+                column("run", Role::Run, ColumnKind::Text),
+                column("kind", Role::Factor, ColumnKind::Text),
+                column("mismatch", Role::Factor, ColumnKind::Number),
+                column("noise", Role::Factor, ColumnKind::Number),
+                column("hidden", Role::Factor, ColumnKind::Text),
+                column("outcome", Role::Result, ColumnKind::Text),
+                column("seconds", Role::Result, ColumnKind::Number),
+                column("scored", Role::Result, ColumnKind::Text),
+                column("ended", Role::Ending, ColumnKind::Text),
+                column("ended_s", Role::Ending, ColumnKind::Number),
+                column("reason", Role::Ending, ColumnKind::Text),
+            ],
+        ))
+    }
+
+    fn count(&self) -> u64 {
+        self.kinds().iter().map(|(.., count)| *count as u64).sum()
+    }
+
+    fn name(&self, number: u64) -> String {
+        format!("{} {:?}", self.seed + number, self.case(number))
+    }
+
+    fn run(&self, number: u64) -> Row {
+        let (kind, settings) = self.case(number).expect("a number below the count");
+        let scored = run(self.seed + number, kind, &settings, self.verbose);
+        let whole = serde_json::to_string(&scored).expect("plain data");
+        Row {
+            run: self.name(number),
+            cells: vec![
+                kind.into(),
+                settings.mismatch.into(),
+                settings.noise.into(),
+                hidden(&scored.truth).into(),
+                format!("{:?}", scored.outcome).into(),
+                scored.seconds.into(),
+                whole.into(),
+                Ending::Complete.word().into(),
+                Cell::Missing,
+                Cell::Missing,
+            ],
+        }
+    }
+}
+
+/// All cases of a plan, on all cores; those that `folder` has are not diagnosed again.
+///
+/// # Errors
+/// A folder that cannot be written or holds other cases.
+pub fn run_all(
+    plan: &Plan,
+    folder: &Path,
+    shard: Option<Shard>,
+    tell: &(dyn Fn(Progress) + Sync),
+) -> Result<Vec<Scored>, Error> {
+    let how = campaign::Plan {
+        folder: folder.to_path_buf(),
+        shard,
+        jobs: None,
+    };
+    let carried = carry_out(plan, &how, &AtomicBool::new(false), tell)?;
+    let scored = carried.table.texts("scored");
+    Ok(scored
         .iter()
-        .flat_map(|&(name, kind, count)| std::iter::repeat_n((name, kind), count))
-        .collect();
-    cases
-        .par_iter()
-        .enumerate()
-        .map(|(i, &(name, kind))| {
-            let plain = Settings::new(kind);
-            let in_turn = |values: &[f64], turn: usize, otherwise: f64| {
-                let place = turn.checked_rem(values.len());
-                place.map_or(otherwise, |place| values[place])
-            };
-            let settings = Settings {
-                mismatch: in_turn(&plan.mismatch, i / plan.noise.len().max(1), plain.mismatch),
-                noise: in_turn(&plan.noise, i, plain.noise),
-                world: plan.world,
-                ..plain
-            };
-            let scored = run(plan.seed + i as u64, name, &settings, plan.verbose);
-            progress(&scored);
-            scored
-        })
-        .collect()
+        .map(|text| serde_json::from_str(text).expect("what was written"))
+        .collect())
 }
 
 /// Rates with Wilson intervals by kind, strength and excitation, parameter errors, coverage, time
@@ -220,7 +317,7 @@ pub fn table(results: &[Scored]) -> String {
     for usual in [true, false] {
         let name = if usual { "the usual" } else { "others" };
         row(&format!("forms of the effects: {name}"), &|r| {
-            r.truth.usual_form == usual && matches!(r.kind, "one" | "two")
+            r.truth.usual_form == usual && matches!(r.kind.as_str(), "one" | "two")
         });
     }
     let distinct = |value: fn(&Truth) -> f64| {

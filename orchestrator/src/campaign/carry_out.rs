@@ -1,8 +1,9 @@
 //! A study from its file to its table: runs that are missing are carried out on all cores.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -10,13 +11,37 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::bench::Bench;
+use super::bench::{Bench, Row};
 use super::journal::{self, Head, IDENTITY, Journal};
 use super::study::Study;
 use super::table::{Cell, Table};
 use crate::error::Error;
 use crate::master::Ending;
 use crate::results::may_overwrite;
+
+/// Runs that can be carried out: those of a study, or others that want its journal, shards and table.
+pub trait Runs: Sync {
+    /// Finds what is wrong before the first run.
+    ///
+    /// # Errors
+    /// What is wrong.
+    fn check(&self) -> Result<(), Error>;
+
+    /// With which rows theirs may stand in one table, and the columns.
+    ///
+    /// # Errors
+    /// As [`Runs::check`].
+    fn head(&self) -> Result<Head, Error>;
+
+    /// How many there are.
+    fn count(&self) -> u64;
+
+    /// The name of a run: what it is, not where it stands.
+    fn name(&self, number: u64) -> String;
+
+    /// Carries a run out; one that fails is a row too.
+    fn run(&self, number: u64) -> Row;
+}
 
 /// A part of a study: every `of`-th run from the `part`-th on, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,6 +50,22 @@ pub struct Shard {
     pub part: u64,
     /// Of how many.
     pub of: u64,
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    /// Reads `I/N`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = "expected I/N with 1 <= I <= N, such as 1/4";
+        let (part, of) = text.split_once('/').ok_or(expected)?;
+        let part = part.trim().parse().map_err(|_| expected)?;
+        let of = of.trim().parse().map_err(|_| expected)?;
+        match (1..=of).contains(&part) {
+            true => Ok(Self { part, of }),
+            false => Err(expected.to_string()),
+        }
+    }
 }
 
 impl Shard {
@@ -90,27 +131,23 @@ const BYTES_A_RUN: u64 = 1200;
 /// Whatever is wrong with the study, before its first run; a folder that cannot be written. A run that
 /// fails is a row.
 pub fn carry_out(
-    study: &Study,
+    runs: &dyn Runs,
     plan: &Plan,
     interrupt: &AtomicBool,
     tell: &(dyn Fn(Progress) + Sync),
 ) -> Result<Carried, Error> {
     let begun = Instant::now();
-    let bench = Bench::new(study);
-    bench.check()?;
-    let head = Head::new(bench.columns()?)?;
+    runs.check()?;
+    let head = runs.head()?;
     if may_overwrite() {
         journal::remove(&plan.folder);
     }
     let mut rows = journal::read(&plan.folder, &head)?;
     let mine = |number: &u64| plan.shard.is_none_or(|shard| shard.holds(*number));
-    let names = |number: u64| study.name(&study.settings(number));
-    let all: Vec<u64> = (0..study.runs()).filter(mine).collect();
-    let missing: Vec<u64> = all
-        .iter()
-        .copied()
-        .filter(|&number| !rows.contains_key(&names(number)))
-        .collect();
+    let all = (0..runs.count()).filter(mine);
+    let all: Vec<(u64, String)> = all.map(|number| (number, runs.name(number))).collect();
+    let missing = all.iter().filter(|(_, name)| !rows.contains_key(name));
+    let missing: Vec<u64> = missing.map(|(number, _)| *number).collect();
     let before = (all.len() - missing.len()) as u64;
     let progress = |done| {
         tell(Progress {
@@ -135,7 +172,7 @@ pub fn carry_out(
                     if interrupt.load(Ordering::Relaxed) {
                         return Ok(());
                     }
-                    let row = bench.run(number);
+                    let row = runs.run(number);
                     journal
                         .lock()
                         .unwrap_or_else(PoisonError::into_inner)
@@ -151,29 +188,25 @@ pub fn carry_out(
         columns: head.columns,
         rows: Vec::new(),
     };
-    let mut known = std::collections::HashSet::new();
-    for &number in &all {
-        let name = names(number);
-        let Some(cells) = rows.get(&name) else {
+    let mut known = HashSet::new();
+    let mut there = 0;
+    for (number, name) in &all {
+        let Some(cells) = rows.get(name) else {
             continue;
         };
+        there += 1;
         // Two points of lists alone may be the same run.
-        if !known.insert(name.clone()) {
-            continue;
+        if known.insert(name) {
+            let mut row = Vec::with_capacity(IDENTITY + cells.len());
+            row.push(Cell::Number(*number as f64));
+            row.push(name.as_str().into());
+            row.extend_from_slice(cells);
+            table.rows.push(row);
         }
-        let mut row = Vec::with_capacity(IDENTITY + cells.len());
-        row.push(Cell::Number(number as f64));
-        row.push(name.into());
-        row.extend_from_slice(cells);
-        table.rows.push(row);
     }
     let ended = table.texts("ended");
     let count = |ending: Ending| ended.iter().filter(|own| **own == ending.word()).count() as u64;
     let rows_there = table.rows.len() as u64;
-    let there = all
-        .iter()
-        .filter(|&&number| rows.contains_key(&names(number)))
-        .count();
     let summary = Summary {
         runs: rows_there,
         complete: count(Ending::Complete) + count(Ending::Terminated),
@@ -181,7 +214,7 @@ pub fn carry_out(
         failed: count(Ending::Failed),
         from_before: before,
         wall_s: begun.elapsed().as_secs_f64(),
-        missing: study.runs() - there as u64,
+        missing: runs.count() - there,
     };
     Ok(Carried { table, summary })
 }
@@ -230,14 +263,13 @@ pub fn rows(
     output: &mut dyn Write,
 ) -> Result<(), Error> {
     let bench = Bench::new(study);
-    let head = Head::new(bench.columns()?)?;
     let mut write = |line: Vec<u8>| {
         output.write_all(&line).map_err(|error| Error::File {
             path: PathBuf::from("standard output"),
             reason: error.to_string(),
         })
     };
-    write(journal::line(&head)?)?;
+    write(journal::line(&bench.head()?)?)?;
     for number in numbers {
         write(journal::row_line(&bench.run(number))?)?;
     }

@@ -55,21 +55,23 @@ struct Written {
     integers: Option<[i64; 2]>,
     #[serde(default)]
     relative: bool,
+    of: Option<Vec<String>>,
 }
 
 /// Most values of a list: more are mistakes.
 const MOST_VALUES: usize = 1_000_000;
 
 impl Values {
-    /// Reads a factor as written.
+    /// Reads a factor as written, and the variables that it names where its own name is none.
     ///
     /// # Errors
     /// What is wrong and what was expected.
-    pub fn read(written: &toml::Value) -> Result<Self, String> {
+    pub fn read(written: &toml::Value) -> Result<(Self, Option<Vec<String>>), String> {
         let plain = |error: toml::de::Error| error.message().to_string();
         let table = match written {
             toml::Value::Array(_) => {
-                return Self::list(written.clone().try_into().map_err(plain)?);
+                let list = written.clone().try_into().map_err(plain)?;
+                return Ok((Self::list(list)?, None));
             }
             toml::Value::Table(table) => table.clone(),
             single => {
@@ -79,8 +81,9 @@ impl Values {
                 ));
             }
         };
-        let written: Written = toml::Value::Table(table).try_into().map_err(plain)?;
-        written.check()
+        let mut written: Written = toml::Value::Table(table).try_into().map_err(plain)?;
+        let of = written.of.take();
+        Ok((written.check()?, of))
     }
 
     fn list(values: Vec<Setting>) -> Result<Self, String> {
@@ -138,6 +141,7 @@ impl Written {
             lognormal,
             integers,
             relative,
+            of: _,
         } = self;
         let given = [
             list.is_some(),
@@ -177,7 +181,9 @@ impl Written {
                 false => low + (high - low) * step as f64 / (steps - 1) as f64,
             };
             return Ok(Values::List(
-                (0..steps).map(|step| setting(value(step), &unit)).collect(),
+                (0..steps)
+                    .map(|step| with_unit(value(step), &unit))
+                    .collect(),
             ));
         }
         if let Some([low, high]) = integers {
@@ -238,7 +244,7 @@ impl Drawn {
             let count = (high - low) as f64 + 1.0;
             return Setting::Integer(low.saturating_add((at * count) as i64).min(high));
         }
-        setting(self.distribution.quantile(at), &self.unit)
+        with_unit(self.distribution.quantile(at), &self.unit)
     }
 }
 
@@ -260,7 +266,7 @@ impl Distribution {
 }
 
 /// A number in a unit as a setting.
-pub(super) fn setting(value: f64, unit: &str) -> Setting {
+pub(crate) fn with_unit(value: f64, unit: &str) -> Setting {
     match unit {
         "" => Setting::Number(value),
         unit => Setting::Text(format!("{value:?} {unit}")),
@@ -327,7 +333,7 @@ mod tests {
 
     fn read(text: &str) -> Result<Values, String> {
         let table: toml::Table = toml::from_str(&format!("x = {text}")).unwrap();
-        Values::read(&table["x"])
+        Values::read(&table["x"]).map(|(values, _)| values)
     }
 
     #[test]

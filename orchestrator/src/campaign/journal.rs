@@ -53,12 +53,18 @@ impl Head {
                 crate::fmu::digest(&bytes),
             );
         }
-        Ok(Self {
+        Ok(Self::of(components, columns))
+    }
+
+    /// The head of rows that these components compute, by name and checksum.
+    #[must_use]
+    pub fn of(components: BTreeMap<String, String>, columns: Vec<Column>) -> Self {
+        Self {
             shakebench: env!("CARGO_PKG_VERSION").to_string(),
             platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
             components,
             columns,
-        })
+        }
     }
 
     /// Why rows under the other head do not belong into a table with rows under this one.
@@ -77,7 +83,7 @@ impl Head {
                 .components
                 .iter()
                 .find(|(name, sum)| other.components.get(*name).is_some_and(|then| then != *sum));
-            changed.map(|(name, _)| format!("was computed with another FMU of {name}"))
+            changed.map(|(name, _)| format!("was computed with another {name}"))
         })
     }
 }
@@ -289,7 +295,7 @@ pub fn read(folder: &Path, head: &Head) -> Result<HashMap<String, Vec<Cell>>, Er
 }
 
 /// Columns before the cells of a row: number and name.
-pub(super) const IDENTITY: usize = 2;
+pub(crate) const IDENTITY: usize = 2;
 
 /// Takes the journals of a folder away.
 pub fn remove(folder: &Path) {

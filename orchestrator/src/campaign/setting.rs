@@ -49,6 +49,8 @@ pub enum Key {
     Algorithm,
     /// A variable of an instance.
     Variable(String),
+    /// Variables of instances that are the same, or the same times what each of them is.
+    Variables(Vec<String>),
 }
 
 /// The keys that are no variables.
@@ -72,8 +74,10 @@ const KEYS: [(&str, Key); 17] = [
     ("algorithm", Key::Algorithm),
 ];
 
-/// The value of `control_model` that commissions each run's own rig.
+/// The value of `control_model` with which controllers are designed on recordings of each run's own rig.
 pub const OWN_MODEL: &str = "own";
+/// The value of `control_model` with which they are designed as without it.
+pub const USUAL_MODEL: &str = "usual";
 
 impl Key {
     /// The key of that name.
@@ -98,10 +102,43 @@ impl Key {
         ))
     }
 
+    /// The key of several variables under a name of their own.
+    ///
+    /// # Errors
+    /// A name that a key or a variable has, variables that are none.
+    pub fn together(name: &str, variables: Vec<String>) -> Result<Self, String> {
+        if Self::of(name).is_ok() {
+            return Err(
+                "`of` names variables; expected a name of its own, without a point".to_string(),
+            );
+        }
+        if variables.is_empty() {
+            return Err("`of` names no variable".to_string());
+        }
+        for variable in &variables {
+            if !matches!(Self::of(variable), Ok(Self::Variable(_))) {
+                return Err(format!(
+                    "`{variable}` is no variable; expected \"instance.variable\""
+                ));
+            }
+        }
+        Ok(Self::Variables(variables))
+    }
+
+    /// The variables that it sets.
+    #[must_use]
+    pub fn variables(&self) -> &[String] {
+        match self {
+            Self::Variable(name) => std::slice::from_ref(name),
+            Self::Variables(names) => names,
+            _ => &[],
+        }
+    }
+
     /// The unit in which a number alone is, and in which it is put into the table; none for texts.
     pub(super) fn unit(&self) -> Option<&'static str> {
         match self {
-            Self::Seed | Self::Scale => Some(""),
+            Self::Seed | Self::Scale | Self::Variables(_) => Some(""),
             Self::PeakAcceleration => Some("g"),
             Self::PeakDisplacement => Some("m"),
             Self::Duration | Self::Step => Some("s"),
@@ -113,7 +150,7 @@ impl Key {
     pub(super) fn is_path(&self, value: &str) -> bool {
         match self {
             Self::Record | Self::Reference => true,
-            Self::ControlModel => value != OWN_MODEL,
+            Self::ControlModel => ![OWN_MODEL, USUAL_MODEL].contains(&value),
             Self::System => is_file(value),
             Self::Plant => value.ends_with(".toml"),
             _ => false,
@@ -188,7 +225,7 @@ impl Key {
             Self::Tuning => request.tuning = Some(choice::<Tuning>(&text()?)?),
             Self::ControlModel => {
                 let name = text()?;
-                request.control_model = (name != OWN_MODEL).then(|| folder.join(name));
+                request.control_model = self.is_path(&name).then(|| folder.join(name));
             }
             Self::Fmi => {
                 request.fmi = match value {
@@ -213,7 +250,13 @@ impl Key {
             Self::Duration => request.duration_s = Some(number()?),
             Self::Step => request.step_s = Some(number()?),
             Self::Algorithm => request.algorithm = Some(choice::<Algorithm>(&text()?)?),
-            Self::Variable(name) => request.set.push(format!("{name}={value}")),
+            Self::Variable(_) | Self::Variables(_) => {
+                let set = self
+                    .variables()
+                    .iter()
+                    .map(|name| format!("{name}={value}"));
+                request.set.extend(set);
+            }
         }
         Ok(())
     }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
+use super::analysis;
 use super::design::{Design, Points};
 use super::factor::Values;
 use super::setting::{self, Key};
@@ -25,6 +26,7 @@ struct Written {
     factors: BTreeMap<String, toml::Value>,
     #[serde(default)]
     limits: BTreeMap<String, Setting>,
+    tune: Option<toml::Table>,
 }
 
 #[derive(Deserialize)]
@@ -93,6 +95,8 @@ pub struct Study {
     pub intensity: String,
     /// Figures that are asked for by other programs.
     pub results: Vec<String>,
+    /// What is searched, for `shakebench tune`.
+    pub tune: Option<toml::Table>,
     /// Places in `factors` of those that are crossed with every point.
     crossed: Vec<usize>,
     /// Places in `factors` of the others, a dimension of the points each.
@@ -103,11 +107,16 @@ pub struct Study {
 }
 
 impl Study {
-    /// Reads a study; paths in it count from its folder.
+    /// Reads a study; paths in it count from its folder. A name without an ending is that of a study that
+    /// comes with the program, where there is no such file.
     ///
     /// # Errors
     /// The place and what was expected there.
     pub fn read(path: &Path) -> Result<Self, Error> {
+        let built_in = BUILT_IN.iter().find(|(name, _)| Path::new(name) == path);
+        if let (Some((_, text)), false) = (built_in, path.exists()) {
+            return Self::parse(path, (*text).to_string());
+        }
         let text = std::fs::read_to_string(path).map_err(|error| Error::File {
             path: path.to_path_buf(),
             reason: match error.kind() {
@@ -142,12 +151,16 @@ impl Study {
         let mut factors: Vec<Factor> = Vec::new();
         for (name, value) in written.factors {
             let at = at("factors", &name);
-            let key = Key::of(&name).map_err(&at)?;
-            let mut values = Values::read(&value).map_err(&at)?;
+            let (mut values, of) = Values::read(&value).map_err(&at)?;
+            let key = match of {
+                Some(variables) => Key::together(&name, variables),
+                None => Key::of(&name),
+            };
+            let key = key.map_err(&at)?;
             if key == Key::Record {
                 values = whole_folders(values, &folder).map_err(&at)?;
             }
-            if values.is_relative() && !matches!(key, Key::Variable(_)) {
+            if values.is_relative() && key.variables().is_empty() {
                 return Err(at(
                     "`relative` belongs to a variable of an instance".to_string()
                 ));
@@ -218,6 +231,7 @@ impl Study {
             limits: limits.collect(),
             intensity: written.study.intensity,
             results: written.study.results,
+            tune: written.tune,
             crossed,
             sampled,
             points,
@@ -228,7 +242,7 @@ impl Study {
     }
 
     /// An error of this study.
-    pub(super) fn fault(&self, reason: &str) -> Error {
+    pub(crate) fn fault(&self, reason: &str) -> Error {
         Error::File {
             path: self.path.clone(),
             reason: reason.to_string(),
@@ -239,6 +253,40 @@ impl Study {
     #[must_use]
     pub fn runs(&self) -> u64 {
         self.points.count() * self.crossings()
+    }
+
+    /// How the rows came about, as the analysis asks.
+    pub(super) fn analysed(&self) -> analysis::Design {
+        let names = |places: &[usize]| -> Vec<String> {
+            let places = places.iter();
+            places
+                .map(|&place| self.factors[place].name.clone())
+                .collect()
+        };
+        match self.design {
+            Design::Saltelli => analysis::Design::Saltelli {
+                sampled: names(&self.sampled),
+                crossed: names(&self.crossed),
+            },
+            _ => analysis::Design::Other,
+        }
+    }
+
+    /// What is ranked on points that it shares: the controllers where they are crossed, otherwise the first
+    /// crossed factor that chooses a component.
+    pub(super) fn ranked(&self) -> Option<analysis::Ranked> {
+        let crossed = self.crossed.iter().map(|&place| &self.factors[place]);
+        let choosing: Vec<&Factor> = crossed
+            .filter(|factor| factor.key.is_structural())
+            .collect();
+        let controllers = choosing.iter().find(|factor| factor.key == Key::System);
+        let ranked = controllers.or(choosing.first())?;
+        let others = choosing.iter().filter(|factor| factor.name != ranked.name);
+        Some(analysis::Ranked {
+            factor: ranked.name.clone(),
+            among: others.map(|factor| factor.name.clone()).collect(),
+            crossings: self.crossings(),
+        })
     }
 
     /// Runs at each point of the design.
@@ -287,18 +335,13 @@ impl Study {
                 text.clone_from(sum);
             }
             let how = if relative { "*=" } else { "=" };
+            let name = match key.variables() {
+                [] => name.to_string(),
+                variables => variables.join(" "),
+            };
             sum.update(format!("{name}{how}{text}\n").as_bytes());
         };
-        let mut all: Vec<(&str, &Key, &Setting, bool)> = self
-            .fixed
-            .iter()
-            .map(|(name, key, value)| (name.as_str(), key, value, false))
-            .collect();
-        let varied = self.factors.iter().zip(settings);
-        all.extend(varied.map(|(factor, value)| {
-            let is_relative = factor.values.is_relative();
-            (factor.name.as_str(), &factor.key, value, is_relative)
-        }));
+        let mut all: Vec<(&str, &Key, &Setting, bool)> = self.all_values(settings).collect();
         all.sort_by_key(|(name, ..)| *name);
         for (name, key, value, relative) in all {
             add(name, key, value, relative);
@@ -320,6 +363,20 @@ impl Study {
     #[must_use]
     pub fn folder(&self) -> PathBuf {
         folder(&self.path)
+    }
+
+    /// Every key with its value in a run with these factors, and whether that is times the system's own.
+    pub(super) fn all_values<'a>(
+        &'a self,
+        settings: &'a [Setting],
+    ) -> impl Iterator<Item = (&'a str, &'a Key, &'a Setting, bool)> {
+        let fixed = self.fixed.iter();
+        let fixed = fixed.map(|(name, key, value)| (name.as_str(), key, value, false));
+        let varied = self.factors.iter().zip(settings);
+        fixed.chain(varied.map(|(factor, value)| {
+            let is_relative = factor.values.is_relative();
+            (factor.name.as_str(), &factor.key, value, is_relative)
+        }))
     }
 
     /// Every key with each of its values in the study.
@@ -357,6 +414,9 @@ impl Study {
         Ok(sums)
     }
 }
+
+/// The studies that come with the program.
+const BUILT_IN: [(&str, &str); 1] = [("rigs", include_str!("../../studies/rigs.toml"))];
 
 /// How the name of a column begins that holds the peak of a signal.
 pub(super) const PEAK: &str = "peak.";

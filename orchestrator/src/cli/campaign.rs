@@ -7,23 +7,26 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt;
-use crate::campaign::{self, Bench, Left, Plan, Progress, Shard, Study, carry_out};
+use crate::campaign::{self, Bench, Left, Plan, Progress, Runs, Shard, Study, carry_out};
 use crate::error::Error;
+use crate::report::columns::aligned;
 use crate::results::{Results, unused};
 
 /// Options of `shakebench campaign`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
-    shakebench campaign STUDY.toml --out RUNS\n\n\
+    shakebench campaign STUDY.toml --out RUNS\n  \
+    shakebench campaign rigs --shard 1/8 --out RIGS\n\n\
     The same command goes on where it was stopped. A study that was extended runs what is new.")]
 pub struct Arguments {
-    /// The study: what is fixed, what varies, and how (docs/campaigns.md)
+    /// The study: what is fixed, what varies, and how (docs/campaigns.md); or `rigs`, the controllers on 200
+    /// rigs that are not the one they were designed for
     study: PathBuf,
     /// Folder for runs.parquet, runs.csv and report.html [default: shakebench-results/STUDY]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Carry out the I-th of N parts of the study; without this, the parts in the folder are collected
-    #[arg(long, value_name = "I/N", value_parser = shard)]
+    #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Runs at a time [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -37,17 +40,6 @@ pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
-}
-
-fn shard(text: &str) -> Result<Shard, String> {
-    let expected = "expected I/N with 1 <= I <= N, such as 1/4";
-    let (part, of) = text.split_once('/').ok_or(expected)?;
-    let part = part.trim().parse().map_err(|_| expected)?;
-    let of = of.trim().parse().map_err(|_| expected)?;
-    match (1..=of).contains(&part) {
-        true => Ok(Shard { part, of }),
-        false => Err(expected.to_string()),
-    }
 }
 
 fn range(text: &str) -> Result<std::ops::Range<u64>, String> {
@@ -103,23 +95,37 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         jobs: arguments.jobs.map(usize::from),
     };
     let is_shown = std::sync::Once::new();
-    let carried = carry_out(&study, &how, asked, &|Progress { done, of }| {
-        is_shown.call_once(|| {
-            bar.set_length(of);
+    let carried = carry_out(
+        &Bench::new(&study),
+        &how,
+        asked,
+        &|Progress { done, of }| {
+            is_shown.call_once(|| {
+                bar.set_length(of);
+                bar.set_position(done);
+                bar.reset_eta();
+                bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
+            });
             bar.set_position(done);
-            bar.reset_eta();
-            bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
-        });
-        bar.set_position(done);
-    });
+        },
+    );
     bar.finish_and_clear();
     let carried = carried?;
     let summary = &carried.summary;
     let is_whole = summary.missing == 0;
-    let files = match is_whole {
-        true => campaign::write(&study, &carried, &folder)?,
-        false => Vec::new(),
-    };
+    let mut files = Vec::new();
+    let mut said = String::new();
+    if is_whole {
+        let findings = campaign::findings(&study, &carried)?;
+        files = campaign::write(&study, &carried, &findings, &folder)?;
+        said = campaign::page::summary(&findings);
+        if let Some(ranking) = &findings.ranking {
+            said += &format!("\n\n{}", aligned(&campaign::page::standings(ranking)));
+            for line in campaign::page::sentences(ranking) {
+                said += &format!("\n{line}");
+            }
+        }
+    }
     if arguments.json {
         println!("{}", serde_json::json!(summary));
     } else {
@@ -136,6 +142,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 summary.missing,
                 folder.display()
             );
+        }
+        if !said.is_empty() {
+            println!("\n{said}");
         }
         if !files.is_empty() {
             println!("\nwritten:");

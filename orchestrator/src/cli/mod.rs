@@ -31,9 +31,9 @@ pub mod iterate;
 mod progress;
 pub mod report;
 mod rig;
-pub mod rigs;
 pub mod run;
 mod terminal;
+pub mod tune;
 pub mod validate;
 
 use std::path::PathBuf;
@@ -123,10 +123,10 @@ enum Command {
         /// File that the calls come through
         file: PathBuf,
     },
-    /// Draw rigs about the physical one and compare designs on them
-    Rigs(rigs::Arguments),
     /// Run a system on a motion
     Run(Box<run::Arguments>),
+    /// Search a controller's parameters over a study, within stability margins
+    Tune(tune::Arguments),
     /// Say what is wrong with an FMU or an SSP archive
     Validate(validate::Arguments),
 }
@@ -166,8 +166,8 @@ pub fn main() -> ExitCode {
         Some(Command::Iterate(arguments)) => iterate::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
-        Some(Command::Rigs(arguments)) => rigs::execute(&arguments),
         Some(Command::Run(arguments)) => run::execute(&arguments),
+        Some(Command::Tune(arguments)) => tune::execute(&arguments),
         Some(Command::Validate(arguments)) => validate::execute(&arguments),
     };
     let status = done.unwrap_or_else(|error| {

@@ -205,6 +205,11 @@ fn reports_and_comparing_runs() {
 }
 
 #[test]
+fn campaigns() {
+    run_page("campaigns.md");
+}
+
+#[test]
 fn iterative_control() {
     run_page("iterative-control.md");
 }

@@ -103,9 +103,15 @@ fn pages_are_drawn_whole_and_tell_the_figures_of_their_files() {
     done(folder, &["compare-runs", "mpc", "lost", "--out", "runs"], 0);
     done(folder, &["design", "--out", "design"], 0);
     done(folder, &["figures", "--out", "figures"], 0);
+    let study = "[study]\nruns = 24\ncross = [\"controller\"]\n\
+        [fixed]\nspecimen = \"yielding\"\nplant = \"servohydraulic\"\nduration = \"8 s\"\n\
+        [factors]\ncontroller = [\"three-variable\", \"mpc\"]\nseed = [1, 2, 3]\n\
+        scale = { uniform = [0.1, 0.5] }\n[limits]\n\"specimen.drift\" = \"0.3 in\"\n";
+    std::fs::write(folder.join("study.toml"), study).unwrap();
+    done(folder, &["campaign", "study.toml", "--out", "study"], 0);
     let oscillator = described(folder).display().to_string();
     done(folder, &["diagnose", &oscillator, "--out", "rig"], 0);
-    let mut pages = ["mpc", "lost", "runs", "design", "figures", "rig"]
+    let mut pages = ["mpc", "lost", "runs", "design", "figures", "rig", "study"]
         .map(|name| folder.join(name).join("report.html"))
         .to_vec();
     if let Some(case) = case() {

@@ -20,6 +20,7 @@ mod physical_rig;
 mod reports;
 mod rigs;
 mod systems;
+mod tuning;
 
 use std::path::Path;
 use std::process::{Command, Output};

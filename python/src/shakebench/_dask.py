@@ -43,15 +43,16 @@ def collect(
     if batch is not None and batch < 1:
         raise InputError(f"batch={batch}: expected 1 or more")
     plan = call(["campaign", text(study), "--plan", "--out", str(out), "--json", *more])
-    if "--force" in more:
-        # What `--force` does in the program; there it would take away what the workers bring.
-        for old in (out / "journal").glob("*.jsonl"):
-            old.unlink()
-        more = [option for option in more if option != "--force"]
     archive, place = _packed(Path(study), plan["files"])
     with _connected(client) as connected, Journal(out, "dask") as journal:
-        _check(connected)
-        return _Study(connected, archive, place, plan, batch, more).run(journal)
+        if plan["missing"]:
+            _check(connected)
+        if "--force" in more:
+            # What `--force` does in the program; there it would take away what the workers bring.
+            for old in (out / "journal").glob("*.jsonl"):
+                old.unlink()
+        of_tasks = [option for option in more if option != "--force"]
+        return _Study(connected, archive, place, plan, batch, of_tasks).run(journal)
 
 
 @contextlib.contextmanager

@@ -48,7 +48,7 @@ pub struct TruthValue {
 }
 
 /// What `diagnose --json` says, as far as it is scored.
-#[derive(Debug, Clone, PartialEq, Default, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Verdict {
     /// `adequate`, `named`, `ambiguous` or `unexplained`.
     pub verdict: String,
@@ -61,7 +61,7 @@ pub struct Verdict {
 }
 
 /// A named effect with its estimates.
-#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NamedEffect {
     /// Name in the catalogue.
     pub effect: String,
@@ -71,7 +71,7 @@ pub struct NamedEffect {
 }
 
 /// An estimate in the unit it is given in.
-#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Estimate {
     /// The number.
     pub value: f64,
@@ -82,7 +82,9 @@ pub struct Estimate {
 }
 
 /// Outcome of a case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
 pub enum Outcome {
     /// Exactly what was hidden.
     Right,

@@ -59,7 +59,8 @@ fn hidden_effects_are_found_and_nothing_where_nothing_is() {
         world: World::Plain,
         verbose: false,
     };
-    let results = run_all(&plan, |_| {});
+    let folder = tempfile::tempdir().unwrap();
+    let results = run_all(&plan, folder.path(), None, &|_| {}).unwrap();
     let report = table(&results);
     println!("{plan:?}\n{report}");
     // So few cases cannot measure rates: the bounds are those that a diagnosis with the required
@@ -93,7 +94,8 @@ fn effects_that_came_later_are_found_too() {
             world: World::Plain,
             verbose: false,
         };
-        let results = run_all(&plan, |_| {});
+        let folder = tempfile::tempdir().unwrap();
+        let results = run_all(&plan, folder.path(), None, &|_| {}).unwrap();
         println!("{plan:?}\n{}", table(&results));
         let (right, wrong) = rates(&results, "one");
         assert!(right == 1.0 && wrong == 0.0, "{}", entry.name);
