@@ -64,7 +64,9 @@ impl FmuLibrary {
             Fmu::open(&path)?
         } else {
             Fmu::open_own(&path).map_err(|error| {
-                format!("{error}; install again, or name the folder of this platform's FMUs in --fmus")
+                format!(
+                    "{error}; install again, or name the folder of this platform's FMUs in --fmus"
+                )
             })?
         };
         self.open.insert(path, fmu.clone());

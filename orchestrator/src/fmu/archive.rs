@@ -198,7 +198,12 @@ fn is_cut_short(path: &Path) -> std::io::Result<bool> {
     if !header.starts_with(b"\x7fELF") {
         return Ok(false);
     }
-    let number = |bytes: &[u8]| bytes.iter().rev().fold(0, |n, byte| n << 8 | u64::from(*byte));
+    let number = |bytes: &[u8]| {
+        bytes
+            .iter()
+            .rev()
+            .fold(0, |n, byte| (n << 8) | u64::from(*byte))
+    };
     let (table, count) = (number(&header[0x20..0x28]), number(&header[0x38..0x3a]));
     let bytes = usize::try_from(count).unwrap_or(0) * SEGMENT;
     if table.saturating_add(bytes as u64) > length {

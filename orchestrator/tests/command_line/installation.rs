@@ -212,7 +212,10 @@ fn fmus_that_do_not_fit_the_program_are_refused_with_the_cure() {
     rewrite(&path, &library, |_| {
         Some(b"MZ of another system".repeat(10))
     });
-    installed.refuses(&run, &["a Windows library", "ShakeTable.fmu", "install again"]);
+    installed.refuses(
+        &run,
+        &["a Windows library", "ShakeTable.fmu", "install again"],
+    );
 
     // Mapped, such a file would end the process.
     fs::write(&path, &whole).unwrap();
