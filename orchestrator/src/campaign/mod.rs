@@ -56,7 +56,7 @@ pub fn findings(study: &Study, carried: &Carried) -> Result<Findings, Error> {
                 above,
             })
             .collect(),
-        design: study.analysed(),
+        design: study.analysed(&carried.table),
         ranked: study.ranked(),
         seed: study.seed,
     };

@@ -1,6 +1,6 @@
 //! A study file, and the runs that it asks for.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -10,6 +10,7 @@ use super::analysis;
 use super::design::{Design, Points};
 use super::factor::Values;
 use super::setting::{self, Key};
+use super::table::Table;
 use crate::error::Error;
 use crate::fmu::hexadecimal;
 use crate::system::Setting;
@@ -256,19 +257,27 @@ impl Study {
     }
 
     /// How the rows came about, as the analysis asks.
-    pub(super) fn analysed(&self) -> analysis::Design {
+    pub(super) fn analysed(&self, table: &Table) -> analysis::Design {
         let names = |places: &[usize]| -> Vec<String> {
             let places = places.iter();
             places
                 .map(|&place| self.factors[place].name.clone())
                 .collect()
         };
-        match self.design {
-            Design::Saltelli => analysis::Design::Saltelli {
-                sampled: names(&self.sampled),
-                crossed: names(&self.crossed),
-            },
-            _ => analysis::Design::Other,
+        if self.design != Design::Saltelli {
+            return analysis::Design::Other;
+        }
+        let runs = table.texts("run").into_iter().enumerate();
+        let rows: HashMap<&str, usize> = runs.map(|(row, name)| (name, row)).collect();
+        let row = |number| {
+            rows.get(self.name(&self.settings(number)).as_str())
+                .copied()
+        };
+        analysis::Design::Saltelli {
+            sampled: names(&self.sampled),
+            crossed: names(&self.crossed),
+            crossings: self.crossings() as usize,
+            rows: (0..self.runs()).map(row).collect(),
         }
     }
 

@@ -146,7 +146,7 @@ impl<'a> Runs<'a> {
             })
             .collect();
         // As many texts as runs are no list.
-        (values.len() > 1 && 2 * values.len() <= self.len()).then(|| List { values, places })
+        (values.len() > 1 && 2 * values.len() <= self.len()).then_some(List { values, places })
     }
 
     /// The controllers, where several were compared.

@@ -64,10 +64,8 @@ struct Outcome {
 pub(super) fn importance(runs: &Runs, settings: &Settings) -> Vec<Importance> {
     let outcomes = outcomes(runs, settings);
     let found = outcomes.iter().flat_map(|outcome| match &settings.design {
-        Design::Saltelli { sampled, crossed } => {
-            sobol(runs, outcome, sampled, crossed, settings.seed)
-        }
         Design::Other => alone(runs, outcome, settings.seed).into_iter().collect(),
+        saltelli => sobol(runs, outcome, saltelli, settings.seed),
     });
     found.filter(|own| !own.factors.is_empty()).collect()
 }
@@ -110,14 +108,17 @@ fn outcomes(runs: &Runs, settings: &Settings) -> Vec<Outcome> {
     all
 }
 
-/// Indices for each value of the crossed factors.
-fn sobol(
-    runs: &Runs,
-    outcome: &Outcome,
-    sampled: &[String],
-    crossed: &[String],
-    seed: u64,
-) -> Vec<Importance> {
+/// Indices for each combination of crossed values.
+fn sobol(runs: &Runs, outcome: &Outcome, design: &Design, seed: u64) -> Vec<Importance> {
+    let Design::Saltelli {
+        sampled,
+        crossed,
+        crossings,
+        rows,
+    } = design
+    else {
+        return Vec::new();
+    };
     let table = runs.table;
     let places: Vec<usize> = sampled
         .iter()
@@ -126,68 +127,67 @@ fn sobol(
     if places.len() != sampled.len() || sampled.is_empty() {
         return Vec::new();
     }
-    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
-    for run in 0..runs.len() {
-        let words: Vec<String> = crossed
-            .iter()
-            .filter_map(|name| {
-                let cell = &table.rows[run][table.place(name)?];
-                let text = cell.text().map(str::to_string);
-                text.or(cell.number().map(|number| number.to_string()))
+    let found = (0..*crossings).filter_map(|crossing| {
+        let own = rows.iter().skip(crossing).step_by(*crossings);
+        let own: Vec<Option<usize>> = own.copied().collect();
+        let blocks = own.chunks_exact(sampled.len() + 2);
+        let values: Vec<Vec<f64>> = blocks
+            .filter(|block| is_mixed(runs, &places, block))
+            .map(|block| {
+                let values = block.iter().map(|run| run.map(|run| outcome.values[run]));
+                values.map(|own| own.unwrap_or(f64::NAN)).collect()
             })
             .collect();
-        let name = words.join(", ");
-        match groups.iter_mut().find(|(own, _)| *own == name) {
-            Some((_, rows)) => rows.push(run),
-            None => groups.push((name, vec![run])),
-        }
-    }
-    let found = groups.into_iter().filter_map(|(name, rows)| {
-        let blocks = rows.chunks_exact(sampled.len() + 2);
-        let whole: Vec<&[usize]> = blocks
-            .filter(|rows| is_mixed(runs, &places, rows))
-            .collect();
-        let values: Vec<Vec<f64>> = whole
-            .iter()
-            .map(|rows| rows.iter().map(|&run| outcome.values[run]).collect())
-            .collect();
-        let told = values
+        let told = values.iter().flatten();
+        let told = told.filter(|own| own.is_finite()).count();
+        let indices = sobol_indices::indices(&values, sampled.len(), seed)?;
+        let shares = sampled.iter().zip(&indices);
+        let shares = shares.map(|(factor, (one, all))| Share {
+            total: Some(all.value),
+            total_band: Some(all.band),
+            ..Share::alone(factor, *one)
+        });
+        let among = own
             .iter()
             .flatten()
-            .filter(|own| own.is_finite())
-            .count();
-        let indices = sobol_indices::indices(&values, sampled.len(), seed)?;
-        let shares = sampled
-            .iter()
-            .zip(&indices)
-            .map(|(factor, (one, all))| Share {
-                total: Some(all.value),
-                total_band: Some(all.band),
-                ..Share::alone(factor, *one)
-            });
-        let among = Some(name).filter(|own| !own.is_empty());
+            .next()
+            .map(|&run| words(runs, crossed, run));
+        let among = among.filter(|own| !own.is_empty());
         Some(Importance::of(
             outcome,
             Method::Sobol,
             shares.collect(),
             told,
-            rows.len(),
+            own.len(),
             among,
         ))
     });
     found.collect()
 }
 
-/// Whether rows are a base sample, its mixed samples and the other base sample.
-fn is_mixed(runs: &Runs, places: &[usize], rows: &[usize]) -> bool {
-    let cell = |row: usize, place: usize| &runs.table.rows[rows[row]][place];
-    let last = rows.len() - 1;
-    places.iter().enumerate().all(|(factor, &place)| {
-        (1..last).all(|row| {
-            let from = if row == factor + 1 { last } else { 0 };
-            cell(row, place) == cell(from, place)
+/// The values that a run has of some factors.
+fn words(runs: &Runs, factors: &[String], run: usize) -> String {
+    let words = factors.iter().filter_map(|name| {
+        let cell = &runs.table.rows[run][runs.table.place(name)?];
+        let text = cell.text().map(str::to_string);
+        text.or(cell.number().map(|number| number.to_string()))
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
+/// Whether runs are a base sample, its mixed samples and the other base sample, as far as they are
+/// there.
+fn is_mixed(runs: &Runs, places: &[usize], block: &[Option<usize>]) -> bool {
+    let cell = |row: usize, place: usize| Some(&runs.table.rows[block[row]?][place]);
+    let last = block.len() - 1;
+    block[0].is_some()
+        && block[last].is_some()
+        && places.iter().enumerate().all(|(factor, &place)| {
+            (1..last).all(|row| {
+                let from = if row == factor + 1 { last } else { 0 };
+                block[row].is_none() || cell(row, place) == cell(from, place)
+            })
         })
-    })
 }
 
 /// What each varied factor explains alone.

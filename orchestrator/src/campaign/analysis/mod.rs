@@ -65,6 +65,11 @@ pub enum Design {
         sampled: Vec<String>,
         /// Factors that are crossed with every sample.
         crossed: Vec<String>,
+        /// Runs of a sample: one for each combination of crossed values, one after the other.
+        crossings: usize,
+        /// The table's row of each run of the design: runs that are the same share one, and those that
+        /// are missing have none.
+        rows: Vec<Option<usize>>,
     },
     /// Any other.
     #[default]

@@ -328,6 +328,17 @@ fn what_has_no_curve_is_said() {
     assert_eq!(analyse(&empty, &settings(), &command).fragility.len(), 2);
 }
 
+/// A mixed sample that is missing leaves out its factor's triple alone.
+fn rows_missing(table: &Table, mut design: Settings) {
+    if let Design::Saltelli { rows, .. } = &mut design.design {
+        rows[2] = None;
+        rows[20] = None;
+    }
+    let found = analyse(table, &design, &command).importance;
+    // Without its base sample nothing is known of a block.
+    assert_eq!((found[0].runs, found[0].left_out), (2000 - 1 - 5, 6));
+}
+
 /// The product of two of three factors, crossed with two controllers of which one gains twice.
 #[test]
 fn sobol_indices_of_each_controller() {
@@ -380,6 +391,8 @@ fn sobol_indices_of_each_controller() {
         design: Design::Saltelli {
             sampled: names.map(String::from).to_vec(),
             crossed: vec!["controller".to_string()],
+            crossings: 2,
+            rows: (0..4000).map(Some).collect(),
         },
         limits: Vec::new(),
         ..settings()
@@ -398,6 +411,21 @@ fn sobol_indices_of_each_controller() {
         assert_eq!((c.alone, c.total), (0.0, Some(0.0)));
     }
     assert_eq!(found[1].among.as_deref(), Some("q"));
+    // A mixed sample that is its base sample over again has no row of its own.
+    let mut twice = table.clone();
+    let mut shared = design.clone();
+    let Design::Saltelli { rows, .. } = &mut shared.design else {
+        unreachable!()
+    };
+    for block in 0..5 {
+        let [base, mixed, other] = [10 * block, 10 * block + 6, 10 * block + 8];
+        rows[mixed] = rows[base];
+        let c = twice.rows[base][3].clone();
+        twice.rows[other][3] = c;
+    }
+    let found = analyse(&twice, &shared, &command).importance;
+    assert_eq!((found[0].runs, found[0].left_out), (2000, 0));
+    rows_missing(&twice, shared);
     // Rows that are no such design are not taken for one.
     table.rows.swap(0, 8);
     table.rows.rotate_left(2);

@@ -25,7 +25,7 @@ pub(super) fn count(number: usize) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place) % 3 == 0 {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
             text.push(',');
         }
         text.push(digit);
@@ -225,7 +225,13 @@ fn half(findings: &Findings, best: &Group) -> Option<String> {
 /// What is exceeded, as a heading.
 pub(super) fn limit(own: &Fragility) -> String {
     match &own.limit {
-        Some(limit) => format!("{limit} above {}", above(own)),
+        Some(name) => {
+            let what = match label(name) {
+                same if same == *name => same,
+                figure => capital(&figure),
+            };
+            format!("{what} above {}", above(own))
+        }
         None => "Stopped by the interlock".to_string(),
     }
 }
@@ -330,7 +336,7 @@ pub(super) fn without_curve(findings: &Findings) -> Vec<String> {
     let told = findings.fragility.iter().filter_map(|own| {
         let under = own.controller.as_ref();
         let under = under.map_or(String::new(), |name| format!(", {name}"));
-        without(own, &findings.intensity).map(|why| format!("{}{under}: {why}", limit(own)))
+        without(own, &label(&findings.intensity)).map(|why| format!("{}{under}: {why}", limit(own)))
     });
     told.collect()
 }
