@@ -210,6 +210,11 @@ fn campaigns() {
 }
 
 #[test]
+fn tuning() {
+    run_page("tuning.md");
+}
+
+#[test]
 fn iterative_control() {
     run_page("iterative-control.md");
 }
