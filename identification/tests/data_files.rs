@@ -99,6 +99,11 @@ fn faults_name_file_line_column_and_what_was_expected() {
             "a.csv: only comments; expected a header such as `time [s]",
         ),
         ("time [s],x [m]\n", "a.csv: a header and no data"),
+        // The unit V is no velocity below names that nobody knows.
+        (
+            "Messung 7\nZeit;Ventil;Weg\nms;V;mm\n0;1;2\n1;1;2\n",
+            "a.csv, line 2: no column of a known name among Zeit, Ventil, Weg; expected a header such as",
+        ),
         (
             "# a\n\n0,1\n1,2\n",
             "a.csv, line 3: numbers where a header should be; expected such as",

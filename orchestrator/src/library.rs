@@ -63,7 +63,11 @@ impl FmuLibrary {
         } else if is_file {
             Fmu::open(&path)?
         } else {
-            Fmu::open_own(&path)?
+            Fmu::open_own(&path).map_err(|error| {
+                format!(
+                    "{error}; install again, or name the folder of this platform's FMUs in --fmus"
+                )
+            })?
         };
         self.open.insert(path, fmu.clone());
         Ok(fmu)

@@ -11,6 +11,7 @@ mod notices;
 mod packing;
 mod platform;
 pub mod supply;
+mod up_to_date;
 mod variant;
 mod workspace;
 

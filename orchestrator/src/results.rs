@@ -1,5 +1,7 @@
 //! The files of a command, written as a whole or not at all.
 
+pub(crate) mod parquet_file;
+
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};

@@ -6,7 +6,7 @@ mod settings;
 use controllers::preview::feedforward::PREVIEW;
 use controllers::preview::{Memory, PreviewControl as Law, PreviewInput};
 use controllers::{Controller, Motion};
-use fmu_kit::{Built, Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Built, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 use settings::{ROLES, Settings};
@@ -46,6 +46,28 @@ impl Component for PreviewControl {
     const DESCRIPTION: &'static str =
         "Preview control of a shake table with friction and specimen in its model";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[
+                ("displacement", "reference_displacement"),
+                ("velocity", "reference_velocity"),
+                ("acceleration", "reference_acceleration"),
+            ],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[
+                ("displacement", "measured_displacement"),
+                ("velocity", "measured_velocity"),
+                ("acceleration", "measured_acceleration"),
+            ],
+        ),
+        Terminal::plug("controller", "valve", &[("command", "controller_command")]),
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+    ];
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {

@@ -6,7 +6,7 @@ mod motion;
 use std::path::Path;
 
 use fmu_kit::{
-    Causality, Component, ComponentResult, Dependency, Variable, resources::optional_text,
+    Causality, Component, ComponentResult, Dependency, Terminal, Variable, resources::optional_text,
 };
 use motion::Motion;
 use serde::{Deserialize, Serialize};
@@ -71,6 +71,15 @@ impl Component for ReferenceMotion {
     const NAME: &'static str = "ReferenceMotion";
     const DESCRIPTION: &'static str = "A motion that a shake table is asked for";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[Terminal::bus(
+        "reference",
+        "reference",
+        &[
+            ("displacement", "displacement"),
+            ("velocity", "velocity"),
+            ("acceleration", "acceleration"),
+        ],
+    )];
 
     fn variables() -> Vec<Variable<Self>> {
         let mut all = fmu_kit::table! { Self, s:

@@ -1,7 +1,7 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! What stands between a signal and whoever takes it, as an FMU.
 
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::signal_path::{SignalEffects, SignalPath as Path};
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +32,10 @@ impl Component for SignalPath {
     const DESCRIPTION: &'static str =
         "Delay, lag, rate limit, play, dead band, gain, offset and saturation of a signal";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::plug("input", "signal", &[("signal", "u")]),
+        Terminal::plug("output", "signal", &[("signal", "y")]),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:

@@ -1,7 +1,7 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! Specimen of several storeys on the table as an FMU.
 
-use fmu_kit::{Causality, Component, ComponentResult, Variable};
+use fmu_kit::{Causality, Component, ComponentResult, Terminal, Variable};
 use plant::ModelError;
 use plant::specimens::hysteresis::BoucWen;
 use plant::specimens::{MAX_STOREYS, Storeys, StoreysState, YieldingSpecimen};
@@ -96,6 +96,18 @@ impl Component for StoreysSpecimen {
     const NAME: &'static str = "StoreysSpecimen";
     const DESCRIPTION: &'static str = "Specimen of several yielding storeys on a shake table";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::plug(
+            "mount",
+            "mount",
+            &[("acceleration", "table_acceleration"), ("force", "force")],
+        ),
+        Terminal::plug(
+            "motion",
+            "specimen-motion",
+            &[("acceleration", "acceleration")],
+        ),
+    ];
 
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::table! { Self, s:

@@ -25,6 +25,7 @@ impl Recording {
             source,
             time,
             notes,
+            left_alone,
             mut channels,
         } = self;
         let unreadable = |what: String, expected| IdentificationError::Unreadable {
@@ -40,6 +41,7 @@ impl Recording {
                     source,
                     time: even,
                     notes,
+                    left_alone,
                     channels,
                 };
                 let faults = whole.faults();
@@ -171,6 +173,7 @@ impl Recording {
                     period,
                 },
                 notes: Vec::new(),
+                left_alone: left_alone.clone(),
                 channels: channels
                     .iter()
                     .map(|(channel, values)| {

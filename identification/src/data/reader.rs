@@ -114,7 +114,7 @@ impl Recording {
             header: HEADER,
         };
         let sheet = Sheet::read(file, wanted)?;
-        Self::channels_of(&sheet, name, called)
+        known(&sheet, Self::channels_of(&sheet, name, called)?)
     }
 
     /// Reads the text of a file, as [`Self::read`] does.
@@ -126,7 +126,8 @@ impl Recording {
             is_column: &|cell| known_column(cell).is_some(),
             header: HEADER,
         };
-        Self::from_sheet(&Sheet::parse(file, text, wanted)?, name)
+        let sheet = Sheet::parse(file, text, wanted)?;
+        known(&sheet, Self::from_sheet(&sheet, name)?)
     }
 
     /// The known channels of a sheet, as [`Self::read`] has them.
@@ -150,10 +151,18 @@ impl Recording {
         }
         // As they stand in the file.
         columns.sort_by_key(|column| column.0);
+        let places: Vec<usize> = columns.iter().map(|column| column.0).collect();
+        let heads = sheet.heads().iter().enumerate();
+        let left_alone = heads.filter(|(place, _)| !places.contains(place));
+        let left_alone = left_alone.map(|(_, head)| head.clone()).collect();
         let columns = columns
             .into_iter()
             .map(|(_, channel, values)| (channel, values));
-        assemble(sheet, name, columns.collect())
+        let recording = assemble(sheet, name, columns.collect())?;
+        Ok(Recording {
+            left_alone,
+            ..recording
+        })
     }
 
     /// Channels of the columns that are asked for, in that order; `Time` becomes the time stamps.
@@ -179,6 +188,18 @@ impl Recording {
         let columns = columns.collect::<Result<_, DataError>>()?;
         assemble(sheet, name, columns)
     }
+}
+
+/// The recording, if any column of the sheet is one.
+fn known(sheet: &Sheet, recording: Recording) -> Result<Recording, DataError> {
+    if recording.left_alone.len() < sheet.heads().len() {
+        return Ok(recording);
+    }
+    let reason = format!(
+        "no column of a known name among {}; expected a header {HEADER}, or a map of the names",
+        sheet.heads().join(", ")
+    );
+    Err(DataError::line(sheet.file(), sheet.header_line(), reason))
 }
 
 fn assemble(

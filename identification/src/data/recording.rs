@@ -30,6 +30,8 @@ pub struct Recording {
     pub time: TimeBase,
     /// What its reader should know of the file.
     pub notes: Vec<String>,
+    /// Headings of the file's columns that are taken for no channel.
+    pub left_alone: Vec<String>,
     pub(super) channels: Vec<(Channel, Vec<f64>)>,
 }
 
@@ -63,6 +65,7 @@ impl Recording {
             source: name.to_string(),
             time,
             notes: Vec::new(),
+            left_alone: Vec::new(),
             channels,
         })
     }
@@ -243,6 +246,7 @@ impl Recording {
                 },
             },
             notes: self.notes.clone(),
+            left_alone: self.left_alone.clone(),
             channels: self
                 .channels
                 .iter()

@@ -307,11 +307,19 @@ fn header(
             .filter(|cell| (wanted.is_column)(cell.trim()))
             .count()
     };
+    // Below names that nobody knows, units may be taken for names, such as V for a velocity.
+    let is_units = |at: usize| {
+        let filled = rows[at].filled().count();
+        at > 0
+            && filled == rows[at - 1].filled().count()
+            && 2 * known(&rows[at].cells) <= filled
+            && units_row(rows.get(at)).is_some()
+    };
     // The first of those with most names: a preamble may hold one of them.
     let most = (0..rows.len().min(PREAMBLE))
         .rev()
         .max_by_key(|&at| known(&rows[at].cells))
-        .filter(|&at| known(&rows[at].cells) > 0);
+        .filter(|&at| known(&rows[at].cells) > 0 && !is_units(at));
     if let Some(at) = most {
         return Ok((rows[at].clone(), at + 1));
     }
@@ -340,6 +348,7 @@ fn header(
                 wanted.header
             ),
         )),
+        Some(at) if at > 1 && is_units(at - 1) => Ok((rows[at - 2].clone(), at - 1)),
         Some(at) => Ok((rows[at - 1].clone(), at)),
         None => Ok((first.clone(), 1)),
     }

@@ -1,18 +1,9 @@
 //! The table of a study as CSV and Parquet.
 
 use std::io::{self, Write};
-use std::sync::Arc;
 
-use parquet::basic::{LogicalType, Repetition, Type as Physical};
-use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::types::Type;
-
-use super::table::{Cell, Column, Kind, Role, Table};
-
-/// Rows of one group of a Parquet file.
-const GROUP: usize = 100_000;
+use super::table::{Cell, Kind, Role, Table};
+use crate::results::parquet_file::{self, Values};
 
 /// Writes the table as CSV: a heading with units, then a line a run; what is missing is empty.
 ///
@@ -40,100 +31,37 @@ pub fn csv(table: &Table, output: impl Write) -> io::Result<()> {
 }
 
 /// Writes the table as Parquet: numbers as doubles, the run's number as a whole one, texts as UTF-8,
-/// what is missing as null; the units stand in the file's key `units` as JSON.
+/// what is missing as null.
 ///
 /// # Errors
 /// As the writer's.
 pub fn parquet(table: &Table, output: impl Write + Send) -> io::Result<()> {
-    write(table, output).map_err(io::Error::other)
-}
-
-fn is_whole(column: &Column) -> bool {
-    column.role == Role::Run && column.kind == Kind::Number
-}
-
-fn write(table: &Table, output: impl Write + Send) -> Result<(), parquet::errors::ParquetError> {
-    let fields = table.columns.iter().map(|column| {
-        let physical = match column.kind {
-            Kind::Text => Physical::BYTE_ARRAY,
-            Kind::Number if is_whole(column) => Physical::INT64,
-            Kind::Number => Physical::DOUBLE,
-        };
-        let field = Type::primitive_type_builder(&column.name, physical)
-            .with_repetition(Repetition::OPTIONAL)
-            .with_logical_type((column.kind == Kind::Text).then_some(LogicalType::String));
-        field.build().map(Arc::new)
+    let columns = table.columns.iter().map(|column| parquet_file::Column {
+        name: column.name.clone(),
+        unit: column.unit.clone(),
+        kind: match column.kind {
+            Kind::Text => parquet_file::Kind::Text,
+            Kind::Number if column.role == Role::Run => parquet_file::Kind::Whole,
+            Kind::Number => parquet_file::Kind::Number,
+        },
     });
-    let fields = fields.collect::<Result<Vec<_>, _>>()?;
-    let schema = Arc::new(
-        Type::group_type_builder("runs")
-            .with_fields(fields)
-            .build()?,
-    );
-    let units: std::collections::BTreeMap<&str, &str> = table
-        .columns
-        .iter()
-        .filter_map(|column| Some((column.name.as_str(), column.unit.as_deref()?)))
-        .collect();
-    let units = parquet::file::metadata::KeyValue::new(
-        "units".to_string(),
-        serde_json::to_string(&units).unwrap_or_default(),
-    );
-    let properties = WriterProperties::builder().set_key_value_metadata(Some(vec![units]));
-    let mut file = SerializedFileWriter::new(output, schema, Arc::new(properties.build()))?;
-    for rows in table.rows.chunks(GROUP) {
-        let mut group = file.next_row_group()?;
-        for (place, column) in table.columns.iter().enumerate() {
-            let cells = rows.iter().map(|row| &row[place]);
-            let Some(mut writer) = group.next_column()? else {
-                break;
-            };
-            match column.kind {
-                Kind::Text => {
-                    let (values, there) = present(cells, |cell| cell.text().map(ByteArray::from));
-                    writer
-                        .typed::<ByteArrayType>()
-                        .write_batch(&values, Some(&there), None)?;
-                }
-                Kind::Number if is_whole(column) => {
-                    let (values, there) = present(cells, |cell| cell.number().map(|n| n as i64));
-                    writer
-                        .typed::<Int64Type>()
-                        .write_batch(&values, Some(&there), None)?;
-                }
-                Kind::Number => {
-                    let (values, there) = present(cells, Cell::number);
-                    writer
-                        .typed::<DoubleType>()
-                        .write_batch(&values, Some(&there), None)?;
-                }
-            }
-            writer.close()?;
+    let columns: Vec<_> = columns.collect();
+    parquet_file::write(&columns, table.rows.len(), output, |place, rows| {
+        let cells = table.rows[rows].iter().map(|row| &row[place]);
+        match table.columns[place].kind {
+            Kind::Text => Values::Texts(cells.map(|cell| cell.text().map(String::from)).collect()),
+            Kind::Number => Values::Numbers(
+                cells
+                    .map(|cell| cell.number().unwrap_or(f64::NAN))
+                    .collect(),
+            ),
         }
-        group.close()?;
-    }
-    file.close()?;
-    Ok(())
-}
-
-/// The values that are there, and for each cell whether it has one.
-fn present<'a, T>(
-    cells: impl Iterator<Item = &'a Cell>,
-    value: impl Fn(&Cell) -> Option<T>,
-) -> (Vec<T>, Vec<i16>) {
-    let mut values = Vec::new();
-    let there = cells.map(|cell| {
-        let value = value(cell);
-        let is_there = i16::from(value.is_some());
-        values.extend(value);
-        is_there
-    });
-    let there = there.collect();
-    (values, there)
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::table::Column;
     use super::*;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::Field;

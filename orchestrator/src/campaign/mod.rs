@@ -27,7 +27,8 @@ pub use setting::Key;
 pub use study::{Factor, Limit, Study};
 
 use crate::error::Error;
-use crate::report::{self, identity};
+use crate::report::identity::{entry, version};
+use crate::report::{self, Cell};
 use crate::results::Results;
 use analysis::Findings;
 
@@ -100,6 +101,15 @@ fn about(study: &Study) -> page::About {
         .path
         .file_stem()
         .map(|name| name.to_string_lossy().into_owned());
+    page::About {
+        title: title.unwrap_or_else(|| file.clone()),
+        identity: identity(study),
+        footer: format!("shakebench campaign {file}; seed {}", study.seed),
+    }
+}
+
+/// What a study is, in few words for a page.
+pub(crate) fn identity(study: &Study) -> Vec<(String, Cell)> {
     let factors: Vec<&str> = study
         .factors
         .iter()
@@ -113,17 +123,13 @@ fn about(study: &Study) -> page::About {
     let design = clap::ValueEnum::to_possible_value(&study.design);
     let design = design.map_or(String::new(), |design| design.get_name().to_string());
     let mut entries = vec![
-        identity::entry("Runs", study.runs().to_string()),
-        identity::entry("Design", design),
-        identity::entry("Varied", factors.join(", ")),
+        entry("Runs", study.runs().to_string()),
+        entry("Design", design),
+        entry("Varied", factors.join(", ")),
     ];
     if !fixed.is_empty() {
-        entries.push(identity::entry("Fixed", fixed.join(", ")));
+        entries.push(entry("Fixed", fixed.join(", ")));
     }
-    entries.push(identity::version());
-    page::About {
-        title: title.unwrap_or_else(|| file.clone()),
-        identity: entries,
-        footer: format!("shakebench campaign {file}; seed {}", study.seed),
-    }
+    entries.push(version());
+    entries
 }

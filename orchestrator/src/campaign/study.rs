@@ -103,8 +103,11 @@ pub struct Study {
     /// Places in `factors` of the others, a dimension of the points each.
     sampled: Vec<usize>,
     points: Points,
-    /// Checksums of files by path, so that a run's name says what it plays.
+    /// Checksums of the files that its runs read, by path.
     files: BTreeMap<PathBuf, String>,
+    /// For each file that is a value, a checksum of it and of all that it refers to, so that a run's name
+    /// says what it plays.
+    contents: BTreeMap<PathBuf, String>,
 }
 
 impl Study {
@@ -237,8 +240,9 @@ impl Study {
             sampled,
             points,
             files: BTreeMap::new(),
+            contents: BTreeMap::new(),
         };
-        study.files = study.checksums()?;
+        study.read_files()?;
         Ok(study)
     }
 
@@ -339,7 +343,7 @@ impl Study {
             let mut text = value.to_string();
             if let Setting::Text(path) = value
                 && key.is_path(path)
-                && let Some(sum) = self.files.get(&folder.join(path))
+                && let Some(sum) = self.contents.get(&folder.join(path))
             {
                 text.clone_from(sum);
             }
@@ -405,22 +409,28 @@ impl Study {
         fixed.chain(lists.flatten())
     }
 
-    fn checksums(&self) -> Result<BTreeMap<PathBuf, String>, Error> {
+    /// Takes the checksums of all files.
+    fn read_files(&mut self) -> Result<(), Error> {
         let folder = self.folder();
-        let mut sums = BTreeMap::new();
+        let (mut files, mut contents) = (BTreeMap::new(), BTreeMap::new());
         for (name, key, value) in self.every_value() {
-            for path in setting::files(key, value, &folder) {
-                if sums.contains_key(&path) {
-                    continue;
+            let mut whole = Sha256::new();
+            let own = setting::files(key, value, &folder);
+            for path in &own {
+                if !files.contains_key(path) {
+                    let bytes = std::fs::read(path).map_err(|error| {
+                        self.fault(&format!("`{name}`: {}: {error}", path.display()))
+                    })?;
+                    files.insert(path.clone(), crate::fmu::digest(&bytes));
                 }
-                let bytes = std::fs::read(&path).map_err(|error| Error::File {
-                    path: self.path.clone(),
-                    reason: format!("`{name}`: {}: {error}", path.display()),
-                })?;
-                sums.insert(path, crate::fmu::digest(&bytes));
+                whole.update(&files[path]);
+            }
+            if let Some(first) = own.into_iter().next() {
+                contents.insert(first, hexadecimal(&whole.finalize()));
             }
         }
-        Ok(sums)
+        (self.files, self.contents) = (files, contents);
+        Ok(())
     }
 }
 

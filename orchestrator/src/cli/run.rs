@@ -95,6 +95,9 @@ pub struct Arguments {
     /// Keep one sample of so many in the results
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     record_every: usize,
+    /// Write the signals as results.parquet too
+    #[arg(long)]
+    parquet: bool,
     /// Show the run while it goes on, on a page of this machine at this port (any free one where none
     /// is given); it keeps pace with real time
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
@@ -259,7 +262,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ));
     }
     summary.coupling_error = coupling_error;
-    let files = page::write(&folder, &prepared, &outcome, &summary, &mut manifest)?;
+    let files = page::write(
+        &folder,
+        &prepared,
+        &outcome,
+        &summary,
+        &mut manifest,
+        arguments.parquet,
+    )?;
     let can_go_on = has_checkpoints
         && matches!(outcome.ended.kind(), Ending::Interrupted | Ending::Failed)
         && checkpoint::is_there(&folder);

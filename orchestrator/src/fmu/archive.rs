@@ -1,7 +1,7 @@
 //! Unpacking an FMU without trusting it.
 
 use std::fs;
-use std::io::{Cursor, Read};
+use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use fmi_rs::{SHARED_LIBRARY_EXTENSION, fmi2, fmi3};
@@ -173,12 +173,50 @@ pub(super) fn binary(
     let mut head = [0; 20];
     let read = fs::File::open(&path).and_then(|mut file| file.read(&mut head));
     read.map_err(|error| missing(format!("`{relative}`: {error}")))?;
-    match foreign(&head) {
-        Some(other) => Err(missing(format!(
+    if let Some(other) = foreign(&head) {
+        return Err(missing(format!(
             "`{relative}` is {other}, not a library for {platform}"
-        ))),
-        None => Ok(path),
+        )));
     }
+    if is_cut_short(&path).map_err(|error| missing(format!("`{relative}`: {error}")))? {
+        return Err(missing(format!("`{relative}` is cut short")));
+    }
+    Ok(path)
+}
+
+/// Whether a 64-bit ELF file ends before what it says is to be loaded: mapped, it would end the process.
+fn is_cut_short(path: &Path) -> std::io::Result<bool> {
+    const HEADER: usize = 64;
+    const SEGMENT: usize = 56;
+    let mut file = fs::File::open(path)?;
+    let length = file.metadata()?.len();
+    let mut header = [0; HEADER];
+    if length < HEADER as u64 {
+        return Ok(true);
+    }
+    file.read_exact(&mut header)?;
+    if !header.starts_with(b"\x7fELF") {
+        return Ok(false);
+    }
+    let number = |bytes: &[u8]| {
+        bytes
+            .iter()
+            .rev()
+            .fold(0, |n, byte| (n << 8) | u64::from(*byte))
+    };
+    let (table, count) = (number(&header[0x20..0x28]), number(&header[0x38..0x3a]));
+    let bytes = usize::try_from(count).unwrap_or(0) * SEGMENT;
+    if table.saturating_add(bytes as u64) > length {
+        return Ok(true);
+    }
+    let mut segments = vec![0; bytes];
+    file.seek(SeekFrom::Start(table))?;
+    file.read_exact(&mut segments)?;
+    let mut ends = segments.chunks_exact(SEGMENT).map(|segment| {
+        let (offset, size) = (number(&segment[0x08..0x10]), number(&segment[0x20..0x28]));
+        offset.saturating_add(size)
+    });
+    Ok(ends.any(|end| end > length))
 }
 
 /// What a library is built for, if not for this machine, by the first bytes of its file.

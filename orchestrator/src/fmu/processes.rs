@@ -77,10 +77,24 @@ impl<'a> Processes<'a> {
     }
 }
 
+/// What to do where a library takes Python's functions from whoever loads it, as PythonFMU's does.
+const PYTHON: &str = "it runs Python, and the library of Python has to be loaded before it: set \
+                      LD_PRELOAD to the file that `python3 -c \"import sysconfig as s; \
+                      print(s.get_config_var('LIBDIR') + '/' + s.get_config_var('INSTSONAME'))\"` prints";
+
+/// Whether a library could not be loaded for want of Python's.
+fn lacks_python(reason: &str) -> bool {
+    ["undefined symbol: Py", "undefined symbol: _Py"]
+        .iter()
+        .any(|symbol| reason.contains(symbol))
+}
+
 /// Wraps the reason why an instance cannot be made.
 pub(super) fn refused(fmu: &Fmu, instance: &str, mut reason: String) -> FmuError {
     let description = &fmu.description;
-    if description.needs_execution_tool {
+    if lacks_python(&reason) {
+        reason += &format!("; {PYTHON}");
+    } else if description.needs_execution_tool {
         reason += &format!(
             "; it needs its tool installed ({})",
             description.generation_tool

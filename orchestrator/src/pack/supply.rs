@@ -15,6 +15,7 @@ use zip::ZipArchive;
 
 use super::archive::PackedFmu;
 use super::error::{PackError, file_error};
+use super::up_to_date::{self, Sources};
 use super::workspace::Workspace;
 use crate::fmu::FmiVersion;
 use crate::program;
@@ -90,10 +91,21 @@ pub fn all_fmus() -> Result<&'static [PackedFmu], PackError> {
 fn find_all() -> Result<Vec<PackedFmu>, PackError> {
     let Folder { path, origin } = folder()?;
     if origin == Origin::Workspace {
+        let workspace = Workspace::find()?;
+        if let Some(fmus) = up_to_date::packed(&workspace, &path) {
+            return Ok(fmus);
+        }
+        let sources = Sources::read(&workspace);
         match super::build_fmus(&path, &FmiVersion::ALL) {
             // Without cargo those that are there have to do.
             Err(PackError::NoCargo { .. }) if holds_fmus(&path) => {}
-            built => return built,
+            Err(error) => return Err(error),
+            Ok(fmus) => {
+                if let Some(sources) = sources {
+                    sources.note(&path, &fmus);
+                }
+                return Ok(fmus);
+            }
         }
     }
     let found = fmus_in(&path)?;

@@ -8,7 +8,9 @@ use sha2::{Digest, Sha256};
 use super::experiment::Prepared;
 use super::identity;
 use super::manifest::Manifest;
-use super::signals::{COLUMNS, RESULTS, columns, read_csv, write_columns, write_csv};
+use super::signals::{
+    COLUMNS, PARQUET, RESULTS, columns, read_csv, write_columns, write_csv, write_parquet,
+};
 use super::summary::{Summary, Table, asked};
 use crate::error::Error;
 use crate::fmu::hexadecimal;
@@ -19,7 +21,7 @@ use crate::report::{self, Cell, Component, Report, SpecimenHistory, Whole};
 use crate::results::Results;
 use crate::units::STANDARD_GRAVITY;
 
-/// Writes the files of a run and says where they are.
+/// Writes the files of a run and says where they are; the signals as Parquet too where that is asked for.
 ///
 /// # Errors
 /// A folder that cannot be written.
@@ -29,6 +31,7 @@ pub fn write(
     outcome: &Outcome,
     summary: &Summary,
     manifest: &mut Manifest,
+    parquet: bool,
 ) -> Result<Vec<PathBuf>, Error> {
     let mut results = Results::begin(folder)?;
     let mut sum = Sha256::new();
@@ -41,9 +44,14 @@ pub fn write(
     })?;
     manifest.results_sha256 = hexadecimal(&sum.finalize());
     // A page of an earlier run here would be another run's.
-    results.replaces(&[report::FILE]);
+    results.replaces(&[report::FILE, PARQUET]);
     let columns = columns(&prepared.system, &outcome.record);
     results.write(COLUMNS, |file| write_columns(&columns, file))?;
+    if parquet {
+        results.write(PARQUET, |file| {
+            write_parquet(&outcome.record, &columns, file)
+        })?;
+    }
     results.write_json("summary.json", summary)?;
     results.write_json("manifest.json", manifest)?;
     let motion = &prepared.motion;

@@ -7,10 +7,13 @@ use std::path::Path;
 use crate::error::Error;
 use crate::fmu::Datum;
 use crate::master::Record;
+use crate::results::parquet_file::{self, Values};
 use crate::system::System;
 
 /// File with the recorded signals.
 pub const RESULTS: &str = "results.csv";
+/// The same as Parquet, where it is asked for.
+pub const PARQUET: &str = "results.parquet";
 /// File that names the columns' units.
 pub const COLUMNS: &str = "columns.csv";
 
@@ -104,6 +107,43 @@ pub fn write_csv(record: &Record, file: impl Write) -> io::Result<()> {
         csv.serialize((row, exact)).map_err(io::Error::other)?;
     }
     csv.flush()
+}
+
+/// Writes a record as Parquet, with the columns and units of [`columns`]: numbers as doubles, other values
+/// as texts.
+///
+/// # Errors
+/// A disk that is full, and the like.
+pub fn write_parquet(
+    record: &Record,
+    columns: &[Column],
+    file: impl Write + Send,
+) -> io::Result<()> {
+    let place = |name: &str, of: &[String]| of.iter().position(|own| own == name);
+    let number = |column: &Column| place(&column.name, &record.columns);
+    let written = columns.iter().map(|column| parquet_file::Column {
+        name: column.name.clone(),
+        unit: Some(column.unit.clone()).filter(|unit| !unit.is_empty()),
+        kind: match number(column) {
+            Some(_) => parquet_file::Kind::Number,
+            None => parquet_file::Kind::Text,
+        },
+    });
+    let written: Vec<_> = written.collect();
+    parquet_file::write(&written, record.len(), file, |column, rows| {
+        let column = &columns[column];
+        match number(column) {
+            Some(place) => {
+                let rows = record.rows().skip(rows.start).take(rows.len());
+                Values::Numbers(rows.map(|row| row[place]).collect())
+            }
+            None => {
+                let place = place(&column.name, &record.exact_columns);
+                let text = |row| Some(record.exact(row).get(place?)?.to_string());
+                Values::Texts(rows.map(text).collect())
+            }
+        }
+    })
 }
 
 /// Reads a record that [`write_csv`] wrote.

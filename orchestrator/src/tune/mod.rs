@@ -9,16 +9,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use cobyla::{Func, RhoBeg, StopTols, minimize};
+use cobyla::{Func, RhoBeg, StopTols, SuccessStatus, minimize};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use margins::{Held, held};
 
 use crate::campaign::analysis::percentile;
-use crate::campaign::{Bench, Key, Runs, Study, Values, with_unit};
+use crate::campaign::{Bench, Key, Runs, Study, Values, identity, with_unit};
 use crate::error::Error;
-use crate::report;
+use crate::report::{self, Cell};
 use crate::results::Results;
 use crate::system::Setting;
 use crate::units::value_in;
@@ -141,6 +141,9 @@ pub struct Tuned {
     pub wall_s: f64,
     /// Options of `shakebench run` that set the parameters found.
     pub set: Vec<String>,
+    /// The study, for the page.
+    #[serde(skip)]
+    identity: Vec<(String, Cell)>,
 }
 
 /// The search of a study.
@@ -228,6 +231,7 @@ pub fn tune(study: &Study, interrupt: &AtomicBool, tell: &dyn Fn(&Trial)) -> Res
         before: side(first)?,
         after: side(best)?,
         set: search.set(&best.values),
+        identity: identity(study),
         parameters,
         ended,
         wall_s: begun.elapsed().as_secs_f64(),
@@ -311,8 +315,9 @@ impl Search<'_> {
                 Some(tolerances),
             );
             ended = match found {
-                Ok((status, ..)) => format!("{status:?}"),
-                Err((status, ..)) => format!("{status:?}"),
+                Ok((SuccessStatus::MaxEvalReached, ..)) => "all evaluations were used".to_string(),
+                Ok(_) => "the search has converged".to_string(),
+                Err(_) => "rounding ended the search".to_string(),
             };
             let trials = trials.borrow();
             let feasible = trials.iter().filter(|trial| trial.keeps_margins);
@@ -326,7 +331,7 @@ impl Search<'_> {
             return Err(error);
         }
         if self.interrupt.load(Ordering::Relaxed) {
-            ended = "interrupted".to_string();
+            ended = "it was interrupted".to_string();
         }
         Ok((trials.into_inner(), ended))
     }

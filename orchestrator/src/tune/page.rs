@@ -12,6 +12,15 @@ fn short(number: f64) -> String {
     }
 }
 
+/// What is made small.
+fn percentile(tuned: &Tuned) -> String {
+    format!(
+        "{} % quantile of {}",
+        100.0 * tuned.quantile,
+        tuned.objective
+    )
+}
+
 fn score(score: &Score) -> String {
     let stopped = match score.stopped {
         0 => String::new(),
@@ -43,11 +52,7 @@ impl Tuned {
     /// What the search did, in a sentence.
     #[must_use]
     pub fn sentence(&self) -> String {
-        let percentile = format!(
-            "{} % quantile of {}",
-            short(100.0 * self.quantile),
-            self.objective
-        );
+        let percentile = percentile(self);
         match (&self.before.held_out, &self.after.held_out) {
             (Some(before), Some(after)) => format!(
                 "On what was held out, the {percentile} is {} instead of {}.",
@@ -68,11 +73,7 @@ impl Tuned {
         let mut rows = vec![["", "before", "after"].map(String::from).to_vec()];
         let mut row =
             |name: String, before: String, after: String| rows.push(vec![name, before, after]);
-        let quantile = format!(
-            "{} % quantile of {}",
-            short(100.0 * self.quantile),
-            self.objective
-        );
+        let quantile = percentile(self);
         row(
             format!("{quantile}, searched"),
             score(&self.before.training),
@@ -134,16 +135,9 @@ pub(super) fn page(tuned: &Tuned) -> Report {
     let lowest: Vec<f64> = lowest.collect();
     let plain = |label: &str| Axis::linear(label, Units::of(""));
     let panel = Panel {
-        title: "The search".into(),
+        title: format!("The search: {}", percentile(tuned)),
         x: plain("set of parameters"),
-        y: Axis::logarithmic(
-            &format!(
-                "{} % quantile of {}",
-                short(100.0 * tuned.quantile),
-                tuned.objective
-            ),
-            Units::of(""),
-        ),
+        y: Axis::logarithmic(&tuned.objective, Units::of("")),
         series: vec![
             Series::line("best so far", Abscissa::At(numbers.clone().into()), lowest).coloured(0),
             series("keeps the margins", of(true), 1),
@@ -169,14 +163,14 @@ pub(super) fn page(tuned: &Tuned) -> Report {
     Report {
         title: "Tuning over a study".into(),
         summary: tuned.sentence(),
-        identity: vec![crate::report::identity::version()],
+        identity: tuned.identity.clone(),
         sections: vec![Section {
             heading: "What was found".into(),
             text: vec![
                 held_out,
                 margins,
                 format!(
-                    "{} sets of parameters were tried; the search ended with {}.",
+                    "{} sets of parameters were tried; {}.",
                     tuned.trials.len(),
                     tuned.ended
                 ),

@@ -3,7 +3,7 @@
 //! A line `<!-- run -->` before a block of `sh` or `python` has it run, `<!-- run fails N -->` expects
 //! the exit status N, `<!-- file NAME -->` writes the block as a file, and `<!-- prints -->` says that the
 //! block stands in what was printed last: line by line, `...` for anything, numbers as exact as they
-//! are printed. The blocks of a page run one after the other in a folder of their own.
+//! are printed; what stands behind `<!-- try -->` needs other tools and is left to `dist/walk`. The blocks of a page run one after the other in a folder of their own.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,6 +26,7 @@ fn mark(line: &str) -> Option<Marked> {
         }),
         ("file", Some(name), None) => Some(Marked::File(name.to_string())),
         ("prints", None, _) => Some(Marked::Prints),
+        ("try", None, _) => None,
         _ => panic!("`{line}` is no mark of the book"),
     }
 }
@@ -206,6 +207,11 @@ fn reports_and_comparing_runs() {
 #[test]
 fn campaigns() {
     run_page("campaigns.md");
+}
+
+#[test]
+fn tuning() {
+    run_page("tuning.md");
 }
 
 #[test]

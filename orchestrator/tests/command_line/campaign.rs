@@ -399,3 +399,60 @@ fn crossed_factors_share_their_points() {
         }
     }
 }
+
+/// A study of a system that others wrote, without a motion: what its file refers to is part of its runs.
+#[test]
+fn a_system_file_counts_with_all_that_it_refers_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let system = r#"
+        connections = ["drive.a -> specimen.table_acceleration"]
+        [components.specimen]
+        fmu = "Specimen"
+        [tables.drive]
+        file = "drive.csv"
+    "#;
+    let study = r#"
+        [study]
+        design = "full"
+        [fixed]
+        system = "own.toml"
+        duration = "2 s"
+        [factors]
+        "specimen.mass" = { range = ["20 kg", "40 kg"], steps = 3 }
+        [limits]
+        "specimen.force" = "1 N"
+    "#;
+    write(folder, "own.toml", system);
+    write(folder, "study.toml", study);
+    let drive = |size: f64| {
+        write(
+            folder,
+            "drive.csv",
+            &format!("time [s],a [m/s2]\n0,0\n1,{size}\n2,0\n"),
+        )
+    };
+    drive(1.0);
+    let said = carried(folder, "study.toml", "out", &[]);
+    assert_eq!(
+        (&said["runs"], &said["complete"]),
+        (&3.into(), &3.into()),
+        "{said}"
+    );
+    let force = |row: &[String], head: &[String]| {
+        let place = head
+            .iter()
+            .position(|name| name == "peak.specimen.force")
+            .unwrap();
+        row[place].parse::<f64>().unwrap()
+    };
+    let (head, rows) = cells(folder, "out");
+    let small = force(&rows[0], &head);
+    assert!(small > 0.0);
+    assert_eq!(carried(folder, "study.toml", "out", &[])["from_before"], 3);
+    drive(2.0);
+    assert_eq!(carried(folder, "study.toml", "out", &[])["from_before"], 0);
+    let (head, rows) = cells(folder, "out");
+    let large = force(&rows[0], &head);
+    assert!((large / small - 2.0).abs() < 1e-6, "{small}, {large}");
+}

@@ -217,3 +217,35 @@ fn results_that_cannot_be_written_are_noticed_before_the_run() {
     let output = shakebench(folder.path(), &["run", "--out", "taken/below"]);
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
 }
+
+/// Parquet holds the columns of `results.csv`, to the bit.
+#[test]
+fn signals_are_written_as_parquet_too_where_that_is_asked_for() {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::Field;
+
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["run", "--duration", "1 s", "--parquet", "--out", "out"];
+    let output = shakebench(folder.path(), &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let file = fs::File::open(folder.path().join("out/results.parquet")).unwrap();
+    let reader = SerializedFileReader::new(file).unwrap();
+    let mut csv = csv::Reader::from_path(folder.path().join("out/results.csv")).unwrap();
+    let names = csv.headers().unwrap().clone();
+    let mut rows = csv.records();
+    let mut count = 0;
+    for row in reader.get_row_iter(None).unwrap() {
+        let expected = rows.next().unwrap().unwrap();
+        for ((name, field), (head, cell)) in row
+            .unwrap()
+            .get_column_iter()
+            .zip(names.iter().zip(&expected))
+        {
+            assert_eq!(name, head);
+            assert_eq!(*field, Field::Double(cell.parse().unwrap()), "{name}");
+        }
+        count += 1;
+    }
+    assert_eq!(count, 500);
+    assert!(rows.next().is_none());
+}

@@ -206,13 +206,23 @@ fn fmus_that_do_not_fit_the_program_are_refused_with_the_cure() {
 
     fs::write(&path, &whole).unwrap();
     rewrite(&path, &library, |_| None);
-    installed.refuses(&run, &["ShakeTable.fmu", "no binary"]);
+    installed.refuses(&run, &["ShakeTable.fmu", "no binary", "install again"]);
 
     fs::write(&path, &whole).unwrap();
     rewrite(&path, &library, |_| {
         Some(b"MZ of another system".repeat(10))
     });
-    installed.refuses(&run, &["a Windows library", "ShakeTable.fmu"]);
+    installed.refuses(
+        &run,
+        &["a Windows library", "ShakeTable.fmu", "install again"],
+    );
+
+    // Mapped, such a file would end the process.
+    fs::write(&path, &whole).unwrap();
+    rewrite(&path, &library, |bytes| Some(bytes[..20_000].to_vec()));
+    if cfg!(target_os = "linux") {
+        installed.refuses(&run, &["cut short", "ShakeTable.fmu", "install again"]);
+    }
 
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
     installed.refuses(&run, &["ShakeTable.fmu", "damaged", "install again"]);

@@ -41,6 +41,13 @@ pub fn problems(recording: &Recording, nominal: &Nominal) -> Vec<String> {
         ));
     }
     if !found.is_empty() {
+        if !recording.left_alone.is_empty() {
+            found.push(format!(
+                "{name}: left alone were {}, which name no channel; a map of the names says which they \
+                 are (`--columns MAP.toml`)",
+                recording.left_alone.join(", ")
+            ));
+        }
         return found;
     }
     if n < SHORTEST {

@@ -77,7 +77,23 @@ impl Case {
             file: file.clone(),
             reason,
         };
-        let text = std::fs::read_to_string(&file).map_err(|error| fail(error.to_string()))?;
+        if !folder.is_dir() {
+            return Err(CaseError::File {
+                file: folder.into(),
+                reason:
+                    "no folder of a case; expected one with nominal.toml, identification.csv and \
+                         validation.csv, or the description of a rig (.toml)"
+                        .into(),
+            });
+        }
+        let text = std::fs::read_to_string(&file).map_err(|error| match error.kind() {
+            std::io::ErrorKind::NotFound => fail(
+                "no such file; it says what is believed of the rig, and `shakebench diagnose \
+                 --template table` prints one to fill in"
+                    .into(),
+            ),
+            _ => fail(error.to_string()),
+        })?;
         let nominal = Nominal::parse(&text).map_err(fail)?;
         let recording =
             |name: &str| Recording::read_called(&folder.join(format!("{name}.csv")), name, called);
