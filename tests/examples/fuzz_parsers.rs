@@ -3,8 +3,8 @@
 //! `cargo run --release -p acceptance --example fuzz_parsers -- MINUTES [SEED] [PARSER...]`
 //!
 //! What panics, takes long, fills the memory or is refused without its file's name is kept in
-//! `tests/corpus/found/PARSER/`. What ends the
-//! process (a stack that overflows) is in the folder that is printed first.
+//! `tests/corpus/found/PARSER/`. What ends the process (a stack that overflows) is in the folder that is
+//! printed first.
 
 use std::collections::BTreeMap;
 use std::fs;
