@@ -62,6 +62,15 @@ class Folder(unittest.TestCase):
             self.assertEqual(Path(one, name).read_bytes(), Path(other, name).read_bytes(), name)
 
 
+class Tuning(Folder):
+    def test_parameters_are_searched_over_a_study(self):
+        search = '[tune]\nevaluations = 4\n[tune.parameters]\n"control.proportional_gain" = ["3 V/in", "9 V/in"]\n'
+        self.study.write_text(STUDY.format(runs=3, scale=1.0) + search)
+        tuned = shakebench.tune(self.study)
+        self.assertLessEqual(tuned["after"]["training"]["quantile"], tuned["before"]["training"]["quantile"])
+        self.assertTrue(tuned["set"][0].startswith("control.proportional_gain="))
+
+
 class OnDask(Folder):
     @classmethod
     def setUpClass(cls):

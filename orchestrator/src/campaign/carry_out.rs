@@ -123,6 +123,8 @@ pub struct Carried {
 
 /// Bytes that a run needs on the disk: its line in the journal and its rows in the results.
 const BYTES_A_RUN: u64 = 1200;
+/// Bytes that the page and what is found need at most.
+const BYTES_OF_PAGES: u64 = 3 << 20;
 
 /// Carries out the runs of a study that no journal in its folder has; `tell` hears how far it is, and
 /// `interrupt` ends it after the runs that are under way.
@@ -157,7 +159,10 @@ pub fn carry_out(
     };
     progress(0);
     if !missing.is_empty() {
-        room(&plan.folder, missing.len() as u64 * BYTES_A_RUN)?;
+        room(
+            &plan.folder,
+            BYTES_OF_PAGES + missing.len() as u64 * BYTES_A_RUN,
+        )?;
         let name = match plan.shard {
             None => "all".to_string(),
             Some(Shard { part, of }) => format!("{part}-of-{of}"),

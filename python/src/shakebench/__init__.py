@@ -12,7 +12,7 @@ computed: :class:`Result` reads like the JSON object that the program prints, an
 """
 
 from ._campaign import campaign
-from ._commands import compare, design, diagnose, doctor, identify, run
+from ._commands import compare, design, diagnose, doctor, identify, run, tune
 from ._fmus import fmu, fmus
 from ._program import Error, InputError, ProgramMissing, program, version
 from ._results import Result
@@ -32,6 +32,7 @@ __all__ = [
     "identify",
     "program",
     "run",
+    "tune",
     "version",
 ]
 __version__ = version()

@@ -179,6 +179,17 @@ def diagnose(
     return _finished(["diagnose", text(case), *named, *options(more)], out)
 
 
+def tune(study: PathLike, *, out: Optional[PathLike] = None, **more: Any) -> Result:
+    """Searches a controller's parameters over a study (a TOML file with a table ``[tune]``).
+
+    ``result["parameters"]`` holds them before and after, ``result["after"]["held_out"]`` what they give on
+    motions that the search did not see, ``result["set"]`` the options of a run that set them.
+
+    Raises :class:`shakebench.InputError` for a study at fault.
+    """
+    return _finished(["tune", text(study), *options(more)], out)
+
+
 def doctor() -> Dict[str, Any]:
     """What is here, what is missing, and the cure: ``doctor()["ready"]`` and ``["findings"]``."""
     return call(["doctor", "--json"])

@@ -113,8 +113,16 @@ pub fn ranking(table: &Table, ranked: &Ranked, figure: &str, seed: u64) -> Ranki
     let errors = table.numbers(figure);
     let ended = table.texts("ended");
     let points = numbers.iter().map(|n| (*n as u64) / (*crossings).max(1));
-    let points: Vec<usize> = points.map(|point| point as usize).collect();
-    let count = points.iter().max().map_or(0, |last| last + 1);
+    let points: Vec<u64> = points.collect();
+    // Points that are the same run have one row among them, and are one.
+    let mut known = points.clone();
+    known.sort_unstable();
+    known.dedup();
+    let count = known.len();
+    let points: Vec<usize> = points
+        .iter()
+        .map(|point| known.partition_point(|own| own < point))
+        .collect();
     // In the order in which they come.
     let mut groups: Vec<Vec<String>> = Vec::new();
     let mut names: Vec<String> = Vec::new();
@@ -257,7 +265,7 @@ mod tests {
                 }
             }
         }
-        let table = Table {
+        let mut table = Table {
             columns: vec![
                 column("number", Role::Run, Kind::Number),
                 column("controller", Role::Factor, Kind::Text),
@@ -284,5 +292,9 @@ mod tests {
             ("a", "b", 1.0)
         );
         assert!(pair.difference_percent[0] > 2.0);
+        // Points that have no row are none.
+        table.rows.drain(28..36);
+        let found = ranking(&table, &ranked, "error", 3);
+        assert_eq!((found.points, found.standings[1].failed), (38, 0));
     }
 }
