@@ -9,6 +9,8 @@ use super::MasterError;
 
 /// Values that change by less than this part of their size, or by so much in their unit, have settled.
 const EXACTLY: (f64, f64) = (1e-12, f64::MIN_POSITIVE);
+/// The same of values that rounding moves to and fro.
+const ROUNDED: (f64, f64) = (1e-12, 1e-12);
 /// The same where nothing comes closer: some FMUs compute with a tolerance of their own.
 const ATTAINABLE: (f64, f64) = (1e-9, 1e-12);
 /// Substitution goes on as long as two passes bring the values so much closer: where two components
@@ -232,9 +234,9 @@ impl<R: Round> Search<'_, R> {
                 return Ok(true);
             }
             let distance = self.distance(values, sizes);
-            // Near the end a value that passes through zero stands out, though all are good.
+            // At the end a value that passes through zero changes by much of its size, though all are good.
             let stands = distance >= before.min(earlier);
-            if stands && self.has_settled(0..values.len(), values, ATTAINABLE) {
+            if stands && self.has_settled(0..values.len(), values, ROUNDED) {
                 return Ok(true);
             }
             let goes_on = match self.free.is_empty() {
