@@ -5,7 +5,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::fmu::{FmiVersion, Fmu};
+use crate::fmu::{CURE, FmiVersion, Fmu};
 use crate::pack::{self, PackedFmu};
 use crate::ssp::Package;
 use crate::system::SystemFile;
@@ -63,11 +63,7 @@ impl FmuLibrary {
         } else if is_file {
             Fmu::open(&path)?
         } else {
-            Fmu::open_own(&path).map_err(|error| {
-                format!(
-                    "{error}; install again, or name the folder of this platform's FMUs in --fmus"
-                )
-            })?
+            Fmu::open_own(&path).map_err(|error| format!("{error}; {CURE}"))?
         };
         self.open.insert(path, fmu.clone());
         Ok(fmu)

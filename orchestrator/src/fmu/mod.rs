@@ -34,6 +34,9 @@ pub use options::{Isolation, Options};
 pub use processes::Processes;
 pub use trace::Trace;
 
+/// What helps where a component of this project is not whole, or of another machine.
+pub(crate) const CURE: &str = "install again, or name the folder of this platform's FMUs in --fmus";
+
 /// `fmi-rs` checks variable names with a parser that keeps its state in globals: one at a time.
 static PARSER: Mutex<()> = Mutex::new(());
 

@@ -13,7 +13,7 @@ use super::messages::{Messages, TELLING};
 use super::native::{self, Mode, Setup, Sink};
 use super::processes::{Processes, refused};
 use super::{
-    CallError, FmiVersion, Fmu, FmuError, Interface, Kind, Message, Options, Trace, archive,
+    CURE, CallError, FmiVersion, Fmu, FmuError, Interface, Kind, Message, Options, Trace, archive,
 };
 use calling::words;
 
@@ -103,7 +103,14 @@ impl Instance {
         let directory = fmu.unpacked.path();
         let identifier = &description.model_identifier;
         let version = description.version;
-        let library = archive::binary(&fmu.path, directory, version, identifier)?;
+        let library = archive::binary(&fmu.path, directory, version, identifier);
+        let library = library.map_err(|error| match error {
+            FmuError::Binary { fmu: path, reason } if fmu.is_own => FmuError::Binary {
+                fmu: path,
+                reason: format!("{reason}; {CURE}"),
+            },
+            other => other,
+        })?;
         let told: Vec<&str> = match &options.log_categories {
             Some(categories) => categories.iter().map(String::as_str).collect(),
             None => TELLING
