@@ -14,6 +14,7 @@ use super::study::{Limit, Study};
 use super::table::{Cell, Column, Kind, Role};
 use crate::commission::rules_on_recordings;
 use crate::error::Error;
+use crate::fmu::Held;
 use crate::library::FmuLibrary;
 use crate::run::experiment::{Motions, Prepared, Request, prepare_shared, system_file};
 use crate::system::tuning::Rules;
@@ -50,6 +51,8 @@ type Tuned = Result<Arc<Rules>, String>;
 
 /// A system whose FMUs are open.
 struct Assembled {
+    /// Its components' libraries, loaded once for all runs. They go before the folders in which they lie.
+    _held: Vec<Held>,
     file: SystemFile,
     library: Arc<Mutex<FmuLibrary>>,
     /// As it is without what the study varies.
@@ -339,10 +342,15 @@ impl<'a> Bench<'a> {
             let mut library = library.lock().unwrap_or_else(PoisonError::into_inner);
             assemble(&file, &[], &mut |name| library.find(name))?
         };
+        let components = system.components.iter();
+        let held = components
+            .filter_map(|component| component.fmu.hold())
+            .collect();
         let found = Arc::new(Assembled {
             file,
             library,
             system,
+            _held: held,
         });
         Ok(open().entry(key).or_insert(found).clone())
     }

@@ -58,6 +58,11 @@ pub struct Fmu {
     unpacked: Arc<folder::Folder>,
 }
 
+/// A library that stays loaded as long as this lives.
+pub(crate) struct Held(
+    #[allow(dead_code, reason = "it is there to be dropped")] libloading::Library,
+);
+
 impl Fmu {
     /// Opens an FMU: unpacks it into a temporary directory and reads its description.
     ///
@@ -140,6 +145,20 @@ impl Fmu {
             variable.dependencies = none.clone();
         }
         fmu
+    }
+
+    /// Keeps the library of a component of this project loaded: one that is loaded anew for each of many runs
+    /// leaves behind what it allocated once. None for others, whose library may be loaded elsewhere or
+    /// count on being loaded anew.
+    pub(crate) fn hold(&self) -> Option<Held> {
+        let Description {
+            version,
+            model_identifier,
+            ..
+        } = &self.description;
+        let path = archive::binary(&self.path, self.unpacked.path(), *version, model_identifier);
+        let path = path.ok().filter(|_| self.is_own)?;
+        native::hold(&path).map(Held)
     }
 
     /// Where the file is, for as long as the archive that it may lie in is open.

@@ -81,6 +81,11 @@ pub(super) fn instantiate(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Box<dyn 
     })
 }
 
+/// Loads a library and does nothing with it; none where it cannot be loaded, which an instance will say.
+pub(super) fn hold(path: &std::path::Path) -> Option<libloading::Library> {
+    library::Functions::load(path, "").ok()?.finish().ok()
+}
+
 /// What an instance must not outlive.
 struct Kept {
     // It goes first: its end may log.
