@@ -39,11 +39,20 @@ pub fn sentences(ranking: &Ranking) -> Vec<String> {
             pair.better,
             pair.worse,
             100.0 * pair.part,
-            significant(low, 2),
-            significant(high, 2),
+            difference(low),
+            difference(high),
         )
     });
     pairs.collect()
+}
+
+/// A difference of two medians; without end where one of them is of runs that were not played to theirs.
+fn difference(percent: f64) -> String {
+    match percent.is_finite() {
+        true => significant(percent, 2),
+        false if percent > 0.0 => "∞".to_string(),
+        false => "-∞".to_string(),
+    }
 }
 
 /// The part of the page.
