@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::carry_out::Runs;
-use super::command::command;
+use super::command::{command, quoted};
 use super::factor::Values;
 use super::journal::Head;
 use super::row::{FIGURES, figures, nominal, number_unit, output, outputs, times, written};
@@ -187,6 +187,12 @@ impl<'a> Bench<'a> {
     #[must_use]
     pub fn command(&self, number: u64) -> String {
         match self.request(&self.study.settings(number)) {
+            // A run has no controllers that are designed on the rig's own recordings.
+            Ok((.., true)) => format!(
+                "shakebench campaign {} --rows {number}-{}",
+                quoted(&self.study.path.display().to_string()),
+                number + 1
+            ),
             Ok((request, ..)) => command(&request),
             Err(error) => error.to_string(),
         }
@@ -226,8 +232,7 @@ impl<'a> Bench<'a> {
     fn outcome(&self, settings: &[Setting], also: &[String]) -> Result<Vec<Cell>, Error> {
         let prepared = self.prepare(settings, also)?;
         let outcome = prepared.run(prepared.algorithm)?;
-        let mut cells = Vec::new();
-        cells.extend(figures(&prepared, &outcome));
+        let mut cells = figures(&prepared, &outcome).to_vec();
         for signal in self
             .study
             .limits

@@ -238,15 +238,15 @@ impl Left {
     ///
     /// # Errors
     /// A study at fault; a journal that is damaged, or was made by another version.
-    pub fn new(study: &Study, folder: Option<&Path>) -> Result<Self, Error> {
-        let head = Head::new(Bench::new(study).columns()?)?;
+    pub fn new(runs: &dyn Runs, folder: Option<&Path>) -> Result<Self, Error> {
+        let head = runs.head()?;
         let rows = match folder {
             Some(folder) if !may_overwrite() => journal::read(folder, &head)?,
             _ => HashMap::new(),
         };
         let mut missing: Vec<[u64; 2]> = Vec::new();
-        for number in 0..study.runs() {
-            if rows.contains_key(&study.name(&study.settings(number))) {
+        for number in 0..runs.count() {
+            if rows.contains_key(&runs.name(number)) {
                 continue;
             }
             match missing.last_mut() {

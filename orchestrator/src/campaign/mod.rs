@@ -45,8 +45,7 @@ pub const FINDINGS: &str = "findings.json";
 ///
 /// # Errors
 /// A limit that fits no system; the check before the first run has found it.
-pub fn findings(study: &Study, carried: &Carried) -> Result<Findings, Error> {
-    let bench = Bench::new(study);
+pub fn findings(study: &Study, bench: &Bench, carried: &Carried) -> Result<Findings, Error> {
     let limits = study.limits.iter().zip(bench.limits()?);
     let settings = analysis::Settings {
         intensity: study.intensity.clone(),

@@ -95,20 +95,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         jobs: arguments.jobs.map(usize::from),
     };
     let is_shown = std::sync::Once::new();
-    let carried = carry_out(
-        &Bench::new(&study),
-        &how,
-        asked,
-        &|Progress { done, of }| {
-            is_shown.call_once(|| {
-                bar.set_length(of);
-                bar.set_position(done);
-                bar.reset_eta();
-                bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
-            });
+    let bench = Bench::new(&study);
+    let carried = carry_out(&bench, &how, asked, &|Progress { done, of }| {
+        is_shown.call_once(|| {
+            bar.set_length(of);
             bar.set_position(done);
-        },
-    );
+            bar.reset_eta();
+            bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
+        });
+        bar.set_position(done);
+    });
     bar.finish_and_clear();
     let carried = carried?;
     let summary = &carried.summary;
@@ -116,7 +112,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let mut files = Vec::new();
     let mut said = String::new();
     if is_whole {
-        let findings = campaign::findings(&study, &carried)?;
+        let findings = campaign::findings(&study, &bench, &carried)?;
         files = campaign::write(&study, &carried, &findings, &folder)?;
         said = campaign::page::summary(&findings);
         if let Some(ranking) = &findings.ranking {
@@ -170,7 +166,7 @@ fn plan(study: &Study, folder: Option<&Path>, json: bool) -> Result<ExitCode, Er
     let columns = bench.columns()?;
     let files: Vec<&PathBuf> = study.files().keys().collect();
     if json {
-        let Left { head, missing } = Left::new(study, folder)?;
+        let Left { head, missing } = Left::new(&bench, folder)?;
         println!(
             "{}",
             serde_json::json!({
