@@ -50,7 +50,6 @@ pub(super) fn report(own: &Commissioned) -> Report {
             env!("CARGO_PKG_VERSION"),
             own.seed
         ),
-        ..Report::default()
     }
 }
 

@@ -30,7 +30,7 @@ pub fn load_reference(path: &Path, options: &Options) -> Result<Motion, MotionEr
         file.column(Channel::Acceleration)?,
     ];
     let mut notes = vec![format!(
-        "reference {}: {} points at {} s, used to the letter",
+        "reference {}: {} points at {} s, played as given",
         file_name(path),
         columns[0].len(),
         rounded(dt)
