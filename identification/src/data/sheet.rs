@@ -64,6 +64,9 @@ impl Sheet {
     /// # Errors
     /// No text, no header, no data, or rows that are not as long as the header.
     pub fn read(file: &Path, wanted: Wanted<'_>) -> Result<Self, DataError> {
+        if file.is_dir() {
+            return Err(DataError::file(file, "a folder; expected a file of data"));
+        }
         Self::parse(file, read_text(file)?, wanted)
     }
 
