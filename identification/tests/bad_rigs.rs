@@ -369,7 +369,8 @@ fn models_and_maps_are_refused_by_place_with_a_cure() {
     let path = folder.path().join("extended.toml");
     let validated = |text: &str| {
         std::fs::write(&path, text).unwrap();
-        let read = ExtendedRig::read(&path).and_then(|model| model.validate(&[data.clone()]));
+        let read =
+            ExtendedRig::read(&path).and_then(|model| model.validate(std::slice::from_ref(&data)));
         read.err().map(|error| error.to_string())
     };
     assert_eq!(validated(MODEL), None);
