@@ -37,3 +37,27 @@ pub(super) fn divisions(values: &[f64]) -> Vec<HydraulicRig> {
     };
     SPOOLS.map(divided).into()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::closed_loop::equations::PARAMETERS;
+
+    #[test]
+    fn a_spool_that_no_valve_has_is_divided_anew_and_another_is_left_alone() {
+        let mut rig = HydraulicRig::from([1.0; PARAMETERS]);
+        (rig.spool_lag, rig.spool_inertia) = (0.0, LEAST_INERTIA);
+        rig.command_delay = 0.007;
+        let all = divisions(&rig.coordinates());
+        assert_eq!(all.len(), SPOOLS.len());
+        for own in &all {
+            assert!(is_plausible(own));
+            let late = own.command_delay + own.spool_lag;
+            assert!(
+                own.command_delay == 0.0 || (late - 0.007).abs() < 1e-12,
+                "{own:?}"
+            );
+        }
+        assert!(divisions(&all[1].coordinates()).is_empty());
+    }
+}
