@@ -2,6 +2,7 @@
 //! in code, and checked against the FMUs before anything is run.
 
 mod assemble;
+mod aids;
 pub mod built_in;
 mod checked;
 mod connection;
@@ -12,11 +13,13 @@ mod file;
 mod fitted;
 mod given;
 mod graph;
+pub mod jacobi;
 mod link;
 mod lookup;
 pub mod model;
 mod passage;
 mod rule;
+mod surface_control;
 mod table;
 pub mod tuning;
 mod value;
