@@ -1,5 +1,5 @@
 //! Amplitude and phase control and adaptive harmonic cancellation for sines, as laboratory controllers have
-//! them (on a hydraulic table J. Yao, D. Di, G. Jiang and S. Gao, Control Engineering Practice 20, 2012).
+//! them; methods for electrohydraulic tables are reviewed in doi:10.1177/1729881416662537 (2016).
 
 use std::f64::consts::TAU;
 
