@@ -142,6 +142,9 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
         ("acceleration-tracking", 5.5),
         ("minimal-control-synthesis", 9.0),
         ("dual-loop", 9.5),
+        ("receding-horizon", 4.0),
+        ("multiple-surface", 5.0),
+        ("dynamic-surface", 6.5),
     ] {
         assert!(median(&json, controller) < largest, "{controller}");
     }
