@@ -1,8 +1,8 @@
 //! Systems: components, how they are connected, and the experiment; read from TOML or put together
 //! in code, and checked against the FMUs before anything is run.
 
-mod assemble;
 mod aids;
+mod assemble;
 pub mod built_in;
 mod checked;
 mod connection;
