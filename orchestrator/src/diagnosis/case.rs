@@ -35,7 +35,7 @@ pub(super) fn extend(
     results: &mut Results,
     folder: &Path,
 ) -> Result<Extended, Error> {
-    let model = ExtendedModel::new(&found.extended_model, &found.modelled);
+    let model = ExtendedModel::new(&found.extended_model, &found.modelled).beside(&case.nominal);
     if found.effects.is_empty() && !found.modelled.is_empty() {
         let names: Vec<&str> = found.modelled.iter().map(|e| e.effect).collect();
         report.notes.push(format!(

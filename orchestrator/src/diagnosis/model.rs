@@ -3,6 +3,10 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use identification::data::{Called, Channel};
+use identification::diagnosis::DiagnosisError;
+use identification::diagnosis::called;
+use identification::diagnosis::rigs::shake_table::{ExtendedTable, TableErrors};
 use identification::diagnosis::rigs::{DescriptionError, ExtendedRig, FileErrors, renamed};
 use serde::Serialize;
 
@@ -19,8 +23,12 @@ const PREDICTION: &str = "prediction";
 pub struct Validation {
     /// The model.
     pub model: PathBuf,
-    /// A record for each file.
+    /// Of a rig, a record for each file.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub records: Vec<FileErrors>,
+    /// Of a shake table.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tables: Vec<TableErrors>,
 }
 
 /// What `diagnose --predict` tells.
@@ -52,13 +60,21 @@ pub fn validate(
     columns: Option<&Path>,
     files: &[PathBuf],
 ) -> Result<Validation, Error> {
-    let read = read(model, columns)?;
-    let records = read
-        .validate(files)
-        .map_err(|error| fault(model, error.into()))?;
+    let (mut records, mut tables) = (Vec::new(), Vec::new());
+    match read(model, columns)? {
+        Read::Rig(rig) => {
+            let found = rig.validate(files);
+            records = found.map_err(|error| fault(model, error.into()))?;
+        }
+        Read::Table(table, called) => {
+            let found = table.validate(files, &called);
+            tables = found.map_err(|error| fault(model, error.into()))?;
+        }
+    }
     Ok(Validation {
         model: model.into(),
         records,
+        tables,
     })
 }
 
@@ -75,23 +91,22 @@ pub fn predict(
     is_periodic: bool,
     out: &Path,
 ) -> Result<Predicted, Error> {
-    let read = read(model, columns)?;
+    let read = match read(model, columns)? {
+        Read::Rig(read) => read,
+        Read::Table(table, called) => {
+            return predict_table(&table, &called, file, is_periodic, out);
+        }
+    };
     let found = read
         .predict(file, is_periodic)
         .map_err(|error| fault(model, error.into()))?;
-    let name = out
-        .file_name()
-        .ok_or_else(|| file_fault(out, "expected the name of a file to write"))?;
-    let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-    let mut results = Results::begin(folder.unwrap_or(Path::new(".")))?;
-    results.write(&name.to_string_lossy(), |file| {
+    write(out, |file| {
         writeln!(file, "{PREDICTION}")?;
         found
             .rows
             .iter()
             .try_for_each(|row| writeln!(file, "{row}"))
     })?;
-    results.finish()?;
     Ok(Predicted {
         model: model.into(),
         file: file.into(),
@@ -103,18 +118,88 @@ pub fn predict(
     })
 }
 
-fn read(model: &Path, columns: Option<&Path>) -> Result<ExtendedRig, Error> {
+/// As [`predict`], of a table: its four outputs, SI, beside the time.
+fn predict_table(
+    table: &ExtendedTable,
+    called: &[Called],
+    file: &Path,
+    is_periodic: bool,
+    out: &Path,
+) -> Result<Predicted, Error> {
+    if is_periodic {
+        return Err(Error::Option {
+            option: "--periodic",
+            reason: format!(
+                "{} is a shake table's, which begins at rest",
+                table.path.display()
+            ),
+        });
+    }
+    let found = table
+        .predict(file, called)
+        .map_err(|error| fault(file, error.into()))?;
+    write(out, |file| {
+        let heads = Channel::OUTPUTS.map(|own| format!("{} [{}]", own.name(), own.unit()));
+        writeln!(file, "time [s],{}", heads.join(","))?;
+        found
+            .time
+            .iter()
+            .zip(&found.rows)
+            .try_for_each(|(t, [x, a, f, s])| writeln!(file, "{t},{x:.9e},{a:.9e},{f:.9e},{s:.9e}"))
+    })?;
+    Ok(Predicted {
+        model: table.path.clone(),
+        file: file.into(),
+        prediction: out.into(),
+        channel: Channel::OUTPUTS.map(Channel::name).join(", "),
+        unit: Channel::OUTPUTS.map(Channel::unit).join(", "),
+        rows: found.rows.len(),
+        given: found.given,
+    })
+}
+
+/// Writes the file `out`, all or nothing.
+fn write(
+    out: &Path,
+    text: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<(), Error> {
+    let name = out
+        .file_name()
+        .ok_or_else(|| file_fault(out, "expected the name of a file to write"))?;
+    let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let mut results = Results::begin(folder.unwrap_or(Path::new(".")))?;
+    results.write(&name.to_string_lossy(), |file| text(file))?;
+    results.finish()?;
+    Ok(())
+}
+
+enum Read {
+    Rig(Box<ExtendedRig>),
+    Table(Box<ExtendedTable>, Vec<Called>),
+}
+
+fn read(model: &Path, columns: Option<&Path>) -> Result<Read, Error> {
+    let is_table = std::fs::read_to_string(model).is_ok_and(|text| ExtendedTable::is_one(&text));
+    if is_table {
+        let table = ExtendedTable::read(model).map_err(|error| fault(model, error.into()))?;
+        let called = columns.map(called).transpose();
+        let called = called.map_err(|error: DiagnosisError| fault(model, error))?;
+        return Ok(Read::Table(Box::new(table), called.unwrap_or_default()));
+    }
     let failed = |error: DescriptionError| fault(model, error.into());
     let mut read = ExtendedRig::read(model).map_err(failed)?;
     if let Some(map) = columns {
         read.columns = renamed(&read.columns, map).map_err(failed)?;
     }
-    Ok(read)
+    Ok(Read::Rig(Box::new(read)))
 }
 
 impl Validation {
     /// What is printed without `--json`.
     pub fn text(&self) -> String {
+        if !self.tables.is_empty() {
+            return self.text_of_tables();
+        }
         let heading = [
             "file",
             "channel",
@@ -148,6 +233,45 @@ impl Validation {
             if !own.is_empty() {
                 text += &format!("{}: {} (SI)\n", one.file.display(), own.join(", "));
             }
+        }
+        text
+    }
+
+    fn text_of_tables(&self) -> String {
+        let heading = ["file", "channel", "as described", "extended", "noise alone"];
+        let mut rows = vec![heading.map(String::from).to_vec()];
+        let percent = |value: f64| format!("{value:.2} %");
+        let times = |value: f64| format!("{value:.2} times");
+        for one in &self.tables {
+            let file = one.file.display().to_string();
+            for own in &one.channels {
+                rows.push(vec![
+                    file.clone(),
+                    own.channel.clone(),
+                    percent(own.described_percent),
+                    percent(own.extended_percent),
+                    percent(own.floor_percent),
+                ]);
+            }
+            rows.push(vec![
+                file,
+                "all, in the noise".into(),
+                times(one.described_in_noise),
+                times(one.extended_in_noise),
+                times(1.0),
+            ]);
+        }
+        let mut text = format!(
+            "one-step error over variation, nothing fitted but the sensors' zeros of a file\n{}",
+            aligned(&rows)
+        );
+        for one in &self.tables {
+            let own: Vec<String> = one
+                .session
+                .iter()
+                .map(|(name, value)| format!("{name} {value:.3e}"))
+                .collect();
+            text += &format!("{}: {} (SI)\n", one.file.display(), own.join(", "));
         }
         text
     }

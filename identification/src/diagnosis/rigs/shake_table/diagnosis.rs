@@ -45,6 +45,19 @@ pub struct ExtendedModel {
     pub standard_errors: BTreeMap<String, f64>,
 }
 
+impl ExtendedModel {
+    /// What was known before any diagnosis.
+    pub fn known(nominal: &Nominal) -> Self {
+        Self {
+            shake_table: nominal.shake_table,
+            specimen: nominal.specimen,
+            effects: nominal.effects,
+            sensors: nominal.sensors,
+            standard_errors: BTreeMap::new(),
+        }
+    }
+}
+
 /// What came out of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnosis {
@@ -198,7 +211,7 @@ fn prediction(
     record: usize,
 ) -> Option<(Predictor, Vec<f64>)> {
     let rig = model.rig(point);
-    let predictor = Predictor::design(&rig, model.period, model.noise, model.disturbance).ok()?;
+    let predictor = Predictor::design(&rig, model.period, &model.noise).ok()?;
     let samples = &model.records[record].samples;
     let mut out = vec![0.0; 4 * samples.len()];
     let sampled = predictor.sample(&rig).ok()?;
@@ -216,7 +229,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         problems: vec![problem.into()],
     };
     let mut notes = Vec::new();
-    let model = prepare(case, &mut notes)?;
+    let mut model = prepare(case, &mut notes)?;
     let relations = relations(&case.identification, &case.nominal);
     if let Some(problem) = misfit(&relations) {
         return Err(unfit(&problem));
@@ -233,13 +246,13 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
              belong together?",
         )
     };
+    let mut judgement = judge(&mut model, &fitted, &[held_out], observer).ok_or_else(lost)?;
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
-    let samples = &model.records[held_out].samples;
-    let mut judgement = judge(&model, &fitted, &[held_out], observer).ok_or_else(lost)?;
     for note in at_their_ends(&model, &judgement.best.point) {
         judgement.verdict = Verdict::Unexplained;
         notes.push(note);
     }
+    let samples = &model.records[held_out].samples;
     let after = prediction(&model, &judgement.best.point, held_out).ok_or_else(lost)?;
     let gain = gain(
         samples,
