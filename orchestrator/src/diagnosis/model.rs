@@ -1,9 +1,10 @@
 //! An extended model on further records, without a fit: what it misses, and what it predicts.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use identification::data::{Called, Channel};
+use identification::data::{Called, Channel, named_columns};
 use identification::diagnosis::DiagnosisError;
 use identification::diagnosis::called;
 use identification::diagnosis::rigs::shake_table::{ExtendedTable, TableErrors};
@@ -23,10 +24,10 @@ const PREDICTION: &str = "prediction";
 pub struct Validation {
     /// The model.
     pub model: PathBuf,
-    /// Of a rig, a record for each file.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    /// A record for each file, of a shake table for each of its channels; no refit stands between its
+    /// model as described and the extended one.
     pub records: Vec<FileErrors>,
-    /// Of a shake table.
+    /// Of a shake table, all channels of a file together.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tables: Vec<TableErrors>,
 }
@@ -60,17 +61,18 @@ pub fn validate(
     columns: Option<&Path>,
     files: &[PathBuf],
 ) -> Result<Validation, Error> {
-    let (mut records, mut tables) = (Vec::new(), Vec::new());
-    match read(model, columns)? {
+    let (records, tables) = match read(model, columns)? {
         Read::Rig(rig) => {
             let found = rig.validate(files);
-            records = found.map_err(|error| fault(model, error.into()))?;
+            let found = found.map_err(|error| fault(model, error.into()))?;
+            (found, Vec::new())
         }
         Read::Table(table, called) => {
             let found = table.validate(files, &called);
-            tables = found.map_err(|error| fault(model, error.into()))?;
+            let found = found.map_err(|error| fault(model, error.into()))?;
+            (found.iter().flat_map(by_channel).collect(), found)
         }
-    }
+    };
     Ok(Validation {
         model: model.into(),
         records,
@@ -118,7 +120,20 @@ pub fn predict(
     })
 }
 
-/// As [`predict`], of a table: its four outputs, SI, beside the time.
+fn by_channel(table: &TableErrors) -> impl Iterator<Item = FileErrors> + '_ {
+    table.channels.iter().map(|own| FileErrors {
+        file: table.file.clone(),
+        channel: own.channel.clone(),
+        nominal_percent: own.described_percent,
+        described_percent: own.described_percent,
+        extended_percent: own.extended_percent,
+        extended_rms: own.extended_rms,
+        unit: own.unit.clone(),
+        session: BTreeMap::from([(format!("{}_zero", own.channel), own.zero)]),
+    })
+}
+
+/// As [`predict`], of a table: the output that was asked for in the file's unit, and, SI, all four beside the time.
 fn predict_table(
     table: &ExtendedTable,
     called: &[Called],
@@ -138,21 +153,27 @@ fn predict_table(
     let found = table
         .predict(file, called)
         .map_err(|error| fault(file, error.into()))?;
+    let wanted = Channel::OUTPUTS[found.wanted];
+    let heads = named_columns(file).unwrap_or_default();
+    let in_file = heads.into_iter().find(|head| head.channel == wanted);
+    let unit = in_file.map_or_else(|| wanted.unit().to_owned(), |head| head.unit);
+    let factor = units::convert(1.0, wanted.unit(), &unit)
+        .map_err(|why| file_fault(file, format!("`{}`: {why}", wanted.name())))?;
     write(out, |file| {
         let heads = Channel::OUTPUTS.map(|own| format!("{} [{}]", own.name(), own.unit()));
-        writeln!(file, "time [s],{}", heads.join(","))?;
-        found
-            .time
-            .iter()
-            .zip(&found.rows)
-            .try_for_each(|(t, [x, a, f, s])| writeln!(file, "{t},{x:.9e},{a:.9e},{f:.9e},{s:.9e}"))
+        writeln!(file, "{PREDICTION},time [s],{}", heads.join(","))?;
+        found.time.iter().zip(&found.rows).try_for_each(|(t, row)| {
+            let [x, a, f, s] = row;
+            let wanted = factor * row[found.wanted];
+            writeln!(file, "{wanted},{t},{x:.9e},{a:.9e},{f:.9e},{s:.9e}")
+        })
     })?;
     Ok(Predicted {
         model: table.path.clone(),
         file: file.into(),
         prediction: out.into(),
-        channel: Channel::OUTPUTS.map(Channel::name).join(", "),
-        unit: Channel::OUTPUTS.map(Channel::unit).join(", "),
+        channel: wanted.name().into(),
+        unit,
         rows: found.rows.len(),
         given: found.given,
     })
@@ -267,11 +288,11 @@ impl Validation {
         );
         for one in &self.tables {
             let own: Vec<String> = one
-                .session
+                .channels
                 .iter()
-                .map(|(name, value)| format!("{name} {value:.3e}"))
+                .map(|own| format!("{} {:.2e} {}", own.channel, own.zero, own.unit))
                 .collect();
-            text += &format!("{}: {} (SI)\n", one.file.display(), own.join(", "));
+            text += &format!("{}: zeros {}\n", one.file.display(), own.join(", "));
         }
         text
     }

@@ -18,7 +18,7 @@ pub const LARGEST_DEVIATE: f64 = 5.6;
 /// the assumed ones are right, a dozen parameters gain about a dozen.
 const NEWS: f64 = 60.0;
 /// Times that they are learned at most: at the first model found, and at what was found with them.
-const LESSONS: usize = 3;
+const LESSONS: usize = 2;
 
 /// What came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

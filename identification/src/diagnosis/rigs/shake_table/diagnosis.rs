@@ -26,6 +26,9 @@ use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Samples};
 /// standard deviations of its noise.
 const LAW_HOLDS_WITHIN: f64 = 4.0;
 
+/// Standard deviations to either side of an estimate that hold the truth in 95 of 100 cases.
+const INTERVAL_95: f64 = 1.96;
+
 /// A channel whose noise is this many times what is stated is said to be loud.
 const LOUD: f64 = 2.0;
 
@@ -248,10 +251,20 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
     };
     let mut judgement = judge(&mut model, &fitted, &[held_out], observer).ok_or_else(lost)?;
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
-    for note in at_their_ends(&model, &judgement.best.point) {
-        judgement.verdict = Verdict::Unexplained;
-        notes.push(note);
+    let mut doubts = at_their_ends(&model, &judgement.best.point);
+    for doubt in at_their_ends(&model, &judgement.all.point) {
+        if !doubts.contains(&doubt) {
+            doubts.push(doubt);
+        }
     }
+    if judgement.verdict != Verdict::Unexplained {
+        doubts.extend(judgement.effects.iter().filter_map(indistinct));
+    }
+    if !doubts.is_empty() {
+        judgement.verdict = Verdict::Unexplained;
+    }
+    notes.extend(doubts);
+    notes.extend(noise_note(&model));
     let samples = &model.records[held_out].samples;
     let after = prediction(&model, &judgement.best.point, held_out).ok_or_else(lost)?;
     let gain = gain(
@@ -396,6 +409,51 @@ fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
         }
     }
     notes
+}
+
+/// What speaks against naming `effect`: an interval of 95 % that holds zero for everything that says how
+/// strong it is.
+fn indistinct(effect: &NamedEffect) -> Option<String> {
+    let mut sizes = effect.parameters.iter().filter(|p| !p.is_shape).peekable();
+    sizes.peek()?;
+    sizes
+        .all(|size| size.value.abs() < INTERVAL_95 * size.standard_error)
+        .then(|| {
+            format!(
+                "{} would help, but on all records its size is no different from zero",
+                effect.effect
+            )
+        })
+}
+
+/// The noises that were learned, where they are not those that were stated.
+fn noise_note(model: &ShakeTableModel) -> Option<String> {
+    let noise = &model.noise;
+    if *noise == model.stated_noise {
+        return None;
+    }
+    let mut sensors = Vec::new();
+    for (i, name) in OUTPUT_NAMES.iter().enumerate() {
+        let stated = model.stated_noise.white[i];
+        if !stated.is_finite() {
+            continue;
+        }
+        let slow = noise.slow[i];
+        let size = noise.white[i].hypot(slow.map_or(0.0, |slow| slow.sigma));
+        let colour = slow.map_or(String::new(), |slow| {
+            let share = 100.0 * (slow.sigma / size).powi(2);
+            let corner = slow.corner(model.period);
+            format!(" ({share:.0} % of its power below {corner:.0} Hz)")
+        });
+        sensors.push(format!("{name} {:.2}{colour}", size / stated));
+    }
+    Some(format!(
+        "noise as the records show it: {:.1} mV beside the command below {:.0} Hz; of the sensors, in what is \
+         stated, {}",
+        1e3 * noise.unseen.sigma,
+        noise.unseen.corner(model.period),
+        sensors.join(", ")
+    ))
 }
 
 /// Two quadratures as amplitude and phase, where the effect is told so.

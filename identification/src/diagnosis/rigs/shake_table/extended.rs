@@ -1,6 +1,5 @@
 //! The extended model of a table as a file, and what it makes of further records without a fit.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
@@ -41,8 +40,6 @@ pub struct TableErrors {
     pub described_in_noise: f64,
     /// And of the extended model.
     pub extended_in_noise: f64,
-    /// Zeros of the file's sensors by the extended model, SI.
-    pub session: BTreeMap<String, f64>,
 }
 
 /// Errors of a channel over its variation, per cent.
@@ -54,6 +51,12 @@ pub struct ChannelErrors {
     pub described_percent: f64,
     /// Extended model.
     pub extended_percent: f64,
+    /// Root mean square of the extended model's error, SI.
+    pub extended_rms: f64,
+    /// SI unit.
+    pub unit: String,
+    /// Zero of the sensor on this file, by the extended model, SI.
+    pub zero: f64,
     /// What a perfect model would leave with the stated noise.
     pub floor_percent: f64,
 }
@@ -67,6 +70,8 @@ pub struct TablePrediction {
     pub rows: Vec<[f64; 4]>,
     /// Rows in which an output was given.
     pub given: usize,
+    /// The first output whose cells are empty in a row, by its place; displacement where none is.
+    pub wanted: usize,
 }
 
 fn rig(model: &Nominal) -> IdentifiedRig {
@@ -161,6 +166,9 @@ impl ExtendedTable {
             channel: OUTPUT_NAMES[i].to_owned(),
             described_percent: 100.0 * before.rms[i] / deviation(i),
             extended_percent: 100.0 * after.rms[i] / deviation(i),
+            extended_rms: after.rms[i],
+            unit: Channel::OUTPUTS[i].unit().to_owned(),
+            zero: after.zeros[i],
             floor_percent: 100.0 * after.floor[i] / deviation(i),
         });
         Ok(TableErrors {
@@ -168,9 +176,6 @@ impl ExtendedTable {
             channels: channels.collect(),
             described_in_noise: before.in_noise,
             extended_in_noise: after.in_noise,
-            session: live()
-                .map(|i| (format!("{}_zero", OUTPUT_NAMES[i]), after.zeros[i]))
-                .collect(),
         })
     }
 
@@ -334,6 +339,8 @@ impl ExtendedTable {
                 _ => recorded,
             }
         });
+        let has_column = |i: usize| values(Channel::OUTPUTS[i]).is_some();
+        let is_wanted = |i: usize| has_column(i) && measured.iter().any(|row| row[i].is_nan());
         if !rows.iter().flatten().all(|value| value.is_finite()) {
             return Err(fail(format!(
                 "the model of {} leaves the finite on it",
@@ -344,6 +351,7 @@ impl ExtendedTable {
             time,
             rows,
             given: measured.iter().filter(|row| is_given(row)).count(),
+            wanted: (0..4).find(|&i| is_wanted(i)).unwrap_or(0),
         })
     }
 }
