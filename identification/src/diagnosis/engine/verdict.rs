@@ -20,6 +20,11 @@ const NEWS: f64 = 60.0;
 /// Times that they are learned at most: at the first model found, and at what was found with them.
 const LESSONS: usize = 2;
 
+/// No name is surer than hidden effects have shown: of `n` effects named in the suite's cases of three
+/// worlds none was wrong, and Laplace's rule of succession then expects one in `n + 2` to be; some hundred
+/// were named.
+const SUREST: f64 = 0.99;
+
 /// What came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -67,7 +72,8 @@ pub struct NamedEffect {
     pub effect: &'static str,
     /// Its parameters.
     pub parameters: Vec<ParameterEstimate>,
-    /// Posterior share against the models tried in its place, 0 to 1.
+    /// Posterior share against the models tried in its place, 0 to 1, no surer than the diagnosis has
+    /// been shown to be.
     pub confidence: f64,
 }
 
@@ -280,7 +286,7 @@ fn weigh<M: ExtensibleModel>(
     let mut nuisance_errors = deviations;
     nuisance_errors.truncate(all.point.nuisance.len());
     for effect in &mut effects {
-        effect.confidence = 1.0 / weight;
+        effect.confidence = SUREST / weight;
     }
     Judgement {
         verdict,
