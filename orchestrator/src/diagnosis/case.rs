@@ -1,6 +1,7 @@
 //! The extended model of a shake table: its file, its FMUs, and what they make of the validation
 //! record in closed loop.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use identification::data::Channel;
@@ -9,7 +10,7 @@ use identification::diagnosis::rigs::shake_table::Diagnosis;
 use identification::diagnosis::{DiagnosisReport, Evidence};
 
 use super::co_simulation::{self, Comparison, RigFmus};
-use super::{EXTENDED_MODEL, file_fault};
+use super::{EXTENDED_MODEL, SEPARATING_MOTION, file_fault};
 use crate::error::Error;
 use crate::extended_model::ExtendedModel;
 use crate::pack::{self, FmiVersion, PackedFmu};
@@ -47,6 +48,17 @@ pub(super) fn extend(
         .toml()
         .map_err(|error| file_fault(&folder.join(EXTENDED_MODEL), error))?;
     results.write_text(EXTENDED_MODEL, &text)?;
+    if let Some(experiment) = &found.separating_experiment {
+        let motion = experiment.reference.iter().enumerate();
+        results.write(SEPARATING_MOTION, |file| {
+            writeln!(file, "time [s],displacement [m]")?;
+            motion.clone().try_for_each(|(k, x)| {
+                let time = k as f64 * experiment.period;
+                writeln!(file, "{time:.6},{x:.9}")
+            })
+        })?;
+        report.separating_motion = Some(folder.join(SEPARATING_MOTION));
+    }
     let mut comparison = None;
     match fmus(&model, results) {
         Ok(built) => {

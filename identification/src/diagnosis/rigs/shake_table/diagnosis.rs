@@ -6,9 +6,8 @@ use plant::identified::effects::{self, Effects, Reporting};
 use plant::identified::shake_table::ShakeTable;
 use plant::sensors::instrumentation::Instrumentation;
 use plant::specimens::linear::LinearSpecimen;
-use units::constants::INCH;
 
-use super::experiment;
+use super::experiment::{self, SeparatingExperiment};
 use super::gain::{Gain, gain};
 use super::health::{RelationReport, health};
 use super::relations::{misfit, relations};
@@ -73,7 +72,7 @@ pub struct Diagnosis {
     /// Rival sets of effects.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The experiment that would tell the first rival apart.
-    pub separating_experiment: Option<String>,
+    pub separating_experiment: Option<SeparatingExperiment>,
     /// What the extended model brings on the validation record.
     pub gain: Gain,
     /// The extended model.
@@ -277,21 +276,13 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
     let effects = readable(judgement.effects);
     let separating_experiment = judgement.rival_points.first().and_then(|rival| {
         let law = case.nominal.controller?;
-        let found = experiment::separate(
+        experiment::separate(
             &rig,
             &model.rig(rival),
             &law,
             &case.nominal.noise,
             model.period,
-        )?;
-        Some(format!(
-            "{} with a peak of {:.2} in ({:.1} mm): the rivals differ there by {:.1} standard \
-             deviations of the noise",
-            found.kind,
-            found.peak / INCH,
-            1e3 * found.peak,
-            found.separation
-        ))
+        )
     });
     let fits_fitted = {
         let squares: f64 = judgement.best.residuals.iter().map(|r| r * r).sum();
