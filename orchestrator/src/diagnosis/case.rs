@@ -49,13 +49,24 @@ pub(super) fn extend(
         .map_err(|error| file_fault(&folder.join(EXTENDED_MODEL), error))?;
     results.write_text(EXTENDED_MODEL, &text)?;
     if let Some(experiment) = &found.separating_experiment {
-        let motion = experiment.reference.iter().enumerate();
+        let (x, period) = (&experiment.reference, experiment.period);
         results.write(SEPARATING_MOTION, |file| {
-            writeln!(file, "time [s],displacement [m]")?;
-            motion.clone().try_for_each(|(k, x)| {
-                let time = k as f64 * experiment.period;
-                writeln!(file, "{time:.6},{x:.9}")
-            })
+            writeln!(
+                file,
+                "time [s],displacement [m],velocity [m/s],acceleration [m/s^2]"
+            )?;
+            for k in 0..x.len() {
+                let (before, after) = (x[k.saturating_sub(1)], x[(k + 1).min(x.len() - 1)]);
+                let velocity = (after - before) / (2.0 * period);
+                let acceleration = (after - 2.0 * x[k] + before) / (period * period);
+                let time = k as f64 * period;
+                writeln!(
+                    file,
+                    "{time:.6},{:.9e},{velocity:.9e},{acceleration:.9e}",
+                    x[k]
+                )?;
+            }
+            Ok(())
         })?;
         report.separating_motion = Some(folder.join(SEPARATING_MOTION));
     }
