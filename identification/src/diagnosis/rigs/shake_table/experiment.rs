@@ -183,3 +183,65 @@ pub fn separate(
     }
     best
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::specimens::linear::LinearSpecimen;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const PERIOD: f64 = 2e-3;
+    const NOISE: [f64; 4] = [1.3e-5, 0.04, 1.3, 0.025];
+    const LAW: ControlLaw = ControlLaw {
+        proportional: 6.15 / INCH,
+        integral: 0.161 / INCH,
+        velocity_feedforward: 0.125 / INCH,
+        acceleration_feedforward: 1e-4 / INCH,
+        velocity_feedback: 0.005 / INCH,
+        acceleration_feedback: 1e-4 / INCH,
+        velocity_filter: 0.25,
+        limit: 10.0,
+    };
+
+    #[test]
+    fn the_proposed_motion_tells_two_rigs_apart_and_can_be_played() {
+        let healthy = IdentifiedRig {
+            specimen: Some(LinearSpecimen::default()),
+            ..Default::default()
+        };
+        let (mut dry, mut viscous) = (healthy, healthy);
+        dry.effects.friction.coulomb_force = 10.0;
+        viscous.shake_table.table.damping += 60.0;
+        let found = separate(&dry, &viscous, &LAW, &NOISE, PERIOD).unwrap();
+        assert!(
+            found.separation > 1.0,
+            "{} {}",
+            found.kind,
+            found.separation
+        );
+        let x = &found.reference;
+        let ends = [x[0], x[1], x[x.len() - 2], x[x.len() - 1]];
+        assert!(ends.iter().all(|x| x.abs() < 1e-4 * found.peak), "{ends:?}");
+        let largest = x.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        assert!((largest / found.peak - 1.0).abs() < 1e-9 && largest < 1.4 * INCH);
+        // What the first rig then records, with noise, is its own and not the other's.
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut record = play(&dry, &LAW, x, PERIOD).unwrap();
+        for row in &mut record {
+            for (value, noise) in row.iter_mut().zip(NOISE) {
+                let normal: f64 = StandardNormal.sample(&mut random);
+                *value += noise * normal;
+            }
+        }
+        let missed = |rig: &IdentifiedRig| {
+            let model = play(rig, &LAW, x, PERIOD).unwrap();
+            let squares = record
+                .iter()
+                .zip(&model)
+                .flat_map(|(y, z)| (0..4).map(move |i| ((y[i] - z[i]) / NOISE[i]).powi(2)));
+            (squares.sum::<f64>() / (4 * x.len()) as f64).sqrt()
+        };
+        assert!((missed(&dry) - 1.0).abs() < 0.05, "{}", missed(&dry));
+        assert!(missed(&viscous) > 1.3, "{}", missed(&viscous));
+    }
+}
