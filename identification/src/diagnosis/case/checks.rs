@@ -13,6 +13,8 @@ const CLIPPED_RUN: usize = 4;
 const MOST_REPEATED: usize = 5;
 /// Samples over which a channel repeats itself about equally often.
 const REPEATS_EVENLY: usize = 250;
+/// Steps of a coarse converter at either end whose readings are compared with the extreme ones.
+const STEPS_BESIDE: usize = 3;
 /// Equal readings in a row that betray a frozen one.
 const FROZEN_RUN: usize = 50;
 
@@ -173,12 +175,17 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
     }
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // Where a converter's steps are coarse, readings repeat at every peak, as often one step below.
-    let others = |is: &dyn Fn(f64) -> bool| -> Vec<f64> {
-        values.iter().copied().filter(|v| is(*v)).collect()
-    };
-    let next_to_high = others(&|v| v < high).into_iter().fold(f64::NEG_INFINITY, f64::max);
-    let next_to_low = others(&|v| v > low).into_iter().fold(f64::INFINITY, f64::min);
+    // Where a converter's steps are coarse, readings repeat wherever the motion turns or rests, as often
+    // a few steps below the extremes.
+    let mut levels = values.to_vec();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    let ends = levels.len().saturating_sub(1).min(STEPS_BESIDE);
+    let next_to_low = levels.get(ends).copied().unwrap_or(high);
+    let next_to_high = levels
+        .len()
+        .checked_sub(1 + ends)
+        .map_or(low, |place| levels[place]);
     let (mut run, mut start) = (1, 0);
     let (mut clipped, mut beside) = (0, 0);
     for k in 1..=values.len() {
@@ -199,7 +206,7 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
         }
         if run >= CLIPPED_RUN && is_extreme {
             clipped += run;
-        } else if run >= CLIPPED_RUN && (value == next_to_high || value == next_to_low) {
+        } else if run >= CLIPPED_RUN && (value >= next_to_high || value <= next_to_low) {
             beside += run;
         }
         (run, start) = (1, k);
