@@ -130,6 +130,7 @@ fn by_channel(table: &TableErrors) -> impl Iterator<Item = FileErrors> + '_ {
         extended_rms: own.extended_rms,
         unit: own.unit.clone(),
         session: BTreeMap::from([(format!("{}_zero", own.channel), own.zero)]),
+        notes: Vec::new(),
     })
 }
 
