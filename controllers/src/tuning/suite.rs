@@ -1,5 +1,7 @@
 //! Every controller of a rig from its model, each by its stated rule, and each as it runs.
 
+use std::sync::OnceLock;
+
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
 use units::constants::{G, STROKE};
@@ -38,27 +40,21 @@ impl Measurements {
     }
 }
 
-/// The controllers of a rig.
+/// What a rule gave, once it was asked.
+type Ruled<T> = OnceLock<Result<T, ModelError>>;
+
+/// The controllers of a rig. Each is found when it is asked for, so that a rig for which one rule finds
+/// none has the others.
 #[derive(Debug, Clone)]
 pub struct Suite {
     /// The model.
     pub rig: ShakeTable,
     /// Its measurements.
     pub measurements: Measurements,
-    /// Displacement PID: half the gain at which the sampled loop oscillates, the printed ratio of
-    /// integral to proportional.
-    pub displacement_pid: Pid,
-    /// Three-variable control: [`ThreeVariableGains::damped`].
-    pub three_variable: ThreeVariableGains,
-    /// Loop shaping: [`Shaped::fastest`].
-    pub loop_shaping: WholePlantDesign,
-    /// Displacement loop under sliding mode.
-    pub displacement_loop: Pid,
-    /// Force loop and rates of sliding mode: [`Hierarchy::tuned`].
-    pub sliding_mode: SlidingModeTuning,
-    /// Model predictive control on the model, with its lateness and noise; outputs in units of the
-    /// stroke, 20 in/s and 1 g.
-    pub mpc: Parameters,
+    tuned: Ruled<ThreeVariableGains>,
+    damped: Ruled<ThreeVariableGains>,
+    shaped: Ruled<WholePlantDesign>,
+    sliding: Ruled<SlidingModeTuning>,
 }
 
 /// A controller of a [`Suite`].
@@ -102,45 +98,125 @@ impl Member {
 const VELOCITY_UNIT: f64 = 0.508;
 
 impl Suite {
-    /// Designs all controllers for `rig`.
+    /// The controllers of `rig`.
+    pub fn new(rig: &ShakeTable, measurements: &Measurements) -> Self {
+        Self {
+            rig: *rig,
+            measurements: *measurements,
+            tuned: OnceLock::new(),
+            damped: OnceLock::new(),
+            shaped: OnceLock::new(),
+            sliding: OnceLock::new(),
+        }
+    }
+
+    /// Gains of [`ThreeVariableGains::tuned`], from which other rules begin.
+    fn tuned(&self) -> Result<ThreeVariableGains, ModelError> {
+        let Measurements { period, .. } = self.measurements;
+        let delay = self.measurements.delay();
+        let find = || ThreeVariableGains::tuned(&self.rig, delay, period);
+        self.tuned.get_or_init(find).clone()
+    }
+
+    /// Displacement PID: half the gain at which the sampled loop oscillates, the printed ratio of
+    /// integral to proportional.
     ///
     /// # Errors
-    /// A rig for which a rule finds no controller, with the rule.
-    pub fn new(rig: &ShakeTable, measurements: &Measurements) -> Result<Self, ModelError> {
+    /// A rig for which the rule finds none.
+    pub fn displacement_pid(&self) -> Result<Pid, ModelError> {
+        let printed = Pid::equation_3_6();
+        let proportional = self.tuned()?.proportional;
+        Ok(Pid {
+            proportional,
+            integral: printed.integral * proportional / printed.proportional,
+            ..printed
+        })
+    }
+
+    /// Three-variable control: [`ThreeVariableGains::damped`].
+    ///
+    /// # Errors
+    /// A rig for which the rule finds none.
+    pub fn three_variable(&self) -> Result<ThreeVariableGains, ModelError> {
+        let Measurements { late, period, .. } = self.measurements;
+        let find = || ThreeVariableGains::damped(&self.rig, late, period);
+        self.damped.get_or_init(find).clone()
+    }
+
+    /// Loop shaping: [`Shaped::fastest`], unless another crossover was asked for.
+    ///
+    /// # Errors
+    /// A rig for which the rule finds none.
+    pub fn loop_shaping(&self) -> Result<WholePlantDesign, ModelError> {
+        self.shaped.get_or_init(|| self.shaping().fastest()).clone()
+    }
+
+    fn shaping(&self) -> Shaped<'_> {
         let Measurements {
             late,
             noise,
             period,
-        } = *measurements;
-        let delay = measurements.delay();
-        let gains = ThreeVariableGains::tuned(rig, delay, period)?;
-        let printed = Pid::equation_3_6();
-        let displacement_pid = Pid {
-            proportional: gains.proportional,
-            integral: printed.integral * gains.proportional / printed.proportional,
-            ..printed
-        };
-        let allocation = ControlAllocation::default();
-        let displacement_loop = Pid {
-            integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
-            limit: allocation.limit / allocation.displacement_share,
-            ..displacement_pid
-        };
-        let sliding_mode = Hierarchy {
-            rig: &rig.state_space(),
-            model: rig,
-            displacement: displacement_loop,
-            delay,
+        } = self.measurements;
+        Shaped {
+            rig: &self.rig,
+            late,
+            noise: noise[0],
             period,
         }
-        .tuned()?;
+    }
+
+    /// The same with another crossover of loop shaping, rad/s.
+    ///
+    /// # Errors
+    /// A crossover that is not reached.
+    pub fn with_crossover(mut self, crossover: f64) -> Result<Self, ModelError> {
+        let design = self.shaping().design(crossover)?;
+        self.shaped = OnceLock::from(Ok(design));
+        Ok(self)
+    }
+
+    /// Displacement loop under sliding mode.
+    fn displacement_loop(&self) -> Result<Pid, ModelError> {
+        let allocation = ControlAllocation::default();
+        Ok(Pid {
+            integral_leak: DISPLACEMENT_INTEGRAL_LEAK,
+            limit: allocation.limit / allocation.displacement_share,
+            ..self.displacement_pid()?
+        })
+    }
+
+    /// Force loop and rates of sliding mode: [`Hierarchy::tuned`].
+    ///
+    /// # Errors
+    /// A rig for which the rule finds none.
+    pub fn sliding_mode(&self) -> Result<SlidingModeTuning, ModelError> {
+        let find = || {
+            Hierarchy {
+                rig: &self.rig.state_space(),
+                model: &self.rig,
+                displacement: self.displacement_loop()?,
+                delay: self.measurements.delay(),
+                period: self.measurements.period,
+            }
+            .tuned()
+        };
+        self.sliding.get_or_init(find).clone()
+    }
+
+    /// Model predictive control on the model, with its lateness and noise; outputs in units of the
+    /// stroke, 20 in/s and 1 g.
+    ///
+    /// # Errors
+    /// A rig for which the rule finds none.
+    pub fn mpc(&self) -> Result<Parameters, ModelError> {
+        let Measurements { noise, period, .. } = self.measurements;
         let mpc = Parameters {
             plant: prediction_plant(&Rig {
-                shake_table: *rig,
+                shake_table: self.rig,
                 specimen: None,
             }),
             low_level: ThreeVariableControl {
-                gains,
+                gains: self.tuned()?,
                 ..ThreeVariableControl::table_3_2()
             },
             period,
@@ -149,7 +225,7 @@ impl Suite {
                 ..Weights::TABLE_5_1
             },
             outlook: Outlook::Extrapolate,
-            loop_delay_samples: delay,
+            loop_delay_samples: self.measurements.delay(),
             noise: Noise {
                 measurement: noise,
                 ..Noise::default()
@@ -157,46 +233,14 @@ impl Suite {
             ..Parameters::default()
         };
         mpc.validate()?;
-        let shaped = Shaped {
-            rig,
-            late,
-            noise: noise[0],
-            period,
-        };
-        Ok(Self {
-            rig: *rig,
-            measurements: *measurements,
-            displacement_pid,
-            three_variable: ThreeVariableGains::damped(rig, late, period)?,
-            loop_shaping: shaped.fastest()?,
-            displacement_loop,
-            sliding_mode,
-            mpc,
-        })
-    }
-
-    /// The same with another crossover of loop shaping, rad/s.
-    ///
-    /// # Errors
-    /// A crossover that is not reached.
-    pub fn with_crossover(mut self, crossover: f64) -> Result<Self, ModelError> {
-        let Measurements {
-            late,
-            noise,
-            period,
-        } = self.measurements;
-        self.loop_shaping = Shaped {
-            rig: &self.rig,
-            late,
-            noise: noise[0],
-            period,
-        }
-        .design(crossover)?;
-        Ok(self)
+        Ok(mpc)
     }
 
     /// What a controller is set to, by the names of its component, SI; beside it the model.
-    pub fn named(&self, member: Member) -> Vec<(String, f64)> {
+    ///
+    /// # Errors
+    /// A rig for which its rule finds none.
+    pub fn named(&self, member: Member) -> Result<Vec<(String, f64)>, ModelError> {
         let own = |all: &[(&str, f64)]| -> Vec<(String, f64)> {
             all.iter().map(|(n, v)| ((*n).to_string(), *v)).collect()
         };
@@ -206,30 +250,29 @@ impl Suite {
                 ("integral_gain", pid.integral),
             ]
         };
-        match member {
-            Member::DisplacementPid => own(&pid(&self.displacement_pid)),
-            Member::ThreeVariable => own(&self.three_variable.named()),
-            Member::LoopShaping => self.loop_shaping.law.named(),
+        Ok(match member {
+            Member::DisplacementPid => own(&pid(&self.displacement_pid()?)),
+            Member::ThreeVariable => own(&self.three_variable()?.named()),
+            Member::LoopShaping => self.loop_shaping()?.law.named(),
             Member::SlidingMode => {
-                let force = &self.sliding_mode.force;
+                let SlidingModeTuning { force, rate } = self.sliding_mode()?;
+                let displacement = self.displacement_loop()?;
                 own(&[
-                    ("surface_rate", self.sliding_mode.rate),
-                    ("reaching_rate", self.sliding_mode.rate),
+                    ("surface_rate", rate),
+                    ("reaching_rate", rate),
                     (
                         "displacement_loop_proportional_gain",
-                        self.displacement_loop.proportional,
+                        displacement.proportional,
                     ),
-                    (
-                        "displacement_loop_integral_gain",
-                        self.displacement_loop.integral,
-                    ),
+                    ("displacement_loop_integral_gain", displacement.integral),
                     ("force_loop_proportional_gain", force.proportional),
                     ("force_loop_integral_gain", force.integral),
                 ])
             }
             Member::ModelPredictive => {
-                let (noise, scale) = (self.mpc.noise.measurement, self.mpc.weights.scale);
-                let mut all = own(&self.mpc.low_level.gains.named());
+                let mpc = self.mpc()?;
+                let (noise, scale) = (mpc.noise.measurement, mpc.weights.scale);
+                let mut all = own(&mpc.low_level.gains.named());
                 // The sensors' noise, and outputs in units of the stroke, 20 in/s and 1 g: with the
                 // printed weights on unscaled outputs displacement counts for nothing and drifts.
                 all.extend(own(&[
@@ -242,13 +285,13 @@ impl Suite {
                 ]));
                 all
             }
-        }
+        })
     }
 
     /// A controller as it runs, at rest, its references at zero.
     ///
     /// # Errors
-    /// Parameters with which it cannot run.
+    /// A rig for which its rule finds none; parameters with which it cannot run.
     pub fn law(&self, member: Member) -> Result<Box<ValveLaw<'static>>, ModelError> {
         let period = self.measurements.period;
         let at_displacement = |heard: &Heard| PidInput {
@@ -257,18 +300,18 @@ impl Suite {
         };
         Ok(match member {
             Member::DisplacementPid => {
-                let mut law = self.displacement_pid;
+                let mut law = self.displacement_pid()?;
                 law.validate()?;
                 Box::new(move |heard| law.step(&at_displacement(heard), period))
             }
             Member::LoopShaping => {
-                let mut law = self.loop_shaping.law;
+                let mut law = self.loop_shaping()?.law;
                 law.validate()?;
                 Box::new(move |heard| law.step(&at_displacement(heard), period))
             }
             Member::ThreeVariable => {
                 let mut law = ThreeVariableControl {
-                    gains: self.three_variable,
+                    gains: self.three_variable()?,
                     ..ThreeVariableControl::table_3_2()
                 };
                 law.validate()?;
@@ -282,8 +325,9 @@ impl Suite {
             }
             Member::SlidingMode => self.hierarchy()?,
             Member::ModelPredictive => {
-                let mut law = ModelPredictiveControl::new(self.mpc.clone())?;
-                let mut below = self.mpc.low_level;
+                let mpc = self.mpc()?;
+                let mut below = mpc.low_level;
+                let mut law = ModelPredictiveControl::new(mpc)?;
                 Box::new(move |heard| {
                     let input = ModelPredictiveInput {
                         measured: heard.motion,
@@ -303,9 +347,9 @@ impl Suite {
     fn hierarchy(&self) -> Result<Box<ValveLaw<'static>>, ModelError> {
         let Measurements { period, .. } = self.measurements;
         let delay = self.measurements.delay();
-        let SlidingModeTuning { force, rate } = self.sliding_mode;
+        let SlidingModeTuning { mut force, rate } = self.sliding_mode()?;
         let mut allocation = ControlAllocation::default();
-        let (mut displacement, mut force) = (self.displacement_loop, force);
+        let mut displacement = self.displacement_loop()?;
         let mut law = SlidingMode::new(self.rig.table, 0.0, rate, rate);
         if delay > 0 {
             let mut prediction = PredictionOverDelay::new(&self.rig, period, delay, 0)?;

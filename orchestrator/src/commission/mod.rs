@@ -288,8 +288,7 @@ pub fn rules_on_recordings(
     let recording = record_excitation(&asked).map_err(|error| error.to_string())?;
     let found = identify(&[recording], Settings::default()).map_err(|error| error.to_string())?;
     let file = found.model_file().map_err(|error| error.to_string())?;
-    let model = ControlModel::new(&file, "the rig's model")?;
-    Rules::new(model).map_err(|error| error.to_string())
+    Ok(Rules::new(ControlModel::new(&file, "the rig's model")?))
 }
 
 fn does_not_run(reason: &str) -> Error {

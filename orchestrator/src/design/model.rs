@@ -91,6 +91,30 @@ pub struct LoopOnModel {
     drawn: Vec<OpenLoop>,
 }
 
+impl LoopOnModel {
+    /// A controller whose rule finds none.
+    fn without(member: Member, error: &ModelError) -> Self {
+        Self {
+            name: member.name().to_string(),
+            stable: false,
+            crossover_rad_s: None,
+            phase_margin_deg: None,
+            gain_margin_db: None,
+            bandwidth_hz: None,
+            peak_sensitivity: f64::INFINITY,
+            target_crossover_rad_s: None,
+            phase_margin_band_deg: None,
+            gain_margin_band_db: None,
+            unstable: 0,
+            robust: false,
+            note: format!("is not found: {error}"),
+            parameters: BTreeMap::new(),
+            open: None,
+            drawn: Vec::new(),
+        }
+    }
+}
+
 /// Controllers on a model: what `--json` prints.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModelDesign {
@@ -111,7 +135,7 @@ pub struct ModelDesign {
 /// Designs controllers on a model file.
 ///
 /// # Errors
-/// A file at fault, an unknown controller, a rule that finds none.
+/// A file at fault, an unknown controller.
 pub fn design(options: &Options) -> Result<ModelDesign, Error> {
     let model = ControlModel::read(&options.model).map_err(|reason| Error::Option {
         option: "--model",
@@ -142,7 +166,7 @@ pub fn on_model(model: &ControlModel, options: &Options) -> Result<ModelDesign, 
             })?]
         }
     };
-    let mut suite = model.suite().map_err(fault)?;
+    let mut suite = model.suite();
     if let Some(crossover) = options.crossover {
         suite = suite
             .with_crossover(crossover)
@@ -160,14 +184,11 @@ pub fn on_model(model: &ControlModel, options: &Options) -> Result<ModelDesign, 
         .iter()
         .filter_map(|draw| late(&draw.rig, draw.late).ok())
         .collect();
-    let loops: Result<Vec<LoopOnModel>, ModelError> = members
+    let loops: Vec<LoopOnModel> = members
         .into_par_iter()
         .map(|member| {
-            let mut own = examine(&suite, member, &nominal, &draws)?;
-            if member == Member::LoopShaping {
-                own.target_crossover_rad_s = Some(suite.loop_shaping.target);
-            }
-            Ok(own)
+            let own = examine(&suite, member, &nominal, &draws);
+            own.unwrap_or_else(|error| LoopOnModel::without(member, &error))
         })
         .collect();
     let mut warnings = Vec::new();
@@ -182,7 +203,7 @@ pub fn on_model(model: &ControlModel, options: &Options) -> Result<ModelDesign, 
         );
     }
     Ok(ModelDesign {
-        loops: loops.map_err(fault)?,
+        loops,
         model: options.model.clone(),
         late_ms: 1e3 * model.late,
         draws: draws.len(),
@@ -249,13 +270,16 @@ fn examine(
         gain_margin_db: margins.gain_margin_db,
         bandwidth_hz: bandwidth(&own),
         peak_sensitivity: own.peak_sensitivity(),
-        target_crossover_rad_s: None,
+        target_crossover_rad_s: match member {
+            Member::LoopShaping => Some(suite.loop_shaping()?.target),
+            _ => None,
+        },
         phase_margin_band_deg: finite(phase_band),
         gain_margin_band_db: finite(gain_band),
         unstable,
         robust: note.is_empty(),
         note,
-        parameters: suite.named(member).into_iter().collect(),
+        parameters: suite.named(member)?.into_iter().collect(),
         open: Some(own),
         drawn,
     })

@@ -72,7 +72,7 @@ impl Rules {
             model.rig = stabilised(&model.rig, gain, late);
             model.hydraulics = None;
             let rules = match &self.suite {
-                Some(_) => Self::new(model).map_err(|error| error.to_string())?,
+                Some(_) => Self::new(model),
                 None => Self::unprinted(model),
             };
             Ok(Box::new(rules))

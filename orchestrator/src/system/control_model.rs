@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use controllers::ModelError;
 use controllers::tuning::suite::{Measurements, Suite};
 use identification::closed_loop::equations::{HydraulicRig, PARAMETERS};
 use identification::closed_loop::friction::SealShape;
@@ -156,10 +155,7 @@ impl ControlModel {
     }
 
     /// All controllers by their rules.
-    ///
-    /// # Errors
-    /// A rig for which a rule finds none.
-    pub fn suite(&self) -> Result<Suite, ModelError> {
+    pub fn suite(&self) -> Suite {
         Suite::new(&self.rig, &self.measurements())
     }
 

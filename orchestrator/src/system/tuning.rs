@@ -101,15 +101,13 @@ pub(super) fn apply(
             ));
         }
         (_, Some(path), _) => {
-            own = Rules::new(ControlModel::read(path)?)
-                .map_err(|error| format!("{}: {error}", path.display()))?;
-            &own
+            own = Rules::new(ControlModel::read(path)?);
+            let applied = own.apply(file, specimen);
+            return applied.map_err(|error| format!("{}: {error}", path.display()));
         }
         (_, None, true) => {
             static RULES: OnceLock<Result<Rules, String>> = OnceLock::new();
-            let rules = RULES.get_or_init(|| {
-                Rules::new(ControlModel::commissioned()?).map_err(|error| error.to_string())
-            });
+            let rules = RULES.get_or_init(|| Ok(Rules::new(ControlModel::commissioned()?)));
             rules.as_ref().map_err(Clone::clone)?
         }
     };
@@ -175,16 +173,12 @@ pub(super) fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
 }
 
 impl Rules {
-    /// Finds all controllers on a model.
-    ///
-    /// # Errors
-    /// A model for which a rule finds none.
-    pub fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
-        let suite = Some(model.suite()?);
-        Ok(Self {
-            suite,
+    /// All controllers on a model, each found when a system asks for it.
+    pub fn new(model: ControlModel) -> Self {
+        Self {
+            suite: Some(model.suite()),
             ..Self::unprinted(model)
-        })
+        }
     }
 
     /// Those of the controllers alone whose parameters the thesis does not print.
@@ -276,7 +270,8 @@ impl Rules {
                     Member::SlidingMode
                 }
                 Rule::ForcePid => {
-                    let force = &suite.sliding_mode.force;
+                    let found = suite.sliding_mode().map_err(|error| error.to_string())?;
+                    let force = &found.force;
                     let gains = [
                         ("proportional_gain", force.proportional),
                         ("integral_gain", force.integral),
@@ -285,7 +280,8 @@ impl Rules {
                     continue;
                 }
                 Rule::UnderPrediction => {
-                    set(component, &suite.mpc.low_level.gains.named());
+                    let mpc = suite.mpc().map_err(|error| error.to_string())?;
+                    set(component, &mpc.low_level.gains.named());
                     continue;
                 }
                 Rule::Preview
@@ -297,7 +293,8 @@ impl Rules {
                 | Rule::SurfaceControl
                 | Rule::MinimalControlSynthesis => continue,
             };
-            for (parameter, value) in suite.named(member) {
+            let values = suite.named(member).map_err(|error| error.to_string())?;
+            for (parameter, value) in values {
                 component.set(&parameter, value);
             }
         }
