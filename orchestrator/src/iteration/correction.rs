@@ -21,7 +21,7 @@ const QUIET: f64 = 8.0;
 const EDGE: f64 = 0.5;
 
 /// What was measured of a table, on the reference's clock.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// Displacement, m.
     pub displacement: Vec<f64>,
