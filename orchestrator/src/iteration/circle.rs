@@ -127,7 +127,7 @@ pub fn close(plan: &Plan) -> Result<Circle, Error> {
         })
     };
     let rig = modelled(&extended)?;
-    let expected = |(tracking, peak_command_v): (Tracking, f64)| Expected {
+    let expected = |tracking: Tracking, peak_command_v: f64| Expected {
         time_domain_percent: tracking.time_domain_percent,
         response_spectrum_percent: tracking
             .laboratory
@@ -136,7 +136,11 @@ pub fn close(plan: &Plan) -> Result<Circle, Error> {
     };
     let unaware = modelled(&believed)?.drive(&wanted, &plan.search)?;
     let found = rig.drive(&wanted, &plan.search)?;
-    let extended_drive = expected((found.tracking, found.peak_command));
+    let on_model = |drive: &Motion| {
+        let (tracking, followed) = rig.tracking(&wanted, drive)?;
+        Ok::<_, Error>(expected(tracking, followed.peak_command))
+    };
+    let extended_drive = expected(found.tracking, found.peak_command);
     let mut warnings = Vec::new();
     let reach = found.drive.peak_displacement();
     if reach > STROKE {
@@ -152,8 +156,8 @@ pub fn close(plan: &Plan) -> Result<Circle, Error> {
         case: name_of(&plan.case),
         motion: wanted.name.clone(),
         effects: file.effects.keys().cloned().collect(),
-        motion_itself: expected(rig.tracking(&wanted, &wanted)?),
-        nominal_drive: expected(rig.tracking(&wanted, &unaware.drive)?),
+        motion_itself: on_model(&wanted)?,
+        nominal_drive: on_model(&unaware.drive)?,
         extended_drive,
         corrections_percent: found.errors,
         warnings,

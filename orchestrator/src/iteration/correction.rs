@@ -92,6 +92,37 @@ impl Inverse {
         })
     }
 
+    /// From the whole of a `drive` that ends at rest and the answer of something linear without noise: exact
+    /// to its last line.
+    #[must_use]
+    pub fn exact(drive: &Motion, answer: &Measured, crossover: f64, band: [f64; 2]) -> Self {
+        let dt = drive.dt;
+        let length = padded(drive.len(), dt);
+        let all = [0.0, 0.5 / dt];
+        let [input, output] = [
+            (&drive.displacement, &drive.acceleration),
+            (&answer.displacement, &answer.acceleration),
+        ]
+        .map(|(x, a)| spectrum(&joined(x, a, dt, crossover, all), length));
+        let lines = input.iter().zip(&output).map(|(input, output)| {
+            let gain = output / input;
+            let size = gain.norm();
+            // Nothing is there at rest.
+            if size.is_normal() {
+                gain.conj() / (size * size.max(1.0 / MOST_GAIN))
+            } else {
+                Complex64::new(0.0, 0.0)
+            }
+        });
+        Self {
+            step: 1.0 / (length as f64 * dt),
+            lines: lines.collect(),
+            crossover,
+            band,
+            coherence: 1.0,
+        }
+    }
+
     /// Mean coherence over the band.
     #[must_use]
     pub fn coherence(&self) -> f64 {

@@ -1,5 +1,6 @@
 //! The drive with which a rig follows a motion, found on a model of it: the model, nonlinear effects and
-//! all, is played along the motion, linearised there, and what is left of the error taken off.
+//! all, is played along the motion, and what is left of the error goes back through the inverse of its linear
+//! part.
 
 use identification::diagnosis::case::ControlLaw;
 use plant::ModelError;
@@ -8,26 +9,29 @@ use serde::{Deserialize, Serialize};
 
 use super::correction::{Inverse, Measured};
 use crate::error::Error;
-use crate::metrics::{self, Tracking, rms};
-use crate::motion::{self, Motion, Scaling, peak};
+use crate::metrics::{self, Tracking};
+use crate::motion::Motion;
 
 /// Runge-Kutta steps a sample, and of a rig with an effect that needs finer ones.
 const SUBSTEPS: [usize; 2] = [4, 8];
-/// Seed of the small motion that linearises the model.
-const PROBE_SEED: u64 = 17;
-/// Its peak acceleration over that of the motion: small beside it, large beside a dead band's edge.
-const PROBE_SHARE: f64 = 0.1;
+/// Height (m) and width (s) of the pulse that the linear part answers, and how long it is left to come to
+/// rest (s).
+const PULSE: f64 = 1e-4;
+const PULSE_WIDTH: f64 = 0.008;
+const PULSE_REST: f64 = 40.0;
 /// Displacement counts below, acceleration above, Hz: nothing that a model shows is noisy.
 const CROSSOVER: f64 = 0.5;
 /// A correction that brings less than this share is none.
 const STALLED: f64 = 0.99;
-/// How often the model is linearised again and the correction halved before it is given up.
+/// How often a correction is halved before it is given up.
 const SETBACKS: usize = 4;
 
 /// A rig as a model has it, under the law of its laboratory.
 #[derive(Debug, Clone, Copy)]
 pub struct ModelledRig {
     rig: SampledRig,
+    /// Without what is not linear about rest.
+    linear: SampledRig,
     law: ControlLaw,
     period: f64,
 }
@@ -80,6 +84,7 @@ impl ModelledRig {
     pub fn new(rig: &IdentifiedRig, law: &ControlLaw, period: f64) -> Result<Self, ModelError> {
         Ok(Self {
             rig: rig.sample(period, SUBSTEPS[usize::from(rig.is_fast())])?,
+            linear: rig.linear_part().sample(period, SUBSTEPS[0])?,
             law: *law,
             period,
         })
@@ -114,38 +119,36 @@ impl ModelledRig {
     ///
     /// # Errors
     /// A rig that runs away.
-    pub fn tracking(&self, wanted: &Motion, drive: &Motion) -> Result<(Tracking, f64), Error> {
+    pub fn tracking(&self, wanted: &Motion, drive: &Motion) -> Result<(Tracking, Followed), Error> {
         let followed = self.follow(&drive.displacement);
         let table = &followed.table;
         let tracking = metrics::tracking(wanted, &table.displacement, &table.acceleration)
             .map_err(|error| not_followed(&error.to_string()))?;
-        Ok((tracking, followed.peak_command))
+        Ok((tracking, followed))
     }
 
     /// The drive with which this rig follows `wanted`: the motion itself, corrected by the inverse of
-    /// the model linearised along the drive so far, until a correction brings nothing.
+    /// the model's linear part, until a correction brings nothing.
     ///
     /// # Errors
     /// A model that runs away under the motion itself.
     pub fn drive(&self, wanted: &Motion, search: &Search) -> Result<FoundDrive, Error> {
+        let inverse = self.inverse(search.band);
         let mut drive = wanted.clone();
-        let (mut tracking, mut peak_command) = self.tracking(wanted, &drive)?;
+        let (mut tracking, mut followed) = self.tracking(wanted, &drive)?;
         let mut errors = vec![tracking.time_domain_percent];
-        let mut table = self.follow(&drive.displacement).table;
-        let (mut gain, mut setbacks, mut inverse) = (1.0, 0, None);
+        let (mut gain, mut setbacks) = (1.0, 0);
         for _ in 0..search.corrections {
-            let linear = match &inverse {
-                Some(linear) => linear,
-                None => inverse.insert(self.linearised(&drive, search.band)?),
-            };
-            let error = linear.error(wanted, &table);
+            let error = inverse.error(wanted, &followed.table);
             let mut corrected = drive.clone();
-            linear.correct(&mut corrected, &error, gain);
-            let after = self.follow(&corrected.displacement);
-            let left = rms(&linear.error(wanted, &after.table));
-            if left.is_finite() && left < STALLED * rms(&error) {
-                (drive, table) = (corrected, after.table);
-                (tracking, peak_command) = self.tracking(wanted, &drive)?;
+            inverse.correct(&mut corrected, &error, gain);
+            // What runs away is no better.
+            let better = self.tracking(wanted, &corrected).ok().filter(|(after, _)| {
+                after.time_domain_percent < STALLED * tracking.time_domain_percent
+            });
+            if let Some(better) = better {
+                drive = corrected;
+                (tracking, followed) = better;
                 errors.push(tracking.time_domain_percent);
                 continue;
             }
@@ -154,45 +157,37 @@ impl ModelledRig {
                 break;
             }
             gain *= 0.5;
-            inverse = None;
         }
         Ok(FoundDrive {
             drive,
             tracking,
-            peak_command,
+            peak_command: followed.peak_command,
             errors,
         })
     }
 
-    /// The transfer function from drive to table for small changes of `drive`.
-    fn linearised(&self, drive: &Motion, band: [f64; 2]) -> Result<Inverse, Error> {
-        let share = PROBE_SHARE * peak(&drive.acceleration);
-        let options = motion::Options {
-            sample_time: self.period,
-            scaling: Some(Scaling::PeakAcceleration(share)),
-            ..motion::Options::default()
+    /// The inverse of the rig's linear part under its law, from its answer to a pulse.
+    fn inverse(&self, band: [f64; 2]) -> Inverse {
+        let samples = (PULSE_REST / self.period) as usize;
+        let at = |k: usize| (k as f64 * self.period - 8.0 * PULSE_WIDTH) / PULSE_WIDTH;
+        let bell = |k: usize| PULSE * (-0.5 * at(k).powi(2)).exp();
+        let pulse = Motion {
+            name: "pulse".into(),
+            dt: self.period,
+            displacement: (0..samples).map(bell).collect(),
+            velocity: (0..samples).map(|k| -at(k) * bell(k) / PULSE_WIDTH).collect(),
+            acceleration: (0..samples)
+                .map(|k| (at(k).powi(2) - 1.0) * bell(k) / PULSE_WIDTH.powi(2))
+                .collect(),
+            notes: Vec::new(),
+            seed: None,
         };
-        let probe = motion::built_in(PROBE_SEED, &options)?;
-        let samples = drive.len().max(probe.len());
-        let mut along = drive.displacement.clone();
-        along.resize(samples, 0.0);
-        let beside: Vec<f64> = along
-            .iter()
-            .enumerate()
-            .map(|(k, x)| x + probe.displacement.get(k).copied().unwrap_or(0.0))
-            .collect();
-        let (without, with) = (self.follow(&along).table, self.follow(&beside).table);
-        let less = |with: &[f64], without: &[f64]| -> Vec<f64> {
-            let both = with.iter().zip(without).take(probe.len());
-            both.map(|(with, without)| with - without).collect()
+        let linear = Self {
+            rig: self.linear,
+            ..*self
         };
-        let answer = Measured {
-            displacement: less(&with.displacement, &without.displacement),
-            acceleration: less(&with.acceleration, &without.acceleration),
-        };
-        Inverse::new(&probe, &answer, CROSSOVER, band)
-            .filter(|inverse| inverse.coherence().is_finite())
-            .ok_or_else(|| not_followed("its answer to a small motion is not finite"))
+        let answer = linear.follow(&pulse.displacement).table;
+        Inverse::exact(&pulse, &answer, CROSSOVER, band)
     }
 }
 
