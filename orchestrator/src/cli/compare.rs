@@ -25,7 +25,7 @@ pub struct Arguments {
     /// Records, or folders of them [default: the built-in motion with eight seeds]
     #[arg(long, value_name = "FILE|DIR", num_args = 1.., conflicts_with = "reference")]
     records: Vec<PathBuf>,
-    /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
+    /// Reference: .csv with time, displacement, velocity, acceleration, played as given
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     #[command(flatten)]

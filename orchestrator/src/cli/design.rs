@@ -97,13 +97,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 
 /// Designs every controller on a model; one that was asked for alone and is not robust is an error.
 fn on_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
+    let bar = super::progress::spinner("designing");
     let design = model::design(&model::Options {
         model: path.to_path_buf(),
         only: arguments.only.clone(),
         crossover: arguments.crossover,
         draws: arguments.draws,
         seed: arguments.seed,
-    })?;
+    });
+    bar.finish_and_clear();
+    let design = design?;
     if let (Some(_), [only]) = (&arguments.only, design.loops.as_slice())
         && !only.robust
     {

@@ -11,7 +11,8 @@ use super::progress;
 use crate::error::Error;
 use crate::identify::{
     CANDIDATE_COLUMNS, EQUATION_COLUMNS, Form, HydraulicIdentification, ONE_INPUT_COLUMNS,
-    OneInputIdentification, Outcome, PARAMETER_COLUMNS, Request, Summary, identify, parameters,
+    OneInputIdentification, Outcome, PARAMETER_COLUMNS, Parameter, Request, Summary, identify,
+    parameters,
 };
 use crate::report::columns::aligned;
 use crate::report::number::significant;
@@ -175,7 +176,7 @@ fn text(found: &RigIdentification, summary: &Summary) -> String {
             .map(String::from)
             .to_vec(),
     ];
-    rows.extend(parameters(found).into_iter().map(|row| row.to_vec()));
+    rows.extend(parameters(found).iter().map(|row| row.text().to_vec()));
     text += &format!("\n{}", aligned(&rows));
     for (index, (payload, error)) in found.payload.iter().enumerate().skip(1) {
         text += &format!(
@@ -264,7 +265,10 @@ fn one_input_text(own: &OneInputIdentification, summary: &Summary) -> String {
 fn hydraulic_text(own: &HydraulicIdentification, summary: &Summary) -> String {
     let (mut text, rest) = beginning(summary);
     text += "hydraulic rig, with the reference as instrument\n\n";
-    text += &table(PARAMETER_COLUMNS, own.parameters());
+    text += &table(
+        PARAMETER_COLUMNS,
+        own.parameters().iter().map(Parameter::text).collect(),
+    );
     text += &format!("\n{}", table(EQUATION_COLUMNS, own.equations()));
     text + &ending(rest, summary)
 }

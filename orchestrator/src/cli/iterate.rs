@@ -31,7 +31,7 @@ pub struct Arguments {
         conflicts_with = "reference"
     )]
     record: Option<PathBuf>,
-    /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
+    /// Reference: .csv with time, displacement, velocity, acceleration, played as given
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     #[command(flatten)]
@@ -98,7 +98,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let name = name.replace(['/', '\\', ' '], "-");
         unused(&Path::new("shakebench-results").join(name), |_| false)
     });
-    let files = iteration::write(&found, &folder)?;
+    let files = iteration::write(&plan, &found, &folder)?;
     if arguments.json {
         println!("{}", serde_json::json!(found));
     } else {

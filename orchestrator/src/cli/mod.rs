@@ -238,4 +238,21 @@ mod tests {
         assert!(long.len() < 700 && long.starts_with("file.toml\nxxx") && long.ends_with("xend"));
         assert!(long.contains("[99403 characters]"), "{long}");
     }
+
+    #[test]
+    fn every_option_stands_in_the_book() {
+        let page = include_str!("../../../docs/settings.md");
+        let elsewhere = ["help", "version", "json"];
+        let mut missing = Vec::new();
+        let program = Cli::command();
+        for command in program.get_subcommands().filter(|one| !one.is_hide_set()) {
+            for option in command.get_arguments().filter_map(clap::Arg::get_long) {
+                let stands = [format!("--{option}`"), format!("--{option} ")];
+                if !elsewhere.contains(&option) && !stands.iter().any(|own| page.contains(own)) {
+                    missing.push(format!("{} --{option}", command.get_name()));
+                }
+            }
+        }
+        assert!(missing.is_empty(), "docs/settings.md lacks {missing:?}");
+    }
 }

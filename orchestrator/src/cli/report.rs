@@ -1,6 +1,6 @@
 //! `shakebench report`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -8,6 +8,7 @@ use clap::Args;
 use crate::comparison;
 use crate::diagnosis;
 use crate::error::Error;
+use crate::iteration;
 use crate::report;
 use crate::run::page;
 
@@ -46,6 +47,11 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ("comparison", comparison::page_again(folder)?)
     } else if has(diagnosis::DIAGNOSIS) {
         ("diagnosis", diagnosis::page_again(folder)?)
+    } else if let Some(command) = made_by(folder) {
+        return Err(fault(&format!(
+            "its page holds more than its other files; expected that of a run, a comparison or a \
+             diagnosis; `{command}` writes it again"
+        )));
     } else {
         return Err(fault(
             "holds no results; expected results.csv, summary.json and manifest.json of a run, \
@@ -59,4 +65,18 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         println!("written, of a {kind}:\n  {}", report.display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What writes the page of a folder whose other files do not hold all of it.
+fn made_by(folder: &Path) -> Option<&'static str> {
+    [
+        ("findings.json", "shakebench campaign STUDY.toml --out DIR"),
+        ("tuned.json", "shakebench tune STUDY.toml --out DIR"),
+        ("commission.json", "shakebench commission --out DIR"),
+        (iteration::ITERATION, "shakebench iterate SYSTEM --out DIR"),
+        ("runs.json", "shakebench compare-runs A B --out DIR"),
+    ]
+    .into_iter()
+    .find(|(file, _)| folder.join(file).is_file())
+    .map(|(_, command)| command)
 }

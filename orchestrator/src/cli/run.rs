@@ -45,7 +45,7 @@ pub struct Arguments {
     /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
     #[arg(long, value_name = "FILE", conflicts_with = "reference")]
     record: Option<PathBuf>,
-    /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
+    /// Reference: .csv with time, displacement, velocity, acceleration, played as given
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     #[command(flatten)]

@@ -119,6 +119,7 @@ pub struct Commissioned {
 const MODEL: &str = "model.toml";
 const RECORDINGS: &str = "recordings";
 const EXCITATION: &str = "excitation";
+const TRIANGLE: &str = "triangle";
 /// Part of the stroke that the excitation uses at most.
 const STROKE_PART: f64 = 0.4;
 /// Band of the excitation, Hz.
@@ -154,7 +155,7 @@ pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned
         (EXCITATION, shape, scale),
         ("noise", noise.shape(), scale),
         ("sines", sines.shape(), scale),
-        ("triangle", slow.1, slow.0),
+        (TRIANGLE, slow.1, slow.0),
     ];
     for (name, shape, mut scale) in plays {
         tell(&format!("recording: {name}"));

@@ -1,16 +1,17 @@
 //! The report of a commissioned rig.
 
-use super::Commissioned;
-use crate::identify::{EQUATION_COLUMNS, Form, PARAMETER_COLUMNS};
+use super::{Commissioned, TRIANGLE};
+use crate::identify::{EQUATION_COLUMNS, Form, parameter_table, parameters};
+use crate::report::identity::{entry, version};
 use crate::report::number::significant;
 use crate::report::{Abscissa, Axis, Cell, Fact, Panel, Report, Section, Series, Table, Units};
-use crate::units::STANDARD_GRAVITY;
 use identification::data::Channel;
 
 pub(super) fn report(own: &Commissioned) -> Report {
     let robust = own.design.loops.iter().filter(|one| one.robust).count();
-    let worst = own.predictions.iter().map(|p| p.largest_percent);
-    let worst = worst.fold(f64::NAN, f64::max);
+    // The triangle is slow: its acceleration is little more than friction and noise.
+    let lively = own.predictions.iter().filter(|own| own.motion != TRIANGLE);
+    let worst = lively.map(|p| p.largest_percent).fold(f64::NAN, f64::max);
     let mut facts = vec![Fact {
         label: "Controllers".into(),
         value: Cell::Text(format!("{robust} of {}", own.design.loops.len())),
@@ -41,6 +42,7 @@ pub(super) fn report(own: &Commissioned) -> Report {
             "What is left of the model's equations is noise, and all controllers are robust to it."
                 .into()
         }),
+        identity: identity(own),
         facts,
         sections,
         footer: format!(
@@ -48,8 +50,32 @@ pub(super) fn report(own: &Commissioned) -> Report {
             env!("CARGO_PKG_VERSION"),
             own.seed
         ),
-        ..Report::default()
     }
+}
+
+fn identity(own: &Commissioned) -> Vec<(String, Cell)> {
+    let request = &own.request;
+    let mut all = vec![
+        entry("Plant", own.plant.as_str()),
+        entry("Specimen", own.specimen.as_str()),
+    ];
+    if !request.set.is_empty() {
+        all.push(entry("Set", request.set.join(", ")));
+    }
+    all.extend([
+        entry(
+            "Level",
+            Cell::Quantity(request.level, Units::ACCELERATION, 3),
+        ),
+        entry(
+            "Stroke, half",
+            Cell::Quantity(request.stroke, Units::DISPLACEMENT, 3),
+        ),
+        entry("Recorded", Cell::Quantity(request.duration, Units::TIME, 3)),
+        entry("Seed", own.seed.to_string()),
+        version(),
+    ]);
+    all
 }
 
 fn growth(own: &Commissioned) -> Section {
@@ -57,7 +83,7 @@ fn growth(own: &Commissioned) -> Section {
         [
             Cell::Quantity(trial.reference_m, Units::DISPLACEMENT, 3),
             Cell::Quantity(trial.displacement_m, Units::DISPLACEMENT, 3),
-            Cell::Text(significant(trial.acceleration_m_s2 / STANDARD_GRAVITY, 3)),
+            Cell::Quantity(trial.acceleration_m_s2, Units::ACCELERATION, 3),
             Cell::Text(trial.ended.clone().unwrap_or_else(|| "complete".into())),
         ]
     });
@@ -66,7 +92,7 @@ fn growth(own: &Commissioned) -> Section {
         notes: own.warnings.clone(),
         tables: vec![Table::of(
             "Peaks of each trial, with the interlock armed",
-            ["reference", "displacement", "acceleration (g)", "end"],
+            ["reference", "displacement", "acceleration", "end"],
             rows,
         )],
         ..Section::default()
@@ -76,36 +102,33 @@ fn growth(own: &Commissioned) -> Section {
 fn model(own: &Commissioned) -> Section {
     let mut tables = match &own.identified.form {
         Form::Hydraulic(found) => vec![
-            Table::of("Parameters", PARAMETER_COLUMNS, found.parameters()),
+            parameter_table("Parameters", &found.parameters()),
             Table::of(
                 "What is left of the equations",
                 EQUATION_COLUMNS,
                 found.equations(),
             ),
         ],
-        Form::General(found) => {
-            let rows = crate::identify::parameters(found);
-            vec![Table::of("Parameters", PARAMETER_COLUMNS, rows)]
-        }
+        Form::General(found) => vec![parameter_table("Parameters", &parameters(found))],
     };
     if !own.predictions.is_empty() {
-        let number = |value: f64| Cell::Text(significant(value, 3));
+        let percent = |value: f64| Cell::Quantity(value, Units::PERCENT, 3);
         tables.push(Table::of(
             "The model on motions that were not fitted, under the same controller",
             [
                 "motion",
-                "peak acceleration (g)",
-                "largest error (%)",
-                "rms error (%)",
-                "rms error of the command (%)",
+                "peak acceleration",
+                "largest error",
+                "RMS error",
+                "RMS error of the command",
             ],
             own.predictions.iter().map(|one| {
                 [
                     Cell::Text(one.motion.clone()),
-                    number(one.peak_m_s2 / STANDARD_GRAVITY),
-                    number(one.largest_percent),
-                    number(one.rms_percent),
-                    number(one.command_percent),
+                    Cell::Quantity(one.peak_m_s2, Units::ACCELERATION, 3),
+                    percent(one.largest_percent),
+                    percent(one.rms_percent),
+                    percent(one.command_percent),
                 ]
             }),
         ));

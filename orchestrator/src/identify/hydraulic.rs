@@ -10,9 +10,9 @@ use identification::closed_loop::{self, Check, Found, Settings};
 use identification::data::{Channel, Recording};
 use identification::identify::model_file::ModelFile;
 
+use super::parameters::{Parameter, Uncertainty, parameter_table};
 use super::poles;
 use super::summary::Summary;
-use crate::report::number::significant;
 use crate::report::{Report, Section, Table, identity};
 
 /// What was found from the first part of the recordings, and how the rest obeys it.
@@ -25,8 +25,6 @@ pub struct HydraulicIdentification {
     pub file: ModelFile,
 }
 
-/// Columns of [`HydraulicIdentification::parameters`].
-pub const PARAMETER_COLUMNS: [&str; 4] = ["parameter", "value", "standard error", "unit"];
 /// Columns of [`HydraulicIdentification::equations`].
 pub const EQUATION_COLUMNS: [&str; 4] = [
     "equation",
@@ -74,19 +72,17 @@ impl HydraulicIdentification {
         self.found.holds() && self.check.mean_squares.iter().all(|square| *square < MOST)
     }
 
-    /// Rows of name, value, standard error and unit, SI.
-    pub fn parameters(&self) -> Vec<[String; 4]> {
+    /// The parameters, SI.
+    pub fn parameters(&self) -> Vec<Parameter> {
         let found = &self.found;
         let values: [f64; NAMES.len()] = found.rig.into();
-        let row = |name: &str, value: f64, error: Option<f64>, unit: &str| {
-            [
-                name.to_string(),
-                significant(value, 6),
-                error.map_or("-".to_string(), |error| significant(error, 2)),
-                unit.to_string(),
-            ]
+        let row = |name: &str, value: f64, error: Option<f64>, unit: &'static str| Parameter {
+            name: name.to_string(),
+            value,
+            error: error.map_or(Uncertainty::Without("-"), Uncertainty::Estimated),
+            unit,
         };
-        let mut rows: Vec<[String; 4]> = NAMES
+        let mut rows: Vec<Parameter> = NAMES
             .iter()
             .zip(values)
             .zip(found.standard_error.iter().zip(UNITS))
@@ -194,7 +190,7 @@ impl HydraulicIdentification {
                 notes: summary.warnings.clone(),
                 panels: vec![poles::panel(summary)],
                 tables: vec![
-                    Table::of("Parameters", PARAMETER_COLUMNS, self.parameters()),
+                    parameter_table("Parameters", &self.parameters()),
                     Table::of(
                         "What is left of the equations",
                         EQUATION_COLUMNS,

@@ -21,9 +21,9 @@ use identification::identify::model_file::ModelFile;
 use identification::identify::rig::{self, Options};
 use identification::identify::specimen_file;
 
-pub use hydraulic::{EQUATION_COLUMNS, HydraulicIdentification, PARAMETER_COLUMNS};
+pub use hydraulic::{EQUATION_COLUMNS, HydraulicIdentification};
 pub use one_input::{CANDIDATE_COLUMNS, ONE_INPUT_COLUMNS, OneInputIdentification};
-pub use parameters::parameters;
+pub use parameters::{PARAMETER_COLUMNS, Parameter, parameter_table, parameters};
 pub use summary::Summary;
 
 use crate::error::Error;

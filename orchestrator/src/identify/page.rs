@@ -3,12 +3,11 @@
 use identification::data::Recording;
 use identification::identify::identified::RigIdentification;
 
-use super::hydraulic::PARAMETER_COLUMNS;
-use super::parameters::parameters;
+use super::parameters::{parameter_table, parameters};
 use super::summary::Summary;
 use super::{poles, residuals, responses};
 use crate::report::identity::{entry, version};
-use crate::report::{Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units};
+use crate::report::{Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Units};
 
 fn identity(
     found: &RigIdentification,
@@ -40,11 +39,7 @@ pub(super) fn report(
     recordings: &[Recording],
     summary: &Summary,
 ) -> Report {
-    let table = Table::of(
-        "Parameters with standard errors",
-        PARAMETER_COLUMNS,
-        parameters(found),
-    );
+    let table = parameter_table("Parameters with standard errors", &parameters(found));
     let mut sections = vec![Section {
         heading: "Model".into(),
         notes: summary.warnings.clone(),

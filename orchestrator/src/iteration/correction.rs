@@ -29,19 +29,30 @@ pub struct Measured {
     pub acceleration: Vec<f64>,
 }
 
+/// A line of the transfer function from drive to table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Where it lies, Hz.
+    pub frequency: f64,
+    /// Its size.
+    pub gain: f64,
+    /// Part of the table's motion that is linear in the drive.
+    pub coherence: f64,
+}
+
 /// The transfer function from drive to table, and how what is measured becomes one error.
 #[derive(Debug, Clone)]
 pub struct Inverse {
     /// Line distance, Hz.
     step: f64,
+    /// The transfer function within the band.
+    response: Vec<Line>,
     /// Coherence times the inverse of the transfer function, a line each.
     lines: Vec<Complex64>,
     /// Frequency below which displacement counts and above which acceleration does, Hz.
     crossover: f64,
     /// Frequencies between which errors are corrected, Hz.
     band: [f64; 2],
-    /// Mean coherence over the band.
-    coherence: f64,
 }
 
 impl Inverse {
@@ -70,15 +81,19 @@ impl Inverse {
             [0.0, 0.5 / dt],
         );
         let spectra = Spectra::new(&[&input, &output], dt, length).ok()?;
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut response = Vec::new();
         let lines = (0..spectra.frequency.len())
             .map(|k| {
                 let coherence = spectra.coherence(0, 1, k);
-                if (band[0]..=band[1]).contains(&spectra.frequency[k]) {
-                    sum += coherence;
-                    count += 1.0;
-                }
                 let gain = spectra.gain(0, 1, k);
+                let frequency = spectra.frequency[k];
+                if (band[0]..=band[1]).contains(&frequency) {
+                    response.push(Line {
+                        frequency,
+                        gain: gain.norm(),
+                        coherence,
+                    });
+                }
                 let size = gain.norm().max(1.0 / MOST_GAIN);
                 coherence * gain.conj() / (size * gain.norm().max(f64::MIN_POSITIVE))
             })
@@ -88,7 +103,7 @@ impl Inverse {
             lines,
             crossover,
             band,
-            coherence: sum / f64::max(count, 1.0),
+            response,
         })
     }
 
@@ -126,7 +141,14 @@ impl Inverse {
     /// Mean coherence over the band.
     #[must_use]
     pub fn coherence(&self) -> f64 {
-        self.coherence
+        let sum: f64 = self.response.iter().map(|line| line.coherence).sum();
+        sum / f64::max(self.response.len() as f64, 1.0)
+    }
+
+    /// The transfer function within the band.
+    #[must_use]
+    pub fn response(&self) -> &[Line] {
+        &self.response
     }
 
     fn at(&self, frequency: f64) -> Complex64 {

@@ -9,7 +9,7 @@ mod page;
 
 use serde::{Deserialize, Serialize};
 
-pub use self::correction::{Inverse, Measured};
+pub use self::correction::{Inverse, Line, Measured};
 pub use self::drive::{read as read_drive, text as drive_text};
 pub use self::page::{ITERATION, write};
 use crate::error::Error;
@@ -136,6 +136,9 @@ pub struct Iteration {
     /// Acceleration errors of the first and the best run, m/s², a sample every `dt` s.
     #[serde(skip)]
     pub errors: Option<(f64, Vec<f64>, Vec<f64>)>,
+    /// The transfer function that the corrections invert.
+    #[serde(skip)]
+    pub response: Vec<Line>,
 }
 
 /// The best run so far.
@@ -271,6 +274,7 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
         system: prepared.system.name.clone(),
         motion: wanted.name.clone(),
         coherence: inverse.coherence(),
+        response: inverse.response().to_vec(),
         best: at,
         stop,
         converges,

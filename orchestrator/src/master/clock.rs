@@ -1,4 +1,4 @@
-//! The clock on the wall: when a step may begin, and how well that was kept.
+//! Real time: when a step may begin, and how well that was kept.
 
 use std::time::{Duration, Instant};
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Times up to this many microseconds are counted one by one.
 const COUNTED: usize = 20_000;
 
-/// Keeps a run from going ahead of the clock on the wall.
+/// Keeps a run from going ahead of real time.
 #[derive(Debug)]
 pub(super) struct Clock {
     begin: Instant,
@@ -22,7 +22,7 @@ pub(super) struct Clock {
     late: Vec<u32>,
 }
 
-/// How the clock on the wall was kept.
+/// How real time was kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RealTime {
     /// Steps that had to be computed in time.

@@ -111,7 +111,7 @@ pub struct Simulation {
     /// Signals that are recorded under a further name, and those names.
     alias_signals: Vec<usize>,
     alias_names: Vec<String>,
-    /// The clock on the wall, where the run keeps pace with it.
+    /// Real time, where the run keeps pace with it.
     clock: Option<clock::Clock>,
     /// What ends the run early.
     end: Option<EndSignals>,

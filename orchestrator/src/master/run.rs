@@ -156,7 +156,7 @@ pub struct Outcome {
     pub messages: Vec<LogLine>,
     /// What the user should know of the order of calls.
     pub notes: Vec<String>,
-    /// How the clock on the wall was kept; of a run in real time.
+    /// How real time was kept; of a run in real time.
     pub real_time: Option<RealTime>,
 }
 

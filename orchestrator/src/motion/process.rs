@@ -89,11 +89,13 @@ impl Unscaled {
             seed: self.seed,
         };
         motion.notes.push(format!(
-            "scaled by {factor:.4} ({}): peak {:.3} g, {:.2} in/s, {:.3} in",
+            "scaled by {factor:.4} ({}): peak {:.3} g, {:.2} in/s ({:.1} mm/s), {:.3} in ({:.2} mm)",
             scaling.describe(),
             motion.peak_acceleration() / STANDARD_GRAVITY,
             peak(&motion.velocity) / INCH,
-            motion.peak_displacement() / INCH
+            1e3 * peak(&motion.velocity),
+            motion.peak_displacement() / INCH,
+            1e3 * motion.peak_displacement()
         ));
         check_stroke(&motion, options.stroke, factor)?;
         Ok(motion)

@@ -30,7 +30,7 @@ pub fn load_reference(path: &Path, options: &Options) -> Result<Motion, MotionEr
         file.column(Channel::Acceleration)?,
     ];
     let mut notes = vec![format!(
-        "reference {}: {} points at {} s, used to the letter",
+        "reference {}: {} points at {} s, played as given",
         file_name(path),
         columns[0].len(),
         rounded(dt)
@@ -105,9 +105,10 @@ fn scale(
         .flatten()
         .for_each(|value| *value *= factor);
     notes.push(format!(
-        "scaled by {factor:.4}: peak {:.3} g and {:.3} in",
+        "scaled by {factor:.4}: peak {:.3} g and {:.3} in ({:.2} mm)",
         peak(&columns[2]) / STANDARD_GRAVITY,
-        peak(&columns[0]) / INCH
+        peak(&columns[0]) / INCH,
+        1e3 * peak(&columns[0])
     ));
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! What a run was, in words for people: rig, controllers, motion, and what differs from defaults.
 
-use super::experiment::is_file;
+use super::experiment::{Request, is_file};
 use super::manifest::Manifest;
 use crate::motion::Motion;
 use crate::report::identity::entry;
@@ -14,7 +14,7 @@ pub fn of_run(manifest: &Manifest, motion: &Motion, whole: Whole) -> Vec<(String
     if !is_file(&request.system) {
         entries.push(entry("Plant", request.plant.as_str()));
         entries.push(entry("Specimen", request.specimen.as_str()));
-        entries.push(entry("Tuning", tuning(manifest)));
+        entries.push(entry("Tuning", tuning(request)));
     }
     entries.push(entry(
         "Set",
@@ -43,8 +43,7 @@ pub fn of_run(manifest: &Manifest, motion: &Motion, whole: Whole) -> Vec<(String
 }
 
 /// Where the controllers' parameters come from.
-pub fn tuning(manifest: &Manifest) -> String {
-    let request = &manifest.request;
+pub fn tuning(request: &Request) -> String {
     let commissioned = request.plant == "servohydraulic";
     match (request.tuning, &request.control_model) {
         (_, Some(model)) => format!("by rule on {}", model.display()),

@@ -51,7 +51,7 @@ pub struct Summary {
     pub tracking: Option<Tracking>,
     /// What the user should know.
     pub warnings: Vec<String>,
-    /// How the clock on the wall was kept; of a run in real time.
+    /// How real time was kept; of a run in real time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub real_time: Option<RealTime>,
     /// The error of the coupling, where it was asked for.

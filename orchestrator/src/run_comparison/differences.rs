@@ -37,7 +37,7 @@ pub(super) fn of(manifests: &[&Manifest]) -> Vec<Difference> {
     compare("system", &|m| m.request.system.clone());
     compare("plant", &|m| of_rig(m, &m.request.plant));
     compare("specimen", &|m| of_rig(m, &m.request.specimen));
-    compare("tuning", &|m| of_rig(m, &tuning(m)));
+    compare("tuning", &|m| of_rig(m, &tuning(&m.request)));
     compare("motion", &|m| m.motion.name.clone());
     compare("motion as played (SHA-256)", &|m| short(&m.motion.sha256));
     compare("samples played", &|m| m.samples.to_string());

@@ -58,7 +58,7 @@ def run(
     """Runs a system on a motion.
 
     ``system`` is a built-in name (``"three-variable"``, ``"mpc"``, ...) or a system file; ``record``
-    an acceleration (PEER ``.AT2`` or CSV), ``reference`` a CSV used to the letter; without either the
+    an acceleration (PEER ``.AT2`` or CSV), ``reference`` a CSV played as given; without either the
     built-in motion is played. ``set`` gives parameters, ``{"control.valve_limit": "5 V"}``. Quantities
     are text with a unit (``duration="10 s"``). ``more`` are further options of ``shakebench run``.
 

@@ -43,7 +43,12 @@
       }
       const pick = (values) => (order ? order.map((n) => values[n]) : values);
       const key = order ? `${series.key}:sorted` : series.key;
-      if (!groups.has(key)) groups.set(key, [pick(series.x).map((v) => v / xUnit[1])]);
+      if (!groups.has(key)) {
+        const x = pick(series.x).map((v) => v / xUnit[1]);
+        // Merging would make one of two points that stand above each other.
+        if (order) x.forEach((v, n) => { if (n && v <= x[n - 1]) x[n] = x[n - 1] + Math.max(Math.abs(x[n - 1]) * 1e-12, 1e-300); });
+        groups.set(key, [x]);
+      }
       const scaled = (values) => pick(values).map((v) => {
         if (v == null || (panel.y.log && v <= 0)) return null;
         return v / yUnit[1];

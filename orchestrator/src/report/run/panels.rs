@@ -43,9 +43,14 @@ fn trip(run: &Run, drawn: &[Series]) -> Option<Series> {
 /// Displacement, velocity and acceleration with their references, and errors.
 pub(super) fn histories(run: &Run) -> Vec<Panel> {
     let (motion, dt) = (run.motion, run.motion.dt);
+    // A run that ended early shows what it did not come to, one that was asked to be shorter not.
+    let asked = match run.ended {
+        "complete" => run.acceleration.len().min(motion.len()),
+        _ => motion.len(),
+    };
     let both = |wanted: &[f64], found: &[f64]| {
         vec![
-            Series::history("reference", dt, wanted).coloured(REFERENCE),
+            Series::history("reference", dt, &wanted[..asked]).coloured(REFERENCE),
             Series::history("table", dt, found).coloured(TABLE),
         ]
     };

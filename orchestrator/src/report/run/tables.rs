@@ -104,11 +104,16 @@ pub(super) fn strong_part(own: &Laboratory) -> Table {
 /// Settings, parameters that differ from their defaults, and components.
 pub(super) fn what_was_run(run: &Run) -> Vec<Table> {
     let motion = run.motion;
+    let played = run.acceleration.len().saturating_sub(1) as f64 * motion.dt;
     let mut rows = vec![
         [Cell::from("ended"), run.ended.into()],
         [
             "duration of the motion".into(),
             Cell::Quantity(run.whole.duration, Units::TIME, 5),
+        ],
+        [
+            "duration of the run".into(),
+            Cell::Quantity(played, Units::TIME, 5),
         ],
         [
             "sample time".into(),
