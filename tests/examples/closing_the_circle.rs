@@ -46,7 +46,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut search = Search::default();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
-        let mut value = || arguments.next().ok_or(format!("{argument}: expected a value"));
+        let mut value = || {
+            arguments
+                .next()
+                .ok_or(format!("{argument}: expected a value"))
+        };
         match argument.as_str() {
             "--seed" => seed = value()?.parse()?,
             "--record" => record = Some(PathBuf::from(value()?)),
@@ -90,7 +94,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             let column = |i: usize| -> Vec<f64> { table.iter().map(|row| row[i] * INCH).collect() };
             Ok(metrics::tracking(wanted, &column(0), &column(1))?.time_domain_percent)
         };
-        let named: Vec<&str> = diagnosis.modelled.iter().map(|named| named.effect).collect();
+        let named: Vec<&str> = diagnosis
+            .modelled
+            .iter()
+            .map(|named| named.effect)
+            .collect();
         let hidden = case.truth.effects.first().and_then(|effect| {
             let (name, value) = effect.parameters.first_key_value()?;
             Some(format!("{name} {:.3} {}", value.value, value.unit))

@@ -45,7 +45,7 @@ pub struct Line {
 pub struct Inverse {
     /// Line distance, Hz.
     step: f64,
-    /// The transfer function within the band.
+    /// The transfer function within the band, where it was measured.
     response: Vec<Line>,
     /// Coherence times the inverse of the transfer function, a line each.
     lines: Vec<Complex64>,
@@ -134,7 +134,7 @@ impl Inverse {
             lines: lines.collect(),
             crossover,
             band,
-            coherence: 1.0,
+            response: Vec::new(),
         }
     }
 

@@ -175,7 +175,9 @@ impl ModelledRig {
             name: "pulse".into(),
             dt: self.period,
             displacement: (0..samples).map(bell).collect(),
-            velocity: (0..samples).map(|k| -at(k) * bell(k) / PULSE_WIDTH).collect(),
+            velocity: (0..samples)
+                .map(|k| -at(k) * bell(k) / PULSE_WIDTH)
+                .collect(),
             acceleration: (0..samples)
                 .map(|k| (at(k).powi(2) - 1.0) * bell(k) / PULSE_WIDTH.powi(2))
                 .collect(),

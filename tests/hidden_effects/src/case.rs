@@ -233,7 +233,9 @@ impl Case {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (hidden, mut motion) = (self.hidden.clone(), Vec::new());
         let played = (&self.plant, hidden, &self.noises);
-        play(played, reference, &mut rng, |rig| motion.push(rig.table_motion()));
+        play(played, reference, &mut rng, |rig| {
+            motion.push(rig.table_motion())
+        });
         motion
     }
 
@@ -328,7 +330,12 @@ fn resolve_peak_command(hidden: &mut Hidden, plant: &Plant, reference: &[f64]) {
     let mut free = hidden.clone();
     free.effects.remove(i);
     let mut quiet = ChaCha8Rng::seed_from_u64(0);
-    let rows = play((plant, free, &Noises::none()), reference, &mut quiet, |_| {});
+    let rows = play(
+        (plant, free, &Noises::none()),
+        reference,
+        &mut quiet,
+        |_| {},
+    );
     let peak = rows.iter().fold(0.0f64, |m, row| m.max(row[1].abs()));
     hidden.effects[i].values[0] *= peak;
 }

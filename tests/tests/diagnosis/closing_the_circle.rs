@@ -54,7 +54,10 @@ fn a_drive_that_knows_the_effect_is_better_on_an_independent_rig() {
     };
     let [itself, unaware, found] = [&wanted, &plain.drive, &aware.drive].map(on_rig);
     println!("{itself:.2}, {unaware:.2}, {found:.2} %");
-    assert!(found < unaware && unaware < itself, "{found} {unaware} {itself}");
+    assert!(
+        found < unaware && unaware < itself,
+        "{found} {unaware} {itself}"
+    );
 }
 
 #[test]
@@ -80,8 +83,16 @@ fn what_makes_no_drive_is_said_and_nothing_is_written() {
     assert!(fault(folder.path()).contains("nominal.toml"));
     assert!(fault(&place).contains("model.toml"));
     let nominal = case.nominal();
-    std::fs::write(&model, format!("{nominal}\n[effects.valve_dead_bant]\nhalf_width = 0.1\n")).unwrap();
-    assert!(fault(&place).contains("valve_dead_band"), "{}", fault(&place));
+    std::fs::write(
+        &model,
+        format!("{nominal}\n[effects.valve_dead_bant]\nhalf_width = 0.1\n"),
+    )
+    .unwrap();
+    assert!(
+        fault(&place).contains("valve_dead_band"),
+        "{}",
+        fault(&place)
+    );
     let text = format!("{nominal}\n[effects.valve_dead_band]\nhalf_width = 0.1\n");
     std::fs::write(&model, &text).unwrap();
     let without = nominal.replace("[controller]", "[controller_of_old]");
