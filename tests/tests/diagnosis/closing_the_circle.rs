@@ -8,17 +8,17 @@ use plant::identified::rig::IdentifiedRig;
 use shakebench::iteration::circle::{Plan, close, write};
 use shakebench::iteration::on_model::{ModelledRig, Search};
 use shakebench::motion::{self, Motion, Options};
-use units::constants::INCH;
+use units::constants::{G, INCH};
 
 fn law_of(case: &Case) -> Nominal {
     Nominal::parse(&case.nominal()).unwrap()
 }
 
-/// A model that knows the effect drives a rig that shares no code with it better than one that does not,
-/// and the parts of a linear rig are inverted whole.
+/// A model that knows the delay drives a rig that shares no code with it, noise and disturbance on, better
+/// than one that does not.
 #[test]
 fn a_drive_that_knows_the_effect_is_better_on_an_independent_rig() {
-    let case = Case::draw(11, &Settings::new(Kind::This("valve_dead_band")));
+    let case = Case::draw(20_262, &Settings::new(Kind::This("command_delay")));
     let nominal = law_of(&case);
     let law = nominal.controller.unwrap();
     let believed = IdentifiedRig {
@@ -26,17 +26,17 @@ fn a_drive_that_knows_the_effect_is_better_on_an_independent_rig() {
         specimen: nominal.specimen,
         ..IdentifiedRig::default()
     };
-    let truth = &case.truth.effects[0].parameters["half_width"];
-    assert_eq!(truth.unit, "V");
+    let truth = &case.truth.effects[0].parameters["delay"];
+    assert_eq!(truth.unit, "s");
     let mut known = believed;
-    known.effects.valve.dead_band = truth.value;
+    known.effects.valve.command_delay = truth.value;
     let options = Options {
-        scaling: Some(motion::Scaling::PeakDisplacement(0.8 * INCH)),
+        scaling: Some(motion::Scaling::PeakAcceleration(0.2 * G)),
         ..Options::default()
     };
     let wanted = motion::built_in(3, &options).unwrap();
     let search = Search {
-        corrections: 8,
+        corrections: 4,
         ..Search::default()
     };
     let [plain, aware] = [believed, known].map(|rig| {
@@ -55,7 +55,7 @@ fn a_drive_that_knows_the_effect_is_better_on_an_independent_rig() {
     let [itself, unaware, found] = [&wanted, &plain.drive, &aware.drive].map(on_rig);
     println!("{itself:.2}, {unaware:.2}, {found:.2} %");
     assert!(
-        found < unaware && unaware < itself,
+        found < 0.5 * unaware && unaware < itself,
         "{found} {unaware} {itself}"
     );
 }
