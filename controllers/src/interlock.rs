@@ -63,6 +63,11 @@ pub struct Interlock {
     pub specimen_silence_time: f64,
     /// Least pressure of the supply, Pa; 0 for no check.
     pub pressure_limit: f64,
+    /// Largest flow out of the supply, m³/s, as a mean over [`flow_time`](Self::flow_time): what the
+    /// pump can give for long; 0 for no check. Short peaks come out of the accumulator.
+    pub flow_limit: f64,
+    /// Time constant of that mean, s.
+    pub flow_time: f64,
     /// What the interlock remembers.
     pub memory: InterlockMemory,
 }
@@ -103,11 +108,13 @@ pub enum Trip {
     Activity = 13,
     /// The supply's pressure is below its limit.
     Pressure = 14,
+    /// More flows out of the supply than the pump can give for long.
+    Flow = 15,
 }
 
 impl Trip {
     /// All causes, in the order of their numbers.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::None,
         Self::NotFinite,
         Self::Stale,
@@ -123,6 +130,7 @@ impl Trip {
         Self::SpecimenLost,
         Self::Activity,
         Self::Pressure,
+        Self::Flow,
     ];
 
     /// Its short name.
@@ -143,6 +151,7 @@ impl Trip {
             Self::SpecimenLost => "specimen-lost",
             Self::Activity => "activity",
             Self::Pressure => "pressure",
+            Self::Flow => "flow",
         }
     }
 
@@ -164,6 +173,7 @@ impl Trip {
             Self::SpecimenLost => "the specimen does not answer to the table any more",
             Self::Activity => "the valve command chatters or the loop oscillates",
             Self::Pressure => "the supply's pressure is below its limit",
+            Self::Flow => "the flow out of the supply is beyond its limit",
         }
     }
 }
@@ -201,6 +211,8 @@ pub struct InterlockMemory {
     travel: [f64; 5],
     /// Mean speed of the table, m/s.
     speed: f64,
+    /// Mean flow out of the supply, m³/s.
+    flow: f64,
     specimen_answered: bool,
     silent: f64,
     heartbeat: i32,
@@ -223,6 +235,8 @@ pub struct InterlockInput {
     pub specimen_acceleration: f64,
     /// Pressure of the supply, Pa; unused without a limit of it.
     pub supply_pressure: f64,
+    /// Flow out of the supply, m³/s; unused without a limit of it.
+    pub supply_flow: f64,
     /// A number that the controller changes at every sample.
     pub heartbeat: i32,
     /// The operator's stop.
@@ -260,6 +274,8 @@ impl Interlock {
             specimen_table_velocity: 1.0 * INCH,
             specimen_silence_time: 0.1,
             pressure_limit: 0.0,
+            flow_limit: 0.0,
+            flow_time: 1.0,
             memory: InterlockMemory {
                 fade: 1.0,
                 ..InterlockMemory::default()
@@ -358,6 +374,16 @@ impl Interlock {
         smoothed > self.activity_limit || itself > SMOOTHED as f64 * self.activity_limit
     }
 
+    /// Whether more has flowed out of the supply for a while than the pump can give for long.
+    fn drains_the_supply(&mut self, flow: f64, period: f64) -> bool {
+        if self.flow_limit == 0.0 || !flow.is_finite() {
+            return false;
+        }
+        let m = &mut self.memory;
+        m.flow += period / (period + self.flow_time) * (flow - m.flow);
+        m.flow > self.flow_limit
+    }
+
     fn misses_beats(&mut self, heartbeat: i32) -> bool {
         let m = &mut self.memory;
         if self.heartbeat_samples == 0 {
@@ -383,6 +409,7 @@ impl Interlock {
             input.measured_force,
             input.specimen_acceleration,
             input.supply_pressure,
+            input.supply_flow,
         ];
         // Each check keeps a count, so all run at every sample.
         let stale = self.counts_stale(input);
@@ -390,6 +417,7 @@ impl Interlock {
         let lost = self.misses_the_specimen(input, period);
         let error = self.tracking_error(input, period);
         let chatters = self.chatters(input.valve_command, period);
+        let drains = self.drains_the_supply(input.supply_flow, period);
         let m = &mut self.memory;
         if input.valve_command.abs() >= self.saturation_level {
             m.saturated += period;
@@ -407,6 +435,7 @@ impl Interlock {
                 self.pressure_limit > 0.0 && input.supply_pressure < self.pressure_limit,
                 Trip::Pressure,
             ),
+            (drains, Trip::Flow),
             (
                 y.displacement.abs() > self.displacement_limit,
                 Trip::Displacement,
@@ -456,6 +485,7 @@ impl Controller for Interlock {
             ("saturation_level", self.saturation_level),
             ("saturation_time", self.saturation_time),
             ("ramp_time", self.ramp_time),
+            ("flow_time", self.flow_time),
             ("stale_travel", self.stale_travel),
             ("specimen_table_motion", self.specimen_table_motion),
             ("specimen_table_velocity", self.specimen_table_velocity),
@@ -465,6 +495,7 @@ impl Controller for Interlock {
         }
         ModelError::require_non_negative("specimen_silence", self.specimen_silence)?;
         ModelError::require_non_negative("pressure_limit", self.pressure_limit)?;
+        ModelError::require_non_negative("flow_limit", self.flow_limit)?;
         ModelError::require_non_negative("reaction_time", self.reaction_time)?;
         ModelError::require_positive("stale_samples", f64::from(self.stale_samples))
     }

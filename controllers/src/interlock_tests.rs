@@ -175,6 +175,33 @@ fn noise_is_no_oscillation_and_a_weak_supply_trips() {
 }
 
 #[test]
+fn the_accumulator_gives_a_peak_and_the_pump_no_more_than_it_can_for_long() {
+    let cubic_inch = INCH.powi(3);
+    let watched = Interlock {
+        flow_limit: 10.0 * cubic_inch,
+        ..Interlock::laboratory()
+    };
+    let drawn = |flow: f64, until: u32| {
+        let (interlock, _) = run(watched, 3000, move |k, input| {
+            input.supply_flow = if k < until { flow } else { 0.0 };
+        });
+        (interlock.memory.trip, interlock.memory.trip_time)
+    };
+    assert_eq!(drawn(9.9 * cubic_inch, 3000).0, Trip::None);
+    // The mean of a step is 1 - exp(-t): a fifth of a second of 40 in³/s passes, ln(4/3) s do not.
+    assert_eq!(drawn(40.0 * cubic_inch, 100).0, Trip::None);
+    let (trip, time) = drawn(40.0 * cubic_inch, 3000);
+    assert_eq!(trip, Trip::Flow);
+    assert!((time - f64::ln(4.0 / 3.0)).abs() < 2.0 * H, "{time}");
+    let off = Interlock {
+        flow_limit: 0.0,
+        ..watched
+    };
+    let (interlock, _) = run(off, 3000, |_, input| input.supply_flow = cubic_inch * 1e3);
+    assert_eq!(interlock.memory.trip, Trip::None);
+}
+
+#[test]
 fn a_table_that_lags_is_not_lost_and_one_that_stands_is() {
     let motion = |t: f64| 1.2 * INCH * (6.0 * t).sin();
     let follow = |x: fn(f64) -> f64| {

@@ -163,6 +163,38 @@ fn a_rig_with_a_loop_of_its_own_is_found_from_reference_and_displacement() {
 }
 
 #[test]
+fn a_nonlinear_rig_that_was_swept_is_not_given_a_drift_below_its_sweep() {
+    // A loop whose valve has a dead band, or that saturates softly; its static gain is one.
+    type Valve = fn(f64) -> f64;
+    let valves: [(&str, Valve); 2] = [
+        ("dead band", |e| 45.0 * (e - e.clamp(-2e-4, 2e-4))),
+        ("soft", |e| 54.0 * e / (1.0 + e.abs() / 0.004).sqrt()),
+    ];
+    let phase = |t: f64| std::f64::consts::TAU * (2.0 * t + 0.2 * t * t);
+    for (name, valve) in valves {
+        let (mut u, mut x) = (0.0, 0.0);
+        let step = PERIOD / STEPS as f64;
+        let (mut wanted, mut shown) = (Vec::new(), Vec::new());
+        for k in 0..SAMPLES {
+            let t = k as f64 * PERIOD;
+            wanted.push(0.004 * phase(t).sin());
+            shown.push(x + 2e-6 * noise(7, 2, k));
+            for i in 0..STEPS {
+                let late = (t + (i as f64 + 0.5) * step - DELAY).max(0.0);
+                u += step / 0.003 * (valve(0.004 * phase(late).sin() - x) - u);
+                x += step * u;
+            }
+        }
+        let channels = vec![(Channel::Reference, wanted), (Channel::Displacement, shown)];
+        let found = identify(&[Recording::new(name, PERIOD, channels).unwrap()], 0.75).unwrap();
+        let below = found.model.response(0.1, PERIOD);
+        println!("{name}: {:?}, {below:.3} at 0.1 rad/s", found.structure);
+        assert!((below - 1.0).norm() < 0.15, "{name}: {below}");
+        assert!(found.mean_square > 2.0 && !found.warnings.is_empty());
+    }
+}
+
+#[test]
 fn recordings_without_a_command_are_refused() {
     let channels = vec![(Channel::Displacement, reference(1))];
     let recording = Recording::new("blind", PERIOD, channels).unwrap();

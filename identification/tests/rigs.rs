@@ -97,3 +97,66 @@ fn a_delay_is_found_at_its_size() {
     assert!((delay.1[0].value - 0.020).abs() < 1e-3, "{delay:?}");
     assert!(found.confirmed.error < 0.005, "{}", found.confirmed.error);
 }
+
+#[test]
+fn windows_are_refused_where_something_brings_the_rig_back_or_nothing_is_left_to_compare() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut data = String::from("t,u,q\n");
+    for k in 0..400 {
+        writeln!(data, "{:.3},{},{}", 0.001 * f64::from(k), k % 7, k).unwrap();
+    }
+    std::fs::write(folder.path().join("record.csv"), data).unwrap();
+    let refused = |kind: &str, windows: &str| {
+        let oscillator = kind == "oscillator";
+        let (input, output) = if oscillator {
+            ("force = { column = \"u\", unit = \"N\" }", "displacement")
+        } else {
+            (
+                "motor_voltage = { column = \"u\", unit = \"V\" }",
+                "position",
+            )
+        };
+        let nominal = if oscillator {
+            "mass = { value = 1.0, unit = \"kg\" }
+            damping = { value = 1.0, unit = \"N s/m\" }
+            stiffness = { value = 1.0, unit = \"N/m\" }"
+        } else {
+            "mass = { value = 1.0, unit = \"kg\" }
+            viscous_friction = { value = 1.0, unit = \"N s/m\" }
+            coulomb_friction = { value = 1.0, unit = \"N\" }
+            force_gain = { value = 1.0, unit = \"N/V\" }"
+        };
+        let text = format!(
+            "name = \"Axis\"\nkind = \"{kind}\"\ndata = [\"record.csv\"]\n[columns]\n\
+             time = {{ column = \"t\", unit = \"s\" }}\n{input}\n\
+             {output} = {{ column = \"q\", unit = \"mm\" }}\n[nominal]\n{nominal}\n\
+             [left_out]\nsecond_half = true\n[windows]\n{windows}\n"
+        );
+        let path = folder.path().join("rig.toml");
+        std::fs::write(&path, text).unwrap();
+        let read = Description::read(&path).and_then(|d| d.measurement(&[]));
+        read.map(|_| ()).map_err(|error| error.to_string())
+    };
+    let good = "length = { value = 0.1, unit = \"s\" }\nknown = { value = 10, unit = \"ms\" }";
+    refused("linear_axis", good).unwrap();
+    let error = refused("oscillator", good).unwrap_err();
+    assert!(
+        error.contains("rig.toml") && error.contains("linear_axis"),
+        "{error}"
+    );
+    for (windows, place) in [
+        (
+            good.replace("0.1", "0.015").as_str(),
+            "expected 2 known ones",
+        ),
+        (good.replace("\"s\"", "\"mm\"").as_str(), "windows.length"),
+        (good.replace("known", "knwon").as_str(), "knwon"),
+        (
+            good.replace("10,", "-10,").as_str(),
+            "expected 2 known ones",
+        ),
+    ] {
+        let error = refused("linear_axis", windows).unwrap_err();
+        assert!(error.contains(place), "{error}");
+    }
+}

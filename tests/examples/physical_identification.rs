@@ -3,7 +3,9 @@
 //! `cargo run --release -p acceptance --example physical_identification [-- KIND... | model FILE]`; the
 //! latter writes the model that controllers of the physical rig are tuned on.
 
-use acceptance::physical_recordings::{PhysicalTest, nine_kinds, other_motions, prediction};
+use acceptance::physical_recordings::{
+    PhysicalTest, nine_kinds, other_motions, prediction, repetition,
+};
 use identification::closed_loop::{Settings, equations::NAMES, identify};
 
 /// Commissions the default rig, one sample late and bare, and writes its model.
@@ -74,6 +76,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     made.peak,
                     100.0 * made.largest,
                     100.0 * made.root_mean_square
+                );
+                let twice = repetition(&other)?;
+                println!(
+                    "   the rig itself, played twice: {:.1} % at most, {:.1} % rms",
+                    100.0 * twice.largest,
+                    100.0 * twice.root_mean_square
                 );
             }
         }

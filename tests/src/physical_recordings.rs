@@ -316,6 +316,34 @@ pub fn prediction(
     })
 }
 
+/// Plays `test` twice on the rig itself, with sensors whose noise differs: how far the rig is from
+/// repeating itself, which no model can be asked to beat in a laboratory.
+///
+/// # Errors
+/// As [`PhysicalTest::play`].
+pub fn repetition(test: &PhysicalTest) -> Result<Prediction, ModelError> {
+    let wanted = test.reference()?;
+    let again = PhysicalTest {
+        seed: test.seed + 1000,
+        ..test.clone()
+    };
+    let (first, second) = (test.play(&wanted)?, again.play(&wanted)?);
+    let size = |values: &[f64]| values.iter().fold(0.0f64, |peak, a| peak.max(a.abs()));
+    let peak = size(&first.acceleration);
+    let errors: Vec<f64> = first
+        .acceleration
+        .iter()
+        .zip(&second.acceleration)
+        .map(|(a, b)| a - b)
+        .collect();
+    let square = errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64;
+    Ok(Prediction {
+        peak,
+        largest: size(&errors) / peak,
+        root_mean_square: square.sqrt() / peak,
+    })
+}
+
 /// Two other motions for `test`: noise of its band, and sines of 2 to 20 Hz.
 pub fn other_motions(test: &PhysicalTest) -> [PhysicalTest; 2] {
     let noise = PhysicalTest {

@@ -1,11 +1,14 @@
 //! Prediction model: the plant under three-variable control, as it is sampled here or as in
 //! Eq 5-5, and what its outputs do over the horizon (Eq 5-12, 5-13).
 
-use nalgebra::{DMatrix, DVector, RowDVector, RowVector3, Vector3};
+use nalgebra::{DMatrix, DVector, RowDVector, RowVector3, SymmetricEigen, Vector3};
 use plant::linear::StateSpace;
 
 use crate::ModelError;
 use crate::three_variable::ThreeVariableGains;
+
+/// Most rotations of the search for the prediction's singular directions.
+const MOST_ROTATIONS: usize = 100_000;
 
 /// Inputs of the loop and outputs of the plant: displacement, velocity, acceleration.
 pub const CHANNELS: usize = 3;
@@ -251,14 +254,19 @@ impl LoopModel {
     ) -> Result<HorizonResponse, ModelError> {
         let (free, full) = self.large_response(p);
         let weight = DVector::from_fn(CHANNELS * p, |i, _| importance[i % CHANNELS].sqrt());
-        let svd = (DMatrix::from_diagonal(&weight) * &full).svd(false, true);
-        let directions = svd.v_t.ok_or_else(|| ModelError::NoSolution {
-            equation: "the prediction's singular value decomposition",
-            reason: "it does not converge".into(),
-        })?;
+        let weighted = DMatrix::from_diagonal(&weight) * &full;
+        // By eigenvectors: the singular value decomposition's last rotations take `hypot`, whose last bit
+        // differs between versions of the system's library.
+        let cost = weighted.tr_mul(&weighted);
+        let Some(found) = SymmetricEigen::try_new(cost, f64::EPSILON, MOST_ROTATIONS) else {
+            return Err(ModelError::NoSolution {
+                equation: "the prediction's singular directions",
+                reason: "they do not converge".into(),
+            });
+        };
         let mut order: Vec<usize> = (0..CHANNELS * p).collect();
-        order.sort_by(|&i, &j| svd.singular_values[j].total_cmp(&svd.singular_values[i]));
-        let commands = DMatrix::from_fn(p, CHANNELS * p, |i, j| directions[(order[i], j)]);
+        order.sort_by(|&i, &j| found.eigenvalues[j].total_cmp(&found.eigenvalues[i]));
+        let commands = DMatrix::from_fn(p, CHANNELS * p, |i, j| found.eigenvectors[(j, order[i])]);
         Ok(HorizonResponse {
             free,
             forced: full * commands.transpose(),

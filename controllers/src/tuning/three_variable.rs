@@ -50,6 +50,16 @@ impl ThreeVariableGains {
 /// Largest sensitivity that the rule allows: it leaves a gain margin of 8.5 dB and a phase margin
 /// of 36 degrees at least. A stiffer loop follows no better.
 const PEAK_SENSITIVITY: f64 = 1.6;
+/// Displacement gains that are tried, V/m: 0.001 to 1000 V/in, whatever the valve's range and the stroke.
+const GAINS: (f64, f64) = (1e-3 / INCH, 1e3 / INCH);
+
+/// Gains to begin with, V/m: the `usual` ones (V/in), then all over [`GAINS`].
+fn trial_gains(usual: impl IntoIterator<Item = f64>) -> impl Iterator<Item = f64> {
+    let all = std::iter::successors(Some(GAINS.0), |gain| Some(1.25 * gain));
+    let usual = usual.into_iter().map(|gain| gain / INCH);
+    usual.chain(all.take_while(|gain| *gain < GAINS.1))
+}
+
 /// Band of the motions, Hz, in which the feedforward is fitted.
 const BAND: (f64, f64) = (0.25, 10.0);
 
@@ -87,12 +97,11 @@ impl ThreeVariableGains {
         let mut best: Option<[f64; 2]> = None;
         for step in 0..=20 {
             let acceleration = 0.1 * f64::from(step) / most;
-            let mut low = 0.1 / INCH;
             let holds = |gain: f64| peak(gain, acceleration) <= PEAK_SENSITIVITY;
-            if !holds(low) || !late_rig.is_held_by(&[low, 0.0, acceleration]) {
-                continue;
-            }
-            while holds(1.05 * low) && low < 1e3 / INCH {
+            let first = trial_gains([0.1])
+                .find(|gain| holds(*gain) && late_rig.is_held_by(&[*gain, 0.0, acceleration]));
+            let Some(mut low) = first else { continue };
+            while holds(1.05 * low) && low < GAINS.1 {
                 low *= 1.05;
             }
             if best.is_none_or(|[gain, _]| low > gain)
@@ -103,7 +112,7 @@ impl ThreeVariableGains {
         }
         let [proportional, acceleration] = best.ok_or(ModelError::NoSolution {
             equation: "the tuning of three-variable control",
-            reason: "no displacement gain from 0.1 V/in upwards holds the table".into(),
+            reason: "no displacement gain of 0.001 to 1000 V/in holds the table with a sensitivity of 1.6".into(),
         })?;
         let printed = Self::TABLE_3_2_IN_THESIS_UNITS;
         let integral = proportional * printed.integral / printed.proportional;
@@ -191,18 +200,16 @@ fn ultimate_gain(rig: &ShakeTable, delay: usize, period: f64) -> Result<f64, Mod
         a.complex_eigenvalues().iter().all(|pole| pole.norm() < 1.0)
     };
     // A rig that is unstable by itself needs some gain: begin where the loop is held.
-    let mut low = [3.0, 1.0, 0.3]
-        .into_iter()
-        .map(|gain| gain / INCH)
+    let mut low = trial_gains([3.0, 1.0, 0.3])
         .find(|&gain| is_stable(gain))
         .ok_or(ModelError::NoSolution {
             equation: "the tuning of three-variable control",
-            reason: "no displacement gain of 0.3 to 3 V/in holds the table".into(),
+            reason: "no displacement gain of 0.001 to 1000 V/in holds the table".into(),
         })?;
     let mut high = low;
     while is_stable(high) {
         (low, high) = (high, 2.0 * high);
-        if high > 1e3 / INCH {
+        if high > GAINS.1 {
             break;
         }
     }

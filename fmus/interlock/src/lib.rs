@@ -43,6 +43,7 @@ pub struct Interlock {
     measured_force: f64,
     specimen_acceleration: f64,
     supply_pressure: f64,
+    supply_flow: f64,
     measurement_valid: bool,
     heartbeat: i32,
     stop: bool,
@@ -64,6 +65,7 @@ impl Default for Interlock {
             measured_force: 0.0,
             specimen_acceleration: 0.0,
             supply_pressure: 0.0,
+            supply_flow: 0.0,
             measurement_valid: true,
             heartbeat: 0,
             stop: false,
@@ -106,7 +108,7 @@ impl Component for Interlock {
     ];
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 8] = [
+        const INPUTS: [&str; 9] = [
             "controller_command",
             "reference_displacement",
             "measured_displacement",
@@ -115,6 +117,7 @@ impl Component for Interlock {
             "measured_force",
             "specimen_acceleration",
             "supply_pressure",
+            "supply_flow",
         ];
         fmu_kit::table! { Self, s:
             input("controller_command", s.controller_command, "Command of the controller", "V").nominal(10.0);
@@ -125,6 +128,7 @@ impl Component for Interlock {
             input("measured_force", s.measured_force, "Measured force of the actuator", "N" => "lbf").nominal(400.0);
             input("specimen_acceleration", s.specimen_acceleration, "Measured absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
             input("supply_pressure", s.supply_pressure, "Pressure of the supply; unused without a limit of it", "Pa" => "psi").nominal(2e7);
+            input("supply_flow", s.supply_flow, "Flow out of the supply; unused without a limit of it", "m3/s" => "in3/s").nominal(2e-4);
             input("measurement_valid", s.measurement_valid, "Whether all measurements are numbers");
             input("heartbeat", s.heartbeat, "A number that the controller changes at every sample");
             input("stop", s.stop, "The operator's stop");
@@ -154,6 +158,8 @@ impl Component for Interlock {
             parameter("specimen_table_motion", s.law.specimen_table_motion, "The table moves above this acceleration ...", "m/s2" => "g");
             parameter("specimen_table_velocity", s.law.specimen_table_velocity, "... and its mean speed this one", "m/s" => "in/s");
             parameter("pressure_limit", s.law.pressure_limit, "Least pressure of the supply, 0 for no check", "Pa" => "psi").min(0.0);
+            parameter("flow_limit", s.law.flow_limit, "Largest mean flow out of the supply, 0 for no check", "m3/s" => "in3/s").min(0.0);
+            parameter("flow_time", s.law.flow_time, "Time constant of that mean", "s");
             parameter("specimen_silence_time", s.law.specimen_silence_time, "Time of the moving table in which a specimen must not be silent", "s");
         }
     }
@@ -182,6 +188,7 @@ impl Component for Interlock {
                 },
                 specimen_acceleration: self.specimen_acceleration,
                 supply_pressure: self.supply_pressure,
+                supply_flow: self.supply_flow,
                 heartbeat: self.heartbeat,
                 stop: self.stop,
                 reset: self.reset,

@@ -23,6 +23,7 @@ pub struct ServoHydraulicTable {
     valve_command: f64,
     specimen_force: f64,
     actuator_force: f64,
+    supply_flow: f64,
     supply_loss_time: f64,
     estimate_error: bool,
     displacement_error: f64,
@@ -43,6 +44,7 @@ impl Default for ServoHydraulicTable {
             valve_command: 0.0,
             specimen_force: 0.0,
             actuator_force: 0.0,
+            supply_flow: 0.0,
             supply_loss_time: NEVER,
             estimate_error: false,
             displacement_error: 0.0,
@@ -124,6 +126,9 @@ impl Component for ServoHydraulicTable {
                 .nominal(400.0).depends_on(&MOTION, Dependent).depends_on(&OIL, Dependent);
             output("supply_pressure", s.state.table.supply_pressure, "Pressure of the supply", "Pa" => "psi")
                 .nominal(2e7).initially_depends_on(&VALVE);
+            output("supply_flow", s.supply_flow, "Flow that the valve draws from the supply", "m3/s" => "in3/s")
+                .nominal(2e-4).depends_on(&["pressure_a", "pressure_b", "supply_pressure", "spool"], Dependent)
+                .initially_depends_on(&VALVE);
             parameter("estimate_error", s.estimate_error, "Estimate the error of every step");
             parameter("pump_pressure", s.rig.table.supply.pressure, "Pressure at which the pump stops delivering", "Pa" => "psi");
             parameter("pump_gain", s.rig.table.supply.pump_gain, "Pump flow per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
@@ -224,6 +229,7 @@ impl Component for ServoHydraulicTable {
         let table = &self.rig.table;
         self.actuator_force = table.actuator_force(&self.state.table);
         self.rates = table.derivatives(&self.state.table, &self.input(time));
+        self.supply_flow = table.supply_flow(&self.state.table);
         self.stop_hit = table.stops.is_hit(self.state.table.displacement);
     }
 

@@ -8,6 +8,7 @@
 pub mod bands;
 pub mod equations;
 pub mod friction;
+mod lateness;
 pub mod least_squares;
 mod model_section;
 pub mod simulation;
@@ -247,7 +248,7 @@ pub fn identify(
     }
     let (table, payloads) = start::table(&equations.experiments, specimen)?;
     let mut best: Option<Optimum> = None;
-    for rig in start::actuators(&equations.experiments, &table, 4)? {
+    for rig in start::actuators(&equations.experiments, &table)? {
         let coordinates = coordinates(&rig, &payloads, force, specimen, settings.friction);
         if let Some(optimum) = approach(&equations, &coordinates)
             && best.as_ref().is_none_or(|b| optimum.cost < b.cost)
@@ -288,16 +289,36 @@ pub fn identify(
                 (optimum, equations, shape) = (found, own, trial);
             }
         }
-        for _ in 0..6 {
-            let Some((found, own)) = refit(shape, &optimum, true) else {
-                break;
-            };
-            let changes = found.values[PARAMETERS..PARAMETERS + SHAPE].to_vec();
-            (optimum, equations) = (found, own);
-            shape = shape.changed(&changes);
-            if changes.iter().all(|c| c.abs() < 0.03) {
+        for round in 0..2 {
+            for _ in 0..6 {
+                let Some((found, own)) = refit(shape, &optimum, true) else {
+                    break;
+                };
+                let changes = found.values[PARAMETERS..PARAMETERS + SHAPE].to_vec();
+                (optimum, equations) = (found, own);
+                shape = shape.changed(&changes);
+                if changes.iter().all(|c| c.abs() < 0.03) {
+                    break;
+                }
+            }
+            // As long as the friction's shape was not known spool and delay may have been mistaken.
+            let rivals = lateness::divisions(&optimum.values);
+            if round > 0 || rivals.is_empty() {
                 break;
             }
+            let own = refit(shape, &optimum, false);
+            let rivals = rivals.iter().filter_map(|rig| {
+                let mut from = optimum.clone();
+                from.values[..PARAMETERS].copy_from_slice(&rig.coordinates());
+                refit(shape, &from, false)
+            });
+            let Some((rival, other)) = rivals.min_by(|a, b| a.0.cost.total_cmp(&b.0.cost)) else {
+                break;
+            };
+            if own.is_some_and(|(own, _)| own.cost <= rival.cost) {
+                break;
+            }
+            (optimum, equations) = (rival, other);
         }
     }
     let rig = HydraulicRig::at(&optimum.values).unwrap_or(table);

@@ -195,15 +195,15 @@ pub fn motion_ratio(experiments: &[Bands]) -> f64 {
     ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// The actuator's start values for spools and leakages on a grid, best first, at most `most` of
-/// them; `rig` gives the table.
+/// The actuator's start values for spools and leakages on a grid, the best of each delay, best first;
+/// `rig` gives the table. A spool's lag and a delay are alike at low frequencies: the best few of the
+/// whole grid may all have taken the one for the other.
 ///
 /// # Errors
 /// No point of the grid on which a positive command pushes the table towards positive displacement.
 pub fn actuators(
     experiments: &[Bands],
     rig: &HydraulicRig,
-    most: usize,
 ) -> Result<Vec<HydraulicRig>, IdentificationError> {
     let mut found: Vec<(f64, HydraulicRig)> = Vec::new();
     let mut backwards = 0;
@@ -250,7 +250,16 @@ pub fn actuators(
         });
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(found.into_iter().map(|(_, own)| own).take(most).collect())
+    let mut best: Vec<HydraulicRig> = Vec::new();
+    for (_, own) in found {
+        if best
+            .iter()
+            .all(|before| before.command_delay != own.command_delay)
+        {
+            best.push(own);
+        }
+    }
+    Ok(best)
 }
 
 /// `F (s + p) = g W u - K s x - c_p (s + p) s x - F_c (s + p) S` with `W`, `p` given: unknowns

@@ -64,6 +64,9 @@ impl Sheet {
     /// # Errors
     /// No text, no header, no data, or rows that are not as long as the header.
     pub fn read(file: &Path, wanted: Wanted<'_>) -> Result<Self, DataError> {
+        if file.is_dir() {
+            return Err(DataError::file(file, "a folder; expected a file of data"));
+        }
         Self::parse(file, read_text(file)?, wanted)
     }
 
@@ -132,13 +135,26 @@ impl Sheet {
     /// The place of the column with this text in the header.
     ///
     /// # Errors
-    /// It is not there; what is there is said.
+    /// It is not there, where what is there is said, or stands there twice.
     pub fn place(&self, head: &str) -> Result<usize, DataError> {
-        let place = self.heads.iter().position(|own| own == head);
-        place.ok_or_else(|| {
-            let reason = format!("no column `{head}` among {}", self.heads.join(", "));
-            DataError::line(&self.file, self.header_line, reason)
-        })
+        let all = self.heads.iter().enumerate();
+        let places: Vec<usize> = all
+            .filter(|(_, own)| *own == head)
+            .map(|(i, _)| i)
+            .collect();
+        let wrong = |reason: String| DataError::line(&self.file, self.header_line, reason);
+        match places[..] {
+            [place] => Ok(place),
+            [] => Err(wrong(format!(
+                "no column `{head}` among {}",
+                self.heads.join(", ")
+            ))),
+            [first, second, ..] => Err(wrong(format!(
+                "columns {} and {} are both called `{head}`; expected names that tell them apart",
+                first + 1,
+                second + 1
+            ))),
+        }
     }
 
     /// Line and text of a column's unit in the row below the header, if there is one.

@@ -112,6 +112,27 @@ pub(super) struct Fitted {
     pub model: DelayedTransferFunction,
 }
 
+/// The frequency (rad/s) below which a hundredth of the input's power lies: what is slower is not shown.
+fn lowest(bands: &[Own]) -> f64 {
+    let mut powers: Vec<(f64, f64)> = bands
+        .iter()
+        .map(|(all, band)| {
+            let power = (band.projected(0) * all.scale[0]).norm_sqr();
+            (band.omega.first().copied().unwrap_or(0.0), power)
+        })
+        .collect();
+    powers.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let enough = 0.01 * powers.iter().map(|own| own.1).sum::<f64>();
+    let mut sum = 0.0;
+    for (omega, power) in powers {
+        sum += power;
+        if sum >= enough {
+            return omega;
+        }
+    }
+    0.0
+}
+
 /// The best model of a structure; `None` where no start makes one.
 pub(super) fn fit(structure: Structure, between: Between, bands: &[Own]) -> Option<Fitted> {
     if 2 * bands.len() < 2 * structure.parameters() {
@@ -126,6 +147,7 @@ pub(super) fn fit(structure: Structure, between: Between, bands: &[Own]) -> Opti
             Between::Held => GROWTH,
             Between::Straight => 0.0,
         },
+        slowest: lowest(bands),
     };
     let weigh = |start: Vec<f64>| {
         let model = coefficients.model(&start)?;

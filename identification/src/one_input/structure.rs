@@ -207,11 +207,36 @@ pub(super) struct Coefficients {
     pub between: Between,
     /// The fastest growth of a pole, 1/s: a valve-driven rig may drift off without its loop.
     pub growth: f64,
+    /// The frequency below which the data hold next to nothing, rad/s. A slower zero goes with a slower
+    /// pole: the two take up some misfit at the low end and make a drift below it.
+    pub slowest: f64,
 }
 
 impl Coefficients {
+    /// Whether the poles of a monic polynomial grow slowly enough.
+    fn is_held(&self, denominator: &[f64]) -> bool {
+        denominator.iter().all(|c| c.is_finite())
+            && poles(denominator).iter().all(|pole| pole.re < self.growth)
+    }
+
+    /// Whether no zero is slower than the data show.
+    fn is_shown(&self, numerator: &[f64]) -> bool {
+        let Some((constant, others)) = numerator.split_last() else {
+            return true;
+        };
+        // Roots of the reversed polynomial are one over the zeros; one at infinity is none.
+        let mut reversed = vec![1.0];
+        reversed.extend(others.iter().rev().map(|c| c / constant));
+        // What lies on the limit is within it.
+        let most = (1.0 + 1e-9) / self.slowest.max(f64::MIN_POSITIVE);
+        reversed.iter().all(|c| c.is_finite())
+            && poles(&reversed)
+                .iter()
+                .all(|inverse| inverse.norm() <= most)
+    }
+
     /// The model of these values: denominator without its 1, numerator, delay; `None` where a pole
-    /// grows faster than [`Self::growth`].
+    /// grows faster than [`Self::growth`] or a zero is slower than [`Self::slowest`].
     pub fn model(&self, values: &[f64]) -> Option<DelayedTransferFunction> {
         let Structure {
             poles,
@@ -223,7 +248,7 @@ impl Coefficients {
         let power = |i: usize| self.scale.powi(i as i32);
         let mut denominator = vec![1.0];
         denominator.extend(own.iter().enumerate().map(|(i, c)| c * power(i + 1)));
-        if !grows_less(&denominator, self.growth) {
+        if !self.is_held(&denominator) {
             return None;
         }
         let order = poles + usize::from(integrates);
@@ -231,9 +256,12 @@ impl Coefficients {
             denominator.push(0.0);
         }
         let numerator = numerator.iter().enumerate();
-        let numerator = numerator
+        let numerator: Vec<f64> = numerator
             .map(|(i, c)| c * power(order - zeros + i))
             .collect();
+        if !self.is_shown(&numerator) {
+            return None;
+        }
         Some(DelayedTransferFunction {
             numerator,
             denominator,
@@ -242,24 +270,45 @@ impl Coefficients {
         })
     }
 
-    /// Values whose poles are mirrored into the left half plane.
+    /// Values whose poles are mirrored into the left half plane and whose zeros are hastened to the lowest
+    /// frequency of the data where they are slower.
     pub fn stable(&self, values: &[f64]) -> Vec<f64> {
+        let Structure { poles, zeros, .. } = self.structure;
         let mut denominator = vec![1.0];
-        denominator.extend(&values[..self.structure.poles]);
+        denominator.extend(&values[..poles]);
         let mut all = stabilised(&denominator)[1..].to_vec();
-        all.extend(&values[self.structure.poles..]);
+        let (numerator, rest) = values[poles..].split_at(zeros + 1);
+        all.extend(hastened(numerator, self.slowest / self.scale));
+        all.extend(rest);
         all
     }
 }
 
-/// Whether all roots of a monic polynomial have a real part below `growth`.
-fn grows_less(denominator: &[f64], growth: f64) -> bool {
-    let poles = || {
-        TransferFunction {
-            numerator: vec![1.0],
-            denominator: denominator.to_vec(),
+/// A polynomial whose roots are of `limit` at least.
+fn hastened(numerator: &[f64], limit: f64) -> Vec<f64> {
+    let lead = numerator[0];
+    let monic: Vec<f64> = numerator.iter().map(|c| c / lead).collect();
+    if !monic.iter().all(|c| c.is_finite()) {
+        return numerator.to_vec();
+    }
+    let mut polynomial = vec![Complex::new(lead, 0.0)];
+    for root in poles(&monic) {
+        let size = root.norm().max(f64::MIN_POSITIVE);
+        let root = root * (limit / size).max(1.0);
+        polynomial.push(Complex::new(0.0, 0.0));
+        for i in (1..polynomial.len()).rev() {
+            let before = polynomial[i - 1];
+            polynomial[i] -= root * before;
         }
-        .poles()
-    };
-    denominator.iter().all(|c| c.is_finite()) && poles().iter().all(|pole| pole.re < growth)
+    }
+    polynomial.iter().map(|c| c.re).collect()
+}
+
+/// Roots of a monic polynomial, highest power first.
+fn poles(denominator: &[f64]) -> Vec<Complex<f64>> {
+    TransferFunction {
+        numerator: vec![1.0],
+        denominator: denominator.to_vec(),
+    }
+    .poles()
 }

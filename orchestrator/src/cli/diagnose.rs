@@ -38,8 +38,8 @@ pub struct Arguments {
     /// description's
     #[arg(long, value_name = "MAP.toml")]
     columns: Option<PathBuf>,
-    /// Print a commented description to fill in: table, actuator, drive, hysteretic device, material or
-    /// oscillator; with --fmu, `map`
+    /// Print a commented description to fill in: table, actuator, drive, axis, hysteretic device, material,
+    /// oscillator, damper or transfer system; with --fmu, `map`
     #[arg(long, value_name = "KIND", conflicts_with_all = ["cases", "model", "data"])]
     template: Option<String>,
     /// Extended model of a rig that a diagnosis wrote; nothing is fitted

@@ -148,6 +148,9 @@ impl Validation {
             if !own.is_empty() {
                 text += &format!("{}: {} (SI)\n", one.file.display(), own.join(", "));
             }
+            for note in &one.notes {
+                text += &format!("note: {note}\n");
+            }
         }
         text
     }

@@ -1,18 +1,18 @@
 //! What is run: a system on a motion, from what was asked for to what has been checked.
 
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
+pub use super::motions::Motions;
 use super::summary::Table;
 use crate::error::Error;
 use crate::fmu::{FmiVersion, Options};
 use crate::library::FmuLibrary;
 use crate::master::{Algorithm, Ended, MasterError, Outcome, Pace, Simulation};
-use crate::motion::{self, Motion, Scaling, Unscaled};
+use crate::motion::{self, Motion};
 use crate::ssp;
 use crate::system::tuning::{self, Rules, Tuning, Wanted};
 use crate::system::{
@@ -440,83 +440,6 @@ fn rest_until(motion: &mut Motion, samples: usize) {
     motion.displacement.resize(samples, last);
     motion.velocity.resize(samples, 0.0);
     motion.acceleration.resize(samples, 0.0);
-}
-
-/// Records that have been made playable but for their scale, for requests that play the same.
-#[derive(Debug, Default)]
-pub struct Motions(Mutex<HashMap<String, Arc<Unscaled>>>);
-
-impl Motions {
-    /// More are not kept.
-    const MOST: usize = 256;
-
-    fn find(&self, request: &Request, file: &SystemFile) -> Result<Motion, Error> {
-        let usual = motion::Options::default();
-        let options = motion::Options {
-            sample_time: file.sampling()?.unwrap_or(usual.sample_time),
-            scaling: request.scaling.map(|scale| match scale {
-                Scale::Factor(factor) => Scaling::Factor(factor),
-                Scale::PeakAcceleration(peak) => Scaling::PeakAcceleration(peak),
-                Scale::PeakDisplacement(peak) => Scaling::PeakDisplacement(peak),
-            }),
-            ..usual
-        };
-        let record = match source(request, file)? {
-            Source::Reference(path) => return Ok(motion::load_reference(&path, &options)?),
-            Source::Record(path) => Some(path),
-            Source::Seed => None,
-        };
-        let key = format!("{record:?} {} {}", request.seed, options.sample_time);
-        let open = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = open().get(&key).cloned();
-        if let Some(unscaled) = known {
-            return Ok(unscaled.scaled(&options)?);
-        }
-        let unscaled = Arc::new(match &record {
-            Some(path) => motion::load_unscaled(path, &options)?,
-            None => motion::built_in_unscaled(request.seed, &options)?,
-        });
-        let mut known = open();
-        if known.len() >= Self::MOST {
-            known.clear();
-        }
-        known.insert(key, unscaled.clone());
-        drop(known);
-        Ok(unscaled.scaled(&options)?)
-    }
-}
-
-/// What is played.
-enum Source {
-    Record(PathBuf),
-    Reference(PathBuf),
-    /// The built-in motion.
-    Seed,
-}
-
-/// What a request plays: what it names, or what its system does.
-fn source(request: &Request, file: &SystemFile) -> Result<Source, Error> {
-    let beside = |path: &String| {
-        file.directory
-            .as_deref()
-            .unwrap_or(Path::new(""))
-            .join(path)
-    };
-    let experiment = &file.experiment;
-    let own = request.record.is_none() && request.reference.is_none();
-    if own && experiment.record.is_some() && experiment.reference.is_some() {
-        let reason = "record and reference are both given; which one shall be played?".to_string();
-        return Err(file.at_fault("experiment", reason).into());
-    }
-    let record = request.record.clone();
-    let record = record.or(experiment.record.as_ref().filter(|_| own).map(beside));
-    let reference = request.reference.clone();
-    let reference = reference.or(experiment.reference.as_ref().filter(|_| own).map(beside));
-    Ok(match (record, reference) {
-        (_, Some(path)) => Source::Reference(path),
-        (Some(path), None) => Source::Record(path),
-        (None, None) => Source::Seed,
-    })
 }
 
 /// Whether a system is named by a file.

@@ -4,6 +4,7 @@ pub mod checkpoint;
 pub mod experiment;
 pub mod identity;
 pub mod manifest;
+mod motions;
 pub mod page;
 pub mod refinement;
 pub mod signals;

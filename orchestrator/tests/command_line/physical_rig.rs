@@ -366,6 +366,38 @@ fn a_broken_rig_is_brought_to_null_in_the_time_that_the_docs_state() {
     }
 }
 
+#[test]
+fn a_worn_valve_that_keeps_the_pump_busy_trips_by_its_flow_at_a_sound_pressure() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("worn");
+    // A hundred times the leakage: 11.1 in³/s at 2,778 psi.
+    let worn = "table.null_leakage=0.004 in3/(s.psi)";
+    let output = shakebench(
+        folder.path(),
+        &[
+            "run",
+            "three-variable",
+            "--plant",
+            "servohydraulic",
+            "--specimen",
+            "none",
+            "--duration",
+            "5s",
+            "--set",
+            worn,
+            "--out",
+            out.to_str().unwrap(),
+        ],
+    );
+    let said = String::from_utf8_lossy(&output.stdout).to_string()
+        + &String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("the flow out of the supply is beyond its limit"),
+        "{said}"
+    );
+}
+
 /// Three-variable control whose last part fails, on the physical rig with the yielding specimen.
 fn failing_controller(fmu: &str, fault: &str) -> String {
     let connections = [

@@ -222,6 +222,13 @@ impl ServoHydraulicTable {
         self.cylinder.area * (a - b) - friction + elastic + lost
     }
 
+    /// Flow that the valve draws from the supply, m³/s.
+    pub fn supply_flow(&self, state: &ServoHydraulicState) -> f64 {
+        self.valve
+            .flows(state.spool, state.pressures, state.supply_pressure)
+            .from_supply
+    }
+
     /// Acceleration of the table (m/s²) under `actuator_force` and `specimen_force` (N).
     fn acceleration_under(
         &self,

@@ -1,4 +1,4 @@
-//! The diagnosis on four real rigs: figures on data not fitted, parts swapped, and effects put on
+//! The diagnosis on real rigs: figures on data not fitted, parts swapped, and effects put on
 //! top of the measurements by the test.
 
 use std::path::{Path, PathBuf};
@@ -111,6 +111,41 @@ fn the_drive_has_asymmetric_friction() {
     // The ripple is that of the screw: a period of 2.5 mm that nobody told.
     let period = value(&report.as_described, "force_ripple", "period");
     assert!((period - 2.5e-3).abs() < 5e-6, "{period}");
+}
+
+#[test]
+fn the_axis_without_its_controller_has_the_same_asymmetric_friction() {
+    let Some(report) = report("emps") else {
+        return;
+    };
+    assert_eq!(report.verdict, Verdict::Named);
+    assert_eq!(report.named, ["asymmetric_friction"]);
+    // In windows of 0.3 s, of the position's variation.
+    for error in [report.confirmed.error, report.confirmed.swapped_error] {
+        assert!(error < 1.5e-3, "{error}");
+    }
+    let asymmetry = value(
+        &report.as_described,
+        "asymmetric_friction",
+        "viscous_asymmetry",
+    );
+    assert!((-0.25..-0.15).contains(&asymmetry), "{asymmetry}");
+}
+
+#[test]
+#[ignore = "minutes"]
+fn the_damper_between_band_and_load_cell_has_levers_and_a_resonance() {
+    let Some(report) = report("friction_damper_bands") else {
+        return;
+    };
+    assert_eq!(report.verdict, Verdict::Named);
+    names(
+        &report,
+        &["inner_force_1", "inner_force_2", "load_path_resonance"],
+    );
+    for error in [report.confirmed.error, report.confirmed.swapped_error] {
+        assert!(error < 0.045, "{error}");
+    }
 }
 
 #[test]

@@ -28,6 +28,9 @@ pub struct Description {
     pub nominal: BTreeMap<String, Quantity>,
     /// What is left out of the fit.
     pub left_out: LeftOut,
+    /// Where a rig that nothing brings back is begun anew.
+    #[serde(default)]
+    pub windows: Option<Windows>,
     /// What an identification found besides, of which a diagnosis makes no use.
     #[serde(default)]
     pub transfer_function: Option<IgnoredAny>,
@@ -57,6 +60,16 @@ pub struct Quantity {
     pub plus_minus: f64,
     /// Unit of both.
     pub unit: String,
+}
+
+/// Windows of a record, each simulated by itself from the outputs at its begin, which are not compared.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Windows {
+    /// How long each is.
+    pub length: Quantity,
+    /// How long the output is known at its begin.
+    pub known: Quantity,
 }
 
 /// Which samples are not fitted.

@@ -125,7 +125,11 @@ pub fn diagnose(
     let rig = description.rig()?;
     let nominal = description.nominal(rig)?;
     let measured = Measured::new(rig, measurement, nominal).called(&description.name);
-    judge(&measured, observer).ok_or_else(|| no_output(description))
+    let mut found = judge(&measured, observer).ok_or_else(|| no_output(description))?;
+    found
+        .findings
+        .extend(measured.notes(&found.confirmed.point));
+    Ok(found)
 }
 
 /// Diagnoses a model on its data; none where the nominal model cannot be simulated.
@@ -240,7 +244,9 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
 fn no_output(description: &Description) -> DescriptionError {
     DescriptionError::Description {
         path: description.path.clone(),
-        what: "the nominal model gives no finite output on these data".to_owned(),
+        what: "the nominal model gives no finite output on these data: look at the values in `nominal` \
+               (a mass of zero?) and at the units of `columns`"
+            .to_owned(),
     }
 }
 

@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::description::{Column, Description, DescriptionError, LeftOut, Quantity};
+use super::description::{
+    Column, Description, DescriptionError, LeftOut, Quantity, Windows, listed,
+};
 use super::diagnosis::{NamedValue, RigDiagnosis};
 use super::measured::Measured;
 use super::parts::{EVERYTHING, InParts};
-use super::{Measurement, Rig, SessionRole};
+use super::{Measurement, Rig, SessionParameter, SessionRole};
 use crate::diagnosis::engine::{Free, Point, SimulatedModel, completed, least_squares};
 use units::convert;
 
@@ -25,6 +27,9 @@ pub struct ExtendedRig {
     /// Time between samples, for data without a `time` column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_step: Option<Quantity>,
+    /// Where it is begun anew.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub windows: Option<Windows>,
     /// Columns of its files.
     pub columns: BTreeMap<String, Column>,
     /// Nominal parameters as they were described.
@@ -65,6 +70,9 @@ pub struct FileErrors {
     pub unit: String,
     /// What the file has for itself, by the extended model, SI.
     pub session: BTreeMap<String, f64>,
+    /// What else was read out of it, a sentence each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 /// What the extended model puts out for a file.
@@ -144,6 +152,7 @@ impl ExtendedRig {
             name: found.name.clone(),
             kind: found.kind.clone(),
             time_step: description.time_step.clone(),
+            windows: description.windows.clone(),
             columns: description.columns.clone(),
             described: exact(&[]),
             refitted: exact(&confirmed.refitted),
@@ -207,6 +216,7 @@ impl ExtendedRig {
             columns: self.columns.clone(),
             nominal,
             left_out: LeftOut::SecondHalf(true),
+            windows: self.windows.clone(),
             transfer_function: None,
             path: self.path.clone(),
         }
@@ -247,7 +257,11 @@ impl ExtendedRig {
                 .keys()
                 .find(|k| parameters.iter().all(|p| p.name != **k))
             {
-                return Err(self.wrong(format!("`effects.{name}.{extra}` is unknown")));
+                let names: Vec<&str> = parameters.iter().map(|p| p.name).collect();
+                return Err(self.wrong(format!(
+                    "`effects.{name}.{extra}` is unknown: expected {}",
+                    listed(&names)
+                )));
             }
             let own = parameters.iter().map(|p| {
                 let at = format!("effects.{name}.{}", p.name);
@@ -267,7 +281,12 @@ impl ExtendedRig {
             .keys()
             .find(|k| known.iter().all(|own| own.name != **k))
         {
-            return Err(self.wrong(format!("`session.{extra}` is unknown to {}", self.kind)));
+            let names: Vec<&str> = known.iter().map(|own| own.name).collect();
+            return Err(self.wrong(format!(
+                "`session.{extra}` is unknown to {}: expected {}",
+                self.kind,
+                listed(&names)
+            )));
         }
         let own = known.iter().map(|own| match self.session.get(own.name) {
             Some(quantity) => self.si(&format!("session.{}", own.name), quantity, own.unit),
@@ -319,9 +338,10 @@ impl ExtendedRig {
                     let session = measured.session_values(&point, 0);
                     let rms = measured.root_mean_square(&point, EVERYTHING);
                     let error = measured.normalised_error(&point, EVERYTHING);
-                    Ok::<_, DescriptionError>((100.0 * error, rms, session))
+                    let notes = measured.notes(&point);
+                    Ok::<_, DescriptionError>((100.0 * error, rms, session, notes))
                 };
-                let (extended_percent, extended_rms, session) = error(&self.nominal, true)?;
+                let (extended_percent, extended_rms, session, notes) = error(&self.nominal, true)?;
                 let named = rig.session().iter().zip(session);
                 Ok(FileErrors {
                     file: file.clone(),
@@ -330,6 +350,7 @@ impl ExtendedRig {
                     described_percent: error(&self.described, false)?.0,
                     extended_percent,
                     extended_rms,
+                    notes,
                     unit: rig.output().unit().to_owned(),
                     session: named
                         .map(|(own, value)| (own.name.to_owned(), value))
@@ -355,13 +376,10 @@ impl ExtendedRig {
             recordings: vec![recording],
         };
         let (measured, mut point) = self.measured(&measurement, &self.nominal, true)?;
-        if given > 0 {
+        let is_told = |own: &SessionParameter| own.role == SessionRole::Start;
+        if given > 0 && rig.session().iter().any(is_told) {
             // The rest of what a file has for itself stays as the model's files had it.
-            let starts: Vec<bool> = rig
-                .session()
-                .iter()
-                .map(|own| own.role == SessionRole::Start)
-                .collect();
+            let starts: Vec<bool> = rig.session().iter().map(is_told).collect();
             let is_start = |i: usize| starts.get(i).copied().unwrap_or(false);
             let free = Free::Chosen(&is_start);
             let found = least_squares(&measured, &point, EVERYTHING, &free, 30);

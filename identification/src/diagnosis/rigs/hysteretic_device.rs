@@ -20,6 +20,16 @@ const FORCE: Channel = Channel::Other {
     unit: "N",
 };
 
+/// Forces measured inside the device, such as those of a band's two ends.
+const FIRST_INNER_FORCE: Channel = Channel::Other {
+    name: "inner_force_1",
+    unit: "N",
+};
+const SECOND_INNER_FORCE: Channel = Channel::Other {
+    name: "inner_force_2",
+    unit: "N",
+};
+
 /// A device whose first force is less than this share of its friction stands in its gap.
 const HELD: f64 = 0.05;
 
@@ -93,6 +103,15 @@ effects! {
         frequency: shape("rad/s", 50.0, 1.5).off_at(0.0),
         damping_ratio: shape("1", 0.1, 1.0),
     } from [[12.0, 0.1], [25.0, 0.1], [50.0, 0.1], [100.0, 0.1]];
+    /// A force measured inside the device acts on its end, by a lever: the ends of a band around a drum
+    /// pull against each other (Coble, Cao, Downey and Ricles, J. Mech. Des. 140, 2018).
+    inner_force_1: InnerForce1 {
+        lever: size("1", 0.01, (-30.0, 30.0)),
+    } from [[0.5], [-0.5]];
+    /// So does a second one.
+    inner_force_2: InnerForce2 {
+        lever: size("1", 0.01, (-30.0, 30.0)),
+    } from [[0.5], [-0.5]];
     /// Displacement or force late.
     delay: Delay {
         delay: size("s", 6e-3, (0.0, 1.2)),
@@ -105,6 +124,10 @@ impl Equations for HystereticDevice {
     type Effects = Effects;
     type Session = Session;
     const INPUTS: &'static [Channel] = &[Channel::Displacement, Channel::Velocity];
+    const OPTIONAL: &'static [(Channel, &'static [&'static str])] = &[
+        (FIRST_INNER_FORCE, &["inner_force_1"]),
+        (SECOND_INNER_FORCE, &["inner_force_2"]),
+    ];
     const OUTPUT: Channel = FORCE;
     const IS_HYSTERETIC: bool = true;
     const IS_SCALED: bool = true;
@@ -155,8 +178,16 @@ impl Equations for HystereticDevice {
                     frequency: resonance,
                     damping_ratio,
                 },
+            inner_force_1: InnerForce1 { lever: first_lever },
+            inner_force_2: InnerForce2 {
+                lever: second_lever,
+            },
             delay: Delay { delay },
         } = *effects;
+        let inner = [
+            (first_lever, recording.input(FIRST_INNER_FORCE)),
+            (second_lever, recording.input(SECOND_INNER_FORCE)),
+        ];
         let (x, v) = (
             recording.input(Channel::Displacement),
             recording.input(Channel::Velocity),
@@ -252,7 +283,12 @@ impl Equations for HystereticDevice {
                     }
                 }
             }
-            let total = force + damping * speed;
+            let mut total = force + damping * speed;
+            for (lever, measured) in inner {
+                if lever != 0.0 && !measured.is_empty() {
+                    total += lever * at(measured, k);
+                }
+            }
             if resonance > 0.0 {
                 let h = recording.period() / steps;
                 for _ in 0..steps as usize {

@@ -80,6 +80,7 @@ impl<'a> Measured<'a> {
                     .map(|one| File {
                         output: one.output(),
                         left_out: &one.left_out,
+                        is_given: &one.is_given,
                     })
                     .collect();
                 places(&files, rig.screened())
@@ -178,6 +179,15 @@ impl<'a> Measured<'a> {
             effects: self.effect_values(point),
             session: self.session_values(point, recording),
         }
+    }
+
+    /// What the equations read out of the recordings beside their inputs.
+    pub fn notes(&self, point: &Point) -> Vec<String> {
+        let nominal = self.nominal_values(point);
+        let recordings = self.measurement.recordings.iter();
+        recordings
+            .flat_map(|one| self.rig.notes(one, &nominal))
+            .collect()
     }
 
     /// Simulated output of one recording.

@@ -4,6 +4,7 @@
 //! diagnosis never asks for white residuals, which no real rig leaves: it names a cause that pays
 //! on data not fitted and that is found on each part of the data.
 
+mod carriage;
 mod closed_loop_actuator;
 mod confirmed;
 mod controlled_damper;
@@ -14,6 +15,7 @@ mod diagnosis;
 mod extended;
 pub mod foreign;
 mod hysteretic_device;
+mod linear_axis;
 mod measured;
 mod natural;
 mod oscillator;
@@ -28,14 +30,14 @@ mod transfer_system;
 
 pub use confirmed::Confirmed;
 pub use description::{
-    Column, Description, DescriptionError, LeftOut, Quantity, column_map, renamed,
+    Column, Description, DescriptionError, LeftOut, Quantity, Windows, column_map, renamed,
 };
 pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
 pub use extended::{ExtendedRig, FileErrors, Prediction};
 
 pub use natural::Natural;
 pub use reading::{Measurement, even_period};
-pub use recording::RigRecording;
+pub use recording::{Begin, RigRecording};
 pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole, SessionTable};
 pub use template::template;
 pub use transfer_system::TransferSystemRig;
@@ -69,6 +71,8 @@ pub trait Equations: Sync {
     const IS_PATH: bool = false;
     /// True where the table of effects is in natural units.
     const IS_SCALED: bool = false;
+    /// True where the equations begin anew wherever the recording says so.
+    const BEGINS_ANEW: bool = false;
     /// Samples that are enough for a first look at candidates, where a simulation is costly.
     const SCREENED: usize = usize::MAX;
 
@@ -97,6 +101,11 @@ pub trait Equations: Sync {
     ) -> Vec<(&'static str, Vec<f64>)> {
         Vec::new()
     }
+
+    /// What the equations read out of a recording beside its inputs, a sentence each.
+    fn notes(&self, _recording: &RigRecording, _nominal: &Self::Nominal) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// [`Equations`] of any kind.
@@ -118,6 +127,9 @@ pub trait Rig: Sync {
 
     /// Whether a row without a time is a point of a path and no sample.
     fn is_path(&self) -> bool;
+
+    /// Whether the equations begin anew wherever the recording says so.
+    fn begins_anew(&self) -> bool;
 
     /// Parameters of the nominal model.
     fn parameters(&self) -> &'static [Named];
@@ -150,6 +162,9 @@ pub trait Rig: Sync {
         nominal: &[f64],
         errors: &[f64],
     ) -> Vec<(&'static str, Vec<f64>)>;
+
+    /// As [`Equations::notes`].
+    fn notes(&self, recording: &RigRecording, nominal: &[f64]) -> Vec<String>;
 
     /// Output for the inputs of `recording` alone, SI; not a number where a count is wrong.
     fn simulate(&self, recording: &RigRecording, values: &Values, out: &mut [f64]);
@@ -189,6 +204,10 @@ impl<E: Equations> Rig for E {
 
     fn is_path(&self) -> bool {
         E::IS_PATH
+    }
+
+    fn begins_anew(&self) -> bool {
+        E::BEGINS_ANEW
     }
 
     fn parameters(&self) -> &'static [Named] {
@@ -240,6 +259,12 @@ impl<E: Equations> Rig for E {
         })
     }
 
+    fn notes(&self, recording: &RigRecording, nominal: &[f64]) -> Vec<String> {
+        E::Nominal::from_values(nominal).map_or_else(Vec::new, |nominal| {
+            Equations::notes(self, recording, &nominal)
+        })
+    }
+
     fn simulate(&self, recording: &RigRecording, values: &Values, out: &mut [f64]) {
         match (
             E::Nominal::from_values(&values.nominal),
@@ -255,9 +280,10 @@ impl<E: Equations> Rig for E {
 }
 
 /// Every kind of rig.
-pub static KINDS: [&dyn Rig; 7] = [
+pub static KINDS: [&dyn Rig; 8] = [
     &closed_loop_actuator::ClosedLoopActuator,
     &positioning_drive::PositioningDrive,
+    &linear_axis::LinearAxis,
     &hysteretic_device::HystereticDevice,
     &cyclic_material::CyclicMaterial,
     &transfer_system::TransferSystemKind,

@@ -66,6 +66,8 @@ pub(in crate::diagnosis::rigs) fn screen(record: usize) -> usize {
 pub(in crate::diagnosis::rigs) struct File<'a> {
     pub output: &'a [f64],
     pub left_out: &'a [bool],
+    /// Samples that are not compared; empty where all are.
+    pub is_given: &'a [bool],
 }
 
 /// Places of the samples of every record that were measured, by record and file: records 0 and 1
@@ -76,7 +78,10 @@ pub(in crate::diagnosis::rigs) fn places(
     screened: usize,
 ) -> Vec<Vec<Vec<usize>>> {
     let mut places = vec![vec![Vec::new(); files.len()]; NAMES.len() + files.len()];
-    let is_measured = |one: &File<'_>, k: usize| one.output.get(k).is_some_and(|y| y.is_finite());
+    let is_measured = |one: &File<'_>, k: usize| {
+        let is_given = one.is_given.get(k) == Some(&true);
+        !is_given && one.output.get(k).is_some_and(|y| y.is_finite())
+    };
     for part in 0..2 {
         let mut mine = Vec::new();
         for (s, one) in files.iter().enumerate() {

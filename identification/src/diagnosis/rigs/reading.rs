@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::description::{Description, DescriptionError, LeftOut, listed};
-use super::{Rig, RigRecording};
+use super::{KINDS, Rig, RigRecording};
 use crate::IdentificationError;
 use crate::data::{Channel, DataError, Pick, Recording, RoundedStamps, Sheet, TimeBase, Wanted};
 
@@ -186,6 +186,18 @@ impl Description {
                 return Err(DataError::line(path, sheet.line(row), what).into());
             }
         }
+        let output = channels
+            .iter()
+            .find(|(channel, _)| *channel == rig.output());
+        if let (false, Some((channel, values))) = (may_lack, output)
+            && values.iter().all(|value| Some(value) == values.first())
+        {
+            let what = format!(
+                "`{}` is constant: expected a motion that a model can be compared with",
+                channel.name()
+            );
+            return Err(DataError::file(path, what).into());
+        }
         let rows = if is_timed || !rig.is_path() {
             (0..sheet.len()).collect()
         } else {
@@ -201,7 +213,10 @@ impl Description {
             (Some(stamps), _) => even_period(stamps).map_err(|row| {
                 DataError::line(path, sheet.line(row), "the times are not evenly spaced")
             })?,
-            (None, Some(step)) => self.si("time_step", step, "s")?.0,
+            (None, Some(step)) => match self.si("time_step", step, "s")?.0 {
+                step if step > 0.0 => step,
+                _ => return Err(self.wrong("`time_step`: expected more than 0 s".to_owned())),
+            },
             (None, None) => {
                 return Err(
                     self.wrong("neither `columns.time` nor `time_step` is given".to_owned())
@@ -215,9 +230,57 @@ impl Description {
         } else {
             Recording::new(&name, period, channels).map_err(at_fault)?
         };
-        let recording = RigRecording::new(recording, rig.inputs(), rig.output());
+        let mut recording = RigRecording::new(recording, rig.inputs(), rig.output());
+        self.begin(&mut recording, rig, may_lack)?;
         Ok((recording, rows))
     }
+
+    /// Where the simulation of `recording` begins.
+    fn begin(
+        &self,
+        recording: &mut RigRecording,
+        rig: &dyn Rig,
+        may_lack: bool,
+    ) -> Result<(), DescriptionError> {
+        if !rig.begins_anew() {
+            return match self.windows {
+                None => Ok(()),
+                Some(_) => Err(self.wrong(format!(
+                    "`windows` is of no use to kind {}: expected it where nothing brings the rig \
+                     back, as in {}",
+                    rig.kind(),
+                    listed(&anew())
+                ))),
+            };
+        }
+        if may_lack {
+            recording.begin_where_known();
+            return Ok(());
+        }
+        let Some(windows) = &self.windows else {
+            return Ok(());
+        };
+        let samples = |what: &str, quantity| {
+            let (length, _) = self.si(what, quantity, "s")?;
+            Ok::<_, DescriptionError>((length / recording.period()).round())
+        };
+        let length = samples("windows.length", &windows.length)?;
+        let known = samples("windows.known", &windows.known)?;
+        if known < 2.0 || length < 2.0 * known {
+            return Err(self.wrong(format!(
+                "`windows` of {length} samples, {known} of them known: expected 2 known ones at least \
+                 and as many to compare"
+            )));
+        }
+        recording.begin_every(length as usize, known as usize);
+        Ok(())
+    }
+}
+
+/// Kinds that can begin anew.
+fn anew() -> Vec<&'static str> {
+    let kinds = KINDS.into_iter().filter(|rig| rig.begins_anew());
+    kinds.map(Rig::kind).collect()
 }
 
 /// Mean spacing of even time stamps, s, or that behind rounded ones.

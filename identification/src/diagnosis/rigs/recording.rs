@@ -22,11 +22,27 @@ pub struct RigRecording {
     pub middle: f64,
     /// True where a sample is left out of the fit.
     pub left_out: Vec<bool>,
+    /// Where equations that can begin anew do so, in order; the first at sample 0.
+    pub begins: Vec<Begin>,
+    /// True where the output tells how something begins and is not compared; empty where nowhere.
+    pub is_given: Vec<bool>,
     /// Whether the record is one period of a motion that goes on.
     pub is_periodic: bool,
     /// The first input between its samples.
     between_samples: OnceLock<Vec<f64>>,
 }
+
+/// A place at which a simulation begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Begin {
+    /// The sample.
+    pub at: usize,
+    /// Samples from there on whose output may be used to find the state.
+    pub known: usize,
+}
+
+/// Known samples at the begin of a recording that says nothing of them.
+const KNOWN: usize = 20;
 
 /// Places in which [`RigRecording::between_samples`] parts a sample.
 pub const PLACES: usize = 16;
@@ -44,6 +60,11 @@ impl RigRecording {
             between: half_way(first, high - low),
             middle: 0.5 * (low + high),
             left_out: vec![false; recording.len()],
+            begins: vec![Begin {
+                at: 0,
+                known: KNOWN,
+            }],
+            is_given: Vec::new(),
             is_periodic: false,
             between_samples: OnceLock::new(),
             output,
@@ -88,6 +109,37 @@ impl RigRecording {
         self.recording.samples(self.output)
     }
 
+    /// Begins anew every `length` samples, from the `known` ones there, which are not compared.
+    pub fn begin_every(&mut self, length: usize, known: usize) {
+        let places = (0..self.len()).step_by(length.max(1));
+        self.begins = places.map(|at| Begin { at, known }).collect();
+        let is_given = (0..self.len()).map(|k| k % length.max(1) < known);
+        self.is_given = is_given.collect();
+    }
+
+    /// Begins anew wherever a run of known outputs begins, and once more before the end of a long one.
+    pub fn begin_where_known(&mut self) {
+        let is_known: Vec<bool> = self.output().iter().map(|y| y.is_finite()).collect();
+        let mut begins = Vec::new();
+        let mut at = 0;
+        while at < is_known.len() {
+            let run = is_known[at..].iter().take_while(|known| **known).count();
+            if run > 0 || at == 0 {
+                begins.push(Begin { at, known: run });
+            }
+            let end = at + run;
+            if run > 2 * KNOWN && end < is_known.len() {
+                let last = Begin {
+                    at: end - KNOWN,
+                    known: KNOWN,
+                };
+                begins.push(last);
+            }
+            at = end + is_known[end..].iter().take_while(|known| !**known).count();
+        }
+        self.begins = begins;
+    }
+
     /// Puts another output in the place of the measured one.
     ///
     /// # Errors
@@ -122,6 +174,33 @@ fn median_of_five(values: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_simulation_begins_wherever_outputs_are_known() {
+        let missing = f64::NAN;
+        let mut output = vec![1.0; 130];
+        output[..10].fill(missing);
+        output[12..20].fill(missing);
+        output[70..].fill(missing);
+        let channels = vec![
+            (Channel::Velocity, vec![0.0; 130]),
+            (Channel::Displacement, output),
+        ];
+        let even = crate::data::TimeBase::Even {
+            start: 0.0,
+            period: 1.0,
+        };
+        let recording = Recording::measured("known", even, channels).unwrap();
+        let mut recording =
+            RigRecording::new(recording, &[Channel::Velocity], Channel::Displacement);
+        recording.begin_where_known();
+        let begins: Vec<(usize, usize)> =
+            recording.begins.iter().map(|b| (b.at, b.known)).collect();
+        assert_eq!(begins, [(0, 0), (10, 2), (20, 50), (50, KNOWN)]);
+        recording.begin_every(50, 3);
+        assert_eq!(recording.begins.len(), 3);
+        assert_eq!(recording.is_given.iter().filter(|given| **given).count(), 9);
+    }
 
     #[test]
     fn samples_half_way_between_two_readings_are_told_from_readings() {

@@ -75,6 +75,14 @@ pub fn template(rig: &dyn Rig) -> String {
     line("# every_second_block = { value = 2.0, unit = \"s\" }  # for a sweep".into());
     line("# files = [\"<record_2.csv>\"]".into());
     line(String::new());
+    if rig.begins_anew() {
+        line("# Nothing brings such a rig back, so that what a model misses adds up. Compared is what it".into());
+        line("# does in windows, each begun from the outputs known at its begin.".into());
+        line("[windows]".into());
+        line("length = { value = 0.5, unit = \"s\" }".into());
+        line("known = { value = 0.02, unit = \"s\" }".into());
+        line(String::new());
+    }
     line("# Effects that are looked for:".into());
     for effect in rig.effects() {
         let words = effect.about.split_whitespace();
@@ -124,6 +132,7 @@ mod tests {
             ("Hysteretic device", "hysteretic_device"),
             ("material", "cyclic_material"),
             ("oscillator", "oscillator"),
+            ("axis", "linear_axis"),
         ] {
             assert_eq!(like(word).map(Rig::kind), Some(kind));
         }

@@ -74,6 +74,7 @@ impl<'a> Bordered<'a> {
             .map(|(output, trial)| File {
                 output,
                 left_out: &trial.left_out,
+                is_given: &[],
             })
             .collect();
         let longest = model.trials.iter().map(Trial::samples).max().unwrap_or(1);

@@ -1,0 +1,289 @@
+//! Carriage of a motor-driven axis: motor voltage to position.
+//!
+//! `M v' = G u - F_v v - F_c sgn v - o` (Janot, Gautier and Brunot, Data set and reference models of
+//! EMPS, 2019), and the effects that such axes have. The voltage is held from sample to sample.
+
+use super::table::{effects, shape, size};
+
+/// Steps of a sample.
+const STEPS: usize = 2;
+/// Most samples by which the voltage may be late.
+const LATEST: usize = 64;
+/// Samples while moving that a ripple is looked for in: at least, and about as many at most.
+const FEWEST: usize = 1000;
+const LOOKED_AT: usize = 10_000;
+/// Periods that fits of a ripple begin from.
+const PEAKS: usize = 4;
+/// Damping ratio of a flexible load.
+const FLEXIBLE_DAMPING: f64 = 0.05;
+
+effects! {
+    /// F± = (F_v (1 ± a) |v| + F_c) sgn v + o: friction of a worn screw (Janot, Gautier and
+    /// Brunot 2019, section 4). The nominal offset is the Coulomb part of the asymmetry.
+    asymmetric_friction: AsymmetricFriction {
+        viscous_asymmetry: size("1", 0.03, (-0.9, 0.9)),
+    } from [[0.1], [-0.1]];
+    /// F_c (1 + s e^{-|v|/v_s}): s > 0 is Stribeck's fall, s < 0 a friction that builds up
+    /// with speed (Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994).
+    speed_dependent_coulomb: SpeedDependentCoulomb {
+        excess: size("1", 0.03, (-0.99, 3.0)),
+        speed: shape("m/s", 0.01, 1.0),
+    } from [[0.2, 0.01], [-0.3, 0.01]];
+    /// A cos(2π q / p) + B sin(2π q / p): screw and motor poles.
+    force_ripple: ForceRipple {
+        cosine: size("N", 0.2, (-20.0, 20.0)),
+        sine: size("N", 0.2, (-20.0, 20.0)),
+        period: shape("m", 5e-3, 1.5),
+    } from [[0.5, 0.5, 5e-3]];
+    /// Current loop: T F' = G u - F.
+    actuation_lag: ActuationLag {
+        time_constant: size("s", 1e-4, (0.0, 0.02)),
+    } from [[5e-4]], like ["delay"];
+    /// u acts late.
+    delay: Delay {
+        delay: size("s", 1e-4, (0.0, 0.02)),
+    } from [[5e-4]], like ["actuation_lag"];
+    /// F_c (1 + c (q - q_0)), q_0 in the middle of the travel: misalignment.
+    position_dependent_friction: PositionDependentFriction {
+        slope: size("1/m", 0.1, (-5.0, 5.0)),
+    } from [[0.3], [-0.3]];
+    /// -D |v| v.
+    quadratic_drag: QuadraticDrag {
+        drag: size("N s2/m2", 20.0, (-2000.0, 2000.0)),
+    } from [[100.0], [-100.0]];
+    /// Load on a spring: a share m of the mass hangs on k and d = 2 ζ (k m)^{1/2}, ζ = 0.05.
+    flexibility: Flexibility {
+        share: size("1", 0.02, (0.0, 0.9)),
+        frequency: shape("rad/s", 300.0, 0.7),
+    } from [[0.1, 150.0], [0.1, 400.0]];
+}
+
+/// Nominal parameters of the mechanics, SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mechanics {
+    /// M.
+    pub mass: f64,
+    /// F_v.
+    pub viscous: f64,
+    /// F_c.
+    pub coulomb: f64,
+    /// o.
+    pub offset: f64,
+    /// G.
+    pub force_gain: f64,
+}
+
+/// The carriage while it moves.
+#[derive(Debug, Clone)]
+pub struct Carriage<'a> {
+    mechanics: Mechanics,
+    effects: &'a Effects,
+    /// Sampling period, s.
+    sample: f64,
+    /// Middle of the travel, m.
+    pub middle: f64,
+    /// Shift of the position's zero against the screw, m.
+    pub screw_shift: f64,
+    /// Position of the motor's side, m.
+    pub position: f64,
+    speed: f64,
+    load_position: f64,
+    load_speed: f64,
+    /// Of the motor; not a number before the first sample.
+    force: f64,
+    /// Voltages that may still be on their way, the newest at the place of its sample.
+    voltages: [f64; LATEST + 2],
+    now: usize,
+}
+
+impl<'a> Carriage<'a> {
+    /// A carriage at `position` that moves with `speed`; `before` are the voltages until then, if there
+    /// are any, the newest at the end.
+    pub fn new(
+        mechanics: Mechanics,
+        effects: &'a Effects,
+        sample: f64,
+        (position, speed): (f64, f64),
+        before: &[f64],
+    ) -> Self {
+        let mut voltages = [f64::NAN; LATEST + 2];
+        let count = voltages.len();
+        for (ago, u) in before.iter().rev().take(count - 1).enumerate() {
+            voltages[count - 1 - ago] = *u;
+        }
+        Self {
+            mechanics,
+            effects,
+            sample,
+            middle: 0.0,
+            screw_shift: 0.0,
+            position,
+            speed,
+            load_position: position,
+            load_speed: speed,
+            force: f64::NAN,
+            voltages,
+            now: 0,
+        }
+    }
+
+    /// Moves through the sample in which the voltage `u` is held.
+    pub fn advance(&mut self, u: f64) {
+        let Mechanics {
+            mass,
+            viscous,
+            coulomb,
+            offset,
+            force_gain,
+        } = self.mechanics;
+        let Effects {
+            asymmetric_friction: AsymmetricFriction { viscous_asymmetry },
+            speed_dependent_coulomb:
+                SpeedDependentCoulomb {
+                    excess,
+                    speed: slow,
+                },
+            force_ripple:
+                ForceRipple {
+                    cosine,
+                    sine,
+                    period,
+                },
+            actuation_lag: ActuationLag { time_constant: lag },
+            delay: Delay { delay },
+            position_dependent_friction: PositionDependentFriction { slope },
+            quadratic_drag: QuadraticDrag { drag },
+            flexibility: Flexibility { share, frequency },
+        } = *self.effects;
+        let h = self.sample / STEPS as f64;
+        let load = share * mass;
+        let motor = mass - load;
+        let spring = load * frequency * frequency;
+        let damper = 2.0 * FLEXIBLE_DAMPING * load * frequency;
+        let keep = if lag > 1e-6 { (-h / lag).exp() } else { 0.0 };
+        let late = (delay / self.sample).clamp(0.0, LATEST as f64);
+        let ring = self.voltages.len();
+        if self.force.is_nan() {
+            // Before the first known voltage stood the same.
+            let unknown = self.voltages.iter_mut().filter(|old| old.is_nan());
+            unknown.for_each(|old| *old = u);
+            self.force = force_gain * self.voltages[ring - 1];
+        }
+        let now = self.now;
+        self.voltages[now % ring] = u;
+        for step in 0..STEPS {
+            // Held from sample to sample: what acts in this step began to act this many samples ago
+            // at its begin and at its end.
+            let from = late - step as f64 / STEPS as f64;
+            let to = from - 1.0 / STEPS as f64;
+            let held =
+                |ago: f64| self.voltages[(now + ring - (ago.ceil().max(0.0) as usize)) % ring];
+            let (older, newer) = (held(from), held(to));
+            // Share of the step until the newer one arrives.
+            let until = ((from - to.ceil().max(0.0)) * STEPS as f64).clamp(0.0, 1.0);
+            let wanted = force_gain * (until * older + (1.0 - until) * newer);
+            self.force = keep * self.force + (1.0 - keep) * wanted;
+            let mut drive = self.force - offset;
+            if cosine != 0.0 || sine != 0.0 {
+                let angle = std::f64::consts::TAU * (self.position - self.screw_shift) / period;
+                drive -= cosine * angle.cos() + sine * angle.sin();
+            }
+            if load > 0.0 {
+                let pull = spring * (self.load_position - self.position)
+                    + damper * (self.load_speed - self.speed);
+                self.load_speed -= h / load * pull;
+                self.load_position += h * self.load_speed;
+                drive += pull;
+            }
+            let mut level = coulomb * (1.0 + slope * (self.position - self.middle));
+            if excess != 0.0 {
+                level *= 1.0 + excess * (-self.speed.abs() / slow).exp();
+            }
+            // Implicit in the friction, so that it holds at standstill.
+            let free = self.speed + h / motor * drive;
+            let side = free.signum();
+            let threshold = h / motor * level;
+            let linear = viscous * (1.0 + side * viscous_asymmetry) + drag * self.speed.abs();
+            self.speed = if free.abs() > threshold {
+                (free - side * threshold) / (1.0 + h / motor * linear)
+            } else {
+                0.0
+            };
+            self.position += h * self.speed;
+        }
+        self.now += 1;
+    }
+}
+
+/// Starts of a ripple, from the `errors` of a model without it over `position`.
+pub fn ripple_starts(
+    coulomb: f64,
+    position: &[f64],
+    errors: &[f64],
+) -> Vec<(&'static str, Vec<f64>)> {
+    let size = 0.02 * coulomb.max(f64::MIN_POSITIVE);
+    let periods = strongest_periods(position, errors).into_iter();
+    let phases = [(size, size), (-size, size), (size, -size), (-size, -size)];
+    periods
+        .flat_map(|period| phases.map(|(c, s)| ("force_ripple", vec![c, s, period])))
+        .collect()
+}
+
+/// Periods of the sines over position that explain most of `errors` where the drive moves: peaks of a
+/// periodogram over uneven positions (Lomb, Astrophysics and Space Science 39, 1976), forward and
+/// backward by themselves, since a loop answers late.
+fn strongest_periods(position: &[f64], errors: &[f64]) -> Vec<f64> {
+    let low = position.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = position.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let travel = high - low;
+    let moving = |k: usize| {
+        let (before, after) = (k.saturating_sub(5), (k + 5).min(position.len() - 1));
+        position[after] - position[before]
+    };
+    let samples: Vec<(f64, f64, bool)> = errors
+        .iter()
+        .enumerate()
+        .filter(|(k, e)| e.is_finite() && moving(*k).abs() > 1e-4 * travel)
+        .map(|(k, e)| (position[k], *e, moving(k) > 0.0))
+        .collect();
+    if travel.is_nan() || travel <= 0.0 || samples.len() < FEWEST {
+        return Vec::new();
+    }
+    let mean = samples.iter().map(|s| s.1).sum::<f64>() / samples.len() as f64;
+    let every = samples.len().div_ceil(LOOKED_AT);
+    let power = |cycles: f64| {
+        let mut sums = [0.0; 4];
+        for (q, e, forward) in samples.iter().step_by(every) {
+            let (sine, cosine) = (std::f64::consts::TAU * cycles * (q - low) / travel).sin_cos();
+            let side = 2 * usize::from(*forward);
+            sums[side] += (e - mean) * cosine;
+            sums[side + 1] += (e - mean) * sine;
+        }
+        sums.iter().map(|s| s * s).sum::<f64>()
+    };
+    // From ten to two hundred cycles over the travel, in quarters of a cycle.
+    let powers: Vec<(f64, f64)> = (40..800)
+        .map(|quarters| f64::from(quarters) / 4.0)
+        .map(|cycles| (cycles, power(cycles)))
+        .collect();
+    let mut peaks: Vec<(f64, f64)> = powers
+        .windows(3)
+        .filter(|w| w[1].1 > w[0].1 && w[1].1 > w[2].1)
+        .map(|w| w[1])
+        .collect();
+    peaks.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let strongest = peaks.iter().take(PEAKS);
+    strongest.map(|(cycles, _)| travel / cycles).collect()
+}
+
+/// Slope of the least-squares line through `positions`, at their begin.
+pub fn start_speed(positions: &[f64], sample: f64) -> f64 {
+    let n = positions.len() as f64;
+    let middle = 0.5 * (n - 1.0);
+    let (mut top, mut bottom) = (0.0, 0.0);
+    for (i, position) in positions.iter().enumerate() {
+        top += (i as f64 - middle) * position;
+        bottom += (i as f64 - middle).powi(2);
+    }
+    top / bottom / sample
+}
