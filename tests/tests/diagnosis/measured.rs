@@ -172,8 +172,8 @@ fn the_press_has_delay_and_unequal_areas() {
 }
 
 #[test]
-#[ignore = "minutes, and not reached or not seen since rigs are fitted by least squares"]
-fn open_the_damper_has_asymmetric_friction_free_play_and_a_memory() {
+#[ignore = "minutes"]
+fn the_damper_has_asymmetric_friction_free_play_and_a_memory() {
     let Some(three) = report("friction_damper") else {
         return;
     };
@@ -191,6 +191,11 @@ fn open_the_damper_has_asymmetric_friction_free_play_and_a_memory() {
     let here = value(&three.as_described, "excursion_memory", "decay");
     let there = value(&three.swapped, "excursion_memory", "decay");
     assert!((here - there).abs() < 10.0, "{here} {there}");
+}
+
+#[test]
+#[ignore = "11.1 %: the sines of one inch by themselves tell less than with that of half an inch"]
+fn open_the_dampers_sines_of_one_inch_are_enough() {
     let Some(two) = report("friction_damper_one_inch") else {
         return;
     };
