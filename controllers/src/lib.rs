@@ -4,6 +4,7 @@
 //! period with what the sensors gave, and the command they return is held until the next call.
 
 pub mod acceleration_tracking;
+pub mod aids;
 pub mod allocation;
 pub mod hierarchy;
 pub mod hybrid;
@@ -17,6 +18,7 @@ pub mod prediction_over_delay;
 pub mod preview;
 pub mod robustness;
 pub mod sliding_mode;
+pub mod surface_control;
 pub mod synthesis;
 pub mod three_variable;
 pub mod tuning;

@@ -90,7 +90,7 @@ impl Section {
     }
 
     /// One sample, by the transposed second direct form.
-    fn step(&self, memory: &mut [f64; 2], input: f64, period: f64) -> f64 {
+    pub(crate) fn step(&self, memory: &mut [f64; 2], input: f64, period: f64) -> f64 {
         if self.is_one() {
             return input;
         }

@@ -13,7 +13,7 @@ pub const MAXIMUM_DELAY: usize = 4;
 /// Disturbances: force on the table (N), offset of the valve (V).
 pub const DISTURBANCES: usize = 2;
 /// What is estimated.
-const ALL: usize = STATES + DISTURBANCES;
+pub const ALL: usize = STATES + DISTURBANCES;
 /// Part of the unknown force that is left after a sample: what lasts for seconds is the valve's, from
 /// which a constant force cannot be told.
 const FORCE_LEFT: f64 = 0.999;
@@ -128,17 +128,14 @@ impl Feedback {
         })
     }
 
-    /// Command (V) that brings the rig to the model's state `x` under the model's `command`, from
-    /// what is `measured` now; `force` is the known one now (N).
-    pub fn command(
+    /// States and disturbances now, from what is `measured` now; `force` is the known one now (N).
+    pub fn estimate(
         &self,
         state: &mut FeedbackState,
         rig: &SampledRig,
-        x: &SVector<f64, STATES>,
-        command: f64,
         measured: &SVector<f64, OUTPUTS>,
         force: f64,
-    ) -> f64 {
+    ) -> SVector<f64, ALL> {
         state.forces[self.delay] = force;
         let mut estimate = SVector::<f64, ALL>::from(state.prediction);
         let innovation = measured - self.output * estimate - rig.d * state.forces[0];
@@ -152,6 +149,21 @@ impl Feedback {
                 [state.forces[i], state.forces[i + 1]],
             );
         }
+        estimate
+    }
+
+    /// Command (V) that brings the rig to the model's state `x` under the model's `command`, from
+    /// what is `measured` now; `force` is the known one now (N).
+    pub fn command(
+        &self,
+        state: &mut FeedbackState,
+        rig: &SampledRig,
+        x: &SVector<f64, STATES>,
+        command: f64,
+        measured: &SVector<f64, OUTPUTS>,
+        force: f64,
+    ) -> f64 {
+        let estimate = self.estimate(state, rig, measured, force);
         let own = estimate.fixed_rows::<STATES>(0);
         let disturbances = estimate.fixed_rows::<DISTURBANCES>(STATES);
         let wanted = x + self.target * disturbances;
@@ -182,7 +194,8 @@ impl Feedback {
         state.forces[self.delay] = force;
     }
 
-    fn advance(
+    /// States and disturbances a sample later under `command` (V) and known forces (N) at both ends.
+    pub fn advance(
         &self,
         rig: &SampledRig,
         estimate: &SVector<f64, ALL>,

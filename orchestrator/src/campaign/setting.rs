@@ -208,7 +208,10 @@ impl Key {
                 let name = text()?;
                 request.system = match is_file(&name) {
                     true => folder.join(name).display().to_string(),
-                    false => known(name, built_in::names().collect())?,
+                    false => {
+                        built_in::check(&name).map_err(|error| error.to_string())?;
+                        name
+                    }
                 };
             }
             Self::Plant => {

@@ -11,7 +11,6 @@ use crate::comparison::{self, Plan, Played, Progress};
 use crate::error::Error;
 use crate::results::unused;
 use crate::system::built_in;
-use crate::units::nearest;
 
 /// Options of `shakebench compare`.
 #[derive(Debug, Args)]
@@ -107,20 +106,12 @@ fn controllers(asked: &[String]) -> Result<Vec<String>, Error> {
     let asked = asked.iter().map(|name| name.trim());
     let asked = asked.filter(|name| !name.is_empty());
     asked
-        .map(|name| {
-            if built_in::names().any(|known| known == name) {
-                return Ok(name.to_string());
-            }
-            let known: Vec<&str> = built_in::names().collect();
-            let suggestion = nearest(name, built_in::names())
-                .map_or(String::new(), |near| format!(" did you mean `{near}`?"));
-            Err(Error::Option {
+        .map(|name| match built_in::check(name) {
+            Ok(()) => Ok(name.to_string()),
+            Err(error) => Err(Error::Option {
                 option: "--controllers",
-                reason: format!(
-                    "`{name}` is no built-in system;{suggestion} expected some of {}",
-                    known.join(", ")
-                ),
-            })
+                reason: error.to_string(),
+            }),
         })
         .collect()
 }

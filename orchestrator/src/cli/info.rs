@@ -43,7 +43,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Some("toml") => system(&SystemFile::read(path)?)?,
         _ if ssp::is_ssp(&name) => system(&ssp::read(&name)?)?,
         Some("at2" | "csv") => motion(path)?,
-        _ if built_in::names().any(|known| known == name) => system(&built_in::system(
+        _ if built_in::check(&name).is_ok() => system(&built_in::system(
             &name,
             built_in::DEFAULT_PLANT,
             built_in::DEFAULT_SPECIMEN,

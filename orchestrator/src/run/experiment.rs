@@ -14,7 +14,8 @@ use crate::library::FmuLibrary;
 use crate::master::{Algorithm, Ended, MasterError, Outcome, Pace, Simulation};
 use crate::motion::{self, Motion};
 use crate::ssp;
-use crate::system::tuning::{self, Rules, Tuning, Wanted};
+use crate::system::jacobi;
+use crate::system::tuning::{Rules, Tuning, Wanted};
 use crate::system::{
     self, Between, InputTable, Link, Origin, Quantity, System, SystemFile, VariableName, built_in,
 };
@@ -221,7 +222,7 @@ pub fn prepare_shared(
             let found = find(fmu);
             found.is_ok_and(|fmu| fmu.description.position(parameter).is_some())
         };
-        tuning::know_jacobi(&mut file, !is_file(&request.system), &mut has);
+        jacobi::know_jacobi(&mut file, !is_file(&request.system), &mut has);
     }
     for path in &request.inputs {
         drive(&mut file, path)?;

@@ -1,5 +1,6 @@
 //! The systems that come with the program. A rig (plant and specimen) and a controller are files
-//! of their own; a system is a controller on a rig.
+//! of their own; a system is a controller on a rig, with aids behind the controller where its name says
+//! so: `three-variable+friction`.
 
 use std::path::Path;
 
@@ -28,7 +29,7 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 13] = [
+const CONTROLLERS: [Part; 16] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
@@ -42,6 +43,9 @@ const CONTROLLERS: [Part; 13] = [
     part!("", "dual-loop"),
     part!("", "multi-metric"),
     part!("", "minimal-control-synthesis"),
+    part!("", "multiple-surface"),
+    part!("", "dynamic-surface"),
+    part!("", "receding-horizon"),
 ];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [
@@ -62,6 +66,20 @@ const SPECIMENS: [(Part, Known); 3] = [
 ];
 /// Computed structures between the ground and the specimen.
 const STRUCTURES: [Part; 1] = [part!("structure/", "two-storeys")];
+/// What a controller's command passes on its way to the valve where one of [`AIDS`] is on.
+const AID_STAGE: &str = include_str!("../../systems/aids.toml");
+/// What may follow a controller's name behind a `+`, and the switch of the component that it turns on.
+const AIDS: [(&str, &str); 7] = [
+    ("friction", "friction_compensation"),
+    ("specimen", "specimen_compensation"),
+    ("observer", "disturbance_observer"),
+    ("delta-p", PRESSURE_STABILISATION),
+    ("notch", "notch_filter"),
+    ("amplitude-phase", "amplitude_phase_control"),
+    ("harmonics", "harmonic_cancellation"),
+];
+/// The switch by which the rig is another one to the controllers.
+pub(super) const PRESSURE_STABILISATION: &str = "pressure_stabilisation";
 /// No specimen, no structure.
 pub const NONE: &str = "none";
 
@@ -75,6 +93,51 @@ pub const DEFAULT_SPECIMEN: &str = "linear";
 /// Names of the built-in systems.
 pub fn names() -> impl Iterator<Item = &'static str> {
     CONTROLLERS.iter().map(|part| part.name)
+}
+
+/// Names of the aids that may follow a system's name, each behind a `+`.
+pub fn aids() -> impl Iterator<Item = &'static str> {
+    AIDS.iter().map(|(name, _)| *name)
+}
+
+/// Checks the name of a built-in system, such as `three-variable+friction+observer`.
+///
+/// # Errors
+/// A controller or an aid that is unknown.
+pub fn check(name: &str) -> Result<(), SystemError> {
+    let unknown = |what, name: &str, hint| SystemError::Unknown {
+        what,
+        name: name.to_string(),
+        hint,
+    };
+    let mut parts = name.split('+');
+    let controller = parts.next().unwrap_or_default();
+    if !names().any(|known| known == controller) {
+        return Err(unknown("system", controller, hint(controller, names())));
+    }
+    match parts.find(|part| !aids().any(|known| known == *part)) {
+        Some(aid) => Err(unknown("aid", aid, hint(aid, aids()))),
+        None => Ok(()),
+    }
+}
+
+/// Puts the aids between the controller in `file` and the valve.
+fn add_aids(file: &mut SystemFile, wanted: &[&str]) -> Result<(), SystemError> {
+    if wanted.is_empty() {
+        return Ok(());
+    }
+    let mut stage = SystemFile::parse("the built-in aids", AID_STAGE)?;
+    for (name, switch) in AIDS {
+        if wanted.contains(&name)
+            && let Some(component) = stage.components.get_mut("aids")
+        {
+            component.set(switch, true);
+        }
+    }
+    file.redirect(&std::mem::take(&mut stage.instead));
+    file.description += &format!("; {}", wanted.join(", "));
+    file.extend(stage);
+    Ok(())
 }
 
 /// Names of the plants.
@@ -140,7 +203,7 @@ pub fn plant_path(plant: &str) -> String {
     absolute.map_or(plant.to_string(), |path| path.display().to_string())
 }
 
-/// A built-in system: the controller `name` on a rig of `plant` and `specimen` (or `none`), with the
+/// A built-in system: the controller `name`, with the aids behind it that the name has, on a rig of `plant` and `specimen` (or `none`), with the
 /// parameters that are `wanted`, by default tuned for the physical rig and as printed for the
 /// identified.
 ///
@@ -152,8 +215,12 @@ pub fn system(
     specimen: &str,
     wanted: Wanted<'_>,
 ) -> Result<SystemFile, SystemError> {
-    let controller = CONTROLLERS.iter().find(|part| part.name == name);
-    let mut file = read("system", controller, name, names())?;
+    check(name)?;
+    let (controller, aids) = name.split_once('+').unwrap_or((name, ""));
+    let part = CONTROLLERS.iter().find(|part| part.name == controller);
+    let mut file = read("system", part, controller, names())?;
+    let aids: Vec<&str> = aids.split('+').filter(|aid| !aid.is_empty()).collect();
+    add_aids(&mut file, &aids)?;
     file.origin = format!("{name} (built-in)");
     let rig = plant_of(plant)?;
     if is_plant_file(plant) {

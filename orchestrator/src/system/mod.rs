@@ -1,6 +1,7 @@
 //! Systems: components, how they are connected, and the experiment; read from TOML or put together
 //! in code, and checked against the FMUs before anything is run.
 
+mod aids;
 mod assemble;
 pub mod built_in;
 mod checked;
@@ -12,11 +13,13 @@ mod file;
 mod fitted;
 mod given;
 mod graph;
+pub mod jacobi;
 mod link;
 mod lookup;
 pub mod model;
 mod passage;
 mod rule;
+mod surface_control;
 mod table;
 pub mod tuning;
 mod value;

@@ -22,10 +22,14 @@ pub enum Rule {
     ModelPredictive,
     /// Model, weights and inverse of multi-metric control.
     MultiMetric,
+    /// Rig, friction, corners, gain and notch of the aids of operators.
+    OperatorAids,
     /// Model, friction, specimen and weights of preview control.
     Preview,
     /// Model and rates of sliding mode.
     SlidingMode,
+    /// Model, surfaces and lead of sliding mode down to the valve.
+    SurfaceControl,
     /// All gains of three-variable control.
     ThreeVariable,
     /// Shaping, filter and gain of acceleration trajectory tracking.

@@ -16,11 +16,14 @@
 //!   [`AccelerationTracking::trajectory`], [`AccelerationTracking::dual_loop`]; multi-metric control:
 //!   the feedback of preview control and [`Shaping::inverse`];
 //! - minimal control synthesis: [`MinimalControlSynthesis::tuned`];
+//! - multiple surfaces, dynamic surface, receding horizon:
+//!   [`Parameters::tuned`](controllers::surface_control::Parameters::tuned);
+//! - the aids of operators: [`AidsDesign::tuned`](controllers::tuning::aids::AidsDesign::tuned); behind a stabilised actuator the other rules have the
+//!   [`stabilised`](controllers::tuning::aids::stabilised) rig for theirs;
 //! - sliding mode and model predictive control have the model as theirs and know the delay; the
 //!   latter also knows the measurements' noise and weighs outputs in units of stroke, 20 in/s and
 //!   1 g.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -31,8 +34,11 @@ use controllers::preview::feedback::Uncertainty;
 use controllers::preview::model::{Hydraulics, RigModel};
 use controllers::tuning::acceleration_tracking::{AccelerationTuning, Shaping};
 use controllers::tuning::suite::{Member, Suite};
+use identification::closed_loop::equations::HydraulicRig;
+use identification::closed_loop::friction::SealShape;
 use serde::{Deserialize, Serialize};
 
+use super::built_in::PRESSURE_STABILISATION;
 use super::control_model::ControlModel;
 use super::file::{ComponentFile, SystemFile};
 use super::link::{Link, Origin};
@@ -60,103 +66,6 @@ pub struct Wanted<'a> {
     pub model: Option<&'a Path>,
     /// Rules on a model that has been read; they go before everything else.
     pub rules: Option<&'a Rules>,
-}
-
-/// Tells the controllers in `file` that predict over a delay how many samples a master that steps
-/// all components from the same values adds: one for each sampled component that a value passes
-/// between measurement and valve. What a file says itself stays, but for a built-in system, whose
-/// delay is that of its rig.
-///
-/// A component is one of these by its parameters: `has` says whether an FMU has one.
-pub fn know_jacobi(
-    file: &mut SystemFile,
-    is_built_in: bool,
-    has: &mut dyn FnMut(&str, &str) -> bool,
-) {
-    const LOOP: &str = "loop_delay_samples";
-    const COMMAND: &str = "command_delay_samples";
-    /// Of a law that predicts the sampled law below it: its loop begins there.
-    const LAW_BELOW: &str = "continuous_law";
-    let sampled = |name: &String| {
-        file.components
-            .get(name)
-            .is_some_and(|part| part.period.is_some())
-    };
-    let mut next: BTreeMap<&String, Vec<&String>> = BTreeMap::new();
-    for link in &file.connections {
-        if let Origin::Output(from) = &link.from {
-            next.entry(&from.component)
-                .or_default()
-                .push(&link.to.component);
-        }
-    }
-    let mut found = Vec::new();
-    for (name, part) in &file.components {
-        if !sampled(name) || !has(&part.fmu, LOOP) {
-            continue;
-        }
-        let through = !has(&part.fmu, LAW_BELOW);
-        let longest = |start: &String| longest_path(start, &next, &sampled, name, through);
-        let starts = file.components.keys().filter(|name| !sampled(name));
-        let hops = starts.filter_map(longest).max();
-        if let Some(hops) = hops {
-            let mut told = vec![(LOOP, hops)];
-            if has(&part.fmu, COMMAND) {
-                told.push((COMMAND, 1));
-            }
-            found.push((name.clone(), told));
-        }
-    }
-    for (name, told) in found {
-        let Some(part) = file.components.get_mut(&name) else {
-            continue;
-        };
-        for (parameter, samples) in told {
-            let own = match part.parameters.get(parameter) {
-                Some(Setting::Integer(own)) if is_built_in => *own,
-                Some(_) => continue,
-                None => 0,
-            };
-            part.set(parameter, own + samples);
-        }
-    }
-}
-
-/// Sampled components on the longest way from `at` to a component that is none, through the
-/// component `by` where `through` is set and past it otherwise.
-fn longest_path(
-    at: &String,
-    next: &BTreeMap<&String, Vec<&String>>,
-    sampled: &impl Fn(&String) -> bool,
-    by: &String,
-    through: bool,
-) -> Option<i64> {
-    fn walk<'a>(
-        at: &'a String,
-        next: &BTreeMap<&'a String, Vec<&'a String>>,
-        sampled: &impl Fn(&String) -> bool,
-        seen: &mut Vec<&'a String>,
-        fits: &impl Fn(&[&String]) -> bool,
-    ) -> Option<i64> {
-        let mut most = None;
-        for &to in next.get(at).into_iter().flatten() {
-            if !sampled(to) {
-                if !seen.is_empty() && fits(seen) {
-                    most = most.max(Some(seen.len() as i64));
-                }
-                continue;
-            }
-            if seen.contains(&to) {
-                continue;
-            }
-            seen.push(to);
-            most = most.max(walk(to, next, sampled, seen, fits));
-            seen.pop();
-        }
-        most
-    }
-    let fits = |seen: &[&String]| seen.contains(&by) == through;
-    walk(at, next, sampled, &mut Vec::new(), &fits)
 }
 
 /// Gives the controllers in `file` the parameters for `plant` with a specimen.
@@ -242,7 +151,7 @@ const KNOWN_STIFFNESS: f64 = 0.8;
 const KNOWN_YIELD_FORCE: f64 = 1.2;
 
 /// A specimen as a controller knows it.
-fn known(specimen: &YieldingSpecimen) -> YieldingSpecimen {
+pub(super) fn known(specimen: &YieldingSpecimen) -> YieldingSpecimen {
     let mut known = *specimen;
     known.columns.yield_force *= KNOWN_YIELD_FORCE;
     known.columns.yield_displacement *= KNOWN_YIELD_FORCE / KNOWN_STIFFNESS;
@@ -252,12 +161,14 @@ fn known(specimen: &YieldingSpecimen) -> YieldingSpecimen {
 /// All rules on a model.
 #[derive(Debug, Clone)]
 pub struct Rules {
-    model: ControlModel,
+    pub(super) model: ControlModel,
     /// Of the controllers whose parameters the thesis prints; none: those stay as printed.
-    suite: Option<Suite>,
+    pub(super) suite: Option<Suite>,
+    /// The same behind a stabilised actuator, once it was asked for.
+    pub(super) stabilised: OnceLock<Result<Box<Rules>, String>>,
 }
 
-fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
+pub(super) fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
     for (name, value) in values {
         component.set(name, *value);
     }
@@ -270,17 +181,44 @@ impl Rules {
     /// A model for which a rule finds none.
     pub fn new(model: ControlModel) -> Result<Self, plant::ModelError> {
         let suite = Some(model.suite()?);
-        Ok(Self { model, suite })
+        Ok(Self {
+            suite,
+            ..Self::unprinted(model)
+        })
     }
 
     /// Those of the controllers alone whose parameters the thesis does not print.
     pub fn unprinted(model: ControlModel) -> Self {
-        Self { model, suite: None }
+        Self {
+            model,
+            suite: None,
+            stabilised: OnceLock::new(),
+        }
     }
 
     /// Gives the controllers in `file` their parameters, under a specimen; its mass counts where the
     /// model knows of none.
     fn apply(
+        &self,
+        file: &mut SystemFile,
+        specimen: Option<&YieldingSpecimen>,
+    ) -> Result<(), String> {
+        let mut is_stabilised = false;
+        for component in file.components.values_mut() {
+            if component.tuning == Some(Rule::OperatorAids) {
+                self.operator_aids(component, specimen)?;
+                let switch = component.parameters.get(PRESSURE_STABILISATION);
+                is_stabilised |= switch == Some(&Setting::Boolean(true));
+            }
+        }
+        match is_stabilised {
+            true => self.behind_stabilisation()?.tune(file, specimen),
+            false => self.tune(file, specimen),
+        }
+    }
+
+    /// The same for the controllers, whatever aids are behind them.
+    fn tune(
         &self,
         file: &mut SystemFile,
         specimen: Option<&YieldingSpecimen>,
@@ -297,6 +235,7 @@ impl Rules {
                     self.linear_quadratic_gaussian(component, specimen)?;
                 }
                 Rule::MultiMetric => self.multi_metric(component, specimen)?,
+                Rule::SurfaceControl => self.surface_control(component, specimen)?,
                 Rule::TrajectoryTracking => {
                     let tuning = AccelerationTracking::trajectory;
                     let own = tuning(&self.model.rig, &self.model.measurements());
@@ -354,6 +293,8 @@ impl Rules {
                 | Rule::MultiMetric
                 | Rule::TrajectoryTracking
                 | Rule::DualLoop
+                | Rule::OperatorAids
+                | Rule::SurfaceControl
                 | Rule::MinimalControlSynthesis => continue,
             };
             for (parameter, value) in suite.named(member) {
@@ -412,17 +353,7 @@ impl Rules {
     ) -> Result<(), String> {
         self.linear_quadratic_gaussian(component, specimen)?;
         if let Some((own, shape)) = &self.model.hydraulics {
-            set(
-                component,
-                &[
-                    ("seal_friction", own.seal_friction),
-                    ("seal_presliding", shape.presliding),
-                    ("seal_excess", shape.excess),
-                    ("seal_stribeck_velocity", shape.stribeck_velocity),
-                    ("seal_sharpness", shape.sharpness),
-                    ("seal_relaxation", shape.relaxation),
-                ],
-            );
+            set(component, &friction_values(own.seal_friction, shape));
         }
         component.set("specimen_known", specimen.is_some());
         if let Some(known) = specimen.map(known) {
@@ -457,17 +388,7 @@ impl Rules {
         self.model(component);
         if let Some((own, _)) = &self.model.hydraulics {
             component.set("hydraulics_known", true);
-            set(
-                component,
-                &[
-                    ("spool_lag", own.spool_lag),
-                    ("spool_inertia", own.spool_inertia),
-                    ("force_rate", own.force_rate),
-                    ("oil_stiffness", own.oil_stiffness),
-                    ("leakage_rate", own.leakage_rate),
-                    ("seal_damping", own.seal_damping),
-                ],
-            );
+            set(component, &hydraulic_values(&hydraulics(own)));
         }
         set(
             component,
@@ -488,6 +409,42 @@ impl Rules {
     }
 }
 
+/// Valve and oil alone.
+pub(super) fn hydraulics(own: &HydraulicRig) -> Hydraulics {
+    Hydraulics {
+        spool_lag: own.spool_lag,
+        spool_inertia: own.spool_inertia,
+        force_rate: own.force_rate,
+        oil_stiffness: own.oil_stiffness,
+        leakage_rate: own.leakage_rate,
+        seal_damping: own.seal_damping,
+    }
+}
+
+/// Valve and oil by the names that components have for them.
+pub(super) fn hydraulic_values(own: &Hydraulics) -> [(&'static str, f64); 6] {
+    [
+        ("spool_lag", own.spool_lag),
+        ("spool_inertia", own.spool_inertia),
+        ("force_rate", own.force_rate),
+        ("oil_stiffness", own.oil_stiffness),
+        ("leakage_rate", own.leakage_rate),
+        ("seal_damping", own.seal_damping),
+    ]
+}
+
+/// Dry friction (N) and its shape by the names that components have for them.
+pub(super) fn friction_values(friction: f64, shape: &SealShape) -> [(&'static str, f64); 6] {
+    [
+        ("seal_friction", friction),
+        ("seal_presliding", shape.presliding),
+        ("seal_excess", shape.excess),
+        ("seal_stribeck_velocity", shape.stribeck_velocity),
+        ("seal_sharpness", shape.sharpness),
+        ("seal_relaxation", shape.relaxation),
+    ]
+}
+
 /// Preview control of a model's rig, not yet tuned.
 fn preview_control(model: &ControlModel) -> preview::Parameters {
     let usual = preview::Parameters::default();
@@ -495,14 +452,7 @@ fn preview_control(model: &ControlModel) -> preview::Parameters {
     preview::Parameters {
         rig: RigModel {
             shake_table: model.rig,
-            hydraulics: model.hydraulics.map(|(own, _)| Hydraulics {
-                spool_lag: own.spool_lag,
-                spool_inertia: own.spool_inertia,
-                force_rate: own.force_rate,
-                oil_stiffness: own.oil_stiffness,
-                leakage_rate: own.leakage_rate,
-                seal_damping: own.seal_damping,
-            }),
+            hydraulics: model.hydraulics.map(|(own, _)| hydraulics(&own)),
         },
         delay: model.delay,
         uncertainty: Uncertainty {

@@ -336,9 +336,14 @@ fn built_in_systems_are_valid_archives_and_give_in_ecos_and_libcosim_what_jacobi
     // It takes no SSP 2.0 either. Neither sets an enumeration, by which preview control has its role.
     let sets_enumerations = |(archive, _): &(PathBuf, PathBuf)| {
         let name = archive.display().to_string();
-        ["-compensated-", "multi-metric-"]
-            .iter()
-            .any(|role| name.contains(role))
+        [
+            "-compensated-",
+            "multi-metric-",
+            "-surface-",
+            "receding-horizon-",
+        ]
+        .iter()
+        .any(|role| name.contains(role))
     };
     let mut taken = [bare, loaded];
     for pairs in &mut taken {

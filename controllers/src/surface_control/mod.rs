@@ -1,0 +1,254 @@
+//! Sliding mode down to the valve: surfaces for motion, oil and spool, one behind the other, and a surface
+//! over a receding horizon.
+//!
+//! With `e = x - x_d` and `S = de/dt + lambda e` as in [`sliding_mode`](crate::sliding_mode), on the oil and the
+//! spool themselves in place of loops of displacement and force:
+//!
+//! ```text
+//! S1 = S                 P_d = m (a_d - lambda de/dt - K1 S1) + c v + k x - f
+//! S2 = P - P_d           y_d = (dP_d/dt + K v + p P - K2 S2)/g
+//! S3 = y - y_d           u   = y + l (dy_d/dt - K3 S3) - o
+//! ```
+//!
+//! - **Multiple surfaces** (M. Won and J. K. Hedrick, International Journal of Control 64, 1996): the derivatives of
+//!   `P_d` and `y_d` are differences of two samples.
+//! - **Dynamic surface** (D. Swaroop, J. K. Hedrick, P. P. Yip and J. C. Gerdes, IEEE Transactions on Automatic Control 45,
+//!   2000): `P_d` and `y_d` pass lags `T dz/dt = P_d - z`, which give them.
+//! - **Receding horizon** (A. Hansen and J. K. Hedrick, American Control Conference, 2015): the moves of the command over
+//!   the next samples that bring `S` from where it is to zero as `exp(-K1 t)` in least squares, the motion
+//!   known ahead; the first of them is made.
+//!
+//! State, force `f` on the table and offset `o` of the valve are those of preview control's Kalman
+//! filter, [`Feedback`].
+
+mod horizon;
+mod surfaces;
+
+use nalgebra::SVector;
+use units::constants::SAMPLING_PERIOD;
+
+pub use self::surfaces::SurfaceMemory;
+use crate::aids::rig::KnownRig;
+use crate::pid::VALVE_LIMIT;
+use crate::preview::feedback::{Feedback, FeedbackState, Uncertainty};
+use crate::preview::feedforward::PREVIEW;
+use crate::preview::model::{OUTPUTS, SampledRig};
+use crate::{Controller, ModelError, Motion};
+
+/// Which law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variant {
+    /// Multiple surfaces.
+    #[default]
+    MultipleSurface,
+    /// Dynamic surface.
+    DynamicSurface,
+    /// Receding horizon.
+    RecedingHorizon,
+}
+
+/// What the law is built from.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Parameters {
+    /// Which law.
+    pub variant: Variant,
+    /// The rig.
+    pub rig: KnownRig,
+    /// `lambda`, 1/s.
+    pub surface_rate: f64,
+    /// `K1`, `K2`, `K3`, 1/s.
+    pub reaching_rates: [f64; 3],
+    /// Time constants of the lags on `P_d` and `y_d`, s.
+    pub filter_times: [f64; 2],
+    /// Samples by which the motion is ahead that the surfaces follow, at most [`PREVIEW`]: what sampling,
+    /// differences or lags make the table late by.
+    pub lead: usize,
+    /// Weight of the command's change a sample beside `S`, m/s per V.
+    pub move_weight: f64,
+    /// What the estimates take to be uncertain.
+    pub uncertainty: Uncertainty,
+    /// Largest magnitude of the valve command, V.
+    pub limit: f64,
+    /// Sampling period, s.
+    pub period: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            variant: Variant::default(),
+            rig: KnownRig::default(),
+            surface_rate: 20.0,
+            reaching_rates: [20.0, 40.0, 80.0],
+            filter_times: [0.01, 0.005],
+            lead: 0,
+            move_weight: 0.01,
+            uncertainty: crate::preview::Parameters::default().uncertainty,
+            limit: VALVE_LIMIT,
+            period: SAMPLING_PERIOD,
+        }
+    }
+}
+
+impl Parameters {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first with which the law cannot run.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        self.rig.validate()?;
+        const REACHING: [&str; 3] = [
+            "motion_reaching_rate",
+            "oil_reaching_rate",
+            "spool_reaching_rate",
+        ];
+        const MEASURED: [&str; OUTPUTS] = [
+            "displacement_measurement_noise",
+            "velocity_measurement_noise",
+            "acceleration_measurement_noise",
+        ];
+        let own = &self.uncertainty;
+        ModelError::require_positive("surface_rate", self.surface_rate)?;
+        for i in 0..3 {
+            ModelError::require_positive(REACHING[i], self.reaching_rates[i])?;
+            ModelError::require_positive(MEASURED[i], own.measurement[i])?;
+        }
+        ModelError::require_positive("oil_filter_time", self.filter_times[0])?;
+        ModelError::require_positive("spool_filter_time", self.filter_times[1])?;
+        if self.lead > PREVIEW {
+            return Err(ModelError::Parameter {
+                name: "reference_lead_samples",
+                value: self.lead as f64,
+                expected: "at most 20",
+            });
+        }
+        ModelError::require_positive("move_weight", self.move_weight)?;
+        ModelError::require_positive("force_step", own.force_step)?;
+        ModelError::require_positive("offset_step", own.offset_step)?;
+        ModelError::require_positive("valve_limit", self.limit)?;
+        ModelError::require_positive("period", self.period)
+    }
+}
+
+/// What the law is told.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SurfaceInput {
+    /// Wanted motion: now, then sample by sample ahead.
+    pub reference: [Motion; PREVIEW + 1],
+    /// Measured motion.
+    pub measured: Motion,
+}
+
+/// What the law remembers: plain data.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Memory {
+    feedback: FeedbackState,
+    surfaces: SurfaceMemory,
+    /// The command before, V.
+    command: f64,
+}
+
+/// The law: what it was built from, what follows from that, and what it remembers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceControl {
+    parameters: Parameters,
+    rig: SampledRig,
+    feedback: Feedback,
+    /// First move over the horizon per error of `S` at its samples, V s/m.
+    moves: [f64; PREVIEW],
+    /// The law's memory.
+    pub memory: Memory,
+}
+
+impl SurfaceControl {
+    /// Designs filter and horizon.
+    ///
+    /// # Errors
+    /// What [`Parameters::validate`] refuses; a Riccati equation without a stabilising solution.
+    pub fn new(parameters: Parameters) -> Result<Self, ModelError> {
+        parameters.validate()?;
+        let p = &parameters;
+        let rig = p.rig.model().sample(p.period);
+        let usual = crate::preview::Parameters::default();
+        // Of the feedback only the filter is used.
+        let feedback = Feedback::new(
+            &rig,
+            &SVector::from(usual.feedback_weights),
+            usual.command_weight,
+            &p.uncertainty,
+            p.rig.delay,
+        )?;
+        let moves = horizon::first_move(&rig, p.surface_rate, p.move_weight)?;
+        Ok(Self {
+            parameters,
+            rig,
+            feedback,
+            moves,
+            memory: Memory::default(),
+        })
+    }
+
+    /// What it was built from.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+}
+
+impl Controller for SurfaceControl {
+    type Input = SurfaceInput;
+    /// Valve command, V.
+    type Output = f64;
+
+    fn validate(&self) -> Result<(), ModelError> {
+        self.parameters.validate()
+    }
+
+    fn step(&mut self, input: &SurfaceInput, _period: f64) -> f64 {
+        let p = &self.parameters;
+        let Motion {
+            displacement,
+            velocity,
+            acceleration,
+        } = input.measured;
+        let measured = SVector::from([displacement, velocity, acceleration]);
+        let memory = &mut self.memory;
+        let state = &mut memory.feedback;
+        let found = self.feedback.estimate(state, &self.rig, &measured, 0.0);
+        let command = match p.variant {
+            Variant::RecedingHorizon => horizon::command(
+                &horizon::Plan {
+                    feedback: &self.feedback,
+                    rig: &self.rig,
+                    moves: &self.moves,
+                    surface_rate: p.surface_rate,
+                    left: (-p.reaching_rates[0] * p.period).exp(),
+                },
+                &found,
+                &input.reference,
+                memory.command,
+            ),
+            variant => {
+                let is_filtered = variant == Variant::DynamicSurface;
+                surfaces::command(
+                    p,
+                    is_filtered,
+                    &found,
+                    &input.reference[p.lead],
+                    &mut memory.surfaces,
+                )
+            }
+        };
+        let command = command.clamp(-p.limit, p.limit);
+        self.feedback.sent(state, &self.rig, command, 0.0);
+        memory.command = command;
+        command
+    }
+
+    fn reset(&mut self) {
+        self.memory = Memory::default();
+    }
+}
+
+#[cfg(test)]
+mod tests;

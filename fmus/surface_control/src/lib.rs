@@ -1,0 +1,162 @@
+#![allow(non_snake_case, reason = "an FMU is named in camel case")]
+//! Sliding mode down to the valve as an FMU.
+
+mod settings;
+
+use controllers::preview::feedforward::PREVIEW;
+use controllers::surface_control::{Memory, SurfaceControl as Law, SurfaceInput};
+use controllers::{Controller, Motion};
+use fmu_kit::{Built, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
+use serde::{Deserialize, Serialize};
+
+use settings::{Settings, VARIANTS};
+
+/// Sliding mode from reference and measured motion to valve command.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct SurfaceControl {
+    settings: Settings,
+    reference: Motion,
+    displacement_ahead: [f64; PREVIEW],
+    velocity_ahead: [f64; PREVIEW],
+    acceleration_ahead: [f64; PREVIEW],
+    measured: Motion,
+    memory: Memory,
+    valve_command: f64,
+    #[serde(skip)]
+    built: Built<Settings, Law>,
+}
+
+const NOW: [&str; 6] = [
+    "reference_displacement",
+    "reference_velocity",
+    "reference_acceleration",
+    "measured_displacement",
+    "measured_velocity",
+    "measured_acceleration",
+];
+
+fn build(settings: &Settings) -> Result<Law, plant::ModelError> {
+    Law::new(settings.parameters(SurfaceControl::STEP_SIZE)?)
+}
+
+impl Component for SurfaceControl {
+    const NAME: &'static str = "SurfaceControl";
+    const DESCRIPTION: &'static str =
+        "Sliding mode of a shake table: multiple surfaces, dynamic surface, receding horizon";
+    const DOCUMENTATION: &'static str = include_str!("../README.md");
+    const TERMINALS: &'static [Terminal] = &[
+        Terminal::bus(
+            "reference",
+            "reference",
+            &[
+                ("displacement", "reference_displacement"),
+                ("velocity", "reference_velocity"),
+                ("acceleration", "reference_acceleration"),
+            ],
+        ),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[
+                ("displacement", "measured_displacement"),
+                ("velocity", "measured_velocity"),
+                ("acceleration", "measured_acceleration"),
+            ],
+        ),
+        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+    ];
+    const ANY_STEP_SIZE: bool = false;
+
+    fn variables() -> Vec<Variable<Self>> {
+        let mut variables = fmu_kit::table! { Self, s:
+            input("reference_displacement", s.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input("reference_velocity", s.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
+            input("reference_acceleration", s.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
+            input("measured_displacement", s.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+            input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
+        };
+        let ahead = fmu_kit::reference_ahead::<Self>(
+            PREVIEW,
+            [
+                |s| &mut s.displacement_ahead,
+                |s| &mut s.velocity_ahead,
+                |s| &mut s.acceleration_ahead,
+            ],
+        );
+        let inputs: Vec<String> = NOW
+            .iter()
+            .map(|name| name.to_string())
+            .chain(ahead.iter().map(|variable| variable.name.clone()))
+            .collect();
+        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+        variables.extend(ahead);
+        let outputs = fmu_kit::table! { Self, s:
+            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0).depends_on(&inputs, Dependent);
+        };
+        variables.extend(outputs);
+        variables.extend(settings::variables());
+        variables.push(
+            Variable::choice("variant", VARIANTS, |s: &mut Self| &mut s.settings.variant)
+                .about("Which law"),
+        );
+        variables
+    }
+
+    fn initialize(&mut self) -> ComponentResult {
+        self.built.of(&self.settings, build)?;
+        self.memory = Memory::default();
+        self.valve_command = 0.0;
+        Ok(())
+    }
+
+    fn step(&mut self, _time: f64, step_size: f64) -> ComponentResult {
+        let control = self.built.of(&self.settings, build)?;
+        control.memory = self.memory;
+        let input = SurfaceInput {
+            reference: std::array::from_fn(|i| match i.checked_sub(1) {
+                None => self.reference,
+                Some(i) => Motion {
+                    displacement: self.displacement_ahead[i],
+                    velocity: self.velocity_ahead[i],
+                    acceleration: self.acceleration_ahead[i],
+                },
+            }),
+            measured: self.measured,
+        };
+        self.valve_command = control.step(&input, step_size);
+        self.memory = control.memory;
+        Ok(())
+    }
+}
+
+fmu_kit::export!(SurfaceControl);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_controller_is_built_from_is_refused_by_name() {
+        for (name, value) in [
+            ("surface_rate", 0.0),
+            ("oil_reaching_rate", -1.0),
+            ("force_step", 0.0),
+            ("valve_limit", 0.0),
+            ("table_mass", 0.0),
+            ("loop_delay_samples", 9.0),
+        ] {
+            let mut component = SurfaceControl::default();
+            let variables = SurfaceControl::variables();
+            let variable = variables.iter().find(|v| v.name == name).unwrap();
+            match &variable.access {
+                fmu_kit::variable::Access::Real(field) => *field(&mut component) = value,
+                fmu_kit::variable::Access::Integer(field) => *field(&mut component) = value as i32,
+                _ => panic!("{name} is no number"),
+            }
+            let error = component.initialize().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{name}`")), "{name}: {error}");
+        }
+    }
+}
