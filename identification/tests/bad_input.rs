@@ -181,6 +181,25 @@ fn a_sensor_that_stands_at_its_end_is_clipped_and_not_frozen() {
 }
 
 #[test]
+fn a_converter_with_steps_as_coarse_as_the_noise_is_no_fault() {
+    let mut case = healthy();
+    let noise = case.nominal.noise;
+    for (channel, noise) in Channel::OUTPUTS.into_iter().zip(noise) {
+        let step = 2.0 * noise;
+        let coarse = |values: &mut Vec<f64>| {
+            for value in values.iter_mut() {
+                *value = (*value / step).round() * step;
+            }
+        };
+        edit(&mut case.identification, channel, coarse);
+        edit(&mut case.validation, channel, coarse);
+    }
+    for recording in [&case.identification, &case.validation] {
+        assert_eq!(problems(recording, &case.nominal), Vec::<String>::new());
+    }
+}
+
+#[test]
 fn dropped_samples_that_were_filled_are_named() {
     let mut case = healthy();
     for channel in Channel::OUTPUTS {

@@ -59,3 +59,38 @@ pub enum Error {
         reason: String,
     },
 }
+
+/// A message without the middle of lines that are longer than anyone reads: those that quote a file
+/// whose lines do not end.
+#[must_use]
+pub fn clipped(message: &str) -> String {
+    const LONGEST: usize = 600;
+    let lines = message.lines().map(|line| {
+        let characters: Vec<char> = line.chars().collect();
+        if characters.len() <= LONGEST {
+            return line.to_string();
+        }
+        let part = |of: &[char]| of.iter().collect::<String>();
+        let left_out = characters.len() - LONGEST;
+        let (begin, end) = (
+            &characters[..LONGEST / 2],
+            &characters[characters.len() - LONGEST / 2..],
+        );
+        format!("{} [{left_out} characters] {}", part(begin), part(end))
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_lose_the_middle_of_endless_lines() {
+        let short = "file.toml: line 1\nexpected a number";
+        assert_eq!(clipped(short), short);
+        let long = clipped(&format!("file.toml\n{}end", "x".repeat(100_000)));
+        assert!(long.len() < 700 && long.starts_with("file.toml\nxxx") && long.ends_with("xend"));
+        assert!(long.contains("[99403 characters]"), "{long}");
+    }
+}

@@ -5,9 +5,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use identification::IdentificationError;
+use identification::data::{Channel, OUTPUT_NAMES};
+use identification::diagnosis::case::{ControlLaw, Nominal};
 use identification::diagnosis::engine::NamedEffect;
 use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
-use identification::identify::model_file::{EffectSections, ModelFile, SI, StandardErrors, Units};
+use identification::identify::model_file::{
+    EffectSections, ModelFile, SI, StandardErrors, UncertaintySection, Units,
+};
 use plant::identified::effects::{self, Variable};
 use plant::identified::nominal::{NominalRig, PARAMETERS};
 use plant::identified::shake_table::ShakeTable;
@@ -102,6 +106,30 @@ impl ExtendedModel {
         Self { parameters, file }
     }
 
+    /// The same with what a later record is looked at by: the rate, law and noise that `nominal` states,
+    /// and its parameters as they were described.
+    #[must_use]
+    pub fn beside(mut self, nominal: &Nominal) -> Self {
+        let described = Self::new(&Estimated::known(nominal), &[]).file;
+        let channels = OUTPUT_NAMES.into_iter().zip(nominal.noise);
+        let noise = channels.chain([(Channel::ValveCommand.name(), nominal.command_noise)]);
+        self.file.sample_rate = Some(nominal.sample_rate);
+        self.file.controller = nominal.controller.as_ref().map(law_section);
+        self.file.noise = Some(
+            noise
+                .map(|(name, value)| (name.to_owned(), value.into()))
+                .collect(),
+        );
+        self.file.uncertainty = Some(UncertaintySection {
+            relative: nominal.uncertainty,
+        });
+        self.file.described = Some(Box::new(ModelFile {
+            standard_errors: None,
+            ..described
+        }));
+        self
+    }
+
     /// The text of the model file.
     ///
     /// # Errors
@@ -188,6 +216,7 @@ fn model_file(model: &Estimated, effects: EffectSections, errors: EffectSections
         table: table(&model.shake_table),
         specimen: model.specimen.map(specimen),
         effects,
+        controller: None,
         noise: None,
         hydraulics: None,
         covariance: None,
@@ -199,5 +228,25 @@ fn model_file(model: &Estimated, effects: EffectSections, errors: EffectSections
             command_delay: None,
             effects: errors,
         }),
+        described: None,
     }
+}
+
+/// The law in the words of a `nominal.toml`, SI.
+fn law_section(law: &ControlLaw) -> toml::Table {
+    let mut section = toml::Table::new();
+    section.insert("kind".into(), "three_variable_control".into());
+    for (name, value) in [
+        ("proportional", law.proportional),
+        ("integral", law.integral),
+        ("velocity_feedforward", law.velocity_feedforward),
+        ("acceleration_feedforward", law.acceleration_feedforward),
+        ("velocity_feedback", law.velocity_feedback),
+        ("acceleration_feedback", law.acceleration_feedback),
+        ("velocity_filter", law.velocity_filter),
+        ("limit", law.limit),
+    ] {
+        section.insert(name.into(), value.into());
+    }
+    section
 }

@@ -14,6 +14,7 @@ use identification::diagnosis::rigs::{Description, ExtendedRig};
 use identification::identify::{model_file::ModelFile, specimen_file};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use shakebench::error::clipped;
 use shakebench::fmu::Fmu;
 use shakebench::run::{manifest::Manifest, signals::read_csv, summary::Summary};
 use shakebench::system::{Between, InputTable, SystemFile};
@@ -187,7 +188,7 @@ fn archive(entries: &[(&str, PathBuf)]) -> Sound {
 
 /// Reads the file with a parser: none where all is well, else what is wrong with how it was read.
 ///
-/// A message names the file, or the parser was given none, and is no book.
+/// A message, as the program prints it, names the file, or the parser was given none, and is no book.
 pub fn fault(parser: &Parser, path: &Path) -> Option<String> {
     let begin = Instant::now();
     let outcome = catch_unwind(AssertUnwindSafe(|| (parser.read)(path)));
@@ -201,8 +202,8 @@ pub fn fault(parser: &Parser, path: &Path) -> Option<String> {
         Ok(Err(message)) if !message.contains(&*name) && parser.name != "nominal" => {
             Some(format!("no file in `{message}`"))
         }
-        Ok(Err(message)) if message.len() > 20_000 => {
-            Some(format!("a message of {} bytes", message.len()))
+        Ok(Err(message)) if clipped(&message).len() > 20_000 => {
+            Some(format!("a message of {} bytes", clipped(&message).len()))
         }
         Ok(_) => None,
     }

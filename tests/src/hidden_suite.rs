@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::UNIX_EPOCH;
 
-use hidden_effects::score::{Estimate, NamedEffect, outcome, parameter_errors, wilson};
+use hidden_effects::score::{Estimate, NamedEffect, names, outcome, parameter_errors, wilson};
 use hidden_effects::{Case, Kind, Outcome, Settings, Truth, Verdict, World};
 use identification::diagnosis::case::Case as Laboratory;
 use identification::diagnosis::engine::{self, Observer};
@@ -121,6 +121,7 @@ fn core_seconds() -> f64 {
 pub fn as_scored(diagnosis: &Diagnosis) -> Verdict {
     let effects = diagnosis.effects.iter().map(|effect| NamedEffect {
         effect: effect.effect.into(),
+        confidence: effect.confidence,
         parameters: effect
             .parameters
             .iter()
@@ -392,9 +393,43 @@ pub fn table(results: &[Scored]) -> String {
             quantile(&seconds, 1.0)
         );
     }
+    text.push_str(&reliability(results));
     text.push_str(&confusions(results));
     for scored in results.iter().filter(|r| r.outcome != Outcome::Right) {
         let _ = writeln!(text, "{}", line(scored));
+    }
+    text
+}
+
+/// Bounds of the confidences that are counted together.
+const SURE: [f64; 6] = [0.0, 0.5, 0.9, 0.99, 0.999, 1.0];
+
+/// Of the effects named with a confidence, how many are there.
+fn reliability(results: &[Scored]) -> String {
+    let all: Vec<(f64, bool)> = results
+        .iter()
+        .flat_map(|scored| names(&scored.truth, &scored.verdict))
+        .collect();
+    let mut text = String::from("\nconfidence -> named, there, 95 % interval\n");
+    for bounds in SURE.windows(2) {
+        let last = bounds[1] == 1.0;
+        let within = |sure: f64| bounds[0] <= sure && (sure < bounds[1] || last);
+        let own: Vec<&(f64, bool)> = all.iter().filter(|(sure, _)| within(*sure)).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let there = own.iter().filter(|(_, there)| *there).count();
+        let mean = own.iter().map(|(sure, _)| sure).sum::<f64>() / own.len() as f64;
+        let (low, high) = wilson(there, own.len());
+        let _ = writeln!(
+            text,
+            "{} to {} (mean {mean:.4}) -> {}, {there}, {:.1} to {:.1} %",
+            bounds[0],
+            bounds[1],
+            own.len(),
+            100.0 * low,
+            100.0 * high
+        );
     }
     text
 }

@@ -415,6 +415,56 @@ fn foreign_fmus_run_among_each_other_and_with_ours() {
     );
 }
 
+/// Each with each, of both versions: what one does in the process does not change the other.
+#[test]
+fn reference_fmus_in_pairs_are_as_they_are_alone() {
+    let Some(folder) = shared::folder() else {
+        return;
+    };
+    let mut fmus = Vec::new();
+    for version in ["fmi2", "fmi3"] {
+        let all = fs::read_dir(folder.join("foreign-fmus").join(version)).unwrap();
+        fmus.extend(all.map(|entry| entry.unwrap().path()));
+    }
+    fmus.retain(|path| path.file_stem().is_some_and(|name| name != "Clocks"));
+    fmus.sort();
+    let component =
+        |name: &str, fmu: &Path| format!("[components.{name}]\nfmu = \"{}\"\n", fmu.display());
+    let columns = |outcome: &Outcome, own: &str| -> Vec<Vec<f64>> {
+        let names = outcome.record.columns.iter();
+        let own = names.filter(|name| name.starts_with(&format!("{own}.")));
+        own.map(|name| column(outcome, name)).collect()
+    };
+    let (step, samples) = (0.01, 101);
+    let alone: Vec<_> = fmus
+        .iter()
+        .map(|fmu| {
+            let outcome = run(&component("one", fmu), &[], step, samples);
+            assert!(
+                outcome.ended.is_regular(),
+                "{}: {}",
+                fmu.display(),
+                outcome.ended.message()
+            );
+            columns(&outcome, "one")
+        })
+        .collect();
+    for (i, one) in fmus.iter().enumerate() {
+        for (k, other) in fmus.iter().enumerate().skip(i) {
+            let system = component("one", one) + &component("other", other);
+            let outcome = run(&system, &[], step, samples);
+            let told = format!("{} with {}", one.display(), other.display());
+            assert!(
+                outcome.ended.is_regular(),
+                "{told}: {}",
+                outcome.ended.message()
+            );
+            assert_eq!(columns(&outcome, "one"), alone[i], "{told}");
+            assert_eq!(columns(&outcome, "other"), alone[k], "{told}");
+        }
+    }
+}
+
 #[test]
 fn scheduled_execution_is_refused_in_words() {
     let Some(fmu) = foreign("fmi3", "Clocks") else {

@@ -168,6 +168,7 @@ impl Found {
             table: body(three(&values, 9)),
             specimen: specimen.map(|own| own.0),
             effects: EffectSections::new(),
+            controller: None,
             noise: Some(noise),
             hydraulics: Some(hydraulic_section(&self.rig, &self.shape)),
             uncertainty: Some(UncertaintySection {
@@ -181,6 +182,7 @@ impl Found {
                 specimen: specimen.map(|own| own.1),
                 command_delay: (delay > 0.0).then_some(self.standard_error[11]),
             }),
+            described: None,
         })
     }
 }

@@ -13,4 +13,4 @@ pub use report::{
     DiagnosisReport, EffectReport, Evidence, GainAgainstNoise, GainReport, ParameterReport,
     RigEvidence, ShakeTableEvidence,
 };
-pub use subject::{Diagnosis, DiagnosisError, Subject, diagnose};
+pub use subject::{Diagnosis, DiagnosisError, Subject, called, diagnose};

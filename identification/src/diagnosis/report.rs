@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::engine::{NamedEffect, Verdict};
+use super::rigs::shake_table::experiment::SeparatingExperiment;
 use super::rigs::shake_table::{self, RelationReport};
 use super::rigs::{NamedValue, RigDiagnosis};
 
@@ -22,6 +23,9 @@ pub struct DiagnosisReport {
     pub alternatives: Vec<Vec<String>>,
     /// The experiment that would tell the first rival apart.
     pub separating_experiment: Option<String>,
+    /// Its motion, as `run --reference` plays it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub separating_motion: Option<PathBuf>,
     /// What the extended model brings on data that were not fitted.
     pub gain: GainReport,
     /// Where the extended model was written.
@@ -198,7 +202,11 @@ impl From<&shake_table::Diagnosis> for DiagnosisReport {
             verdict: found.verdict,
             effects: found.effects.iter().map(EffectReport::from).collect(),
             alternatives: found.alternatives.iter().map(owned).collect(),
-            separating_experiment: found.separating_experiment.clone(),
+            separating_experiment: found
+                .separating_experiment
+                .as_ref()
+                .map(SeparatingExperiment::sentence),
+            separating_motion: None,
             gain: (&found.gain).into(),
             extended_model: None,
             extended_fmu: None,
@@ -250,6 +258,7 @@ impl From<&RigDiagnosis> for DiagnosisReport {
             effects: confirmed.effects.iter().map(effect).collect(),
             alternatives: rivals.map(|(rival, _)| vec![rival.clone()]).collect(),
             separating_experiment: None,
+            separating_motion: None,
             gain: GainReport {
                 before_nrmse: part.nominal_error,
                 after_nrmse: confirmed.error,

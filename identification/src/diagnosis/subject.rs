@@ -58,7 +58,10 @@ fn channels() -> String {
 }
 
 /// What a map of columns calls the channels of a case.
-fn called(map: &Path) -> Result<Vec<Called>, DiagnosisError> {
+///
+/// # Errors
+/// A map that cannot be read, or that names a channel which no case has.
+pub fn called(map: &Path) -> Result<Vec<Called>, DiagnosisError> {
     let all = column_map(map)?.into_iter();
     all.map(|(name, (head, unit))| {
         let mut known = Channel::KNOWN.into_iter();

@@ -42,6 +42,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
+use crate::error;
 use crate::fmu::{FmiVersion, isolation};
 use crate::pack::supply;
 use crate::report::UnitSystem;
@@ -175,7 +176,7 @@ pub fn main() -> ExitCode {
         Some(Command::Validate(arguments)) => validate::execute(&arguments),
     };
     let status = done.unwrap_or_else(|error| {
-        eprintln!("error: {}", clipped(&error.to_string()));
+        eprintln!("error: {}", error::clipped(&error.to_string()));
         ExitCode::from(2)
     });
     terminal::flush();
@@ -183,26 +184,6 @@ pub fn main() -> ExitCode {
         true => ExitCode::from(1),
         false => status,
     }
-}
-
-/// A message without the middle of lines that are longer than anyone reads: those that quote a file
-/// whose lines do not end.
-fn clipped(message: &str) -> String {
-    const LONGEST: usize = 600;
-    let lines = message.lines().map(|line| {
-        let characters: Vec<char> = line.chars().collect();
-        if characters.len() <= LONGEST {
-            return line.to_string();
-        }
-        let part = |of: &[char]| of.iter().collect::<String>();
-        let left_out = characters.len() - LONGEST;
-        let (begin, end) = (
-            &characters[..LONGEST / 2],
-            &characters[characters.len() - LONGEST / 2..],
-        );
-        format!("{} [{left_out} characters] {}", part(begin), part(end))
-    });
-    lines.collect::<Vec<_>>().join("\n")
 }
 
 /// `--fmi` where one version is meant.
@@ -229,15 +210,6 @@ impl From<OneVersion> for FmiVersion {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn messages_lose_the_middle_of_endless_lines() {
-        let short = "file.toml: line 1\nexpected a number";
-        assert_eq!(clipped(short), short);
-        let long = clipped(&format!("file.toml\n{}end", "x".repeat(100_000)));
-        assert!(long.len() < 700 && long.starts_with("file.toml\nxxx") && long.ends_with("xend"));
-        assert!(long.contains("[99403 characters]"), "{long}");
-    }
 
     #[test]
     fn every_option_stands_in_the_book() {

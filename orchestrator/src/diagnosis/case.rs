@@ -1,6 +1,7 @@
 //! The extended model of a shake table: its file, its FMUs, and what they make of the validation
 //! record in closed loop.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use identification::data::Channel;
@@ -9,7 +10,7 @@ use identification::diagnosis::rigs::shake_table::Diagnosis;
 use identification::diagnosis::{DiagnosisReport, Evidence};
 
 use super::co_simulation::{self, Comparison, RigFmus};
-use super::{EXTENDED_MODEL, file_fault};
+use super::{EXTENDED_MODEL, SEPARATING_MOTION, file_fault};
 use crate::error::Error;
 use crate::extended_model::ExtendedModel;
 use crate::pack::{self, FmiVersion, PackedFmu};
@@ -35,7 +36,7 @@ pub(super) fn extend(
     results: &mut Results,
     folder: &Path,
 ) -> Result<Extended, Error> {
-    let model = ExtendedModel::new(&found.extended_model, &found.modelled);
+    let model = ExtendedModel::new(&found.extended_model, &found.modelled).beside(&case.nominal);
     if found.effects.is_empty() && !found.modelled.is_empty() {
         let names: Vec<&str> = found.modelled.iter().map(|e| e.effect).collect();
         report.notes.push(format!(
@@ -47,6 +48,28 @@ pub(super) fn extend(
         .toml()
         .map_err(|error| file_fault(&folder.join(EXTENDED_MODEL), error))?;
     results.write_text(EXTENDED_MODEL, &text)?;
+    if let Some(experiment) = &found.separating_experiment {
+        let (x, period) = (&experiment.reference, experiment.period);
+        results.write(SEPARATING_MOTION, |file| {
+            writeln!(
+                file,
+                "time [s],displacement [m],velocity [m/s],acceleration [m/s^2]"
+            )?;
+            for k in 0..x.len() {
+                let (before, after) = (x[k.saturating_sub(1)], x[(k + 1).min(x.len() - 1)]);
+                let velocity = (after - before) / (2.0 * period);
+                let acceleration = (after - 2.0 * x[k] + before) / (period * period);
+                let time = k as f64 * period;
+                writeln!(
+                    file,
+                    "{time:.6},{:.9e},{velocity:.9e},{acceleration:.9e}",
+                    x[k]
+                )?;
+            }
+            Ok(())
+        })?;
+        report.separating_motion = Some(folder.join(SEPARATING_MOTION));
+    }
     let mut comparison = None;
     match fmus(&model, results) {
         Ok(built) => {

@@ -47,14 +47,7 @@ impl RigFmus {
     /// The same FMUs with the parameters of the nominal model and the effects that it knows.
     #[must_use]
     pub fn nominal(mut self, nominal: &Nominal) -> Self {
-        let known = Estimated {
-            shake_table: nominal.shake_table,
-            specimen: nominal.specimen,
-            effects: nominal.effects,
-            sensors: nominal.sensors,
-            standard_errors: BTreeMap::new(),
-        };
-        self.values = ExtendedModel::new(&known, &[]).parameters;
+        self.values = ExtendedModel::new(&Estimated::known(nominal), &[]).parameters;
         self
     }
 }

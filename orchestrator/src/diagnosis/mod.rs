@@ -30,6 +30,8 @@ use crate::results::Results;
 
 /// File with the extended model, in the folder of `--out`.
 pub const EXTENDED_MODEL: &str = "extended_model.toml";
+/// File with the motion that would tell rivals apart, in the folder of `--out`.
+pub const SEPARATING_MOTION: &str = "separating_motion.csv";
 /// File with the JSON object, in the folder of `--out`.
 pub const DIAGNOSIS: &str = "diagnosis.json";
 
@@ -91,6 +93,7 @@ pub fn files(report: &DiagnosisReport, folder: &Path) -> Vec<PathBuf> {
         let own = own.iter().map(|name| folder.join(name));
         files.extend(own.filter(|file| file.is_file()));
     }
+    files.extend(report.separating_motion.iter().cloned());
     files.extend(report.extended_fmus.iter().cloned());
     files
 }

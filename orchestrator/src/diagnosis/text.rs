@@ -141,6 +141,12 @@ pub(super) fn remarks(report: &DiagnosisReport) -> Vec<String> {
     };
     if let Some(experiment) = &report.separating_experiment {
         lines.push(format!("what would separate them: {experiment}"));
+        if let Some(motion) = &report.separating_motion {
+            let motion = motion.display();
+            lines.push(format!(
+                "it is {motion}; see it with `shakebench run three-variable --reference {motion}`"
+            ));
+        }
     }
     lines.extend(report.notes.iter().cloned());
     if let Evidence::ShakeTable(evidence) = &report.evidence {

@@ -155,6 +155,96 @@ fn a_diagnosis_has_the_fields_of_the_contract_and_its_files() {
     ] {
         assert!(page.contains(words), "`{words}` is not in the page");
     }
+    what_the_extended_model_makes_of_a_record(folder.path(), &case);
+}
+
+/// Nothing is fitted: a record is scored, and predicted from its reference alone.
+fn what_the_extended_model_makes_of_a_record(folder: &Path, case: &Path) {
+    let record = case.join("validation.csv");
+    let with_model = |more: &[&str]| {
+        let model = ["diagnose", "--model", "out/extended_model.toml", "--json"];
+        let output = shakebench(folder, &[&model[..], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        serde_json::from_str::<Value>(&stdout(&output)).unwrap()
+    };
+    let scored = with_model(&["--validate", record.to_str().unwrap()]);
+    let table = &scored["tables"][0];
+    let number = |name: &str| table[name].as_f64().unwrap();
+    assert!(number("described_in_noise") > 1.5, "{scored}");
+    assert!(
+        (0.9..1.1).contains(&number("extended_in_noise")),
+        "{scored}"
+    );
+    let records = scored["records"].as_array().unwrap();
+    assert_eq!(records.len(), 4);
+    assert!(records.iter().all(|own| own["extended_percent"].is_f64()));
+
+    let text = fs::read_to_string(&record).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let head: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let place = |name: &str| head.iter().position(|cell| cell.starts_with(name)).unwrap();
+    let (time, reference) = (place("time"), place("reference"));
+    let displacement = place("displacement");
+    let mut wanted = format!("{},{},displacement [in]\n", head[time], head[reference]);
+    let mut measured = Vec::new();
+    for line in lines {
+        let cells: Vec<&str> = line.split(',').collect();
+        wanted += &format!("{},{},\n", cells[time], cells[reference]);
+        measured.push(0.0254 * cells[displacement].parse::<f64>().unwrap());
+    }
+    fs::write(folder.join("wanted.csv"), wanted).unwrap();
+    let told = with_model(&["--predict", "wanted.csv", "--out", "prediction.csv"]);
+    assert_eq!((&told["given"], &told["unit"]), (&0.into(), &"in".into()));
+    let predicted = fs::read_to_string(folder.join("prediction.csv")).unwrap();
+    let mut rows = predicted.lines();
+    assert!(
+        rows.next()
+            .unwrap()
+            .starts_with("prediction,time [s],displacement [m],")
+    );
+    let predicted: Vec<f64> = rows
+        .map(|row| 0.0254 * row.split(',').next().unwrap().parse::<f64>().unwrap())
+        .collect();
+    assert_eq!(predicted.len(), measured.len());
+    let sum = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
+    let missed = sum(&mut predicted.iter().zip(&measured).map(|(a, b)| a - b));
+    // The whole record in closed loop, without a look at it: noise and unseen voltage are all that is missed.
+    let share = missed / sum(&mut measured.iter().copied());
+    assert!(share < 0.05, "{share}");
+}
+
+#[test]
+fn an_extended_model_of_a_table_says_what_it_lacks() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |words: &[&str], text: &str| {
+        fs::write(folder.path().join("model.toml"), text).unwrap();
+        fs::write(
+            folder.path().join("wanted.csv"),
+            "time [s],reference [in]\n0,0\n0.002,0\n",
+        )
+        .unwrap();
+        let output = shakebench(
+            folder.path(),
+            &[
+                "diagnose",
+                "--model",
+                "model.toml",
+                "--predict",
+                "wanted.csv",
+            ],
+        );
+        assert_eq!(output.status.code(), Some(2));
+        for word in words {
+            assert!(stderr(&output).contains(word), "{}", stderr(&output));
+        }
+    };
+    let template = shakebench(folder.path(), &["diagnose", "--template", "table"]);
+    let nominal = stdout(&template).replace("nan", "0.1");
+    told(&["model.toml", "[described]"], &nominal);
+    told(
+        &["model.toml", "sample_rate"],
+        &nominal.replace("sample_rate", "# sample_rate"),
+    );
 }
 
 #[test]

@@ -18,6 +18,41 @@ pub enum Droop {
     Line,
     /// `exp(-L m)`.
     Exponential,
+    /// `(1 - L m)^(1/2)`, an orifice's flow under a pressure that falls with the demand; no less than the
+    /// floor.
+    Root,
+}
+
+/// How friction goes through zero velocity, of width w.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sign {
+    /// `tanh(v/w)`.
+    HyperbolicTangent,
+    /// `2/pi arctan(pi v / (2 w))`.
+    Arctangent,
+    /// `v / (v² + w²)^(1/2)`.
+    Root,
+}
+
+impl Sign {
+    /// Its value at velocity `v` with width `w`.
+    pub fn at(self, v: f64, w: f64) -> f64 {
+        use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
+        match self {
+            Self::HyperbolicTangent => (v / w).tanh(),
+            Self::Arctangent => FRAC_2_PI * (FRAC_PI_2 * v / w).atan(),
+            Self::Root => v / v.hypot(w),
+        }
+    }
+}
+
+/// How the hysteretic part z of a drift goes over into yielding at y.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Yielding {
+    /// Bouc and Wen: `dz = (1 - (1 + sign(z v))/2 |z/y|^n) v`.
+    BoucWen,
+    /// Elastic, then plastic: `z` stands at `y`.
+    Bilinear,
 }
 
 /// How stiffness falls with the largest drift so far, from 0 to the full loss.
@@ -36,7 +71,9 @@ pub enum Degradation {
 pub struct Form {
     /// True for the usual forms.
     pub usual: bool,
-    /// Width of the friction's sign function, in/s.
+    /// The friction's sign function.
+    pub friction_sign: Sign,
+    /// Its width, in/s.
     pub friction_width: f64,
     /// Velocity of the Stribeck bump, in/s.
     pub stribeck_velocity: f64,
@@ -44,7 +81,9 @@ pub struct Form {
     pub stribeck_exponent: f64,
     /// Excursion over which friction fades, in.
     pub fading_displacement: f64,
-    /// Sharpness of yielding.
+    /// Law of yielding.
+    pub yielding: Yielding,
+    /// Its sharpness.
     pub yield_exponent: f64,
     /// Stiffness after yielding over stiffness before.
     pub yield_ratio: f64,
@@ -80,10 +119,12 @@ impl Default for Form {
     fn default() -> Self {
         Self {
             usual: true,
+            friction_sign: Sign::HyperbolicTangent,
             friction_width: 0.1,
             stribeck_velocity: 0.5,
             stribeck_exponent: 2.0,
             fading_displacement: 0.3,
+            yielding: Yielding::BoucWen,
             yield_exponent: 3.0,
             yield_ratio: 0.05,
             uplift_ratio: 0.2,
@@ -137,13 +178,33 @@ impl Form {
             Degradation::Hyperbola,
             Degradation::Line,
         ];
-        Self {
+        let drawn = Self {
             stribeck_exponent: if rng.random_bool(0.3) { 1.0 } else { 2.0 },
             droop: droops[rng.random_range(0..3)],
             degradation: degradations[rng.random_range(0..3)],
             absent_share: f64::from(rng.random_bool(0.5)),
             disturbed_before_play: rng.random_bool(0.5),
             ..chosen
+        };
+        if world != World::Open {
+            return drawn;
+        }
+        // Laws that a diagnosis need not hold.
+        let signs = [Sign::HyperbolicTangent, Sign::Arctangent, Sign::Root];
+        let is_bilinear = rng.random_bool(0.3);
+        Self {
+            friction_sign: signs[rng.random_range(0..3)],
+            yielding: if is_bilinear {
+                Yielding::Bilinear
+            } else {
+                Yielding::BoucWen
+            },
+            droop: if rng.random_bool(0.25) {
+                Droop::Root
+            } else {
+                drawn.droop
+            },
+            ..drawn
         }
     }
 }

@@ -236,6 +236,7 @@ impl Rig {
             Droop::Hyperbola => 1.0 / (1.0 + loss),
             Droop::Line => (1.0 - loss).max(h.form.droop_floor),
             Droop::Exponential => (-loss).exp(),
+            Droop::Root => (1.0 - loss).max(0.0).sqrt().max(h.form.droop_floor),
         };
         if let Some(drift) = h.outside(Outside::WarmingOil) {
             u *= 1.0 + drift * (self.time / 20.0 - 0.3);
@@ -293,7 +294,7 @@ impl Rig {
 
         // Table and foundation.
         let v = s[V];
-        let sign = (v / h.form.friction_width).tanh();
+        let sign = h.form.friction_sign.at(v, h.form.friction_width);
         let mut friction = h.value("coulomb_friction");
         if let (Some(coulomb), Some(bump)) =
             (h.get("stribeck_friction", 0), h.get("stribeck_friction", 1))

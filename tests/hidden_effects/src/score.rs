@@ -65,6 +65,9 @@ pub struct Verdict {
 pub struct NamedEffect {
     /// Name in the catalogue.
     pub effect: String,
+    /// How sure it is said to be, 0 to 1.
+    #[serde(default)]
+    pub confidence: f64,
     /// Estimates by parameter.
     #[serde(default)]
     pub parameters: BTreeMap<String, Estimate>,
@@ -188,6 +191,19 @@ pub fn parameter_errors(
     errors
 }
 
+/// Of every effect that is named: how sure it is said to be, and whether it is there.
+pub fn names(truth: &Truth, verdict: &Verdict) -> Vec<(f64, bool)> {
+    if verdict.verdict != "named" {
+        return Vec::new();
+    }
+    let is_there = |name: &str| {
+        let mut hidden = truth.effects.iter();
+        hidden.any(|e| canonical(&e.effect) == canonical(name))
+    };
+    let all = verdict.effects.iter();
+    all.map(|e| (e.confidence, is_there(&e.effect))).collect()
+}
+
 /// Wilson's 95 % interval of a share, as fractions.
 pub fn wilson(hits: usize, of: usize) -> (f64, f64) {
     if of == 0 {
@@ -230,6 +246,7 @@ mod tests {
                 .iter()
                 .map(|e| NamedEffect {
                     effect: (*e).into(),
+                    confidence: 1.0,
                     parameters: BTreeMap::new(),
                 })
                 .collect(),

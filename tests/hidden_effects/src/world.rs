@@ -14,7 +14,8 @@ pub enum World {
     #[default]
     Plain,
     /// Drawn in every case, outside what a diagnosis may have been made for: an unseen voltage of 1 to
-    /// 30 mV below 2 to 60 Hz, coloured noise and quantisation on the sensors, other forms of effects.
+    /// 30 mV below 2 to 60 Hz, coloured noise and quantisation on the sensors, other forms of effects and other laws of
+    /// friction, yielding and droop.
     Open,
     /// As the plain one with three times the noise and 2 % mismatch.
     Noisy,

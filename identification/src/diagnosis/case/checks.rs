@@ -9,8 +9,12 @@ const SHORTEST: usize = 500;
 const LEAST_EXCITATION: f64 = 8.0;
 /// Equal readings in a row, at the channel's extreme, that betray a clipped sensor.
 const CLIPPED_RUN: usize = 4;
-/// Samples that may repeat the one before in every channel by chance (converters have steps).
+/// Samples that may repeat the one before in every channel without being looked at.
 const MOST_REPEATED: usize = 5;
+/// Samples over which a channel repeats itself about equally often.
+const REPEATS_EVENLY: usize = 250;
+/// Steps of a coarse converter at either end whose readings are compared with the extreme ones.
+const STEPS_BESIDE: usize = 3;
 /// Equal readings in a row that betray a frozen one.
 const FROZEN_RUN: usize = 50;
 
@@ -171,8 +175,19 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
     }
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // Where a converter's steps are coarse, readings repeat wherever the motion turns or rests, as often
+    // a few steps below the extremes.
+    let mut levels = values.to_vec();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    let ends = levels.len().saturating_sub(1).min(STEPS_BESIDE);
+    let next_to_low = levels.get(ends).copied().unwrap_or(high);
+    let next_to_high = levels
+        .len()
+        .checked_sub(1 + ends)
+        .map_or(low, |place| levels[place]);
     let (mut run, mut start) = (1, 0);
-    let mut clipped = 0;
+    let (mut clipped, mut beside) = (0, 0);
     for k in 1..=values.len() {
         if k < values.len() && values[k] == values[k - 1] {
             run += 1;
@@ -191,10 +206,12 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
         }
         if run >= CLIPPED_RUN && is_extreme {
             clipped += run;
+        } else if run >= CLIPPED_RUN && (value >= next_to_high || value <= next_to_low) {
+            beside += run;
         }
         (run, start) = (1, k);
     }
-    if clipped > 2 * CLIPPED_RUN && high > low {
+    if clipped > 2 * (CLIPPED_RUN + beside) && high > low {
         found.push(format!(
             "{name}: `{channel}` is clipped, {clipped} readings stand at its extremes {low:.4e} \
              and {high:.4e}"
@@ -209,14 +226,22 @@ fn held(recording: &Recording) -> Option<String> {
         .into_iter()
         .filter_map(|channel| recording.channel(channel))
         .collect();
-    let repeats = |k: &usize| {
-        channels
-            .iter()
-            .all(|channel| channel[*k] == channel[*k - 1])
-    };
-    let repeated: Vec<usize> = (1..recording.len()).filter(repeats).collect();
+    let same = |channel: &&[f64], k: usize| channel[k] == channel[k - 1];
+    let all: Vec<usize> = (1..recording.len()).collect();
+    let repeats = |k: &&usize| channels.iter().all(|channel| same(channel, **k));
+    let repeated: Vec<usize> = all.iter().filter(repeats).copied().collect();
     let first = *repeated.first()?;
-    (repeated.len() > MOST_REPEATED).then(|| {
+    // A converter with steps as coarse as the noise repeats readings too, each channel by itself.
+    let by_chance = |block: &[usize]| -> f64 {
+        let n = block.len() as f64;
+        let shares = channels.iter().map(|channel| {
+            let count = block.iter().filter(|k| same(channel, **k)).count();
+            count as f64 / n
+        });
+        n * shares.product::<f64>()
+    };
+    let by_chance: f64 = all.chunks(REPEATS_EVENLY).map(by_chance).sum();
+    (repeated.len() as f64 > MOST_REPEATED as f64 + 3.0 * by_chance).then(|| {
         format!(
             "{}: {} samples repeat the one before in all channels, the first after {:.4} s: \
              dropped samples that were filled",

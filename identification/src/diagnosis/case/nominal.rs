@@ -83,6 +83,9 @@ struct File {
     _covariance: Option<IgnoredAny>,
     #[serde(rename = "standard_errors")]
     _standard_errors: Option<IgnoredAny>,
+    // What a diagnosis began from.
+    #[serde(rename = "described")]
+    _described: Option<IgnoredAny>,
 }
 
 /// Units of all numbers of the file.

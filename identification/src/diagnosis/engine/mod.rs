@@ -19,7 +19,7 @@ pub use least_squares::{
     Columns, Free, SimulatedModel, Solution, all_errors, deviations, least_squares, solution,
 };
 pub use likelihood::{Hypothesis, PenalisedLikelihood};
-pub use model::{Candidate, EffectParameter, ExtensibleModel, Point, Role, Scale};
+pub use model::{Candidate, EffectParameter, ExtensibleModel, Lesson, Point, Role, Scale};
 pub use progress::{Observer, Progress, Step};
 pub use search::{Found, Selection, search};
 pub use verdict::{Judgement, NamedEffect, ParameterEstimate, Verdict, estimates, judge};

@@ -24,9 +24,14 @@ pub trait ExtensibleModel: Sync {
     /// one value a sample.
     fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)>;
 
-    /// The same rig with what its predictor assumes about unseen disturbances multiplied by
-    /// `factor`.
-    fn disturbed(&self, factor: f64) -> Self
+    /// The same rig with the noises that fit `residuals`, those of `records` after one another at
+    /// `point`; none where they cannot be learned.
+    fn with_learned_noise(
+        &self,
+        point: &Point,
+        residuals: &[f64],
+        records: &[usize],
+    ) -> Option<Lesson<Self>>
     where
         Self: Sized;
 
@@ -50,6 +55,16 @@ pub trait ExtensibleModel: Sync {
         record: usize,
         out: &mut [f64],
     ) -> bool;
+}
+
+/// A model whose noises were learned from records.
+pub struct Lesson<M> {
+    /// It.
+    pub model: M,
+    /// By how much they lower twice the negative log likelihood.
+    pub gain: f64,
+    /// What was learned, by name.
+    pub figures: Vec<(&'static str, f64)>,
 }
 
 /// Share of its range within which a parameter is at its bound.

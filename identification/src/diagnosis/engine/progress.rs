@@ -16,6 +16,13 @@ pub enum Progress {
         /// What it achieves, by name.
         figures: Vec<(&'static str, f64)>,
     },
+    /// The noises were learned.
+    Noise {
+        /// By how much they lower twice the negative log likelihood.
+        gain: f64,
+        /// What was learned, by name.
+        figures: Vec<(&'static str, f64)>,
+    },
 }
 
 /// Why a search looks at a model.
@@ -35,6 +42,13 @@ impl fmt::Display for Progress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Fitting(records) => write!(f, "fitting {records}"),
+            Self::Noise { gain, figures } => {
+                write!(f, "  noise learned: gain {gain:.4e}")?;
+                for (name, value) in figures {
+                    write!(f, ", {name} {value:.3}")?;
+                }
+                Ok(())
+            }
             Self::Model {
                 step,
                 effects,

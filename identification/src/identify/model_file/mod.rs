@@ -50,6 +50,9 @@ pub struct ModelFile {
     /// (`effect.parameter`), SI whatever `units` says.
     #[serde(default, skip_serializing_if = "EffectSections::is_empty")]
     pub effects: EffectSections,
+    /// The law that made the command, as a `nominal.toml` states it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub controller: Option<toml::Table>,
     /// One standard deviation of the white noise of each channel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<toml::Table>,
@@ -65,6 +68,9 @@ pub struct ModelFile {
     /// Standard errors of everything above, in the same layout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_errors: Option<StandardErrors>,
+    /// The nominal model that a diagnosis began from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub described: Option<Box<ModelFile>>,
 }
 
 fn inch_pound() -> String {
@@ -266,6 +272,7 @@ impl ModelFile {
             table: Self::body_section([table.mass, table.damping, table.stiffness], units),
             specimen: rig.specimen.map(|own| Self::body_section(body(own), units)),
             effects: EffectSections::new(),
+            controller: None,
             noise: Some(noise(found)),
             hydraulics: None,
             uncertainty: Some(UncertaintySection {
@@ -289,6 +296,7 @@ impl ModelFile {
                 command_delay: (delay > 0.0)
                     .then_some(found.standard_error[Physical::CommandDelay]),
             }),
+            described: None,
         }
     }
 

@@ -1,6 +1,7 @@
 //! The specimen and what is hidden in it.
 
 use super::*;
+use crate::form::Yielding;
 
 impl Rig {
     pub(super) fn specimen_masses(&self) -> (f64, f64) {
@@ -43,10 +44,16 @@ impl Rig {
         }
         if let Some(yielding) = h.get("specimen_yielding", 0) {
             let z = s[HYSTERETIC];
-            let shape = 0.5
-                * (1.0 + (z * rate).signum())
-                * (z.abs() / yielding).powf(h.form.yield_exponent);
-            derivative[HYSTERETIC] = rate * (1.0 - shape);
+            derivative[HYSTERETIC] = match h.form.yielding {
+                Yielding::BoucWen => {
+                    let shape = 0.5
+                        * (1.0 + (z * rate).signum())
+                        * (z.abs() / yielding).powf(h.form.yield_exponent);
+                    rate * (1.0 - shape)
+                }
+                Yielding::Bilinear if z.abs() >= yielding && z * rate > 0.0 => 0.0,
+                Yielding::Bilinear => rate,
+            };
             let ratio = h.form.yield_ratio;
             elastic = k * (ratio * drift + (1.0 - ratio) * z);
         }

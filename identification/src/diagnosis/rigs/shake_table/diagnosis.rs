@@ -6,9 +6,8 @@ use plant::identified::effects::{self, Effects, Reporting};
 use plant::identified::shake_table::ShakeTable;
 use plant::sensors::instrumentation::Instrumentation;
 use plant::specimens::linear::LinearSpecimen;
-use units::constants::INCH;
 
-use super::experiment;
+use super::experiment::{self, SeparatingExperiment};
 use super::gain::{Gain, gain};
 use super::health::{RelationReport, health};
 use super::relations::{misfit, relations};
@@ -26,8 +25,14 @@ use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Samples};
 /// standard deviations of its noise.
 const LAW_HOLDS_WITHIN: f64 = 4.0;
 
+/// Standard deviations to either side of an estimate that hold the truth in 95 of 100 cases.
+const INTERVAL_95: f64 = 1.96;
+
 /// A channel whose noise is this many times what is stated is said to be loud.
 const LOUD: f64 = 2.0;
+/// And beyond this many times it is another sensor than the one described, or a broken one: no cause is
+/// claimed from it. The prior of a level is a factor of 2.7 at its 95 % ends.
+const TOO_LOUD: f64 = 4.0;
 
 /// The parameter set that the FMUs of table, specimen and instrumentation take, SI.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -45,6 +50,19 @@ pub struct ExtendedModel {
     pub standard_errors: BTreeMap<String, f64>,
 }
 
+impl ExtendedModel {
+    /// What was known before any diagnosis.
+    pub fn known(nominal: &Nominal) -> Self {
+        Self {
+            shake_table: nominal.shake_table,
+            specimen: nominal.specimen,
+            effects: nominal.effects,
+            sensors: nominal.sensors,
+            standard_errors: BTreeMap::new(),
+        }
+    }
+}
+
 /// What came out of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnosis {
@@ -57,7 +75,7 @@ pub struct Diagnosis {
     /// Rival sets of effects.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The experiment that would tell the first rival apart.
-    pub separating_experiment: Option<String>,
+    pub separating_experiment: Option<SeparatingExperiment>,
     /// What the extended model brings on the validation record.
     pub gain: Gain,
     /// The extended model.
@@ -198,7 +216,7 @@ fn prediction(
     record: usize,
 ) -> Option<(Predictor, Vec<f64>)> {
     let rig = model.rig(point);
-    let predictor = Predictor::design(&rig, model.period, model.noise, model.disturbance).ok()?;
+    let predictor = Predictor::design(&rig, model.period, &model.noise).ok()?;
     let samples = &model.records[record].samples;
     let mut out = vec![0.0; 4 * samples.len()];
     let sampled = predictor.sample(&rig).ok()?;
@@ -216,7 +234,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         problems: vec![problem.into()],
     };
     let mut notes = Vec::new();
-    let model = prepare(case, &mut notes)?;
+    let mut model = prepare(case, &mut notes)?;
     let relations = relations(&case.identification, &case.nominal);
     if let Some(problem) = misfit(&relations) {
         return Err(unfit(&problem));
@@ -233,13 +251,23 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
              belong together?",
         )
     };
+    let mut judgement = judge(&mut model, &fitted, &[held_out], observer).ok_or_else(lost)?;
     let before = prediction(&model, &origin, held_out).ok_or_else(lost)?;
-    let samples = &model.records[held_out].samples;
-    let mut judgement = judge(&model, &fitted, &[held_out], observer).ok_or_else(lost)?;
-    for note in at_their_ends(&model, &judgement.best.point) {
-        judgement.verdict = Verdict::Unexplained;
-        notes.push(note);
+    let mut doubts = at_their_ends(&model, &judgement.best.point);
+    for doubt in at_their_ends(&model, &judgement.all.point) {
+        if !doubts.contains(&doubt) {
+            doubts.push(doubt);
+        }
     }
+    if judgement.verdict != Verdict::Unexplained {
+        doubts.extend(judgement.effects.iter().filter_map(indistinct));
+    }
+    if !doubts.is_empty() || loudest(&model) > TOO_LOUD {
+        judgement.verdict = Verdict::Unexplained;
+    }
+    notes.extend(doubts);
+    notes.extend(noise_note(&model));
+    let samples = &model.records[held_out].samples;
     let after = prediction(&model, &judgement.best.point, held_out).ok_or_else(lost)?;
     let gain = gain(
         samples,
@@ -251,21 +279,13 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
     let effects = readable(judgement.effects);
     let separating_experiment = judgement.rival_points.first().and_then(|rival| {
         let law = case.nominal.controller?;
-        let found = experiment::separate(
+        experiment::separate(
             &rig,
             &model.rig(rival),
             &law,
             &case.nominal.noise,
             model.period,
-        )?;
-        Some(format!(
-            "{} with a peak of {:.2} in ({:.1} mm): the rivals differ there by {:.1} standard \
-             deviations of the noise",
-            found.kind,
-            found.peak / INCH,
-            1e3 * found.peak,
-            found.separation
-        ))
+        )
     });
     let fits_fitted = {
         let squares: f64 = judgement.best.residuals.iter().map(|r| r * r).sum();
@@ -383,6 +403,64 @@ fn at_their_ends(model: &ShakeTableModel, point: &Point) -> Vec<String> {
         }
     }
     notes
+}
+
+/// What speaks against naming `effect`: an interval of 95 % that holds zero for everything that says how
+/// strong it is.
+fn indistinct(effect: &NamedEffect) -> Option<String> {
+    let mut sizes = effect.parameters.iter().filter(|p| !p.is_shape).peekable();
+    sizes.peek()?;
+    sizes
+        .all(|size| size.value.abs() < INTERVAL_95 * size.standard_error)
+        .then(|| {
+            format!(
+                "{} would help, but on all records its size is no different from zero",
+                effect.effect
+            )
+        })
+}
+
+/// The learned noise of a sensor over what is stated, of the loudest.
+fn loudest(model: &ShakeTableModel) -> f64 {
+    let noise = &model.noise;
+    let ratios = (0..4).filter_map(|i| {
+        let stated = model.stated_noise.white[i];
+        let slow = noise.slow[i].map_or(0.0, |slow| slow.sigma);
+        stated
+            .is_finite()
+            .then(|| noise.white[i].hypot(slow) / stated)
+    });
+    ratios.fold(0.0, f64::max)
+}
+
+/// The noises that were learned, where they are not those that were stated.
+fn noise_note(model: &ShakeTableModel) -> Option<String> {
+    let noise = &model.noise;
+    if *noise == model.stated_noise {
+        return None;
+    }
+    let mut sensors = Vec::new();
+    for (i, name) in OUTPUT_NAMES.iter().enumerate() {
+        let stated = model.stated_noise.white[i];
+        if !stated.is_finite() {
+            continue;
+        }
+        let slow = noise.slow[i];
+        let size = noise.white[i].hypot(slow.map_or(0.0, |slow| slow.sigma));
+        let colour = slow.map_or(String::new(), |slow| {
+            let share = 100.0 * (slow.sigma / size).powi(2);
+            let corner = slow.corner(model.period);
+            format!(" ({share:.0} % of its power below {corner:.0} Hz)")
+        });
+        sensors.push(format!("{name} {:.2}{colour}", size / stated));
+    }
+    Some(format!(
+        "noise as the records show it: {:.1} mV beside the command below {:.0} Hz; of the sensors, in what is \
+         stated, {}",
+        1e3 * noise.unseen.sigma,
+        noise.unseen.corner(model.period),
+        sensors.join(", ")
+    ))
 }
 
 /// Two quadratures as amplitude and phase, where the effect is told so.

@@ -3,6 +3,7 @@
 pub mod catalogue;
 mod diagnosis;
 pub mod experiment;
+mod extended;
 pub mod gain;
 mod health;
 pub mod predictor;
@@ -10,6 +11,7 @@ pub mod relations;
 mod sentence;
 
 pub use diagnosis::*;
+pub use extended::{ChannelErrors, DESCRIBED, ExtendedTable, TableErrors, TablePrediction};
 pub use health::RelationReport;
 pub use plant::identified::effects::quantity::laboratory_unit;
 pub use sentence::{amount, said, with_error};

@@ -11,8 +11,10 @@ use plant::identified::rig::IdentifiedRig;
 
 use crate::data::OUTPUT_NAMES;
 use crate::diagnosis::case::Nominal;
-use crate::diagnosis::engine::{Candidate, ExtensibleModel, Point};
-use crate::diagnosis::rigs::shake_table::predictor::{Disturbance, Predictor, Samples};
+use crate::diagnosis::engine::{Candidate, ExtensibleModel, Lesson, Point};
+use crate::diagnosis::rigs::shake_table::predictor::{
+    Disturbance, Noise, Predictor, Samples, learn,
+};
 
 /// A recording prepared for the predictor, and whether the effects were there when it was taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,10 +38,10 @@ pub struct ShakeTableModel {
     pub uncertainty: f64,
     /// Sampling period, s.
     pub period: f64,
-    /// Sensor noise, SI, infinite where a channel is missing.
-    pub noise: [f64; 4],
-    /// What drives the rig unseen.
-    pub disturbance: Disturbance,
+    /// What its predictors assume of the noises.
+    pub noise: Noise,
+    /// What was known of them beforehand.
+    pub stated_noise: Noise,
     /// The records.
     pub records: Vec<Prepared>,
     candidates: Vec<Candidate>,
@@ -59,6 +61,8 @@ impl ShakeTableModel {
             .iter()
             .fold(1e-3f64, |peak, u| peak.max(u.abs()));
         let (candidates, effects) = catalogue(peak, period).into_iter().unzip();
+        let unseen = Disturbance::beside_command(nominal.command_noise, period);
+        let noise = Noise::new(noise, unseen);
         Self {
             nominal: IdentifiedRig {
                 shake_table: nominal.shake_table,
@@ -69,7 +73,7 @@ impl ShakeTableModel {
             uncertainty: nominal.uncertainty,
             period,
             noise,
-            disturbance: Disturbance::beside_command(nominal.command_noise, period),
+            stated_noise: noise,
             records,
             candidates,
             effects,
@@ -141,10 +145,48 @@ impl ExtensibleModel for ShakeTableModel {
         &OUTPUT_NAMES
     }
 
-    fn disturbed(&self, factor: f64) -> Self {
+    // A baseline has another predictor, whose innovations tell no more than the others'.
+    fn with_learned_noise(
+        &self,
+        point: &Point,
+        residuals: &[f64],
+        records: &[usize],
+    ) -> Option<Lesson<Self>> {
+        let mut rest = residuals;
+        let mut innovations = Vec::new();
+        for &record in records {
+            let (mine, others) = rest.split_at_checked(self.residual_count(record))?;
+            rest = others;
+            if self.records[record].with_effects {
+                innovations.push(mine);
+            }
+        }
+        let learned = learn(
+            &self.rig(point),
+            self.period,
+            &self.noise,
+            &self.stated_noise,
+            &innovations,
+        )?;
         let mut model = self.clone();
-        model.disturbance.sigma *= factor;
-        model
+        model.noise = learned.noise;
+        let mut figures = vec![
+            ("unseen voltage in mV", 1e3 * learned.noise.unseen.sigma),
+            ("its corner in Hz", learned.noise.unseen.corner(self.period)),
+        ];
+        for (i, name) in OUTPUT_NAMES.into_iter().enumerate() {
+            let stated = self.stated_noise.white[i];
+            if stated.is_finite() {
+                let slow = learned.noise.slow[i].map_or(0.0, |slow| slow.sigma);
+                let level = learned.noise.white[i].hypot(slow);
+                figures.push((name, level / stated));
+            }
+        }
+        Some(Lesson {
+            model,
+            gain: learned.gain,
+            figures,
+        })
     }
 
     // From the measured signals one sample before: the noise of the sample itself is in its
@@ -193,9 +235,7 @@ impl ExtensibleModel for ShakeTableModel {
     }
 
     fn predictor(&self, point: &Point) -> Option<ShakeTablePredictor> {
-        let design = |rig: &IdentifiedRig| {
-            Predictor::design(rig, self.period, self.noise, self.disturbance).ok()
-        };
+        let design = |rig: &IdentifiedRig| Predictor::design(rig, self.period, &self.noise).ok();
         let without_effects = if self.records.iter().all(|record| record.with_effects) {
             None
         } else {
@@ -240,18 +280,25 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::diagnosis::engine::{Judgement, Observer, judge};
+    use crate::diagnosis::engine::{Judgement, Observer, evaluate, judge};
     use plant::identified::shake_table::ShakeTable;
     use plant::specimens::linear::LinearSpecimen;
 
-    /// Records of `rig` under a small proportional controller on random references.
-    fn model(rig: &IdentifiedRig, seed: u64) -> ShakeTableModel {
+    const PERIOD: f64 = 2e-3;
+    const STATED: [f64; 4] = [1.3e-5, 0.04, 1.3, 0.025];
+
+    fn stated() -> Noise {
+        Noise::new(STATED, Disturbance::beside_command(5e-4, PERIOD))
+    }
+
+    /// Records of `rig` with `noise` under a small proportional controller on random references.
+    fn model(rig: &IdentifiedRig, noise: &Noise, seed: u64) -> ShakeTableModel {
         let nominal = Nominal {
-            sample_rate: 500.0,
+            sample_rate: 1.0 / PERIOD,
             shake_table: ShakeTable::default(),
             specimen: Some(LinearSpecimen::default()),
             controller: None,
-            noise: [1.3e-5, 0.04, 1.3, 0.025],
+            noise: STATED,
             command_noise: 5e-4,
             uncertainty: 0.01,
             effects: Default::default(),
@@ -259,12 +306,11 @@ mod tests {
         };
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = move || -> f64 { StandardNormal.sample(&mut random) };
-        let period = 1.0 / nominal.sample_rate;
-        let sampled = rig.sample(period, 2).unwrap();
-        let disturbance = Disturbance::beside_command(nominal.command_noise, period);
+        let sampled = rig.sample(PERIOD, 2).unwrap();
         let records = ["identification", "validation"].map(|name| {
             let mut state = Default::default();
             let (mut reference, mut slow, mut unseen) = (0.0, 0.0, 0.0);
+            let mut coloured = [0.0; 4];
             let mut samples = Samples {
                 command: Vec::new(),
                 channels: Vec::new(),
@@ -272,15 +318,17 @@ mod tests {
             for k in 0..4000 {
                 slow += 0.01 * (0.15 * normal() - slow);
                 reference += 0.02 * (slow - reference);
-                let mut channels = sampled.measure(&mut state, f64::from(k) * period);
-                for (value, noise) in channels.iter_mut().zip(nominal.noise) {
-                    *value += noise * normal();
+                let mut channels = sampled.measure(&mut state, f64::from(k) * PERIOD);
+                for i in 0..4 {
+                    if let Some(slow) = noise.slow[i] {
+                        coloured[i] = slow.phi * coloured[i] + slow.drive() * normal();
+                    }
+                    channels[i] += coloured[i] + noise.white[i] * normal();
                 }
                 let command = 240.0 * (reference - channels[0]);
                 samples.command.push(command);
                 samples.channels.push(channels);
-                let fresh = disturbance.sigma * (1.0 - disturbance.phi.powi(2)).sqrt();
-                unseen = disturbance.phi * unseen + fresh * normal();
+                unseen = noise.unseen.phi * unseen + noise.unseen.drive() * normal();
                 sampled.step_disturbed(&mut state, command, unseen);
             }
             Prepared {
@@ -300,6 +348,51 @@ mod tests {
     }
 
     #[test]
+    fn the_noise_is_learned_from_the_records() {
+        let rig = IdentifiedRig {
+            specimen: Some(LinearSpecimen::default()),
+            ..Default::default()
+        };
+        let mut there = Noise::new(STATED, Disturbance::below(15e-3, 8.0, PERIOD));
+        there.white[2] *= 0.5;
+        there.slow[2] = Some(Disturbance::below(STATED[2], 10.0, PERIOD));
+        let model = model(&rig, &there, 47);
+        let origin = Point {
+            nuisance: vec![0.0; model.nuisance()],
+            effects: Vec::new(),
+        };
+        let lesson = |model: &ShakeTableModel| {
+            let fit = evaluate(model, &origin, &[0, 1]).unwrap();
+            let lesson = model.with_learned_noise(&origin, &fit.residuals, &[0, 1]);
+            (fit.residuals, lesson.unwrap())
+        };
+        let (before, first) = lesson(&model);
+        let (after, second) = lesson(&first.model);
+        let found = first.model.noise;
+        let near = |found: f64, there: f64, within: f64| {
+            assert!((found / there - 1.0).abs() < within, "{found} for {there}");
+        };
+        near(found.unseen.sigma, 15e-3, 0.15);
+        near(found.unseen.corner(PERIOD), 8.0, 0.3);
+        for i in 0..4 {
+            near(found.white[i], there.white[i], 0.05);
+        }
+        let slow = found.slow[2].unwrap();
+        near(slow.sigma, STATED[2], 0.15);
+        near(slow.corner(PERIOD), 10.0, 0.3);
+        // With it the innovations are white and of unit size, and there is nothing more to learn.
+        let mean_square = |r: &[f64]| r.iter().map(|r| r * r).sum::<f64>() / r.len() as f64;
+        assert!(mean_square(&before) > 1.5, "{}", mean_square(&before));
+        near(mean_square(&after), 1.0, 0.02);
+        assert!(
+            first.gain > 1e3 && second.gain < 30.0,
+            "{} {}",
+            first.gain,
+            second.gain
+        );
+    }
+
+    #[test]
     fn order_and_labels_of_the_catalogue_change_no_verdict() {
         let mut rig = IdentifiedRig {
             specimen: Some(LinearSpecimen::default()),
@@ -308,8 +401,8 @@ mod tests {
         for hidden in [vec![], vec!["load_cell_bias", "valve_dead_band"]] {
             rig.effects.valve.dead_band = f64::from(hidden.contains(&"valve_dead_band")) * 0.12;
             rig.sensors.actuator_force.bias = f64::from(hidden.contains(&"load_cell_bias")) * 8.0;
-            let model = model(&rig, 31);
-            let straight = judge(&model, &[0], &[1], Observer::none()).unwrap();
+            let model = model(&rig, &stated(), 31);
+            let straight = judge(&mut model.clone(), &[0], &[1], Observer::none()).unwrap();
             assert_eq!(said(&straight).1, hidden);
 
             let mut turned = model.clone();
@@ -318,7 +411,7 @@ mod tests {
             turned.candidates.rotate_left(7);
             turned.effects.rotate_left(7);
             assert_eq!(
-                said(&judge(&turned, &[0], &[1], Observer::none()).unwrap()),
+                said(&judge(&mut turned, &[0], &[1], Observer::none()).unwrap()),
                 said(&straight)
             );
 
@@ -333,7 +426,7 @@ mod tests {
                 candidate.effect = mirror(candidate.effect);
                 candidate.contains = candidate.contains.map(mirror);
             }
-            let judgement = judge(&relabelled, &[0], &[1], Observer::none()).unwrap();
+            let judgement = judge(&mut relabelled, &[0], &[1], Observer::none()).unwrap();
             let mut expected: Vec<_> = hidden.iter().map(|name| mirror(name)).collect();
             expected.sort_unstable();
             assert_eq!(said(&judgement), (straight.verdict, expected));

@@ -3,35 +3,22 @@
 //!
 //! The plant is unstable without its controller, so a replay of the command would drift; a small
 //! correction from the measured channels holds the model to the record, small enough that an
-//! effect stays visible in the innovations. What drives the rig unseen is a voltage `w` beside
-//! the command, white or coloured: `w(k+1) = phi w(k) + sigma sqrt(1 - phi²) e(k)`.
+//! effect stays visible in the innovations. What drives the rig unseen is a coloured voltage beside the
+//! command; a sensor's noise is white, with a coloured part where the records show one ([`learn`]).
 
-use nalgebra::{DMatrix, DVector};
+mod learning;
+mod linear;
+mod noise;
+mod simulation;
+
 use plant::ModelError;
 use plant::identified::rig::{IdentifiedRig, IdentifiedRigState, STATES, SampledRig};
-use plant::linear::discrete_riccati;
 
 use crate::data::{Channel, Recording};
 
-/// The unseen voltage beside the command.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Disturbance {
-    /// Standard deviation, V.
-    pub sigma: f64,
-    /// Correlation from sample to sample.
-    pub phi: f64,
-}
-
-impl Disturbance {
-    /// What a servo valve adds to a command recorded with `command_noise` (V): eight times that
-    /// noise, with a corner at 30 Hz.
-    pub fn beside_command(command_noise: f64, period: f64) -> Self {
-        Self {
-            sigma: 8.0 * command_noise.max(1e-5),
-            phi: (-std::f64::consts::TAU * 30.0 * period).exp(),
-        }
-    }
-}
+pub use learning::{Learned, learn};
+use linear::Linear;
+pub use noise::{Disturbance, Noise};
 
 /// Kalman gain and whitening for one rig and one sampling period.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,6 +31,8 @@ pub struct Predictor {
     disturbance_gain: [f64; 4],
     /// Corrections of the accelerations one, two, ... samples ago.
     past_gain: Vec<[f64; 4]>,
+    /// Channels with a slow noise: its correlation from sample to sample and its corrections.
+    slow: Vec<(usize, f64, [f64; 4])>,
     /// Inverse of the lower Cholesky factor of the innovations' covariance.
     whitening: [[f64; 4]; 4],
     /// Its inverse: from whitened innovations to SI.
@@ -85,147 +74,48 @@ impl Samples {
 }
 
 impl Predictor {
-    /// Designs the gain on the linear part of `rig` for channels with `noise` (one standard
-    /// deviation, SI; infinite for a channel that is missing).
+    /// Designs the gain on the linear part of `rig` for `noise`.
     ///
     /// # Errors
     /// A rig that cannot be simulated, or one for which there is no stabilising gain.
-    pub fn design(
-        rig: &IdentifiedRig,
-        period: f64,
-        noise: [f64; 4],
-        disturbance: Disturbance,
-    ) -> Result<Self, ModelError> {
-        let rig = rig.linear_part();
-        let sampled = rig.sample(period, 2)?;
-        let continuous = rig.active_states();
-        let late = (rig.sensors.acceleration.delay / period).floor();
-        let past = if rig.sensors.acceleration.delay > 0.0 {
-            late as usize + 1
-        } else {
-            0
-        };
-        let n = continuous.len();
-        let order = n + 1 + past;
-        let mut undelayed = rig;
-        undelayed.sensors.acceleration.delay = 0.0;
-        let undelayed = undelayed.sample(period, 1)?;
-
-        // The linear system, column by column from unit perturbations (balanced below).
-        let mut a = DMatrix::<f64>::zeros(order, order);
-        let mut c = DMatrix::<f64>::zeros(4, order);
-        for j in 0..=n {
-            let mut state = IdentifiedRigState::default();
-            if j < n {
-                state.continuous[continuous[j]] = 1.0;
-            }
-            let now = undelayed.measure(&mut state, 0.0);
-            let acceleration = undelayed.motion(&state).acceleration;
-            for i in 0..4 {
-                c[(i, j)] = now[i];
-            }
-            if past > 0 {
-                c[(1, j)] -= (1.0 + rig.sensors.acceleration.scale_error) * acceleration;
-                a[(n + 1, j)] = acceleration;
-            }
-            sampled.step_disturbed(&mut state, 0.0, if j < n { 0.0 } else { 1.0 });
-            for (i, &index) in continuous.iter().enumerate() {
-                a[(i, j)] = state.continuous[index];
-            }
-        }
-        a[(n, n)] = disturbance.phi;
-        if past > 0 {
-            let samples = rig.sensors.acceleration.delay / period;
-            let (whole, fraction) = (late as usize, samples - late);
-            let scale = 1.0 + rig.sensors.acceleration.scale_error;
-            // Past accelerations: entry 1 is one sample old.
-            for (age, weight) in [(whole, 1.0 - fraction), (whole + 1, fraction)] {
-                if age == 0 {
-                    for j in 0..n {
-                        let mut state = IdentifiedRigState::default();
-                        state.continuous[continuous[j]] = 1.0;
-                        c[(1, j)] += scale * weight * undelayed.motion(&state).acceleration;
-                    }
-                } else {
-                    c[(1, n + age)] += scale * weight;
-                }
-            }
-            for age in 2..=past {
-                a[(n + age, n + age - 1)] = 1.0;
-            }
-        }
-
-        // Balance: scale states by their response to the disturbance.
-        let drive = disturbance.sigma * (1.0 - disturbance.phi * disturbance.phi).sqrt();
-        let mut response = DVector::<f64>::zeros(order);
-        response[n] = 1.0;
-        let mut scale = DVector::<f64>::from_element(order, 1e-12);
-        for _ in 0..300 {
-            for i in 0..order {
-                scale[i] = scale[i].max(response[i].abs());
-            }
-            response = &a * &response;
-        }
-        let shows_specimen = rig.specimen.is_some();
-        let measured: Vec<usize> = (0..4)
-            .filter(|&i| noise[i].is_finite() && (shows_specimen || i < 3))
-            .collect();
-        let a = DMatrix::from_fn(order, order, |i, j| a[(i, j)] * scale[j] / scale[i]);
-        let c = DMatrix::from_fn(measured.len(), order, |i, j| {
-            c[(measured[i], j)] * scale[j] / noise[measured[i]]
-        });
-        let r = DMatrix::identity(measured.len(), measured.len());
-        let mut q = DMatrix::identity(order, order) * (1e-3 * drive).powi(2);
-        q[(n, n)] = (drive / scale[n]).powi(2);
-        if !a
-            .iter()
-            .chain(c.iter())
-            .all(|value| value.is_finite() && value.abs() < 1e12)
-        {
-            return Err(ModelError::NoSolution {
-                equation: "the predictor's Riccati equation",
-                reason: "the sampled rig is not finite".into(),
-            });
-        }
-        let p = discrete_riccati(&a.transpose(), &c.transpose(), &q, &r)?;
-        let s = &c * &p * c.transpose() + &r;
-        let no_solution = || ModelError::NoSolution {
-            equation: "the predictor's Riccati equation",
-            reason: "the innovations have no covariance".into(),
-        };
-        let inverse = s.clone().try_inverse().ok_or_else(no_solution)?;
-        let k = &p * c.transpose() * inverse;
-        let log_determinant = s.determinant().ln();
-        let factor = s.cholesky().ok_or_else(no_solution)?.l();
-        let whiten = factor.clone().try_inverse().ok_or_else(no_solution)?;
+    pub fn design(rig: &IdentifiedRig, period: f64, noise: &Noise) -> Result<Self, ModelError> {
+        let linear = Linear::design(rig, period, noise)?;
+        let white = &noise.white;
         let row = |i: usize| {
             let mut row = [0.0; 4];
-            for (j, &channel) in measured.iter().enumerate() {
-                row[channel] = scale[i] * k[(i, j)] / noise[channel];
+            for (j, &channel) in linear.measured.iter().enumerate() {
+                row[channel] = linear.scale[i] * linear.gain[(i, j)] / white[channel];
             }
             row
         };
         let mut whitening = [[0.0; 4]; 4];
         let mut spread = [[0.0; 4]; 4];
-        for (j, &channel) in measured.iter().enumerate() {
-            for i in 0..measured.len() {
-                whitening[measured[i]][channel] = whiten[(i, j)] / noise[channel];
-                spread[measured[i]][channel] = factor[(i, j)] * noise[measured[i]];
+        for (j, &channel) in linear.measured.iter().enumerate() {
+            for (i, &other) in linear.measured.iter().enumerate() {
+                whitening[other][channel] = linear.whiten[(i, j)] / white[channel];
+                spread[other][channel] = linear.factor[(i, j)] * white[other];
             }
         }
-        let mut gain: Vec<_> = (0..n).map(|i| (continuous[i], row(i))).collect();
-        if let Some(follower) = rig.follower() {
+        let states = linear.continuous.iter().enumerate();
+        let mut gain: Vec<_> = states.map(|(i, &state)| (state, row(i))).collect();
+        if let Some(follower) = rig.linear_part().follower() {
             gain.push((follower, row(5)));
         }
+        let n = linear.unseen();
+        let slow = linear.slow.iter().enumerate().map(|(place, &channel)| {
+            let phi = noise.slow[channel].map_or(0.0, |own| own.phi);
+            (channel, phi, row(linear.first_slow() + place))
+        });
         Ok(Self {
             period,
-            phi: disturbance.phi,
+            phi: noise.unseen.phi,
             gain,
             disturbance_gain: row(n),
-            past_gain: (1..=past).map(|age| row(n + age)).collect(),
+            past_gain: (1..=linear.past).map(|age| row(n + age)).collect(),
+            slow: slow.collect(),
             whitening,
             spread,
-            log_determinant,
+            log_determinant: linear.log_determinant,
         })
     }
 
@@ -234,12 +124,13 @@ impl Predictor {
     pub fn innovations(&self, rig: &SampledRig, samples: &Samples, out: &mut [f64]) -> bool {
         let mut state = IdentifiedRigState::default();
         let mut disturbance = 0.0;
+        let mut slow = [0.0; 4];
         let rows = samples.command.iter().zip(&samples.channels);
         for (k, ((&command, measured), row)) in rows.zip(out.chunks_exact_mut(4)).enumerate() {
             let predicted = rig.measure(&mut state, k as f64 * self.period);
             let mut innovation = [0.0; 4];
             for i in 0..4 {
-                innovation[i] = measured[i] - predicted[i];
+                innovation[i] = measured[i] - predicted[i] - slow[i];
             }
             for i in 0..4 {
                 row[i] = dot(&self.whitening[i], &innovation);
@@ -251,6 +142,9 @@ impl Predictor {
                 rig.correct_past(&mut state, age, dot(gain, &innovation));
             }
             disturbance += dot(&self.disturbance_gain, &innovation);
+            for (channel, phi, gain) in &self.slow {
+                slow[*channel] = phi * (slow[*channel] + dot(gain, &innovation));
+            }
             rig.step_disturbed(&mut state, command, disturbance);
             disturbance *= self.phi;
         }
