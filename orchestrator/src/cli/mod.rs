@@ -22,6 +22,7 @@ pub mod compare_runs;
 pub mod design;
 pub mod diagnose;
 pub mod doctor;
+pub mod drive;
 pub mod export;
 pub mod figures;
 pub mod identify;
@@ -108,6 +109,8 @@ enum Command {
     Figures(figures::Arguments),
     /// Say what is here, what is missing, and the cure
     Doctor(doctor::Arguments),
+    /// Find the drive with which a diagnosed rig follows a motion, on its extended model
+    Drive(drive::Arguments),
     /// Write a system with its components as an SSP archive
     Export(export::Arguments),
     /// Find a rig's parameters from measured data
@@ -148,6 +151,7 @@ pub fn main() -> ExitCode {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
         Some(Command::Build(arguments)) => build::execute(&arguments),
+        Some(Command::Drive(arguments)) => drive::execute(&arguments),
         Some(Command::Campaign(arguments)) => campaign::execute(&arguments),
         Some(Command::Commission(arguments)) => commission::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),

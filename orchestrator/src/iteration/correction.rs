@@ -21,7 +21,7 @@ const QUIET: f64 = 8.0;
 const EDGE: f64 = 0.5;
 
 /// What was measured of a table, on the reference's clock.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// Displacement, m.
     pub displacement: Vec<f64>,
@@ -45,7 +45,7 @@ pub struct Line {
 pub struct Inverse {
     /// Line distance, Hz.
     step: f64,
-    /// The transfer function within the band.
+    /// The transfer function within the band, where it was measured.
     response: Vec<Line>,
     /// Coherence times the inverse of the transfer function, a line each.
     lines: Vec<Complex64>,
@@ -105,6 +105,37 @@ impl Inverse {
             band,
             response,
         })
+    }
+
+    /// From the whole of a `drive` that ends at rest and the answer of something linear without noise: exact
+    /// to its last line.
+    #[must_use]
+    pub fn exact(drive: &Motion, answer: &Measured, crossover: f64, band: [f64; 2]) -> Self {
+        let dt = drive.dt;
+        let length = padded(drive.len(), dt);
+        let all = [0.0, 0.5 / dt];
+        let [input, output] = [
+            (&drive.displacement, &drive.acceleration),
+            (&answer.displacement, &answer.acceleration),
+        ]
+        .map(|(x, a)| spectrum(&joined(x, a, dt, crossover, all), length));
+        let lines = input.iter().zip(&output).map(|(input, output)| {
+            let gain = output / input;
+            let size = gain.norm();
+            // Nothing is there at rest.
+            if size.is_normal() {
+                gain.conj() / (size * size.max(1.0 / MOST_GAIN))
+            } else {
+                Complex64::new(0.0, 0.0)
+            }
+        });
+        Self {
+            step: 1.0 / (length as f64 * dt),
+            lines: lines.collect(),
+            crossover,
+            band,
+            response: Vec::new(),
+        }
     }
 
     /// Mean coherence over the band.

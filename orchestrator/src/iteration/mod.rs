@@ -1,8 +1,10 @@
 //! Iterative control as laboratories use it (Section 1.2.3): the drive is corrected from run to run by
-//! the inverse of the measured transfer function.
+//! the inverse of the measured transfer function; or found on a model, without a run of the rig.
 
+pub mod circle;
 mod correction;
 mod drive;
+pub mod on_model;
 mod page;
 
 use serde::{Deserialize, Serialize};

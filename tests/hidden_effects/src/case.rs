@@ -92,7 +92,9 @@ pub struct Case {
     pub records: Vec<Record>,
     /// What was hidden.
     pub truth: Truth,
-    noise: [f64; 5],
+    plant: Plant,
+    hidden: Hidden,
+    noises: Noises,
     mismatch: f64,
 }
 
@@ -190,7 +192,7 @@ impl Case {
                 } else {
                     hidden.clone()
                 };
-                let rows = play(&plant, present, reference, &noises, &mut normal);
+                let rows = play((&plant, present, &noises), reference, &mut normal, |_| {});
                 Record {
                     name,
                     excitation,
@@ -218,9 +220,23 @@ impl Case {
         Self {
             records,
             truth,
-            noise: noises.stated,
+            plant,
+            hidden,
+            noises,
             mismatch: settings.mismatch,
         }
+    }
+
+    /// What the table does, displacement (in) and acceleration (in/s²), while the case's rig with what
+    /// is hidden in it follows another `reference` (in) under the laboratory's law.
+    pub fn follow(&self, reference: &[f64], seed: u64) -> Vec<[f64; 2]> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let (hidden, mut motion) = (self.hidden.clone(), Vec::new());
+        let played = (&self.plant, hidden, &self.noises);
+        play(played, reference, &mut rng, |rig| {
+            motion.push(rig.table_motion())
+        });
+        motion
     }
 
     /// Writes `nominal.toml` and the records into `folder`, and nothing about the truth.
@@ -244,7 +260,7 @@ impl Case {
 
     /// The nominal model as the laboratory writes it down.
     pub fn nominal(&self) -> String {
-        let [x, a, f, s, u] = self.noise;
+        let [x, a, f, s, u] = self.noises.stated;
         let Plant {
             denominator,
             voltage_to_force,
@@ -314,17 +330,22 @@ fn resolve_peak_command(hidden: &mut Hidden, plant: &Plant, reference: &[f64]) {
     let mut free = hidden.clone();
     free.effects.remove(i);
     let mut quiet = ChaCha8Rng::seed_from_u64(0);
-    let rows = play(plant, free, reference, &Noises::none(), &mut quiet);
+    let rows = play(
+        (plant, free, &Noises::none()),
+        reference,
+        &mut quiet,
+        |_| {},
+    );
     let peak = rows.iter().fold(0.0f64, |m, row| m.max(row[1].abs()));
     hidden.effects[i].values[0] *= peak;
 }
 
+/// Rows of a record; `seen` is shown the rig at every sample.
 fn play(
-    plant: &Plant,
-    hidden: Hidden,
+    (plant, hidden, noises): (&Plant, Hidden, &Noises),
     reference: &[f64],
-    noises: &Noises,
     rng: &mut ChaCha8Rng,
+    mut seen: impl FnMut(&Rig),
 ) -> Vec<[f64; 7]> {
     let n = reference.len();
     let at = |k: usize| reference[k.min(n - 1)];
@@ -336,6 +357,7 @@ fn play(
             let before = at(k.saturating_sub(1));
             let rate = (at(k + 1) - before) * RATE / 2.0;
             let curvature = (at(k + 1) - 2.0 * at(k) + before) * RATE * RATE;
+            seen(&rig);
             let true_values = rig.sample();
             let x = noise.reading(0, true_values.x, rng);
             let a = noise.reading(1, true_values.a, rng);

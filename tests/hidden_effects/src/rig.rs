@@ -131,6 +131,12 @@ impl Rig {
         }
     }
 
+    /// What the table does, which no sensor tells as it is: displacement (in) and acceleration (in/s²).
+    pub fn table_motion(&self) -> [f64; 2] {
+        let forces = self.forces(&self.state, self.flow_command());
+        [self.state[X], forces.table_acceleration]
+    }
+
     /// Advances one sample with `command` held and an unseen voltage `disturbance` beside it.
     pub fn advance(&mut self, command: f64, disturbance: f64) {
         let before_play = self.hidden.form.disturbed_before_play;

@@ -1,5 +1,6 @@
 //! Effects that a model lacks: hidden by an independent program, put on measurements, or neither.
 
+mod closing_the_circle;
 mod extended_model;
 mod foreign;
 mod hidden_effects;

@@ -1,10 +1,12 @@
 //! What a laboratory hands in: a nominal model and recordings.
 
 mod checks;
+mod model;
 mod nominal;
 mod template;
 
 pub use checks::{blind_spot, noise_ratios, problems, too_little_excitation};
+pub use model::rig_of;
 pub use nominal::{ControlLaw, Nominal};
 pub use template::template;
 

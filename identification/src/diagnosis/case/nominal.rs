@@ -303,7 +303,7 @@ fn known_effects(file: &File) -> Result<(Effects, Instrumentation), String> {
 }
 
 /// Sets the effect of a section `[effects.name]`.
-fn set_effect(
+pub(super) fn set_effect(
     name: &str,
     values: &BTreeMap<String, f64>,
     effects: &mut Effects,

@@ -1,0 +1,147 @@
+//! `shakebench drive`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::run::quantity;
+use crate::error::Error;
+use crate::iteration::circle::{self, Circle, Plan};
+use crate::iteration::on_model::Search;
+use crate::motion::{self, Scaling};
+use crate::report::columns::aligned;
+use crate::results::{Results, unused};
+use crate::units::STANDARD_GRAVITY;
+
+/// Options of `shakebench drive`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    shakebench diagnose my-case --out results\n  \
+    shakebench drive my-case --model results/extended_model.toml --record NGA/RSN1633_MANJIL_ABBAR--L.AT2\n  \
+    shakebench drive my-case --model results/extended_model.toml --pga 0.15 --out drives")]
+pub struct Arguments {
+    /// Case of a diagnosis: a folder with nominal.toml, whose law the drive is for
+    #[arg(value_name = "CASE")]
+    case: PathBuf,
+    /// Extended model that `shakebench diagnose` made of the case
+    #[arg(long, value_name = "MODEL.toml")]
+    model: PathBuf,
+    /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
+    #[arg(
+        long,
+        alias = "motion",
+        value_name = "FILE",
+        conflicts_with = "reference"
+    )]
+    record: Option<PathBuf>,
+    /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// Scale of the motion: peak acceleration in g
+    #[arg(long, value_name = "G", conflicts_with = "peak")]
+    pga: Option<String>,
+    /// Scale of the motion: peak displacement, such as "1.2 in" (a number alone is in m)
+    #[arg(long, value_name = "L")]
+    peak: Option<String>,
+    /// Seed of the built-in motion [default: 1]
+    #[arg(long, conflicts_with_all = ["record", "reference"])]
+    seed: Option<u64>,
+    /// Most corrections
+    #[arg(long, default_value_t = Search::default().corrections)]
+    corrections: usize,
+    /// Lowest and highest frequency that is corrected, Hz
+    #[arg(long, value_names = ["LOW", "HIGH"], num_args = 2, default_values_t = Search::default().band)]
+    band: Vec<f64>,
+    /// Folder for drive.csv and drive.json [default: shakebench-results/drive-CASE-MOTION]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Finds the drive and writes it.
+///
+/// # Errors
+/// Input at fault; nothing is written then.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if let Some(folder) = &arguments.out {
+        Results::check(folder)?;
+    }
+    let found = circle::close(&plan(arguments)?)?;
+    let folder = arguments.out.clone().unwrap_or_else(|| {
+        let name = format!("drive-{}-{}", found.case, found.motion);
+        let name = name.replace(['/', '\\', ' '], "-");
+        unused(&Path::new("shakebench-results").join(name), |_| false)
+    });
+    let files = circle::write(&found, &folder)?;
+    if arguments.json {
+        println!("{}", serde_json::json!(found));
+    } else {
+        print!("{}", text(&found));
+        println!("\nwritten:");
+        for file in files {
+            println!("  {}", file.display());
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn plan(arguments: &Arguments) -> Result<Plan, Error> {
+    let [low, high] = [0, 1].map(|i| arguments.band.get(i).copied().unwrap_or(f64::NAN));
+    if !(low > 0.0 && high > low && high <= 100.0) {
+        return Err(Error::Option {
+            option: "--band",
+            reason: format!("{low} to {high} Hz; expected 0 < LOW < HIGH <= 100"),
+        });
+    }
+    let scaling = match (&arguments.pga, &arguments.peak) {
+        (Some(pga), _) => Some(Scaling::PeakAcceleration(
+            quantity("--pga", pga, "g")? * STANDARD_GRAVITY,
+        )),
+        (_, Some(peak)) => Some(Scaling::PeakDisplacement(quantity("--peak", peak, "m")?)),
+        _ => None,
+    };
+    Ok(Plan {
+        case: arguments.case.clone(),
+        model: arguments.model.clone(),
+        record: arguments.record.clone(),
+        reference: arguments.reference.clone(),
+        scaling,
+        seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),
+        search: Search {
+            corrections: arguments.corrections,
+            band: [low, high],
+        },
+    })
+}
+
+fn text(found: &Circle) -> String {
+    let head = ["drive", "RMS error", "spectrum", "largest command"];
+    let mut rows = vec![head.map(str::to_string).to_vec()];
+    for (name, expected) in found.expected() {
+        rows.push(vec![
+            name.to_string(),
+            format!("{:.3} %", expected.time_domain_percent),
+            expected
+                .response_spectrum_percent
+                .map_or("-".into(), |value| format!("{value:.3} %")),
+            format!("{:.2} V", expected.peak_command_v),
+        ]);
+    }
+    let named = match found.effects.as_slice() {
+        [] => "which has no effect".to_string(),
+        some => format!("with {}", some.join(", ")),
+    };
+    let warnings: String = found
+        .warnings
+        .iter()
+        .map(|line| format!("warning: {line}\n"))
+        .collect();
+    format!(
+        "{} on the extended model, {named}\n\n{}\n{warnings}",
+        found.motion,
+        aligned(&rows)
+    )
+}
