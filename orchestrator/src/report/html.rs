@@ -14,6 +14,9 @@ const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const UPLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 const UPLOT_LICENSE: &str = include_str!("assets/uPlot.LICENSE");
 
+/// Letters of a cell that stands in one line.
+const WORD: usize = 10;
+
 /// Renders the report. All text is escaped; the file refers to nothing outside itself.
 ///
 /// # Errors
@@ -130,5 +133,7 @@ fn cell(cell: &Cell) -> Value {
             (us, si)
         }
     };
-    context! { one => laboratory == si, laboratory, si }
+    // A word of a table that is not to be broken.
+    let short = (1..=WORD).contains(&si.chars().count());
+    context! { one => laboratory == si, short, laboratory, si }
 }
