@@ -55,3 +55,18 @@ pub struct Motion {
     /// Acceleration in m/s².
     pub acceleration: f64,
 }
+
+impl Motion {
+    /// This motion and behind it those of the samples ahead, of which there are one fewer than come out:
+    /// displacements, velocities and accelerations, SI.
+    pub fn with_ahead<const COUNT: usize>(self, ahead: [&[f64]; 3]) -> [Self; COUNT] {
+        std::array::from_fn(|i| match i.checked_sub(1) {
+            None => self,
+            Some(i) => Self {
+                displacement: ahead[0][i],
+                velocity: ahead[1][i],
+                acceleration: ahead[2][i],
+            },
+        })
+    }
+}

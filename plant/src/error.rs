@@ -1,5 +1,7 @@
 //! What can be wrong with a model's parameters.
 
+const NOT_NEGATIVE: &str = "zero or a positive number";
+
 /// A model that cannot be built or must not be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {
@@ -42,6 +44,18 @@ pub enum ModelError {
 }
 
 impl ModelError {
+    /// A parameter that counts.
+    ///
+    /// # Errors
+    /// Names the parameter and its value where it is negative.
+    pub fn count(name: &'static str, value: i32) -> Result<usize, Self> {
+        usize::try_from(value).map_err(|_| Self::Parameter {
+            name,
+            value: f64::from(value),
+            expected: NOT_NEGATIVE,
+        })
+    }
+
     /// Checks that a parameter is finite and positive.
     ///
     /// # Errors
@@ -68,7 +82,7 @@ impl ModelError {
         Err(Self::Parameter {
             name,
             value,
-            expected: "zero or a positive number",
+            expected: NOT_NEGATIVE,
         })
     }
 

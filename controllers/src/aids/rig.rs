@@ -9,10 +9,11 @@ use plant::linear::{StateSpace, log_space};
 use plant::specimens::linear::LinearSpecimen;
 
 use crate::ModelError;
+pub use crate::preview::feedback::MAXIMUM_DELAY;
 use crate::preview::model::{Hydraulics, RigModel, STATES};
 
-/// Valve, oil and table as recordings give them.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+/// Valve, oil and table as recordings give them; by default the physical rig's, nothing late.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct KnownRig {
     /// Valve and oil.
     pub hydraulics: Hydraulics,
@@ -22,44 +23,13 @@ pub struct KnownRig {
     pub delay: usize,
 }
 
-/// Most samples by which measurements may be late.
-pub const MAXIMUM_DELAY: usize = 4;
-
-impl Default for KnownRig {
-    /// The physical rig's, linearised, nothing late.
-    fn default() -> Self {
-        Self {
-            hydraulics: Hydraulics {
-                spool_lag: 0.00477,
-                spool_inertia: 7.04e-6,
-                force_rate: 1.92e4,
-                oil_stiffness: 1.87e5,
-                leakage_rate: 2.67,
-                seal_damping: 876.0,
-            },
-            table: Table::default(),
-            delay: 0,
-        }
-    }
-}
-
 impl KnownRig {
     /// Checks the parameters.
     ///
     /// # Errors
     /// Names the first with which nothing can be compensated.
     pub fn validate(&self) -> Result<(), ModelError> {
-        let own = &self.hydraulics;
-        for (name, value) in [
-            ("spool_lag", own.spool_lag),
-            ("spool_inertia", own.spool_inertia),
-            ("force_rate", own.force_rate),
-            ("oil_stiffness", own.oil_stiffness),
-        ] {
-            ModelError::require_positive(name, value)?;
-        }
-        ModelError::require_non_negative("leakage_rate", own.leakage_rate)?;
-        ModelError::require_non_negative("seal_damping", own.seal_damping)?;
+        self.hydraulics.validate()?;
         if self.delay > MAXIMUM_DELAY {
             return Err(ModelError::Parameter {
                 name: "loop_delay_samples",

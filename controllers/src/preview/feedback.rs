@@ -35,6 +35,27 @@ pub struct Uncertainty {
     pub offset_step: f64,
 }
 
+impl Uncertainty {
+    /// Checks the deviations.
+    ///
+    /// # Errors
+    /// Names the first that no filter is built from.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        let [displacement, velocity, acceleration] = self.measurement;
+        for (name, value) in [
+            ("displacement_measurement_noise", displacement),
+            ("velocity_measurement_noise", velocity),
+            ("acceleration_measurement_noise", acceleration),
+            ("force_step", self.force_step),
+            ("offset_step", self.offset_step),
+        ] {
+            ModelError::require_positive(name, value)?;
+        }
+        ModelError::require_non_negative("valve_noise", self.valve)?;
+        ModelError::require_non_negative("force_noise", self.force)
+    }
+}
+
 /// Feedback of the states' distance from where they should be, and the filter that gives them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feedback {

@@ -157,23 +157,13 @@ impl Parameters {
             "feedback_velocity_weight",
             "feedback_acceleration_weight",
         ];
-        const MEASURED: [&str; OUTPUTS] = [
-            "displacement_measurement_noise",
-            "velocity_measurement_noise",
-            "acceleration_measurement_noise",
-        ];
         for i in 0..OUTPUTS {
             ModelError::require_positive(TRACKING[i], self.tracking_weights[i])?;
             ModelError::require_positive(FEEDBACK[i], self.feedback_weights[i])?;
-            ModelError::require_positive(MEASURED[i], self.uncertainty.measurement[i])?;
         }
-        let own = &self.uncertainty;
+        self.uncertainty.validate()?;
         ModelError::require_positive("move_weight", self.move_weight)?;
         ModelError::require_positive("command_weight", self.command_weight)?;
-        ModelError::require_non_negative("valve_noise", own.valve)?;
-        ModelError::require_non_negative("force_noise", own.force)?;
-        ModelError::require_positive("force_step", own.force_step)?;
-        ModelError::require_positive("offset_step", own.offset_step)?;
         ModelError::require_positive("valve_limit", self.limit)?;
         ModelError::require_positive("period", self.period)
     }

@@ -30,6 +30,39 @@ pub struct Hydraulics {
     pub seal_damping: f64,
 }
 
+impl Default for Hydraulics {
+    /// The physical rig's (`ServoHydraulicTable`), linearised.
+    fn default() -> Self {
+        Self {
+            spool_lag: 0.00477,
+            spool_inertia: 7.04e-6,
+            force_rate: 1.92e4,
+            oil_stiffness: 1.87e5,
+            leakage_rate: 2.67,
+            seal_damping: 876.0,
+        }
+    }
+}
+
+impl Hydraulics {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Names the first that cannot be simulated.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        for (name, value) in [
+            ("spool_lag", self.spool_lag),
+            ("spool_inertia", self.spool_inertia),
+            ("force_rate", self.force_rate),
+            ("oil_stiffness", self.oil_stiffness),
+        ] {
+            ModelError::require_positive(name, value)?;
+        }
+        ModelError::require_non_negative("leakage_rate", self.leakage_rate)?;
+        ModelError::require_non_negative("seal_damping", self.seal_damping)
+    }
+}
+
 /// Actuator and table: the form of Eq 2-4, or valve and oil in place of its actuator.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct RigModel {
@@ -48,16 +81,7 @@ impl RigModel {
         let Some(own) = &self.hydraulics else {
             return self.shake_table.validate();
         };
-        for (name, value) in [
-            ("spool_lag", own.spool_lag),
-            ("spool_inertia", own.spool_inertia),
-            ("force_rate", own.force_rate),
-            ("oil_stiffness", own.oil_stiffness),
-        ] {
-            ModelError::require_positive(name, value)?;
-        }
-        ModelError::require_non_negative("leakage_rate", own.leakage_rate)?;
-        ModelError::require_non_negative("seal_damping", own.seal_damping)?;
+        own.validate()?;
         self.shake_table.table.validate()
     }
 

@@ -32,7 +32,7 @@ use crate::aids::rig::KnownRig;
 use crate::pid::VALVE_LIMIT;
 use crate::preview::feedback::{Feedback, FeedbackState, Uncertainty};
 use crate::preview::feedforward::PREVIEW;
-use crate::preview::model::{OUTPUTS, SampledRig};
+use crate::preview::model::SampledRig;
 use crate::{Controller, ModelError, Motion};
 
 /// Which law.
@@ -103,16 +103,10 @@ impl Parameters {
             "oil_reaching_rate",
             "spool_reaching_rate",
         ];
-        const MEASURED: [&str; OUTPUTS] = [
-            "displacement_measurement_noise",
-            "velocity_measurement_noise",
-            "acceleration_measurement_noise",
-        ];
-        let own = &self.uncertainty;
+        self.uncertainty.validate()?;
         ModelError::require_positive("surface_rate", self.surface_rate)?;
-        for i in 0..3 {
-            ModelError::require_positive(REACHING[i], self.reaching_rates[i])?;
-            ModelError::require_positive(MEASURED[i], own.measurement[i])?;
+        for (name, rate) in REACHING.into_iter().zip(self.reaching_rates) {
+            ModelError::require_positive(name, rate)?;
         }
         ModelError::require_positive("oil_filter_time", self.filter_times[0])?;
         ModelError::require_positive("spool_filter_time", self.filter_times[1])?;
@@ -124,8 +118,6 @@ impl Parameters {
             });
         }
         ModelError::require_positive("move_weight", self.move_weight)?;
-        ModelError::require_positive("force_step", own.force_step)?;
-        ModelError::require_positive("offset_step", own.offset_step)?;
         ModelError::require_positive("valve_limit", self.limit)?;
         ModelError::require_positive("period", self.period)
     }

@@ -34,15 +34,7 @@ impl Component for AccelerationTracking {
         "Acceleration trajectory tracking and dual loop of acceleration and force";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[
-                ("displacement", "reference_displacement"),
-                ("velocity", "reference_velocity"),
-                ("acceleration", "reference_acceleration"),
-            ],
-        ),
+        Terminal::REFERENCE,
         Terminal::bus(
             "measured",
             "motion",
@@ -52,7 +44,7 @@ impl Component for AccelerationTracking {
                 ("force", "measured_force"),
             ],
         ),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {

@@ -28,7 +28,7 @@ impl Component for ControlAllocation {
             &[("command", "displacement_loop_command")],
         ),
         Terminal::plug("force_loop", "valve", &[("command", "force_loop_command")]),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {

@@ -43,7 +43,7 @@ impl Component for DisplacementPid {
             "motion",
             &[("displacement", "measured_displacement")],
         ),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {

@@ -35,7 +35,7 @@ impl Component for ForcePid {
     const TERMINALS: &'static [Terminal] = &[
         Terminal::bus("reference", "reference", &[("force", "reference_force")]),
         Terminal::bus("measured", "motion", &[("force", "measured_force")]),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {

@@ -103,8 +103,8 @@ impl Component for Interlock {
             "specimen-motion",
             &[("acceleration", "specimen_acceleration")],
         ),
-        Terminal::plug("controller", "valve", &[("command", "controller_command")]),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::CONTROLLER,
+        Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {

@@ -96,6 +96,25 @@ pub fn number<C: Component>(component: &mut C, names: &[&str]) {
     }
 }
 
+/// Checks that each of the values alone, of a Float64 or Int32 variable, is refused by the variable's name.
+///
+/// # Panics
+/// When one of them is not refused, or not by its name.
+pub fn refuses<C: Component>(values: &[(&str, f64)]) {
+    let model = Model::<C>::get().expect("the table is sound");
+    for &(name, value) in values {
+        let mut component = C::default();
+        let (_, variable) = model.find(name).expect("the variable is in the table");
+        match &variable.access {
+            Access::Integer(field) => *field(&mut component) = value as i32,
+            _ => *real(&mut component, variable).expect("the variable is a number") = value,
+        }
+        let refused = component.initialize().expect_err("it is refused");
+        let error = refused.to_string();
+        assert!(error.contains(&format!("`{name}`")), "{name}: {error}");
+    }
+}
+
 fn bytes<C: Component>(component: &C) -> Vec<u8> {
     postcard::to_allocvec(component).expect("the component can be serialized")
 }

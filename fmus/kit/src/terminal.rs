@@ -35,6 +35,35 @@ impl MatchingRule {
 }
 
 impl Terminal {
+    /// The motion that a table is asked for.
+    pub const REFERENCE: Self = Self::bus(
+        "reference",
+        "reference",
+        &[
+            ("displacement", "reference_displacement"),
+            ("velocity", "reference_velocity"),
+            ("acceleration", "reference_acceleration"),
+        ],
+    );
+
+    /// The motion of a table, as measured.
+    pub const MEASURED: Self = Self::bus(
+        "measured",
+        "motion",
+        &[
+            ("displacement", "measured_displacement"),
+            ("velocity", "measured_velocity"),
+            ("acceleration", "measured_acceleration"),
+        ],
+    );
+
+    /// The command that the valve takes.
+    pub const VALVE: Self = Self::plug("valve", "valve", &[("command", "valve_command")]);
+
+    /// The command of the controller before.
+    pub const CONTROLLER: Self =
+        Self::plug("controller", "valve", &[("command", "controller_command")]);
+
     /// A terminal whose members have to be the same on both sides.
     pub const fn plug(
         name: &'static str,

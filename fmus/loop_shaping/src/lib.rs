@@ -29,7 +29,7 @@ impl Component for LoopShaping {
             "motion",
             &[("displacement", "measured_displacement")],
         ),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {

@@ -42,7 +42,7 @@ impl Component for MinimalControlSynthesis {
             "motion",
             &[("displacement", "measured_displacement")],
         ),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {

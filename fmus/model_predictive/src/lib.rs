@@ -56,24 +56,8 @@ impl Component for ModelPredictive {
         "Model predictive control of a shake table over three-variable control";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[
-                ("displacement", "reference_displacement"),
-                ("velocity", "reference_velocity"),
-                ("acceleration", "reference_acceleration"),
-            ],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[
-                ("displacement", "measured_displacement"),
-                ("velocity", "measured_velocity"),
-                ("acceleration", "measured_acceleration"),
-            ],
-        ),
+        Terminal::REFERENCE,
+        Terminal::MEASURED,
         Terminal::bus(
             "command",
             "reference",
@@ -148,14 +132,11 @@ impl Component for ModelPredictive {
         let control = self.built.of(&self.settings, build)?;
         control.memory = self.memory;
         let input = ModelPredictiveInput {
-            reference: std::array::from_fn(|i| match i.checked_sub(1) {
-                None => self.reference,
-                Some(i) => Motion {
-                    displacement: self.displacement_ahead[i],
-                    velocity: self.velocity_ahead[i],
-                    acceleration: self.acceleration_ahead[i],
-                },
-            }),
+            reference: self.reference.with_ahead([
+                &self.displacement_ahead,
+                &self.velocity_ahead,
+                &self.acceleration_ahead,
+            ]),
             measured: self.measured,
         };
         self.command = control.step(&input, step_size);
@@ -199,27 +180,13 @@ mod tests {
 
     #[test]
     fn what_no_controller_is_built_from_is_refused_by_name() {
-        let set = |component: &mut ModelPredictive, name: &str, value: f64| {
-            let variables = ModelPredictive::variables();
-            let variable = variables.iter().find(|v| v.name == name).unwrap();
-            match &variable.access {
-                fmu_kit::variable::Access::Real(field) => *field(component) = value,
-                fmu_kit::variable::Access::Integer(field) => *field(component) = value as i32,
-                _ => panic!("{name} is no number"),
-            }
-        };
-        for (name, value) in [
+        fmu_kit::conformance::refuses::<ModelPredictive>(&[
             ("prediction_horizon", 0.0),
             ("displacement_weight", -1.0),
             ("minimum_displacement", 0.1),
             ("violation_weight", 0.0),
             ("valve_limit", 0.0),
             ("table_mass", 0.0),
-        ] {
-            let mut component = ModelPredictive::default();
-            set(&mut component, name, value);
-            let error = component.initialize().unwrap_err().to_string();
-            assert!(error.contains(&format!("`{name}`")), "{name}: {error}");
-        }
+        ]);
     }
 }

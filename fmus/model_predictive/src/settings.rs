@@ -95,14 +95,6 @@ impl Default for Settings {
     }
 }
 
-fn count(name: &'static str, value: i32) -> Result<usize, ModelError> {
-    usize::try_from(value).map_err(|_| ModelError::Parameter {
-        name,
-        value: f64::from(value),
-        expected: "zero or a positive number",
-    })
-}
-
 impl Settings {
     /// What the controller is built from; refuses negative counts by name.
     pub fn parameters(&self, period: f64) -> Result<Parameters, ModelError> {
@@ -132,7 +124,7 @@ impl Settings {
                 LowLevelLaw::Sampled
             },
             period,
-            horizon: count("prediction_horizon", self.prediction_horizon)?,
+            horizon: ModelError::count("prediction_horizon", self.prediction_horizon)?,
             weights: Weights {
                 output: self.output_weights,
                 rate: self.rate_weights,
@@ -148,8 +140,11 @@ impl Settings {
                 (false, true) => Outlook::Extrapolate,
                 (false, false) => Outlook::Hold,
             },
-            loop_delay_samples: count("loop_delay_samples", self.loop_delay_samples)?,
-            command_delay_samples: count("command_delay_samples", self.command_delay_samples)?,
+            loop_delay_samples: ModelError::count("loop_delay_samples", self.loop_delay_samples)?,
+            command_delay_samples: ModelError::count(
+                "command_delay_samples",
+                self.command_delay_samples,
+            )?,
             disturbance: self.disturbance,
             noise: Noise {
                 valve: self.valve_noise,
@@ -161,7 +156,7 @@ impl Settings {
             } else {
                 SolverChoice::Kwik
             },
-            iteration_limit: count("iteration_limit", self.iteration_limit)?,
+            iteration_limit: ModelError::count("iteration_limit", self.iteration_limit)?,
             time_limit: if self.time_limit == 0.0 {
                 f64::INFINITY
             } else {

@@ -34,15 +34,7 @@ impl Component for OperatorAids {
         "Friction and specimen compensation, observer, stabilisation, notch, harmonics";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[
-                ("displacement", "reference_displacement"),
-                ("velocity", "reference_velocity"),
-                ("acceleration", "reference_acceleration"),
-            ],
-        ),
+        Terminal::REFERENCE,
         Terminal::bus(
             "measured",
             "motion",
@@ -53,8 +45,8 @@ impl Component for OperatorAids {
                 ("force", "measured_force"),
             ],
         ),
-        Terminal::plug("controller", "valve", &[("command", "controller_command")]),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::CONTROLLER,
+        Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {
@@ -115,12 +107,7 @@ impl Component for OperatorAids {
     }
 
     fn initialize(&mut self) -> ComponentResult {
-        let delay = self.loop_delay_samples;
-        self.law.rig.delay = usize::try_from(delay).map_err(|_| ModelError::Parameter {
-            name: "loop_delay_samples",
-            value: f64::from(delay),
-            expected: "zero or a positive number",
-        })?;
+        self.law.rig.delay = ModelError::count("loop_delay_samples", self.loop_delay_samples)?;
         self.law.validate()?;
         self.law.reset();
         self.valve_command = 0.0;
@@ -167,7 +154,7 @@ mod tests {
 
     #[test]
     fn what_no_aid_can_run_with_is_refused_by_name() {
-        for (name, value) in [
+        fmu_kit::conformance::refuses::<OperatorAids>(&[
             ("force_rate", 0.0),
             ("seal_friction", -1.0),
             ("specimen_corner", 0.0),
@@ -178,17 +165,6 @@ mod tests {
             ("loop_delay_samples", 9.0),
             ("loop_delay_samples", -1.0),
             ("measured_cycles", 0.0),
-        ] {
-            let mut component = OperatorAids::default();
-            let variables = OperatorAids::variables();
-            let variable = variables.iter().find(|v| v.name == name).unwrap();
-            match &variable.access {
-                fmu_kit::variable::Access::Real(field) => *field(&mut component) = value,
-                fmu_kit::variable::Access::Integer(field) => *field(&mut component) = value as i32,
-                _ => panic!("{name} is no number"),
-            }
-            let error = component.initialize().unwrap_err().to_string();
-            assert!(error.contains(&format!("`{name}`")), "{name}: {error}");
-        }
+        ]);
     }
 }

@@ -47,26 +47,10 @@ impl Component for PreviewControl {
         "Preview control of a shake table with friction and specimen in its model";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[
-                ("displacement", "reference_displacement"),
-                ("velocity", "reference_velocity"),
-                ("acceleration", "reference_acceleration"),
-            ],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[
-                ("displacement", "measured_displacement"),
-                ("velocity", "measured_velocity"),
-                ("acceleration", "measured_acceleration"),
-            ],
-        ),
-        Terminal::plug("controller", "valve", &[("command", "controller_command")]),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::REFERENCE,
+        Terminal::MEASURED,
+        Terminal::CONTROLLER,
+        Terminal::VALVE,
     ];
     const ANY_STEP_SIZE: bool = false;
 
@@ -119,14 +103,11 @@ impl Component for PreviewControl {
         let control = self.built.of(&self.settings, build)?;
         control.memory = self.memory;
         let input = PreviewInput {
-            reference: std::array::from_fn(|i| match i.checked_sub(1) {
-                None => self.reference,
-                Some(i) => Motion {
-                    displacement: self.displacement_ahead[i],
-                    velocity: self.velocity_ahead[i],
-                    acceleration: self.acceleration_ahead[i],
-                },
-            }),
+            reference: self.reference.with_ahead([
+                &self.displacement_ahead,
+                &self.velocity_ahead,
+                &self.acceleration_ahead,
+            ]),
             measured: self.measured,
             command: self.command,
         };
@@ -144,24 +125,13 @@ mod tests {
 
     #[test]
     fn what_no_controller_is_built_from_is_refused_by_name() {
-        for (name, value) in [
+        fmu_kit::conformance::refuses::<PreviewControl>(&[
             ("move_weight", 0.0),
             ("command_weight", -1.0),
             ("force_step", 0.0),
             ("valve_limit", 0.0),
             ("table_mass", 0.0),
             ("loop_delay_samples", 9.0),
-        ] {
-            let mut component = PreviewControl::default();
-            let variables = PreviewControl::variables();
-            let variable = variables.iter().find(|v| v.name == name).unwrap();
-            match &variable.access {
-                fmu_kit::variable::Access::Real(field) => *field(&mut component) = value,
-                fmu_kit::variable::Access::Integer(field) => *field(&mut component) = value as i32,
-                _ => panic!("{name} is no number"),
-            }
-            let error = component.initialize().unwrap_err().to_string();
-            assert!(error.contains(&format!("`{name}`")), "{name}: {error}");
-        }
+        ]);
     }
 }

@@ -52,15 +52,7 @@ impl Default for Settings {
         Self {
             law: Parameters::default(),
             shake_table: ShakeTable::default(),
-            // The physical rig's (ServoHydraulicTable), linearised.
-            hydraulics: Hydraulics {
-                spool_lag: 0.00477,
-                spool_inertia: 7.04e-6,
-                force_rate: 1.92e4,
-                oil_stiffness: 1.87e5,
-                leakage_rate: 2.67,
-                seal_damping: 876.0,
-            },
+            hydraulics: Hydraulics::default(),
             hydraulics_known: false,
             specimen: YieldingSpecimen::default(),
             specimen_known: false,
@@ -74,13 +66,6 @@ impl Default for Settings {
 impl Settings {
     /// What the controller is built from; refuses a negative count by name.
     pub fn parameters(&self, period: f64) -> Result<Parameters, ModelError> {
-        let count = |name, samples: i32| {
-            usize::try_from(samples).map_err(|_| ModelError::Parameter {
-                name,
-                value: f64::from(samples),
-                expected: "zero or a positive number",
-            })
-        };
         Ok(Parameters {
             role: match self.role {
                 2 => Role::Compensation,
@@ -95,8 +80,8 @@ impl Settings {
                 specimen: self.specimen_known.then_some(self.specimen),
                 ..self.law.load
             },
-            delay: count("loop_delay_samples", self.loop_delay_samples)?,
-            shaping_lead: count("shaping_lead_samples", self.shaping_lead_samples)?,
+            delay: ModelError::count("loop_delay_samples", self.loop_delay_samples)?,
+            shaping_lead: ModelError::count("shaping_lead_samples", self.shaping_lead_samples)?,
             period,
             ..self.law
         })

@@ -68,7 +68,7 @@ impl Component for ServoHydraulicTable {
     const DESCRIPTION: &'static str = "Uniaxial servo-hydraulic shake table from first principles";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::VALVE,
         Terminal::bus(
             "motion",
             "motion",

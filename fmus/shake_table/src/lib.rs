@@ -88,7 +88,7 @@ impl Component for ShakeTable {
     const DESCRIPTION: &'static str = "Uniaxial shake table with its identified hydraulic actuator";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::VALVE,
         Terminal::bus(
             "motion",
             "motion",

@@ -74,15 +74,7 @@ impl Component for SlidingMode {
     const DESCRIPTION: &'static str = "Sliding mode over a displacement and a force loop";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[
-                ("displacement", "reference_displacement"),
-                ("velocity", "reference_velocity"),
-                ("acceleration", "reference_acceleration"),
-            ],
-        ),
+        Terminal::REFERENCE,
         Terminal::bus(
             "measured",
             "motion",

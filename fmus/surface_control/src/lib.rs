@@ -44,27 +44,8 @@ impl Component for SurfaceControl {
     const DESCRIPTION: &'static str =
         "Sliding mode of a shake table: multiple surfaces, dynamic surface, receding horizon";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
-    const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[
-                ("displacement", "reference_displacement"),
-                ("velocity", "reference_velocity"),
-                ("acceleration", "reference_acceleration"),
-            ],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[
-                ("displacement", "measured_displacement"),
-                ("velocity", "measured_velocity"),
-                ("acceleration", "measured_acceleration"),
-            ],
-        ),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
-    ];
+    const TERMINALS: &'static [Terminal] =
+        &[Terminal::REFERENCE, Terminal::MEASURED, Terminal::VALVE];
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
@@ -115,14 +96,11 @@ impl Component for SurfaceControl {
         let control = self.built.of(&self.settings, build)?;
         control.memory = self.memory;
         let input = SurfaceInput {
-            reference: std::array::from_fn(|i| match i.checked_sub(1) {
-                None => self.reference,
-                Some(i) => Motion {
-                    displacement: self.displacement_ahead[i],
-                    velocity: self.velocity_ahead[i],
-                    acceleration: self.acceleration_ahead[i],
-                },
-            }),
+            reference: self.reference.with_ahead([
+                &self.displacement_ahead,
+                &self.velocity_ahead,
+                &self.acceleration_ahead,
+            ]),
             measured: self.measured,
         };
         self.valve_command = control.step(&input, step_size);
@@ -139,24 +117,13 @@ mod tests {
 
     #[test]
     fn what_no_controller_is_built_from_is_refused_by_name() {
-        for (name, value) in [
+        fmu_kit::conformance::refuses::<SurfaceControl>(&[
             ("surface_rate", 0.0),
             ("oil_reaching_rate", -1.0),
             ("force_step", 0.0),
             ("valve_limit", 0.0),
             ("table_mass", 0.0),
             ("loop_delay_samples", 9.0),
-        ] {
-            let mut component = SurfaceControl::default();
-            let variables = SurfaceControl::variables();
-            let variable = variables.iter().find(|v| v.name == name).unwrap();
-            match &variable.access {
-                fmu_kit::variable::Access::Real(field) => *field(&mut component) = value,
-                fmu_kit::variable::Access::Integer(field) => *field(&mut component) = value as i32,
-                _ => panic!("{name} is no number"),
-            }
-            let error = component.initialize().unwrap_err().to_string();
-            assert!(error.contains(&format!("`{name}`")), "{name}: {error}");
-        }
+        ]);
     }
 }

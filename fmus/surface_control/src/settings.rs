@@ -53,13 +53,6 @@ impl Default for Settings {
 impl Settings {
     /// What the law is built from; refuses a negative count by name.
     pub fn parameters(&self, period: f64) -> Result<Parameters, ModelError> {
-        let count = |name, samples: i32| {
-            usize::try_from(samples).map_err(|_| ModelError::Parameter {
-                name,
-                value: f64::from(samples),
-                expected: "zero or a positive number",
-            })
-        };
         Ok(Parameters {
             variant: match self.variant {
                 2 => Variant::DynamicSurface,
@@ -67,10 +60,10 @@ impl Settings {
                 _ => Variant::MultipleSurface,
             },
             rig: KnownRig {
-                delay: count("loop_delay_samples", self.loop_delay_samples)?,
+                delay: ModelError::count("loop_delay_samples", self.loop_delay_samples)?,
                 ..self.law.rig
             },
-            lead: count("reference_lead_samples", self.reference_lead_samples)?,
+            lead: ModelError::count("reference_lead_samples", self.reference_lead_samples)?,
             period,
             ..self.law
         })

@@ -30,27 +30,8 @@ impl Component for ThreeVariableControl {
     const NAME: &'static str = "ThreeVariableControl";
     const DESCRIPTION: &'static str = "Three-variable control of a shake table";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
-    const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[
-                ("displacement", "reference_displacement"),
-                ("velocity", "reference_velocity"),
-                ("acceleration", "reference_acceleration"),
-            ],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[
-                ("displacement", "measured_displacement"),
-                ("velocity", "measured_velocity"),
-                ("acceleration", "measured_acceleration"),
-            ],
-        ),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
-    ];
+    const TERMINALS: &'static [Terminal] =
+        &[Terminal::REFERENCE, Terminal::MEASURED, Terminal::VALVE];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:

@@ -35,7 +35,7 @@ pub struct Arguments {
         conflicts_with = "reference"
     )]
     record: Option<PathBuf>,
-    /// Reference: .csv with time, displacement, velocity, acceleration, used to the letter
+    /// Reference: .csv with time, displacement, velocity, acceleration, played as given
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Scale of the motion: peak acceleration in g

@@ -15,9 +15,8 @@ use crate::metrics::Tracking;
 use crate::motion::{self, Motion, Scaling};
 use crate::results::Results;
 use crate::units::INCH;
+use crate::units::constants::STROKE;
 
-/// Stroke of the table, m: a drive beyond it is said.
-const STROKE: f64 = 1.5 * INCH;
 /// File with the figures.
 const FIGURES: &str = "drive.json";
 /// The drive.
