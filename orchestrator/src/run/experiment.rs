@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::fmu::{FmiVersion, Options};
 use crate::library::FmuLibrary;
 use crate::master::{Algorithm, Ended, MasterError, Outcome, Pace, Simulation};
-use crate::motion::{self, Motion};
+use crate::motion::{self, Motion, Scaling};
 use crate::ssp;
 use crate::system::jacobi;
 use crate::system::tuning::{Rules, Tuning, Wanted};
@@ -46,7 +46,7 @@ pub struct Request {
     /// Seed of the built-in motion.
     pub seed: u64,
     /// How large it is played.
-    pub scaling: Option<Scale>,
+    pub scaling: Option<Scaling>,
     /// Parameters.
     pub set: Vec<String>,
     /// Version of FMI of the project's own components.
@@ -61,18 +61,6 @@ pub struct Request {
     /// Input tables, whose columns are named as the inputs that they drive.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<PathBuf>,
-}
-
-/// How large a motion is played.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Scale {
-    /// A factor.
-    Factor(f64),
-    /// Peak acceleration, m/s².
-    PeakAcceleration(f64),
-    /// Peak displacement, m.
-    PeakDisplacement(f64),
 }
 
 /// A request with everything it needs, checked.
