@@ -1,6 +1,7 @@
 //! Numbers with units, as options.
 
 use crate::error::Error;
+use crate::system;
 use crate::units;
 
 /// A positive quantity; a number alone is in `unit`.
@@ -35,14 +36,7 @@ pub fn if_given(
 /// # Errors
 /// Another thing.
 pub fn percent(option: &'static str, text: &str) -> Result<f64, Error> {
-    let number = text.trim().trim_end_matches('%').trim_end().parse::<f64>();
-    let positive = number
-        .ok()
-        .filter(|value| *value > 0.0 && value.is_finite());
-    positive.ok_or_else(|| Error::Option {
-        option,
-        reason: format!("`{text}` is no share; expected a number above 0, such as \"0.05 %\""),
-    })
+    system::percent(text).map_err(|reason| Error::Option { option, reason })
 }
 
 /// Lowest and highest frequency of `--band`, Hz.
