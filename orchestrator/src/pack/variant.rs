@@ -5,6 +5,7 @@ use std::{ops::Range, path::Path};
 use fmu_kit::resources::{START_VALUES, variant_token};
 use roxmltree::{Document, Node};
 
+use super::annotation::escape;
 use super::archive::{archive_bytes, read_archive, write_archive};
 use super::error::{PackError, file_error};
 
@@ -116,11 +117,4 @@ fn change(
         text.replace_range(range, &value);
     }
     Ok(text)
-}
-
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }

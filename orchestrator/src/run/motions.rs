@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::experiment::Request;
+use super::request::Request;
 use crate::error::Error;
 use crate::motion::{self, Motion, Unscaled};
 use crate::system::SystemFile;
