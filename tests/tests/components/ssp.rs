@@ -341,7 +341,6 @@ fn built_in_systems_are_valid_archives_and_give_in_ecos_and_libcosim_what_jacobi
     compared(&[("ecos", &bare), ("libcosim", &bare), ("libcosim", &loaded)]);
 }
 
-/// Controllers that ask for the motion of samples before do not go into an archive (preview, MPC).
 #[test]
 fn the_physical_rig_is_a_valid_archive_and_gives_in_ecos_and_libcosim_what_jacobi_gives_here() {
     let folder = tempfile::tempdir().unwrap();
@@ -349,8 +348,9 @@ fn the_physical_rig_is_a_valid_archive_and_gives_in_ecos_and_libcosim_what_jacob
         [
             "displacement-pid",
             "three-variable",
-            "loop-shaping",
             "sliding-mode",
+            "mpc",
+            "dual-loop",
         ]
         .map(|system| {
             exported(

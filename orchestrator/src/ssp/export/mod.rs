@@ -98,11 +98,11 @@ impl Writer<'_> {
             if let Source::Reference { quantity, ahead } = connection.source
                 && !from_motion.contains(&(quantity, ahead))
             {
-                if !(0..=AHEAD).contains(&ahead) {
+                if !(-1..=AHEAD).contains(&ahead) {
                     let origin = self.system.origin(connection.source);
                     return Err(self.fault(format!(
                         "`{origin}` cannot be written: the component that plays the motion knows \
-                         it up to {AHEAD} samples ahead"
+                         it from one sample before to {AHEAD} samples ahead"
                     )));
                 }
                 from_motion.push((quantity, ahead));
