@@ -15,6 +15,7 @@ use super::friction::{SHAPE, SealShape, Searched};
 use super::least_squares::{Coordinate, Residuals, minimise};
 use super::simulation::Simulation;
 use super::specimen::SpecimenOverMass;
+use super::velocity::velocity;
 use crate::data::{Channel, Recording};
 
 /// Rate at which the replayed displacement is led back to the measured one, rad/s.
@@ -27,6 +28,9 @@ const STEP: f64 = 5e-4;
 const MOST: usize = 60_000;
 /// Length of the blocks whose scatter gives the standard errors, s.
 const BLOCK: f64 = 2.0;
+/// Share of the viscous force that the shape of the curve may take for dry friction, or the other way:
+/// valve and seals are not quite what the model's form says.
+const MISTAKEN: f64 = 0.01;
 /// Parameters: Coulomb force and damping of the seals over those before, then the changes of the shape.
 const FITTED: usize = 2 + SHAPE;
 
@@ -54,8 +58,8 @@ pub struct Friction {
     pub coulomb: f64,
     /// The shape over it.
     pub shape: SealShape,
-    /// Standard errors of damping (N s/m) and Coulomb force (N) by the scatter between blocks of the
-    /// records.
+    /// Standard errors of damping (N s/m) and Coulomb force (N): the scatter between blocks of the
+    /// records and, of the latter, a hundredth of the viscous force.
     pub standard_errors: [f64; 2],
     /// Root mean square of the replay's errors in the parts that were not fitted, over that before.
     pub improvement: f64,
@@ -296,16 +300,32 @@ pub fn friction(
     let (better, shape) = fitted.at(&found.values);
     let covariance = fitted.covariance(&found.values)?;
     let error = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+    let mistaken = MISTAKEN * better.seal_damping * speed(records)?;
     Some(Friction {
         damping: better.seal_damping,
         coulomb: better.seal_friction,
         shape,
         standard_errors: [
             better.seal_damping * error(1),
-            better.seal_friction * error(0),
+            (better.seal_friction * error(0)).hypot(mistaken),
         ],
         improvement,
     })
+}
+
+/// Root mean square of the table's velocity, m/s.
+fn speed(records: &[Replayed<'_>]) -> Option<f64> {
+    let (mut square, mut count) = (0.0, 0);
+    for own in records {
+        let (x, a) = (
+            own.recording.channel(Channel::Displacement)?,
+            own.recording.channel(Channel::Acceleration)?,
+        );
+        let velocity = velocity(x, a, own.recording.period()).ok()?;
+        square += velocity.iter().map(|v| v * v).sum::<f64>();
+        count += velocity.len();
+    }
+    Some((square / count.max(1) as f64).sqrt())
 }
 
 impl Found {
@@ -340,8 +360,10 @@ impl Found {
         let Some(own) = friction(&records, self.rig, self.shape, known) else {
             return;
         };
-        let errors = [own.standard_errors[0], own.standard_errors[1]];
-        for (parameter, error) in [(SEAL_DAMPING, errors[0]), (SEAL_FRICTION, errors[1])] {
+        for (parameter, error) in [SEAL_DAMPING, SEAL_FRICTION]
+            .into_iter()
+            .zip(own.standard_errors)
+        {
             self.widen(parameter, error);
         }
         let rig = HydraulicRig {
