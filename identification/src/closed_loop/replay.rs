@@ -30,7 +30,7 @@ const MOST: usize = 60_000;
 const BLOCK: f64 = 2.0;
 /// Share of the viscous force that the shape of the curve may take for dry friction, or the other way:
 /// valve and seals are not quite what the model's form says.
-const MISTAKEN: f64 = 0.01;
+const MISTAKEN: f64 = 0.02;
 /// Parameters: Coulomb force and damping of the seals over those before, then the changes of the shape.
 const FITTED: usize = 2 + SHAPE;
 
@@ -59,7 +59,7 @@ pub struct Friction {
     /// The shape over it.
     pub shape: SealShape,
     /// Standard errors of damping (N s/m) and Coulomb force (N): the scatter between blocks of the
-    /// records and, of the latter, a hundredth of the viscous force.
+    /// records and, of the latter, a fiftieth of the viscous force.
     pub standard_errors: [f64; 2],
     /// Root mean square of the replay's errors in the parts that were not fitted, over that before.
     pub improvement: f64,
