@@ -4,7 +4,7 @@ use hidden_effects::case::{Case, Kind, Settings};
 use hidden_effects::outside::Outside;
 use identification::diagnosis::case::ControlLaw;
 use identification::diagnosis::engine::{Observer, Verdict};
-use identification::diagnosis::rigs::shake_table::experiment::{self, motions};
+use identification::diagnosis::rigs::shake_table::experiment::{self, Motion, motions};
 use identification::diagnosis::rigs::shake_table::left_over::{Residual, left_over, play, probe};
 use identification::diagnosis::rigs::shake_table::predictor::{
     Disturbance, Noise, Predictor, Samples,
@@ -64,20 +64,21 @@ fn mean_excess((samples, whitened): &(Samples, Vec<f64>)) -> f64 {
     blocks.iter().sum::<f64>() / blocks.len() as f64
 }
 
-/// What the model lacks is hidden; the proposed motion shows much more of it than the records did, and
-/// not much less than the best of all motions would have.
+/// What the model lacks is hidden; the proposed motion shows more of it than any record did, and is in the
+/// best quarter of all motions.
 #[test]
 fn the_proposed_motion_shows_more_of_what_is_not_explained() {
     let model = healthy();
-    let (mut drooping, mut stalling, mut dead) = (model, model, model);
-    drooping.effects.hydraulics.droop_loss = 0.15;
+    let (mut drooping, mut stalling) = (model, model);
+    drooping.effects.hydraulics.droop_loss = 0.03;
     stalling.effects.hydraulics.stall_force = 600.0;
-    dead.effects.valve.dead_band = 0.05;
-    for there in [drooping, stalling, dead] {
-        let small = motions(PERIOD).filter(|motion| motion.peak < 0.5 * INCH);
-        let records: Vec<_> = small
-            .skip(2)
-            .step_by(5)
+    for there in [drooping, stalling] {
+        // Noise, sweep and sine of a moderate size.
+        let is_moderate = |motion: &Motion| (0.2..0.5).contains(&(motion.peak / INCH));
+        let moderate: Vec<Motion> = motions(PERIOD).filter(is_moderate).collect();
+        let records: Vec<_> = [3, 1, 2]
+            .iter()
+            .map(|place| &moderate[*place])
             .map(|motion| record(&there, &model, &motion.reference))
             .collect();
         let residuals: Vec<Residual<'_>> = records
@@ -86,15 +87,17 @@ fn the_proposed_motion_shows_more_of_what_is_not_explained() {
             .collect();
         let found = probe(&model, &LAW, &residuals, PERIOD).unwrap();
         let shown = mean_excess(&record(&there, &model, &found.reference));
-        let before = mean_excess(&records[0]);
-        let best = motions(PERIOD)
+        let before = records.iter().map(mean_excess).fold(0.0, f64::max);
+        let mut all: Vec<f64> = motions(PERIOD)
             .filter(|motion| play(&model, &LAW, motion, PERIOD).is_some())
             .map(|motion| mean_excess(&record(&there, &model, &motion.reference)))
-            .fold(0.0, f64::max);
+            .collect();
+        all.sort_by(f64::total_cmp);
+        let upper = all[3 * all.len() / 4];
         let told = found.sentence();
-        println!("{told}: before {before:.2}, shown {shown:.2}, best {best:.2}");
-        assert!(shown > 2.0 * before, "{told}: {shown} {before}");
-        assert!(shown > 0.4 * best, "{told}: {shown} {best}");
+        println!("{told}: before {before:.2}, shown {shown:.2}, upper quarter above {upper:.2}");
+        assert!(shown > before, "{told}: {shown} {before}");
+        assert!(shown >= upper, "{told}: {shown} {upper}");
     }
 }
 

@@ -91,13 +91,17 @@ impl Extended {
             _ => PathBuf::from(&model.fmu),
         };
         if is_file(&place) && !place.is_file() {
-            return Err(file_fault(
-                path,
-                format!(
-                    "its FMU {} is not there: say with --fmu where it is now",
-                    place.display()
+            let missing = place.display();
+            return Err(match fmu {
+                Some(_) => Error::Option {
+                    option: "--fmu",
+                    reason: format!("{missing}: no such file"),
+                },
+                None => file_fault(
+                    path,
+                    format!("its FMU {missing} is not there: say with --fmu where it is now"),
                 ),
-            ));
+            });
         }
         // Relative paths in a system count from its folder, those of the command line do not.
         let place = match is_file(&place) {

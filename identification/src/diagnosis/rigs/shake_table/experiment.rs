@@ -21,7 +21,7 @@ pub enum Aim {
     LeftOver {
         /// Where that is, in words.
         place: String,
-        /// How many times as much of it a sample is expected as in the identification record.
+        /// How many times as much of it a sample is expected as in the record that shows most.
         times: f64,
     },
 }
@@ -56,7 +56,7 @@ impl SeparatingExperiment {
             ),
             Aim::LeftOver { place, times } => format!(
                 "{motion}: what is left over is largest at {place}, and this motion is expected to show \
-                 {times:.1} times as much of it a sample as the identification record does"
+                 {times:.1} times as much of it a sample as the record that shows most"
             ),
         }
     }

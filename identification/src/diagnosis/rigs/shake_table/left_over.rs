@@ -25,7 +25,9 @@ const BANDS: [f64; 6] = [0.5, 2.0, 5.0, 10.0, 20.0, 40.0];
 /// Power in a band counts up to so many times what the records hold: nothing tells what is beyond.
 const BEYOND: f64 = 4.0;
 /// Share of the variation of what is left over, on seconds left out, that a quantity must tell.
-const TOLD: f64 = 0.15;
+const TOLD: f64 = 0.2;
+/// Quantities that tell up to so much less than the best are asked along with it.
+const AS_GOOD: f64 = 0.1;
 /// Rounds of coordinate descent.
 const ROUNDS: usize = 300;
 
@@ -268,9 +270,42 @@ fn told_left_out(rows: &[Vec<f64>], values: &[f64]) -> f64 {
     1.0 - missed / all.max(f64::MIN_POSITIVE)
 }
 
-/// The motion on which most of what `rig` leaves over in `records` (the first is the one that it is set
-/// against) is to be expected. None where it does not follow from where the rig is, or where no motion
-/// that `law` can play shows more of it than the records do.
+/// A look with what it expects.
+struct Told {
+    look: Look,
+    coefficients: Vec<f64>,
+    /// Share that it tells of the variation on seconds left out.
+    share: f64,
+}
+
+impl Told {
+    fn by(quantity: Quantity, records: &[Residual<'_>], values: &[f64], period: f64) -> Self {
+        let look = Look::at(quantity, records, period);
+        let all = records.iter().flat_map(|record| look.rows(record.samples));
+        let rows: Vec<Vec<f64>> = all.take(values.len()).collect();
+        let whole: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
+        Self {
+            coefficients: not_negative(&whole, values),
+            share: told_left_out(&rows, values),
+            look,
+        }
+    }
+
+    /// The range in which most is left over, in words.
+    fn place(&self) -> Option<String> {
+        let weight = |i: usize| match self.look.quantity {
+            Quantity::Frequency => self.coefficients[i] * self.look.largest[i],
+            _ => self.coefficients[i],
+        };
+        let ranges = (0..RANGES).filter(|i| self.look.largest[*i] > 0.0);
+        let range = ranges.max_by(|a, b| weight(*a).total_cmp(&weight(*b)))?;
+        Some(self.look.told(range))
+    }
+}
+
+/// The motion on which most of what `rig` leaves over in `records` is to be expected: the mean of what
+/// the quantities expect that tell it nearly as well as the best. None where it does not follow from where
+/// the rig is, or where no motion that `law` can play is expected to show more of it than a record did.
 pub fn probe(
     rig: &IdentifiedRig,
     law: &ControlLaw,
@@ -281,40 +316,36 @@ pub fn probe(
         .iter()
         .flat_map(|record| left_over(record, period))
         .collect();
-    let looks = Quantity::ALL.into_iter().map(|quantity| {
-        let look = Look::at(quantity, records, period);
-        let rows: Vec<Vec<f64>> = records
-            .iter()
-            .flat_map(|record| look.rows(record.samples))
-            .collect();
-        let told = told_left_out(&rows, &values);
-        (told, look, rows)
-    });
-    let (told, look, rows) = looks.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    if told < TOLD || rows.len() != values.len() {
+    let mut looks = Quantity::ALL.map(|quantity| Told::by(quantity, records, &values, period));
+    looks.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let [best, ..] = &looks;
+    if best.share < TOLD {
         return None;
     }
-    let whole: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
-    let coefficients = not_negative(&whole, &values);
-    let ranges = (0..RANGES).filter(|i| look.largest[*i] > 0.0);
-    let weight = |i: usize| match look.quantity {
-        Quantity::Frequency => coefficients[i] * look.largest[i],
-        _ => coefficients[i],
+    let as_good = looks
+        .iter()
+        .filter(|look| look.share > best.share - AS_GOOD);
+    let as_good: Vec<&Told> = as_good.collect();
+    let expected = |samples: &Samples| {
+        let all = as_good
+            .iter()
+            .map(|own| own.look.expected(&own.coefficients, samples));
+        all.sum::<f64>() / as_good.len() as f64
     };
-    let range = ranges.max_by(|a, b| weight(*a).total_cmp(&weight(*b)))?;
-    let before = look.expected(&coefficients, records.first()?.samples);
+    let recorded = records.iter().map(|record| expected(record.samples));
+    let recorded = recorded.fold(f64::MIN_POSITIVE, f64::max);
     let played = experiment::motions(period).filter_map(|motion| {
-        let samples = play(rig, law, &motion, period)?;
-        let expected = look.expected(&coefficients, &samples);
+        let expected = expected(&play(rig, law, &motion, period)?);
         expected.is_finite().then_some((expected, motion))
     });
     let (expected, motion) = played.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (expected > before).then(|| experiment::SeparatingExperiment {
+    let place = best.place()?;
+    (expected > recorded).then(|| experiment::SeparatingExperiment {
         kind: motion.kind,
         peak: motion.peak,
         aim: experiment::Aim::LeftOver {
-            place: look.told(range),
-            times: expected / before.max(1e-3 * expected),
+            place,
+            times: expected / recorded,
         },
         period,
         reference: motion.reference,
