@@ -163,6 +163,17 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
         let still = |recording: &&Recording| too_little_excitation(recording, nominal);
         found.extend(to_be_moved.iter().filter_map(still));
     }
+    let (fitted, unseen) = (&case.identification, &case.validation);
+    let is_same = |channel: &Channel| fitted.samples(*channel) == unseen.samples(*channel);
+    if [Channel::ValveCommand, Channel::Displacement]
+        .iter()
+        .all(is_same)
+    {
+        found.push(format!(
+            "{}: its samples are those of {}: expected another record, on which the model is tested",
+            unseen.name, fitted.name
+        ));
+    }
     let has = |recording: &Recording| {
         Channel::OUTPUTS.map(|channel| recording.channel(channel).is_some())
     };
