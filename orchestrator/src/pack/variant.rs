@@ -5,6 +5,7 @@ use std::{ops::Range, path::Path};
 use fmu_kit::resources::{START_VALUES, variant_token};
 use roxmltree::{Document, Node};
 
+use super::annotation::escape;
 use super::archive::{Entries, archive_bytes, read_archive, write_archive};
 use super::error::{PackError, file_error};
 
@@ -148,11 +149,4 @@ fn change(
         text.replace_range(range, &value);
     }
     Ok(text)
-}
-
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
