@@ -246,8 +246,8 @@ fn spectrum_at(values: &[f64], angles: [f64; TOGETHER]) -> [Complex64; TOGETHER]
     let turns = angles.map(|angle| Complex64::from_polar(1.0, -angle));
     let mut sums = [Complex64::ZERO; TOGETHER];
     for value in values.iter().rev() {
-        for (sum, turn) in sums.iter_mut().zip(&turns) {
-            *sum = *sum * turn + value;
+        for lane in 0..TOGETHER {
+            sums[lane] = sums[lane] * turns[lane] + value;
         }
     }
     sums
