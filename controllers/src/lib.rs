@@ -5,6 +5,7 @@
 
 pub mod acceleration_tracking;
 pub mod allocation;
+pub mod clipped_optimal;
 pub mod hierarchy;
 pub mod hybrid;
 pub mod interlock;
