@@ -6,6 +6,7 @@
 pub mod acceleration_tracking;
 pub mod aids;
 pub mod allocation;
+pub mod clipped_optimal;
 pub mod hierarchy;
 pub mod hybrid;
 pub mod interlock;

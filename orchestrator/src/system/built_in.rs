@@ -55,7 +55,7 @@ const PLANTS: [Part; 2] = [
 /// What controllers may know of a specimen: one storey or nothing.
 type Known = fn() -> Option<YieldingSpecimen>;
 /// What stands on the table.
-const SPECIMENS: [(Part, Known); 3] = [
+const SPECIMENS: [(Part, Known); 5] = [
     (part!("specimen/", "linear"), || {
         Some(LinearSpecimen::appendix_a().into())
     }),
@@ -63,6 +63,8 @@ const SPECIMENS: [(Part, Known); 3] = [
         Some(YieldingSpecimen::default())
     }),
     (part!("specimen/", "storeys"), || None),
+    (part!("specimen/", "storeys-tuned-mass"), || None),
+    (part!("specimen/", "storeys-damped"), || None),
 ];
 /// Computed structures between the ground and the specimen.
 const STRUCTURES: [Part; 1] = [part!("structure/", "two-storeys")];
