@@ -230,9 +230,12 @@ impl Controller for AdaptiveInverse {
 mod tests {
     use super::*;
 
+    /// Parts of the wanted velocity: angular frequency (rad/s) and amplitude (m/s).
+    const PARTS: [(f64, f64); 4] = [(4.0, 0.05), (11.0, 0.05), (23.0, 0.04), (47.0, 0.03)];
+
     /// Error over the wanted acceleration, first and last, on a rig whose valve does `gain` of what the law
-    /// takes it to do.
-    fn errors(adaptation: f64, gain: f64) -> [f64; 2] {
+    /// takes it to do; and the law at the end.
+    fn learn(adaptation: f64, gain: f64) -> ([f64; 2], AdaptiveInverse) {
         let known = KnownRig {
             delay: 1,
             ..KnownRig::default()
@@ -246,11 +249,10 @@ mod tests {
         .unwrap();
         let period = law.parameters().period;
         let rig = known.model().sample(period);
-        let parts = [(4.0, 0.05), (11.0, 0.05), (23.0, 0.04), (47.0, 0.03)];
         let wanted = |k: f64| {
             let t = period * k;
             let sum = |by: i32, shift: f64| -> f64 {
-                parts
+                PARTS
                     .iter()
                     .map(|(w, v): &(f64, f64)| v * w.powi(by) * (w * t + shift).sin())
                     .sum()
@@ -286,7 +288,35 @@ mod tests {
             let command = law.step(&input, period);
             x = rig.advance(&x, gain * command, [0.0; 2]);
         }
-        sums.map(|[error, wanted]| (error / wanted).sqrt())
+        (sums.map(|[error, wanted]| (error / wanted).sqrt()), law)
+    }
+
+    fn errors(adaptation: f64, gain: f64) -> [f64; 2] {
+        learn(adaptation, gain).0
+    }
+
+    /// Where the motion has power, the taps come to `1/(gain P_v)`, the inverse of the rig that they drive.
+    #[test]
+    fn the_taps_converge_to_the_inverse_in_closed_form() {
+        let gain = 0.8;
+        let (_, law) = learn(0.02, gain);
+        let (known, period) = (law.parameters().rig, law.parameters().period);
+        let rig = LateRig::new(&known.state_space(None), 0.0, period).unwrap();
+        let off = |taps: [f64; TAPS], omega: f64| {
+            let response: Complex<f64> = (0..TAPS)
+                .map(|i| {
+                    let ahead = (LEAD as f64 - i as f64) * period;
+                    taps[i] * Complex::new(0.0, omega * ahead).exp()
+                })
+                .sum();
+            (response * rig.responses(omega)[1] * gain - 1.0).norm()
+        };
+        for (omega, _) in PARTS {
+            let (before, after) = (off(law.inverse, omega), off(law.weights(), omega));
+            println!("{omega} rad/s: off by {before:.4}, learnt {after:.4}");
+            assert!((before - 0.2).abs() < 0.03, "{before}");
+            assert!(after < 0.02, "{after}");
+        }
     }
 
     #[test]

@@ -240,9 +240,7 @@ impl Controller for ClippedOptimal {
                 .map(|j| self.correction[i][j] * innovation[j])
                 .sum::<f64>();
         }
-        self.wanted = -(0..states)
-            .map(|j| self.feedback[j] * now[j])
-            .sum::<f64>();
+        self.wanted = -(0..states).map(|j| self.feedback[j] * now[j]).sum::<f64>();
         for i in 0..states {
             let moved: f64 = (0..states).map(|j| self.transition[i][j] * now[j]).sum();
             self.estimate[i] = moved + self.input[i] * input.damper_force;

@@ -4,6 +4,7 @@
 //! period with what the sensors gave, and the command they return is held until the next call.
 
 pub mod acceleration_tracking;
+pub mod adaptive_inverse;
 pub mod aids;
 pub mod allocation;
 pub mod clipped_optimal;

@@ -29,7 +29,7 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 16] = [
+const CONTROLLERS: [Part; 17] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
@@ -46,6 +46,7 @@ const CONTROLLERS: [Part; 16] = [
     part!("", "multiple-surface"),
     part!("", "dynamic-surface"),
     part!("", "receding-horizon"),
+    part!("", "adaptive-inverse"),
 ];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [

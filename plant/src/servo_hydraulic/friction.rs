@@ -82,6 +82,15 @@ impl SealFriction {
         self.static_force > 0.0
     }
 
+    /// One over the time (1/s) in which a table that reverses with `acceleration` (m/s²) moves by half of the
+    /// deflection at which the seals slide; 0 without dry friction.
+    pub(super) fn reversal_rate(&self, acceleration: f64) -> f64 {
+        if !self.is_dry() {
+            return 0.0;
+        }
+        (acceleration * self.stiffness / self.coulomb).sqrt()
+    }
+
     fn bump(&self, velocity: f64) -> f64 {
         let square = (velocity / self.stribeck_velocity).powi(2);
         // Beyond this the exponential is below a rounding of 1, and most of the time is spent there.

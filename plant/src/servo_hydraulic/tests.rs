@@ -280,3 +280,37 @@ fn co_simulation_with_the_specimen_approaches_the_whole_rig() {
         );
     }
 }
+
+#[test]
+fn faint_friction_moves_the_table_as_none_does_or_is_refused_by_name() {
+    let swept = |coulomb: f64| {
+        let mut table = ServoHydraulicTable::default();
+        table.friction.coulomb = coulomb;
+        table.friction.static_force = coulomb * 4.0 / 3.0;
+        table.validate()?;
+        let mut state = table.rest();
+        let run = |k: i32| {
+            let t = 0.002 * f64::from(k);
+            let input = ServoHydraulicInput {
+                valve_command: 8.0 * (12.0 * t).cos() + (60.0 * t).sin(),
+                ..ServoHydraulicInput::default()
+            };
+            state = table.advance(&state, &input, 0.002);
+            state.displacement.powi(2)
+        };
+        Ok::<f64, ModelError>(((0..1000).map(run).sum::<f64>() / 1000.0).sqrt())
+    };
+    let none = swept(0.0).unwrap();
+    for coulomb in [0.1, 0.01, 1e-3, 1e-4] {
+        let faint = swept(coulomb).unwrap();
+        assert!(
+            (faint / none - 1.0).abs() < 1e-5,
+            "{coulomb} N: {faint} m, without {none} m"
+        );
+    }
+    let refused = swept(1e-5).unwrap_err().to_string();
+    assert!(
+        refused.contains("`coulomb_friction`") && refused.contains("zero"),
+        "{refused}"
+    );
+}

@@ -356,7 +356,11 @@ mod tests {
             }
             println!("{voltage} V: {largest:.0} N");
             // The prototype's: some 200 N without voltage, beyond 1 kN with all of it.
-            let range = if voltage == 0.0 { 150.0..700.0 } else { 700.0..2500.0 };
+            let range = if voltage == 0.0 {
+                150.0..700.0
+            } else {
+                700.0..2500.0
+            };
             assert!(range.contains(&largest), "{largest}");
         }
     }
@@ -388,6 +392,12 @@ mod tests {
             damper: Some((3, MagnetorheologicalDamper::default())),
             ..building
         };
-        assert!(wrong.validate().unwrap_err().to_string().contains("damper_storey"));
+        assert!(
+            wrong
+                .validate()
+                .unwrap_err()
+                .to_string()
+                .contains("damper_storey")
+        );
     }
 }
