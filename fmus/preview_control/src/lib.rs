@@ -23,11 +23,16 @@ pub struct PreviewControl {
     command: f64,
     memory: Memory,
     valve_command: f64,
+    specimen_acceleration: f64,
+    actuator_force: f64,
+    specimen_mass: f64,
+    specimen_stiffness: f64,
+    specimen_yield_force: f64,
     #[serde(skip)]
     built: Built<Settings, Law>,
 }
 
-const NOW: [&str; 7] = [
+const NOW: [&str; 9] = [
     "reference_displacement",
     "reference_velocity",
     "reference_acceleration",
@@ -35,6 +40,8 @@ const NOW: [&str; 7] = [
     "measured_velocity",
     "measured_acceleration",
     "controller_command",
+    "specimen_acceleration",
+    "measured_force",
 ];
 
 fn build(settings: &Settings) -> Result<Law, plant::ModelError> {
@@ -64,6 +71,10 @@ impl Component for PreviewControl {
             input("controller_command", s.command, "Another controller's command, where this compensates", "V").nominal(10.0);
             input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
         };
+        variables.extend(fmu_kit::table! { Self, s:
+            input("specimen_acceleration", s.specimen_acceleration, "Absolute acceleration of the specimen, where it is estimated", "m/s2" => "g").nominal(10.0);
+            input("measured_force", s.actuator_force, "Force of the actuator on the table, where the specimen is estimated", "N" => "lbf").nominal(400.0);
+        });
         let ahead = fmu_kit::reference_ahead::<Self>(
             PREVIEW,
             [
@@ -85,6 +96,11 @@ impl Component for PreviewControl {
         };
         variables.extend(outputs);
         variables.extend(settings::variables());
+        variables.extend(fmu_kit::table! { Self, s:
+            local("estimated_specimen_mass", s.specimen_mass, "Mass of the specimen as it is known now", "kg" => "lbf.s2/in").discrete();
+            local("estimated_specimen_stiffness", s.specimen_stiffness, "Its stiffness before it yields", "N/m" => "lbf/in").discrete();
+            local("estimated_specimen_yield_force", s.specimen_yield_force, "Its yield force", "N" => "lbf").discrete();
+        });
         variables.push(
             Variable::choice("role", ROLES, |s: &mut Self| &mut s.settings.role)
                 .about("What the law does"),
@@ -110,9 +126,16 @@ impl Component for PreviewControl {
             ]),
             measured: self.measured,
             command: self.command,
+            specimen_acceleration: self.specimen_acceleration,
+            actuator_force: self.actuator_force,
         };
         self.valve_command = control.step(&input, step_size);
         self.memory = control.memory;
+        if let Some(specimen) = control.specimen() {
+            self.specimen_mass = specimen.mass;
+            self.specimen_stiffness = specimen.columns.stiffness();
+            self.specimen_yield_force = specimen.columns.yield_force;
+        }
         Ok(())
     }
 }

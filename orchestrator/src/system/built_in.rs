@@ -29,7 +29,7 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 17] = [
+const CONTROLLERS: [Part; 18] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
@@ -47,6 +47,7 @@ const CONTROLLERS: [Part; 17] = [
     part!("", "dynamic-surface"),
     part!("", "receding-horizon"),
     part!("", "adaptive-inverse"),
+    part!("", "adaptive-preview"),
 ];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [
