@@ -35,6 +35,23 @@ macro_rules! table {
     };
 }
 
+/// The inputs of a law that makes a measured motion follow a reference, as in `tracking_inputs!(Self, s:
+/// s.reference, s.measured)`: `reference_displacement` (m), `reference_velocity`,
+/// `reference_acceleration`, and the same of `measured`. Each of the two has the fields of a motion.
+#[macro_export]
+macro_rules! tracking_inputs {
+    ($component:ty, $s:ident: $reference:expr, $measured:expr) => {
+        $crate::table! { $component, $s:
+            input("reference_displacement", $reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input("reference_velocity", $reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
+            input("reference_acceleration", $reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
+            input("measured_displacement", $measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input("measured_velocity", $measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+            input("measured_acceleration", $measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
+        }
+    };
+}
+
 /// Gives a component's library every function of FMI 2.0 and FMI 3.0, and the private ones with
 /// which the packer asks for descriptions and the tests run the component without FMI.
 ///

@@ -406,6 +406,12 @@ impl<C> Variable<C> {
         self
     }
 
+    /// Declares that it depends directly on all of `knowns`.
+    pub fn depends_on_all(self, knowns: &[Self], kind: Dependency) -> Self {
+        let names: Vec<&str> = knowns.iter().map(|known| known.name.as_str()).collect();
+        self.depends_on(&names, kind)
+    }
+
     /// Declares that its initial value depends on inputs or parameters.
     pub fn initially_depends_on<S: AsRef<str>>(mut self, names: &[S]) -> Self {
         self.declaration

@@ -37,15 +37,6 @@ struct Counts {
     low_level_alone: i32,
 }
 
-const NOW: [&str; 6] = [
-    "reference_displacement",
-    "reference_velocity",
-    "reference_acceleration",
-    "measured_displacement",
-    "measured_velocity",
-    "measured_acceleration",
-];
-
 fn build(settings: &Settings) -> Result<ModelPredictiveControl, plant::ModelError> {
     ModelPredictiveControl::new(settings.parameters(ModelPredictive::STEP_SIZE)?)
 }
@@ -71,29 +62,15 @@ impl Component for ModelPredictive {
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        let mut variables = fmu_kit::table! { Self, s:
-            input("reference_displacement", s.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
-            input("reference_velocity", s.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
-            input("reference_acceleration", s.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
-            input("measured_displacement", s.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
-            input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
-            input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
-        };
-        let ahead = fmu_kit::reference_ahead::<Self>(
+        let mut inputs = fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured);
+        inputs.extend(fmu_kit::reference_ahead::<Self>(
             MAXIMUM_HORIZON,
             [
                 |s| &mut s.displacement_ahead,
                 |s| &mut s.velocity_ahead,
                 |s| &mut s.acceleration_ahead,
             ],
-        );
-        let inputs: Vec<String> = NOW
-            .iter()
-            .map(|name| name.to_string())
-            .chain(ahead.iter().map(|variable| variable.name.clone()))
-            .collect();
-        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
-        variables.extend(ahead);
+        ));
         let outputs = fmu_kit::table! { Self, s:
             output("command_displacement", s.command.displacement, "Displacement for three-variable control", "m" => "in").nominal(0.0381);
             output("command_velocity", s.command.velocity, "Velocity for three-variable control", "m/s" => "in/s").nominal(0.5);
@@ -107,11 +84,12 @@ impl Component for ModelPredictive {
             output("fallback_count", s.counts.fallbacks, "Steps along the previous plan because the solver gave up");
             output("low_level_alone_count", s.counts.low_level_alone, "Steps left to three-variable control alone");
         };
-        variables.extend(
-            outputs
-                .chain(counts)
-                .map(|output| output.depends_on(&inputs, Dependent)),
-        );
+        let outputs: Vec<Variable<Self>> = outputs
+            .chain(counts)
+            .map(|output| output.depends_on_all(&inputs, Dependent))
+            .collect();
+        let mut variables = inputs;
+        variables.extend(outputs);
         variables.extend(settings::variables());
         variables.push(
             Variable::choice("solver", SOLVERS, |s: &mut Self| &mut s.settings.solver)

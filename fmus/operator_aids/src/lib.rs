@@ -17,17 +17,6 @@ pub struct OperatorAids {
     added: f64,
 }
 
-const INPUTS: [&str; 8] = [
-    "controller_command",
-    "reference_displacement",
-    "reference_velocity",
-    "reference_acceleration",
-    "measured_displacement",
-    "measured_velocity",
-    "measured_acceleration",
-    "measured_force",
-];
-
 impl Component for OperatorAids {
     const NAME: &'static str = "OperatorAids";
     const DESCRIPTION: &'static str =
@@ -50,25 +39,22 @@ impl Component for OperatorAids {
     ];
 
     fn variables() -> Vec<Variable<Self>> {
-        fmu_kit::table! { Self, s:
+        let mut inputs = fmu_kit::tracking_inputs!(Self, s: s.input.reference, s.input.measured);
+        inputs.extend(fmu_kit::table! { Self, s:
             input("controller_command", s.input.command, "The controller's command", "V").nominal(10.0);
-            input("reference_displacement", s.input.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
-            input("reference_velocity", s.input.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
-            input("reference_acceleration", s.input.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
-            input("measured_displacement", s.input.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
-            input("measured_velocity", s.input.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
-            input("measured_acceleration", s.input.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
             input("measured_force", s.input.force, "Force of the actuator", "N" => "lbf").nominal(200.0);
+        });
+        let others = fmu_kit::table! { Self, s:
             output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
-                .discrete().nominal(10.0).depends_on(&INPUTS, Dependent);
+                .discrete().nominal(10.0).depends_on_all(&inputs, Dependent);
             output("added_command", s.added, "What the aids added to the controller's command", "V")
-                .discrete().nominal(10.0).depends_on(&INPUTS, Dependent);
+                .discrete().nominal(10.0).depends_on_all(&inputs, Dependent);
             output("distortion", s.law.harmonics.memory.measured.distortion, "Sines: harmonics 2 to 9 of the measured acceleration over the fundamental, of the latest epoch")
-                .discrete().depends_on(&INPUTS, Dependent);
+                .discrete().depends_on_all(&inputs, Dependent);
             output("amplitude_ratio", s.law.harmonics.memory.measured.amplitude_ratio, "Sines: fundamental of the measured acceleration over the wanted one")
-                .discrete().depends_on(&INPUTS, Dependent);
+                .discrete().depends_on_all(&inputs, Dependent);
             output("phase_lag", s.law.harmonics.memory.measured.phase_lag, "Sines: by which it is late", "rad" => "deg")
-                .discrete().depends_on(&INPUTS, Dependent);
+                .discrete().depends_on_all(&inputs, Dependent);
             parameter("friction_compensation", s.law.on.friction, "Whether dry friction along the wanted motion is compensated");
             parameter("specimen_compensation", s.law.on.specimen, "Whether the specimen's measured force is compensated");
             parameter("disturbance_observer", s.law.on.observer, "Whether what the model does not explain is opposed");
@@ -103,7 +89,10 @@ impl Component for OperatorAids {
             parameter("harmonic_gain", s.law.harmonics.gain, "Sines: part of an error that is taken off at once");
             parameter("settling_cycles", s.law.harmonics.settling_cycles, "Sines: cycles of an epoch that are not measured").min(0.0);
             parameter("measured_cycles", s.law.harmonics.measured_cycles, "Sines: cycles that are").min(1.0);
-        }
+        };
+        let mut variables = inputs;
+        variables.extend(others);
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {
@@ -132,7 +121,17 @@ mod tests {
     #[test]
     fn inputs_arrive_where_they_belong() {
         let mut component = OperatorAids::default();
-        number(&mut component, &INPUTS);
+        let inputs = [
+            "controller_command",
+            "reference_displacement",
+            "reference_velocity",
+            "reference_acceleration",
+            "measured_displacement",
+            "measured_velocity",
+            "measured_acceleration",
+            "measured_force",
+        ];
+        number(&mut component, &inputs);
         let Input {
             command,
             reference,

@@ -32,18 +32,6 @@ pub struct PreviewControl {
     built: Built<Settings, Law>,
 }
 
-const NOW: [&str; 9] = [
-    "reference_displacement",
-    "reference_velocity",
-    "reference_acceleration",
-    "measured_displacement",
-    "measured_velocity",
-    "measured_acceleration",
-    "controller_command",
-    "specimen_acceleration",
-    "measured_force",
-];
-
 fn build(settings: &Settings) -> Result<Law, plant::ModelError> {
     Law::new(settings.parameters(PreviewControl::STEP_SIZE)?)
 }
@@ -62,38 +50,25 @@ impl Component for PreviewControl {
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        let mut variables = fmu_kit::table! { Self, s:
-            input("reference_displacement", s.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
-            input("reference_velocity", s.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
-            input("reference_acceleration", s.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
-            input("measured_displacement", s.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
-            input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+        let mut inputs = fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured);
+        inputs.extend(fmu_kit::table! { Self, s:
             input("controller_command", s.command, "Another controller's command, where this compensates", "V").nominal(10.0);
-            input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
-        };
-        variables.extend(fmu_kit::table! { Self, s:
             input("specimen_acceleration", s.specimen_acceleration, "Absolute acceleration of the specimen, where it is estimated", "m/s2" => "g").nominal(10.0);
             input("measured_force", s.actuator_force, "Force of the actuator on the table, where the specimen is estimated", "N" => "lbf").nominal(400.0);
         });
-        let ahead = fmu_kit::reference_ahead::<Self>(
+        inputs.extend(fmu_kit::reference_ahead::<Self>(
             PREVIEW,
             [
                 |s| &mut s.displacement_ahead,
                 |s| &mut s.velocity_ahead,
                 |s| &mut s.acceleration_ahead,
             ],
-        );
-        let inputs: Vec<String> = NOW
-            .iter()
-            .map(|name| name.to_string())
-            .chain(ahead.iter().map(|variable| variable.name.clone()))
-            .collect();
-        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
-        variables.extend(ahead);
+        ));
         let outputs = fmu_kit::table! { Self, s:
             output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
-                .discrete().nominal(10.0).depends_on(&inputs, Dependent);
+                .discrete().nominal(10.0).depends_on_all(&inputs, Dependent);
         };
+        let mut variables = inputs;
         variables.extend(outputs);
         variables.extend(settings::variables());
         variables.extend(fmu_kit::table! { Self, s:

@@ -26,15 +26,6 @@ pub struct SurfaceControl {
     built: Built<Settings, Law>,
 }
 
-const NOW: [&str; 6] = [
-    "reference_displacement",
-    "reference_velocity",
-    "reference_acceleration",
-    "measured_displacement",
-    "measured_velocity",
-    "measured_acceleration",
-];
-
 fn build(settings: &Settings) -> Result<Law, plant::ModelError> {
     Law::new(settings.parameters(SurfaceControl::STEP_SIZE)?)
 }
@@ -49,33 +40,20 @@ impl Component for SurfaceControl {
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        let mut variables = fmu_kit::table! { Self, s:
-            input("reference_displacement", s.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
-            input("reference_velocity", s.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
-            input("reference_acceleration", s.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
-            input("measured_displacement", s.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
-            input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
-            input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
-        };
-        let ahead = fmu_kit::reference_ahead::<Self>(
+        let mut inputs = fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured);
+        inputs.extend(fmu_kit::reference_ahead::<Self>(
             PREVIEW,
             [
                 |s| &mut s.displacement_ahead,
                 |s| &mut s.velocity_ahead,
                 |s| &mut s.acceleration_ahead,
             ],
-        );
-        let inputs: Vec<String> = NOW
-            .iter()
-            .map(|name| name.to_string())
-            .chain(ahead.iter().map(|variable| variable.name.clone()))
-            .collect();
-        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
-        variables.extend(ahead);
+        ));
         let outputs = fmu_kit::table! { Self, s:
             output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
-                .discrete().nominal(10.0).depends_on(&inputs, Dependent);
+                .discrete().nominal(10.0).depends_on_all(&inputs, Dependent);
         };
+        let mut variables = inputs;
         variables.extend(outputs);
         variables.extend(settings::variables());
         variables.push(

@@ -17,15 +17,6 @@ pub struct ThreeVariableControl {
     valve_command: f64,
 }
 
-const INPUTS: [&str; 6] = [
-    "reference_displacement",
-    "reference_velocity",
-    "reference_acceleration",
-    "measured_displacement",
-    "measured_velocity",
-    "measured_acceleration",
-];
-
 impl Component for ThreeVariableControl {
     const NAME: &'static str = "ThreeVariableControl";
     const DESCRIPTION: &'static str = "Three-variable control of a shake table";
@@ -34,15 +25,10 @@ impl Component for ThreeVariableControl {
         &[Terminal::REFERENCE, Terminal::MEASURED, Terminal::VALVE];
 
     fn variables() -> Vec<Variable<Self>> {
-        fmu_kit::table! { Self, s:
-            input("reference_displacement", s.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
-            input("reference_velocity", s.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
-            input("reference_acceleration", s.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
-            input("measured_displacement", s.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
-            input("measured_velocity", s.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
-            input("measured_acceleration", s.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
-                .discrete().nominal(10.0).depends_on(&INPUTS, Dependent);
+        let inputs = fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured);
+        let others = fmu_kit::table! { Self, s:
+                        output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0).depends_on_all(&inputs, Dependent);
             parameter("proportional_gain", s.law.gains.proportional, "P of Table 3-2", "V/m" => "V/in");
             parameter("integral_gain", s.law.gains.integral, "I of Table 3-2", "V/(m.s)" => "V/(in.s)");
             parameter("velocity_feedback_gain", s.law.gains.velocity_feedback, "Kbv of Table 3-2", "V.s/m" => "V.s/in");
@@ -51,7 +37,10 @@ impl Component for ThreeVariableControl {
             parameter("velocity_feedforward_gain", s.law.gains.velocity_feedforward, "Kfv of Table 3-2", "V.s/m" => "V.s/in");
             parameter("acceleration_feedforward_gain", s.law.gains.acceleration_feedforward, "Kfa of Table 3-2", "V.s2/m" => "V.s2/in");
             parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
-        }
+        };
+        let mut variables = inputs;
+        variables.extend(others);
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {
@@ -110,7 +99,15 @@ mod tests {
                 integral: 0.0
             }
         );
-        number(&mut component, &INPUTS);
+        let inputs = [
+            "reference_displacement",
+            "reference_velocity",
+            "reference_acceleration",
+            "measured_displacement",
+            "measured_velocity",
+            "measured_acceleration",
+        ];
+        number(&mut component, &inputs);
         let reference = Motion {
             displacement: 1.0,
             velocity: 2.0,
