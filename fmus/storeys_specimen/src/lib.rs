@@ -53,9 +53,10 @@ impl Default for StoreysSpecimen {
             yield_displacement: strength.map(|force| force / STIFFNESS),
             post_yield_ratio: [0.05; MAX_STOREYS],
             damper_storey: 0,
-            // A twentieth of the prototype: some 10 N without voltage, 60 N with all of it.
+            // With all voltage half of the strength of the lowest storey, 3 % of the building's weight: some
+            // 5 N without voltage, 15 N with all of it.
             damper: MagnetorheologicalDamper {
-                size: 0.05,
+                size: 0.011,
                 ..MagnetorheologicalDamper::default()
             },
             tuned_mass_floor: 0,
