@@ -24,7 +24,7 @@ use crate::run::page;
 use crate::run::refinement::refine;
 use crate::run::summary::Summary;
 use crate::run::text::text;
-use crate::system::built_in;
+use crate::system::{self, built_in};
 use crate::units::{self, STANDARD_GRAVITY};
 
 /// Options of `shakebench run`.
@@ -35,6 +35,7 @@ use crate::units::{self, STANDARD_GRAVITY};
     shakebench run my-rig.toml --algorithm jacobi --step 1ms --json\n  \
     shakebench run system.ssp --duration \"10 s\"\n  \
     shakebench run Theirs.fmu --input forces.csv\n  \
+    shakebench run my-system.toml --step 10ms --variable-step 0.1%\n  \
     shakebench run long.toml --duration \"2 h\" --checkpoint-every \"1 min\" --out long\n  \
     shakebench run --resume long\n  \
     shakebench run --manifest shakebench-results/three-variable-synthetic-1/manifest.json")]
@@ -70,9 +71,16 @@ pub struct Arguments {
     /// Coupling step, such as "0.5 ms"; controllers keep their own period [default: 2 ms]
     #[arg(long, value_name = "T")]
     step: Option<String>,
+    /// Choose each coupling step so that what components give each other errs over it by an estimated
+    /// share of its largest size so far, such as "0.1 %"; --step is then the greatest
+    #[arg(long, value_name = "PERCENT")]
+    variable_step: Option<String>,
+    /// Least step where it varies [default: a 1024th of the greatest]
+    #[arg(long, value_name = "T")]
+    least_step: Option<String>,
     /// Halve the coupling step until the error of the coupling is estimated to be at most so much of
     /// the peak of each signal, such as "0.05 %"
-    #[arg(long, value_name = "PERCENT", conflicts_with_all = ["manifest", "resume"])]
+    #[arg(long, value_name = "PERCENT", conflicts_with_all = ["manifest", "resume", "variable_step"])]
     coupling_error: Option<String>,
     /// Play only the beginning of the motion, such as "10 s"
     #[arg(long, value_name = "T")]
@@ -127,13 +135,13 @@ pub struct Arguments {
     /// Go on with the run in this folder from its last checkpoint
     #[arg(long, value_name = "DIR", conflicts_with_all = [
         "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
-        "duration", "scaling", "seed", "manifest", "out", "record_every", "checkpoint_every",
+        "variable_step", "least_step",        "duration", "scaling", "seed", "manifest", "out", "record_every", "checkpoint_every",
     ])]
     resume: Option<PathBuf>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
         "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
-        "duration", "scaling", "seed",
+        "variable_step", "least_step",        "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
 }
@@ -465,6 +473,11 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
         fmi: arguments.fmi.into(),
         algorithm: arguments.algorithm,
         step_s: text("--step", &arguments.step, "s")?,
+        variable_step_percent: match &arguments.variable_step {
+            Some(share) => Some(percent("--variable-step", share)?),
+            None => None,
+        },
+        least_step_s: text("--least-step", &arguments.least_step, "s")?,
         duration_s: text("--duration", &arguments.duration, "s")?,
         inputs: arguments.input.iter().map(|path| absolute(path)).collect(),
     })
@@ -486,14 +499,7 @@ pub(super) fn quantity(option: &'static str, text: &str, unit: &'static str) -> 
 
 /// A positive share, per cent.
 fn percent(option: &'static str, text: &str) -> Result<f64, Error> {
-    let number = text.trim().trim_end_matches('%').trim_end().parse::<f64>();
-    let positive = number
-        .ok()
-        .filter(|value| *value > 0.0 && value.is_finite());
-    positive.ok_or_else(|| Error::Option {
-        option,
-        reason: format!("`{text}` is no share; expected a number above 0, such as \"0.05 %\""),
-    })
+    system::percent(text).map_err(|reason| Error::Option { option, reason })
 }
 
 /// A whole number above 0.

@@ -89,6 +89,8 @@ pub struct CallError {
     pub variables: Vec<String>,
     /// What came of it, as a clause.
     pub outcome: String,
+    /// Whether it is a step that the FMU discarded: it can go on from a saved state.
+    pub is_discarded_step: bool,
     /// What the FMU logged since the last call that went well.
     pub messages: Vec<String>,
 }

@@ -336,6 +336,7 @@ fn play(prepared: &Prepared, drive: Motion, late: usize) -> Result<Played, Error
         algorithm: prepared.algorithm,
         system: prepared.system.clone(),
         step: prepared.step,
+        variable: prepared.variable,
         samples: drive.len(),
         motion: drive,
         options: prepared.options.clone(),

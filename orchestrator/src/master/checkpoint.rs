@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::run::Tripped;
+use super::variable::Progress as StepProgress;
 use super::{MasterError, Record, Simulation};
 use crate::fmu::{Datum, State};
 
@@ -18,6 +19,7 @@ pub struct Checkpoint {
     last_numbers: Vec<f64>,
     last_exact: Vec<Datum>,
     tripped: Option<Tripped>,
+    variable: Option<StepProgress>,
     parts: Vec<PartState>,
     /// Time that the stepping has taken, s.
     wall: f64,
@@ -98,6 +100,7 @@ impl Simulation {
                 .iter()
                 .zip(&self.parts)
                 .all(|(kept, part)| kept.name == part.instance.name);
+        let fits = fits && checkpoint.variable.is_some() == self.variable.is_some();
         if !fits || record.columns != self.columns() || record.exact_columns != self.exact_names {
             return Err(MasterError::OtherCheckpoint);
         }
@@ -116,6 +119,9 @@ impl Simulation {
             .clone_from(&checkpoint.last_numbers);
         self.last_signals.exact.clone_from(&checkpoint.last_exact);
         self.tripped.clone_from(&checkpoint.tripped);
+        if let (Some(control), Some(progress)) = (&mut self.variable, &checkpoint.variable) {
+            control.progress.clone_from(progress);
+        }
         self.tick = checkpoint.tick;
         self.notes.push(format!(
             "the run goes on from its checkpoint at {} s",
@@ -154,6 +160,10 @@ impl Simulation {
             last_numbers: self.last_signals.numbers.clone(),
             last_exact: self.last_signals.exact.clone(),
             tripped: self.tripped.clone(),
+            variable: self
+                .variable
+                .as_ref()
+                .map(|control| control.progress.clone()),
             parts,
             wall,
         }))

@@ -10,10 +10,24 @@ use super::iterative::Coupling;
 use super::reference::Reference;
 use super::signals::{Place, Signals};
 use super::transfer::{Drive, Inputs, Outputs};
+use super::variable::{self, StepControl, VariableStep};
 use super::{Algorithm, EndSignals, MasterError, Part, Simulation, order, start};
 use crate::fmu::{Causality, Datum, Instance, Kind, Options, Processes, State, Variability};
 use crate::motion::Motion;
-use crate::system::{Connection, Operation, Quantity, Source, System};
+use crate::system::{Between, Connection, Operation, Quantity, Source, System};
+
+/// How a system is stepped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// Order of calls.
+    pub algorithm: Algorithm,
+    /// Coupling step, s; the greatest one where it varies.
+    pub step: f64,
+    /// Length of the run, s.
+    pub stop: f64,
+    /// How the step varies, if it does.
+    pub variable: Option<VariableStep>,
+}
 
 impl Simulation {
     /// Loads and initializes `system` under `motion`, with a coupling step of `step` seconds.
@@ -42,13 +56,44 @@ impl Simulation {
         (step, stop): (f64, f64),
         options: &Options,
     ) -> Result<Self, MasterError> {
+        let plan = Plan {
+            algorithm,
+            step,
+            stop,
+            variable: None,
+        };
+        Self::planned(system, motion, &plan, options)
+    }
+
+    /// As [`Simulation::new`], of the run that `plan` says, with FMUs run as `options` say.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`]; a variable step that does not suit the components.
+    pub fn planned(
+        system: &System,
+        motion: &Motion,
+        plan: &Plan,
+        options: &Options,
+    ) -> Result<Self, MasterError> {
+        let Plan {
+            algorithm,
+            step: greatest,
+            stop,
+            variable,
+        } = *plan;
+        let divisions = match &variable {
+            Some(wanted) => variable::divisions(system, algorithm, greatest, wanted)?,
+            None => 1,
+        };
+        let step = greatest / divisions as f64;
         // A Jacobi master sets, steps and reads: every FMU bears that.
         let (system, mut notes) = match algorithm {
             Algorithm::Jacobi => (system.clone(), Vec::new()),
             _ => order::bearable(system, step, stop, options),
         };
         let system = &system;
-        let ticks_per_row = ticks(motion.dt, step, "the sample time of the motion")?;
+        let ticks_per_row =
+            divisions * ticks(motion.dt, greatest, "the sample time of the motion")?;
         // A Jacobi master meets loops of direct feedthrough at the beginning only.
         let schedule = system.schedule(algorithm != Algorithm::GaussSeidel)?;
         let repeats_calls = |component: usize| {
@@ -75,7 +120,8 @@ impl Simulation {
                 Source::Output { .. } => {}
             }
         }
-        let mut plan = Plan::new(system, &mut reference, &schedule.operations);
+        let mut plan = Places::new(system, &mut reference, &schedule.operations);
+        plan.tables_are_smooth = variable.is_some();
         let mut processes = Processes::new(options);
         let mut parts = Vec::with_capacity(system.components.len());
         for (index, component) in system.components.iter().enumerate() {
@@ -90,10 +136,17 @@ impl Simulation {
             start::prepare(&mut instance, component)?;
             let every = component
                 .period
-                .map(|period| ticks(period, step, &format!("the period of `{}`", component.name)));
+                .map(|period| {
+                    ticks(
+                        period,
+                        greatest,
+                        &format!("the period of `{}`", component.name),
+                    )
+                })
+                .transpose()?;
             parts.push(Part {
                 instance,
-                every: every.transpose()?,
+                every: every.map(|steps| divisions * steps),
                 inputs: plan.inputs(&mut reference, index, |_| true),
                 outputs: std::mem::take(&mut plan.outputs[index]),
                 state: State::default(),
@@ -158,7 +211,7 @@ impl Simulation {
             numbers: vec![0.0; plan.names.len()],
             exact,
         };
-        let coupling = Coupling::new(&parts);
+        let coupling = Coupling::new(&parts, reference.len());
         if algorithm == Algorithm::Iterative {
             notes.extend(coupling.explicit(&parts).into_iter().map(|at| {
                 format!(
@@ -168,8 +221,15 @@ impl Simulation {
                 )
             }));
         }
+        let control = variable.map(|wanted| {
+            let control =
+                StepControl::new(&wanted, divisions, coupling.signals().collect(), &parts);
+            notes.extend(control.notes(&parts));
+            control
+        });
         let mut simulation = Self {
             algorithm,
+            variable: control,
             coupling,
             begin: system.start,
             step,
@@ -228,8 +288,10 @@ fn ticks(period: f64, step: f64, what: &str) -> Result<usize, MasterError> {
 }
 
 /// Where each signal stands.
-struct Plan<'a> {
+struct Places<'a> {
     system: &'a System,
+    /// Whether what a table holds on straight lines changes between samples.
+    tables_are_smooth: bool,
     places: HashMap<(usize, usize), Place>,
     names: Vec<String>,
     /// Names and empty values of signals that numbers do not hold.
@@ -242,7 +304,7 @@ struct Plan<'a> {
     incoming: Vec<Vec<&'a Connection>>,
 }
 
-impl<'a> Plan<'a> {
+impl<'a> Places<'a> {
     fn new(system: &'a System, reference: &mut Reference, operations: &[Operation]) -> Self {
         let mut names = vec![String::new(); reference.len()];
         // Those of the motion come first, in this order; the others follow as they are connected.
@@ -264,6 +326,7 @@ impl<'a> Plan<'a> {
         }
         let mut plan = Self {
             system,
+            tables_are_smooth: false,
             places: HashMap::new(),
             names,
             exact: Vec::new(),
@@ -344,7 +407,10 @@ impl<'a> Plan<'a> {
     /// Whether the source changes between samples.
     fn is_smooth(&self, source: Source) -> bool {
         match source {
-            Source::Reference { .. } | Source::Table { .. } => false,
+            Source::Reference { .. } => false,
+            Source::Table { table, .. } => {
+                self.tables_are_smooth && self.system.tables[table].between == Between::Linear
+            }
             Source::Output {
                 component,
                 variable,

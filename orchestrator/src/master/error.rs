@@ -20,6 +20,9 @@ pub enum MasterError {
     /// Steps and periods that do not fit together.
     #[error("{0}")]
     Step(String),
+    /// Steps of different lengths where they cannot be.
+    #[error("--variable-step: {0}")]
+    VariableStep(String),
     /// A sampled component in a loop of direct feedthrough that cannot save its state.
     #[error(
         "--algorithm iterative repeats the call of the sampled component `{0}`, which is part of a loop \
@@ -94,4 +97,15 @@ pub enum MasterError {
         /// Its last change.
         change: f64,
     },
+}
+
+impl MasterError {
+    /// Whether a shorter step may help: an FMU that discarded it, values that did not settle over it.
+    pub(super) fn is_of_the_step(&self) -> bool {
+        match self {
+            Self::Call(error) => error.is_discarded_step,
+            Self::NotConverged { .. } | Self::Loop { .. } => true,
+            _ => false,
+        }
+    }
 }

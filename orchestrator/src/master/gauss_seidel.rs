@@ -19,21 +19,31 @@ pub(super) fn observe(simulation: &mut Simulation) -> Result<(), MasterError> {
 /// step, `(3 y_k - y_(k-1)) / 2` (Adams-Bashforth). That couples them with second order, where
 /// `y_k` would be half a step late and of first.
 pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
-    let (tick, time, step) = (simulation.tick, simulation.time(), simulation.step);
-    let (now, last) = (&simulation.signals, &mut simulation.last_signals);
-    let coupling = &simulation.coupling;
-    if tick == 0 {
-        coupling.copy(now, last);
+    if simulation.tick == 0 {
+        simulation.keep_as_last();
     }
+    step(simulation, 1, 1.0)?;
+    simulation.keep_as_last();
+    Ok(())
+}
+
+/// The step alone, over so many ticks; the step before it was shorter by `ratio`.
+#[inline]
+pub(super) fn step(
+    simulation: &mut Simulation,
+    ticks: usize,
+    ratio: f64,
+) -> Result<(), MasterError> {
+    let (time, length) = (simulation.time(), ticks as f64 * simulation.step);
+    let (now, last) = (&simulation.signals, &simulation.last_signals);
     for part in simulation
         .parts
         .iter_mut()
         .filter(|part| part.every.is_none())
     {
         part.inputs
-            .transfer_between(now, last, -0.5, &mut part.instance)?;
-        part.step(time, step)?;
+            .transfer_between(now, last, -0.5 * ratio, &mut part.instance)?;
+        part.step(time, length)?;
     }
-    coupling.copy(now, last);
     Ok(())
 }

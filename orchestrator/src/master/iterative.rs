@@ -10,12 +10,26 @@ use super::{MasterError, Part, Simulation};
 
 /// Continuous components over `[t_k, t_k + h]`, repeated until the values at the end agree.
 pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
-    let (time, step) = (simulation.time(), simulation.step);
+    if simulation.tick == 0 {
+        simulation.keep_as_last();
+    }
+    step(simulation, 1, 1.0)?;
+    simulation.keep_as_last();
+    Ok(())
+}
+
+/// The step alone, over so many ticks; the step before it was shorter by `ratio`.
+pub(super) fn step(
+    simulation: &mut Simulation,
+    ticks: usize,
+    ratio: f64,
+) -> Result<(), MasterError> {
+    let (time, length) = (simulation.time(), ticks as f64 * simulation.step);
     // Between two calls of a sampled component nothing of it changes.
     let end = Moment {
         tick: simulation.tick,
-        time: time + step,
-        step,
+        time: time + length,
+        step: simulation.step,
         calls: false,
     };
     let Simulation {
@@ -26,11 +40,9 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
         last_signals: last,
         names,
         coupling,
+        reference,
         ..
     } = simulation;
-    if end.tick == 0 {
-        coupling.copy(signals, last);
-    }
     // What cannot go back makes its step once, and what nothing couples as well.
     let continuous = parts.iter_mut().zip(&coupling.repeats);
     for (part, repeats) in continuous.filter(|(part, _)| part.every.is_none()) {
@@ -38,23 +50,27 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
             part.instance.save_state(&mut part.state)?;
         } else {
             part.inputs
-                .transfer_between(signals, last, -0.5, &mut part.instance)?;
-            part.step(time, step)?;
+                .transfer_between(signals, last, -0.5 * ratio, &mut part.instance)?;
+            part.step(time, length)?;
         }
     }
-    coupling.copy(signals, last);
     next.copy_from(signals);
     let Coupling {
         sources,
+        tables,
         solver,
         values,
         repeats,
     } = coupling;
+    if !tables.is_empty() {
+        reference.ahead(end.time, &mut next.numbers);
+    }
     for (value, &signal) in values.iter_mut().zip(sources.iter()) {
         *value = next.numbers[signal];
     }
     let mut pass = Pass {
         start: time,
+        length,
         end,
         sources,
         repeats,
@@ -80,6 +96,8 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
 #[derive(Default)]
 pub(super) struct Coupling {
     sources: Vec<usize>,
+    /// The signals of input tables that change within a step.
+    tables: Vec<usize>,
     solver: Solver,
     values: Vec<f64>,
     /// Which components repeat their steps: continuous ones with such inputs that save their states.
@@ -90,7 +108,7 @@ impl Coupling {
     /// Copies these signals.
     #[inline]
     pub(super) fn copy(&self, from: &Signals, to: &mut Signals) {
-        for &signal in &self.sources {
+        for &signal in self.sources.iter().chain(&self.tables) {
             to.numbers[signal] = from.numbers[signal];
         }
     }
@@ -105,14 +123,21 @@ impl Coupling {
         (0..parts.len()).filter(coupled).collect()
     }
 
-    /// Of these components.
-    pub(super) fn new(parts: &[Part]) -> Self {
+    /// All that changes within a step and drives a component that is not sampled.
+    pub(super) fn signals(&self) -> impl Iterator<Item = usize> + '_ {
+        self.sources.iter().chain(&self.tables).copied()
+    }
+
+    /// Of these components; the first so many signals come from outside.
+    pub(super) fn new(parts: &[Part], outside: usize) -> Self {
         let continuous = parts.iter().filter(|part| part.every.is_none());
         let mut sources: Vec<usize> = continuous
             .flat_map(|part| part.inputs.smooth_sources())
             .collect();
         sources.sort_unstable();
         sources.dedup();
+        let (tables, sources): (Vec<usize>, Vec<usize>) =
+            sources.into_iter().partition(|&signal| signal < outside);
         let repeats = parts.iter().map(|part| {
             let is_coupled = part.every.is_none() && part.inputs.smooth_sources().next().is_some();
             is_coupled && part.instance.fmu.description.saves_state
@@ -122,6 +147,7 @@ impl Coupling {
             solver: Solver::new(&vec![true; sources.len()]),
             values: vec![0.0; sources.len()],
             sources,
+            tables,
         }
     }
 }
@@ -129,6 +155,7 @@ impl Coupling {
 /// A step while it is sought.
 struct Pass<'a> {
     start: f64,
+    length: f64,
     end: Moment,
     sources: &'a [usize],
     repeats: &'a [bool],
@@ -154,7 +181,7 @@ impl Round for Pass<'_> {
             let (now, next) = (self.signals, &*self.next);
             part.inputs
                 .transfer_between(now, next, 0.5, &mut part.instance)?;
-            part.step(self.start, self.end.step)?;
+            part.step(self.start, self.length)?;
         }
         let continuous = self.actions.iter_mut();
         for action in continuous.filter(|action| action.is_continuous()) {

@@ -22,6 +22,7 @@ mod run;
 mod signals;
 mod start;
 mod transfer;
+mod variable;
 
 use std::fmt;
 use std::ops::Range;
@@ -31,9 +32,11 @@ use std::time::{Duration, Instant};
 
 pub use checkpoint::{Checkpoint, KeepCheckpoint};
 pub use clock::RealTime;
+pub use compile::Plan;
 pub use error::MasterError;
 pub use record::Record;
 pub use run::{Ended, Ending, LogLine, Outcome, Pace};
+pub use variable::{StepsTaken, VariableStep};
 
 use crate::fmu::{Diverted, Instance, Item, Progress, State};
 use crate::live::Tap;
@@ -83,8 +86,10 @@ pub struct Simulation {
     algorithm: Algorithm,
     /// Time at which it begins, s.
     begin: f64,
-    /// Coupling step, s.
+    /// Coupling step, s: the least one where it varies.
     step: f64,
+    /// Chooses the steps where they vary.
+    variable: Option<variable::StepControl>,
     tick: usize,
     /// Ticks from one row of the record to the next: one sample of the motion.
     ticks_per_row: usize,
@@ -254,7 +259,7 @@ impl Simulation {
         }
     }
 
-    /// Coupling step, s.
+    /// Coupling step, s; the least one where it varies.
     pub fn step(&self) -> f64 {
         self.step
     }
@@ -291,11 +296,23 @@ impl Simulation {
         Ok(())
     }
 
-    /// Steps over `[t_k, t_k + h]`.
+    /// Takes the present signals for those of the step before.
+    #[inline]
+    fn keep_as_last(&mut self) {
+        self.coupling.copy(&self.signals, &mut self.last_signals);
+    }
+
+    /// Steps over `[t_k, t_k + h]`, or as far as the error allows where steps vary.
     ///
     /// # Errors
     /// A call that an FMU did not complete, or a coupling that does not converge.
     pub fn advance(&mut self) -> Result<(), MasterError> {
+        if let Some(mut control) = self.variable.take() {
+            let made = variable::advance(self, &mut control);
+            self.variable = Some(control);
+            self.tick += made?;
+            return Ok(());
+        }
         match self.algorithm {
             Algorithm::Jacobi => jacobi::advance(self)?,
             Algorithm::GaussSeidel => gauss_seidel::advance(self)?,

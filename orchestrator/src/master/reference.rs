@@ -2,7 +2,7 @@
 //! signals.
 
 use crate::motion::Motion;
-use crate::system::{InputTable, Quantity};
+use crate::system::{Between, InputTable, Quantity};
 
 /// Histories of the motion, input tables, and the signals that are taken from them.
 pub(super) struct Reference {
@@ -136,12 +136,26 @@ impl Reference {
                 *signal = place.map_or(0.0, |place| values.get(place).copied().unwrap_or(at_rest));
             }
         }
+        self.look_up(time, signals, |_| true);
+    }
+
+    /// Puts what tables hold on straight lines a moment before `time`, s, into their signals: where two
+    /// rows have that time, it is what the first says.
+    pub(super) fn ahead(&mut self, time: f64, signals: &mut [f64]) {
+        let before = time - 4e-9 * time.abs().max(1e-3);
+        self.look_up(before, signals, |table| table.between == Between::Linear);
+    }
+
+    #[inline]
+    fn look_up(&mut self, time: f64, signals: &mut [f64], is_wanted: fn(&InputTable) -> bool) {
         if self.tables.is_empty() {
             return;
         }
         let taps = self.taps.iter().zip(&mut self.rows);
         for (signal, (tap, row)) in signals.iter_mut().zip(taps) {
-            if let Tap::Table(table, column) = *tap {
+            if let Tap::Table(table, column) = *tap
+                && is_wanted(&self.tables[table])
+            {
                 *signal = self.tables[table].at(column, time, row);
             }
         }

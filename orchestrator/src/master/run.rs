@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::action::Moment;
 use super::clock::{Clock, RealTime};
-use super::{EndSignals, MasterError, Record, Simulation, comes};
+use super::{EndSignals, MasterError, Record, Simulation, StepsTaken, comes};
 use crate::fmu::{Kind, Message};
 
 /// A run with a value of this size diverges.
@@ -146,8 +146,12 @@ pub struct Outcome {
     pub ended: Ended,
     /// Coupling steps made.
     pub steps: usize,
-    /// Coupling step, s.
+    /// Coupling step, s; the greatest one where it varied.
     pub step: f64,
+    /// Time that was simulated, s.
+    pub simulated: f64,
+    /// How the steps were, where they varied.
+    pub variable: Option<StepsTaken>,
     /// Time that the stepping took, s.
     pub wall: f64,
     /// Time that the steps of each component took, s.
@@ -199,6 +203,8 @@ impl Simulation {
         let ended = self.play(samples, progress, &mut record, &clock);
         let wall = clock.read();
         progress(record.len());
+        let control = self.variable.as_ref();
+        let variable = control.map(|control| control.taken(self.step, &self.names));
         self.close();
         let notes = std::mem::take(&mut self.notes);
         let messages = self.parts.iter().flat_map(|part| {
@@ -218,8 +224,15 @@ impl Simulation {
         Outcome {
             record,
             spent: spent.collect(),
-            steps: self.tick,
-            step: self.step,
+            steps: match &self.variable {
+                Some(control) => control.progress.made,
+                None => self.tick,
+            },
+            step: variable
+                .as_ref()
+                .map_or(self.step, |taken| taken.greatest_s),
+            simulated: self.tick as f64 * self.step,
+            variable,
             wall,
             messages: messages.collect(),
             notes,
@@ -406,7 +419,9 @@ impl Simulation {
         // The others are at the end of the step: a row in between would mix two times.
         let is_alone = self.parts.len() == 1;
         let at_end = (time - self.time()).abs() <= 1e-9 * self.step;
-        if (is_alone && time > self.time() - self.step) || at_end {
+        let control = self.variable.as_ref();
+        let length = self.step * control.map_or(1.0, |control| control.progress.last as f64);
+        if (is_alone && time > self.time() - length) || at_end {
             let time = if at_end { self.time() } else { time };
             let at = Moment {
                 tick: self.tick,

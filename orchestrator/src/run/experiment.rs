@@ -11,7 +11,7 @@ use super::summary::Table;
 use crate::error::Error;
 use crate::fmu::{FmiVersion, Options};
 use crate::library::FmuLibrary;
-use crate::master::{Algorithm, Ended, MasterError, Outcome, Pace, Simulation};
+use crate::master::{Algorithm, Ended, MasterError, Outcome, Pace, Plan, Simulation, VariableStep};
 use crate::motion::{self, Motion};
 use crate::ssp;
 use crate::system::jacobi;
@@ -56,6 +56,12 @@ pub struct Request {
     pub algorithm: Option<Algorithm>,
     /// Coupling step, s.
     pub step_s: Option<f64>,
+    /// Error by which the steps are chosen, where they vary, per cent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variable_step_percent: Option<f64>,
+    /// Least step where they vary, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least_step_s: Option<f64>,
     /// Length played, s.
     pub duration_s: Option<f64>,
     /// Input tables, whose columns are named as the inputs that they drive.
@@ -83,8 +89,10 @@ pub struct Prepared {
     pub motion: Motion,
     /// Order of calls.
     pub algorithm: Algorithm,
-    /// Coupling step, s.
+    /// Coupling step, s; the greatest one where it varies.
     pub step: f64,
+    /// How it varies, if it does.
+    pub variable: Option<VariableStep>,
     /// Samples to play.
     pub samples: usize,
     /// How FMUs are run.
@@ -109,6 +117,8 @@ impl Request {
             fmi: FmiVersion::V3,
             algorithm: None,
             step_s: None,
+            variable_step_percent: None,
+            least_step_s: None,
             duration_s: None,
             inputs: Vec::new(),
         }
@@ -122,8 +132,13 @@ impl Prepared {
     /// An FMU that cannot be loaded or refuses its parameters, a step that does not fit, a loop.
     pub fn simulation(&self, algorithm: Algorithm) -> Result<Simulation, MasterError> {
         let stop = self.samples as f64 * self.motion.dt;
-        let plan = (self.step, stop);
-        Simulation::with(&self.system, &self.motion, algorithm, plan, &self.options)
+        let plan = Plan {
+            algorithm,
+            step: self.step,
+            stop,
+            variable: self.variable,
+        };
+        Simulation::planned(&self.system, &self.motion, &plan, &self.options)
     }
 
     /// Runs it as fast as it goes.
@@ -279,6 +294,7 @@ pub fn prepare_shared(
         motion,
         algorithm,
         step,
+        variable: variable_step(request, &file)?,
         samples,
         options: Options::default(),
     })
@@ -318,6 +334,23 @@ fn named(request: &Request, rules: Option<&Rules>) -> Result<SystemFile, Error> 
         &request.specimen,
         wanted,
     )?)
+}
+
+/// How the step varies: as was asked for, or as the system says.
+fn variable_step(request: &Request, file: &SystemFile) -> Result<Option<VariableStep>, Error> {
+    let percent = request.variable_step_percent.or(file.variable_step()?);
+    let least = request.least_step_s.or(file.least_step()?);
+    if let (None, Some(_)) = (percent, least) {
+        return Err(Error::Option {
+            option: "--least-step",
+            reason: "only a step that varies has a least one; expected --variable-step, such as                      --variable-step \"0.1 %\", beside it"
+                .to_string(),
+        });
+    }
+    Ok(percent.map(|percent| VariableStep {
+        tolerance: percent / 100.0,
+        least,
+    }))
 }
 
 /// The order of calls: what was asked for, what the system says, or the usual one.

@@ -30,7 +30,10 @@ pub fn of_run(manifest: &Manifest, motion: &Motion, whole: Whole) -> Vec<(String
     ));
     entries.push(entry(
         "Stepped by",
-        format!("{}, {} ms", manifest.algorithm, 1e3 * manifest.step_s),
+        match manifest.request.variable_step_percent {
+            Some(_) => format!("{}, up to {} ms", manifest.algorithm, 1e3 * manifest.step_s),
+            None => format!("{}, {} ms", manifest.algorithm, 1e3 * manifest.step_s),
+        },
     ));
     entries.push(entry(
         "Version",

@@ -12,6 +12,7 @@ use super::signals::{
     COLUMNS, PARQUET, RESULTS, columns, read_csv, write_columns, write_csv, write_parquet,
 };
 use super::summary::{Summary, Table, asked};
+use super::text::steps_in_words;
 use crate::error::Error;
 use crate::fmu::hexadecimal;
 use crate::master::{Outcome, Record};
@@ -99,7 +100,13 @@ fn page(
     let settings = vec![
         row("FMI", summary.fmi.clone()),
         row("algorithm", summary.algorithm.clone()),
-        row("coupling step", format!("{} ms", 1e3 * summary.step_s)),
+        row(
+            "coupling step",
+            match &summary.variable_step {
+                Some(_) => steps_in_words(summary),
+                None => format!("{} ms", 1e3 * summary.step_s),
+            },
+        ),
         row(
             "speed",
             format!(

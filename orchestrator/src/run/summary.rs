@@ -10,7 +10,7 @@ use super::manifest::Manifest;
 use super::refinement::CouplingError;
 use crate::error::Error;
 use crate::json;
-use crate::master::{Ended, Ending, Outcome, RealTime, Record};
+use crate::master::{Ended, Ending, Outcome, RealTime, Record, StepsTaken};
 use crate::metrics::{self, Tracking};
 use crate::motion::Motion;
 use crate::system::{Link, Origin};
@@ -25,7 +25,7 @@ pub struct Summary {
     pub motion: MotionSummary,
     /// Coupling steps made.
     pub steps: usize,
-    /// Coupling step.
+    /// Coupling step; the greatest one where it varied.
     pub step_s: f64,
     /// Versions of FMI of its components.
     pub fmi: String,
@@ -57,6 +57,9 @@ pub struct Summary {
     /// The error of the coupling, where it was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupling_error: Option<CouplingError>,
+    /// How the steps were, where they varied.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variable_step: Option<StepsTaken>,
 }
 
 /// What stopped a run.
@@ -123,6 +126,21 @@ impl Summary {
             .collect();
         let notes = system.notes.iter().chain(&outcome.notes);
         warnings.splice(0..0, notes.cloned());
+        if let Some(taken) = outcome.variable.as_ref().filter(|taken| taken.over > 0) {
+            warnings.push(format!(
+                "{} of {} steps were kept though the error of the coupling over them was estimated to be \
+                 larger than {} % (at most {:.3} % of `{}`): {}",
+                taken.over,
+                outcome.steps,
+                taken.tolerance_percent,
+                taken.worst_percent,
+                taken.worst_signal.as_deref().unwrap_or_default(),
+                match taken.repeated {
+                    0 => "steps could not be repeated, or were the least",
+                    _ => "they were the least; a smaller --least-step follows faster changes",
+                }
+            ));
+        }
         let asked = asked(&outcome.record, motion);
         let wanted = asked.as_ref().unwrap_or(motion);
         let is_whole = outcome.record.len() < 2 || {
@@ -155,7 +173,6 @@ impl Summary {
                 units::constants::STROKE / INCH
             ));
         }
-        let simulated = outcome.steps as f64 * outcome.step;
         let mut versions: Vec<String> = system
             .components
             .iter()
@@ -176,7 +193,7 @@ impl Summary {
             fmi: versions.join(" and "),
             algorithm: prepared.algorithm.to_string(),
             wall_s: outcome.wall,
-            real_time_factor: simulated / outcome.wall,
+            real_time_factor: outcome.simulated / outcome.wall,
             ended: outcome.ended.kind(),
             ended_because: outcome.ended.reason(),
             trip: Trip::of(&outcome.ended),
@@ -193,6 +210,7 @@ impl Summary {
             warnings,
             real_time: outcome.real_time.clone(),
             coupling_error: None,
+            variable_step: outcome.variable.clone(),
         }
     }
 }

@@ -8,6 +8,25 @@ use crate::report::columns::aligned;
 use crate::report::number::significant;
 use crate::report::{Cell, UnitSystem, Units};
 
+/// Length of the coupling steps: of each, or of the shortest and the longest.
+pub(super) fn steps_in_words(summary: &Summary) -> String {
+    let milliseconds = |seconds: f64| {
+        let text = significant(1e3 * seconds, 3);
+        match text.contains('.') && !text.contains('e') {
+            true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+            false => text,
+        }
+    };
+    match &summary.variable_step {
+        Some(taken) => format!(
+            "{} to {} ms",
+            milliseconds(taken.shortest_s),
+            milliseconds(taken.longest_s)
+        ),
+        None => format!("{} ms", milliseconds(summary.step_s)),
+    }
+}
+
 /// The figures of a run as tables for people, in the units of the terminal.
 pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
     let mut text = match motion.is_empty() {
@@ -21,16 +40,27 @@ pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
         text += &format!("  seed of the noise of `{name}`: {seed}\n");
     }
     text += &format!(
-        "\n{} steps of {} ms (FMI {}, {}), {} times real time, {}\n\n",
+        "\n{} steps of {} (FMI {}, {}), {} times real time, {}\n\n",
         summary.steps,
-        significant(1e3 * summary.step_s, 3)
-            .trim_end_matches('0')
-            .trim_end_matches('.'),
+        steps_in_words(summary),
         summary.fmi,
         summary.algorithm,
         significant(summary.real_time_factor, 2),
         summary.ended.word(),
     );
+    if let Some(taken) = &summary.variable_step {
+        text += &format!(
+            "steps chosen for an error of {} % over each: {} were repeated; the largest that was kept is \
+             estimated at {} %{}\n\n",
+            taken.tolerance_percent,
+            taken.repeated,
+            significant(taken.worst_percent, 2),
+            match &taken.worst_signal {
+                Some(signal) => format!(" (`{signal}`)"),
+                None => String::new(),
+            },
+        );
+    }
     if let Some(error) = &summary.coupling_error {
         text += &format!(
             "error of the coupling, estimated: at most {:.3} % of the peak of a signal (`{}`)\n\n",

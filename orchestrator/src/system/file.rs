@@ -204,6 +204,12 @@ pub struct ExperimentFile {
     /// Coupling step, such as `"2 ms"`.
     #[serde(default)]
     pub step: Option<Setting>,
+    /// Error by which the coupling step is chosen, such as `"0.1 %"`; `step` is then the greatest.
+    #[serde(default)]
+    pub variable_step: Option<Setting>,
+    /// Least coupling step where it varies, such as `"1 us"`.
+    #[serde(default)]
+    pub least_step: Option<Setting>,
     /// How much of the motion is played, such as `"20 s"`.
     #[serde(default)]
     pub duration: Option<Setting>,
@@ -419,6 +425,24 @@ impl SystemFile {
         self.time("step", self.experiment.step.as_ref())
     }
 
+    /// Error by which the coupling step is chosen, per cent.
+    ///
+    /// # Errors
+    /// What stands there is no positive share.
+    pub fn variable_step(&self) -> Result<Option<f64>, SystemError> {
+        let written = self.experiment.variable_step.as_ref();
+        let share = written.map(value::share).transpose();
+        share.map_err(|reason| self.fault("experiment.variable_step", reason))
+    }
+
+    /// Least coupling step where it varies, s.
+    ///
+    /// # Errors
+    /// What stands there is no time.
+    pub fn least_step(&self) -> Result<Option<f64>, SystemError> {
+        self.time("least_step", self.experiment.least_step.as_ref())
+    }
+
     /// How much of the motion is played, s.
     ///
     /// # Errors
@@ -489,6 +513,8 @@ impl SystemFile {
         let (own, other) = (&mut self.experiment, part.experiment);
         own.sampling = other.sampling.or(own.sampling.take());
         own.step = other.step.or(own.step.take());
+        own.variable_step = other.variable_step.or(own.variable_step.take());
+        own.least_step = other.least_step.or(own.least_step.take());
         own.start = other.start.or(own.start.take());
         own.algorithm = other.algorithm.or(own.algorithm.take());
         own.duration = other.duration.or(own.duration.take());

@@ -34,4 +34,5 @@ pub use link::{Link, Origin, Quantity, VariableName};
 pub use passage::{DeclaredUnit, Hop, Passage, Transformation, Way};
 pub use rule::Rule;
 pub use table::{Between, InputTable, TableFile};
+pub(crate) use value::percent;
 pub use value::{Declared, Setting, Value};

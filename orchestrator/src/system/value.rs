@@ -264,6 +264,26 @@ pub(super) fn time(written: &Setting) -> Result<f64, String> {
     Err(format!("{seconds} s is no time, expected more than 0 s"))
 }
 
+/// A positive share in a system file, per cent: a number, or a text such as `"0.1 %"`.
+///
+/// # Errors
+/// What was expected.
+pub(super) fn share(written: &Setting) -> Result<f64, String> {
+    percent(&written.to_string())
+}
+
+/// A positive share, per cent; `%` may stand behind it.
+///
+/// # Errors
+/// What was expected.
+pub(crate) fn percent(text: &str) -> Result<f64, String> {
+    let number = text.trim().trim_end_matches('%').trim_end().parse::<f64>();
+    let number = number.ok();
+    let positive = number.filter(|value| *value > 0.0 && value.is_finite());
+    let expected = "expected a number above 0, such as \"0.05 %\"";
+    positive.ok_or_else(|| format!("`{text}` is no share; {expected}"))
+}
+
 /// A number in the variable's unit, which may stand behind it.
 fn number(variable: &Variable, text: &str) -> Result<f64, String> {
     let unit = variable.unit.as_deref().unwrap_or("");

@@ -22,6 +22,7 @@ mod reports;
 mod rigs;
 mod systems;
 mod tuning;
+mod variable_step;
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -115,11 +115,7 @@ fn the_step_is_halved_until_the_coupling_errs_by_less_than_asked_for() {
             ..Request::built_in("three-variable")
         };
         // Under the heaviest, the loop is close to its limit, and 2 ms make it unstable.
-        let algorithms = match ratio > 1.0 {
-            true => vec![Algorithm::GaussSeidel],
-            false => vec![Algorithm::GaussSeidel, Algorithm::Iterative],
-        };
-        for algorithm in algorithms {
+        for algorithm in [Algorithm::GaussSeidel, Algorithm::Iterative] {
             let mut prepared = prepare(&request).unwrap();
             prepared.algorithm = algorithm;
             let truth = table_acceleration_under(&prepared.motion, Some(specimen));

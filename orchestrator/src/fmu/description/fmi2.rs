@@ -152,6 +152,7 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
         ),
         adjoint_derivatives: false,
         variable_step: steps.is_none_or(|it| it.canHandleVariableCommunicationStepSize),
+        internal_step: None,
         offers_model_exchange: exchange.is_some(),
         event_indicators: file.numberOfEventIndicators as usize,
         states: file.derivatives.len(),

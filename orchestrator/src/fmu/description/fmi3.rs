@@ -128,6 +128,9 @@ pub(super) fn read(text: &str, sizes: &Sizes) -> Result<Description, String> {
             |it| it.providesAdjointDerivatives,
         ),
         variable_step: steps.is_none_or(|it| it.canHandleVariableCommunicationStepSize),
+        internal_step: steps
+            .and_then(|it| it.fixedInternalStepSize.as_ref()?.parse().ok())
+            .filter(|step: &f64| *step > 0.0 && step.is_finite()),
         offers_model_exchange: exchange.is_some(),
         event_indicators: file.eventIndicators.len(),
         states: file.derivatives.len(),

@@ -183,6 +183,8 @@ pub struct Description {
     pub default_stop: Option<f64>,
     /// Whether the step size may differ from call to call.
     pub variable_step: bool,
+    /// Step by which it computes inside, s, where it says so.
+    pub internal_step: Option<f64>,
     /// The variables, in the order of the file.
     pub variables: Vec<Variable>,
     /// What the file does against the standard without being unusable.

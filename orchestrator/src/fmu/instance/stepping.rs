@@ -119,7 +119,9 @@ impl Instance {
         }
         let reached = last.map_or(String::new(), |last| format!(" (it came to {last} s)"));
         let outcome = format!("returned discard{reached}");
-        Err(self.failure(Function::DoStep, &[], outcome))
+        let mut error = self.failure(Function::DoStep, &[], outcome);
+        error.is_discarded_step = true;
+        Err(error)
     }
 
     /// Lets an instance whose events are handled from outside take in what was set, as an event at
