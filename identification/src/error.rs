@@ -87,6 +87,17 @@ pub enum IdentificationError {
         /// Part of the command that the outputs leave unexplained, relative.
         residual: f64,
     },
+    /// Channels that cannot be of one motion.
+    #[error(
+        "{recording}: {what}; check the units in the header, the signs, and that no channels are \
+         swapped"
+    )]
+    Contradiction {
+        /// The recording.
+        recording: String,
+        /// Which channels, and how they contradict each other.
+        what: String,
+    },
     /// An unstable or non-physical result.
     #[error("unstable result where a stable one is expected: {what}; {remedy}")]
     Unstable {

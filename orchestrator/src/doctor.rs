@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::fmu::{FmiVersion, Fmu, Instance, Isolation, Options, Processes};
 use crate::pack::supply::{self, Origin};
 use crate::pack::{self, PackedFmu};
-use crate::program;
+use crate::program::{self, VERSION};
 
 /// How an examined part is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -78,7 +78,7 @@ pub fn examine() -> Examination {
     findings.push(cargo());
     findings.extend(packages());
     Examination {
-        shakebench: supply::VERSION,
+        shakebench: VERSION,
         platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
         program: program::file().ok(),
         origin: folder.as_ref().map(|folder| folder.origin),

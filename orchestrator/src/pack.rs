@@ -29,8 +29,8 @@ use notices::Notices;
 use packing::Form;
 pub use platform::Platform;
 pub use supply::all_fmus;
-pub(crate) use variant::with_resource;
 pub use variant::{StartValue, write_variant};
+pub(crate) use variant::{variant_bytes, with_resource};
 use workspace::{Component, Workspace};
 
 /// Builds every component and packs it as `out/fmi2/NAME.fmu` and `out/fmi3/NAME.fmu`, as far as

@@ -1,9 +1,12 @@
-//! Where this program's own file lies.
+//! This program: its version, and where its file lies.
 
 use std::env;
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
+
+/// Its version, which is that of its components too.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The program's file, with links resolved where that can be done.
 ///

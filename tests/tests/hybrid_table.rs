@@ -6,7 +6,8 @@ use plant::hybrid::{Frame, ReferenceFrame};
 use plant::specimens::linear::LinearSpecimen;
 use shakebench::fmu::FmiVersion;
 use shakebench::master::Ended;
-use shakebench::run::experiment::{Request, Scale, prepare};
+use shakebench::motion::Scaling;
+use shakebench::run::experiment::{Request, prepare};
 use shakebench::run::summary::asked;
 
 const PERIOD: f64 = 0.002;
@@ -53,7 +54,7 @@ fn errors(controller: &str, plant: &str, fmi: FmiVersion, set: &[String]) -> Err
         plant: plant.to_string(),
         duration_s: Some(20.0),
         set: set.to_vec(),
-        scaling: Some(Scale::PeakAcceleration(1.0)),
+        scaling: Some(Scaling::PeakAcceleration(1.0)),
         fmi,
         ..Request::built_in(controller)
     };

@@ -126,7 +126,18 @@ pub fn apply<C: Component>(
             Access::Real(field) => *field(component) = number,
             Access::Within(place) => *place(component) = number,
             Access::Element(field, index) => field(component)[*index] = number,
-            _ => return Err(fail(format!("`{name}` is no Float64"))),
+            Access::Choice(field, choices) => {
+                let mut known = choices.items.iter().map(|item| item.value);
+                let chosen = known.find(|value| f64::from(*value) == number);
+                *field(component) = chosen.ok_or_else(|| {
+                    fail(format!("`{name}` = {number} is none of {}", choices.name))
+                })?;
+            }
+            _ => {
+                return Err(fail(format!(
+                    "`{name}` is neither Float64 nor an enumeration"
+                )));
+            }
         }
     }
     Ok(())
@@ -177,7 +188,10 @@ mod tests {
                 "mass,0.01",
                 "start_values.csv:2: `mass` = 0.01 is out of its range",
             ),
-            ("note,1", "start_values.csv:2: `note` is no Float64"),
+            (
+                "note,1",
+                "start_values.csv:2: `note` is neither Float64 nor an enumeration",
+            ),
         ] {
             let text = format!("stiffness,1\n{line}\n");
             assert_eq!(

@@ -27,6 +27,8 @@ pub struct ReferenceMotion {
     displacement: [f64; AHEAD + 1],
     velocity: [f64; AHEAD + 1],
     acceleration: [f64; AHEAD + 1],
+    /// Displacement, velocity and acceleration one sample before.
+    before: [f64; 3],
 }
 
 impl Default for ReferenceMotion {
@@ -39,14 +41,44 @@ impl Default for ReferenceMotion {
             displacement: [0.0; AHEAD + 1],
             velocity: [0.0; AHEAD + 1],
             acceleration: [0.0; AHEAD + 1],
+            before: [0.0; 3],
         }
     }
+}
+
+/// Unit, unit in which people want to see it, and usual size of a quantity.
+type Shown = (&'static str, &'static str, f64);
+
+const DISPLACEMENT: Shown = ("m", "in", 0.0381);
+const VELOCITY: Shown = ("m/s", "in/s", 0.5);
+const ACCELERATION: Shown = ("m/s2", "g", 10.0);
+
+fn wanted(
+    variable: Variable<ReferenceMotion>,
+    (unit, shown, nominal): Shown,
+) -> Variable<ReferenceMotion> {
+    let shown = variable.unit(unit).shown_in(shown).nominal(nominal);
+    let shown = shown.depends_on(&["scale"], Dependency::Dependent);
+    shown.initially_depends_on(&["scale", "sine_amplitude", "sine_frequency"])
+}
+
+/// A quantity one sample before.
+fn before(
+    name: &str,
+    shown: Shown,
+    field: fn(&mut ReferenceMotion) -> &mut f64,
+) -> Variable<ReferenceMotion> {
+    let variable = Variable::output(&format!("{name}_before"), field);
+    wanted(
+        variable.about(&format!("Wanted {name} one sample before")),
+        shown,
+    )
 }
 
 /// A quantity now and ahead.
 fn histories(
     name: &str,
-    (unit, shown, nominal): (&'static str, &'static str, f64),
+    shown: Shown,
     now: fn(&mut ReferenceMotion) -> &mut f64,
     ahead: fn(&mut ReferenceMotion) -> &mut [f64],
 ) -> Vec<Variable<ReferenceMotion>> {
@@ -58,13 +90,8 @@ fn histories(
             .enumerate()
             .map(|(i, element)| element.about(&format!("Wanted {name} {} samples ahead", i + 1))),
     );
-    all.into_iter()
-        .map(|variable| {
-            let shown = variable.unit(unit).shown_in(shown).nominal(nominal);
-            let shown = shown.depends_on(&["scale"], Dependency::Dependent);
-            shown.initially_depends_on(&["scale", "sine_amplitude", "sine_frequency"])
-        })
-        .collect()
+    let all = all.into_iter().map(|variable| wanted(variable, shown));
+    all.collect()
 }
 
 impl Component for ReferenceMotion {
@@ -89,22 +116,27 @@ impl Component for ReferenceMotion {
         };
         all.extend(histories(
             "displacement",
-            ("m", "in", 0.0381),
+            DISPLACEMENT,
             |s| &mut s.displacement[0],
             |s| &mut s.displacement[1..],
         ));
         all.extend(histories(
             "velocity",
-            ("m/s", "in/s", 0.5),
+            VELOCITY,
             |s| &mut s.velocity[0],
             |s| &mut s.velocity[1..],
         ));
         all.extend(histories(
             "acceleration",
-            ("m/s2", "g", 10.0),
+            ACCELERATION,
             |s| &mut s.acceleration[0],
             |s| &mut s.acceleration[1..],
         ));
+        all.extend([
+            before("displacement", DISPLACEMENT, |s| &mut s.before[0]),
+            before("velocity", VELOCITY, |s| &mut s.before[1]),
+            before("acceleration", ACCELERATION, |s| &mut s.before[2]),
+        ]);
         all
     }
 
@@ -128,6 +160,10 @@ impl Component for ReferenceMotion {
             self.velocity[ahead] = self.scale * v;
             self.acceleration[ahead] = self.scale * a;
         }
+        // Before its beginning it rests at zero.
+        let last = now.checked_sub(1);
+        let last = last.map_or([0.0; 3], |sample| self.motion.at(sample, sine));
+        self.before = last.map(|value| self.scale * value);
     }
 
     fn step(&mut self, _time: f64, _step_size: f64) -> ComponentResult {

@@ -11,6 +11,7 @@ pub mod friction;
 mod lateness;
 pub mod least_squares;
 mod model_section;
+pub mod replay;
 pub mod simulation;
 pub mod specimen;
 pub mod start;
@@ -355,6 +356,10 @@ pub fn identify(
         period: channels.first().map_or(0.0, |c| c.recording.period()),
         warnings: Vec::new(),
     };
+    if settings.friction {
+        let again = |shape| bands(Some(shape)).ok();
+        found.replay_friction(recordings, &optimum.values, &again);
+    }
     found.warnings = remarks(&found, recordings);
     Ok(found)
 }

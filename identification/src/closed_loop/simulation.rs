@@ -25,6 +25,7 @@ pub struct Simulation {
     seal: f64,
     commands: Vec<f64>,
     before: [f64; 2],
+    longest_step: f64,
 }
 
 /// What the sensors show, SI, on the displacement's clock.
@@ -59,7 +60,22 @@ impl Simulation {
             state: [0.0; STATES],
             commands: Vec::new(),
             before: [0.0; 2],
+            longest_step: LONGEST_STEP,
         }
+    }
+
+    /// The same with inner steps of at most `longest` s.
+    #[must_use]
+    pub fn with_steps_of(mut self, longest: f64) -> Self {
+        self.longest_step = longest;
+        self
+    }
+
+    /// The same at rest at `displacement` (m).
+    #[must_use]
+    pub fn starting_at(mut self, displacement: f64) -> Self {
+        self.state[3] = displacement;
+        self
     }
 
     fn seal_force(&self, v: f64) -> f64 {
@@ -123,7 +139,7 @@ impl Simulation {
         for (command, share) in pieces {
             if share > 0.0 {
                 let duration = share * self.period;
-                let count = inner_steps(duration, LONGEST_STEP);
+                let count = inner_steps(duration, self.longest_step);
                 let inner = duration / f64::from(count);
                 for _ in 0..count {
                     // The seals are stiff: they move on by themselves, half a step to either

@@ -21,7 +21,7 @@ pub struct DiagnosisReport {
     pub effects: Vec<EffectReport>,
     /// Rival sets of effects.
     pub alternatives: Vec<Vec<String>>,
-    /// The experiment that would tell the first rival apart.
+    /// The experiment that would tell the first rival apart, or show more of what is not explained.
     pub separating_experiment: Option<String>,
     /// Its motion, as `run --reference` plays it.
     #[serde(default, skip_serializing_if = "Option::is_none")]

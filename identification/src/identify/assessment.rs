@@ -31,7 +31,9 @@ pub(crate) fn assess(
                 "the table comes out with damping {:.4} N s/m and stiffness {:.4} N/m",
                 table.damping, table.stiffness
             ),
-            remedy: "record the free decay, or excite around the table's natural frequency".into(),
+            remedy: "check that no channels are swapped and their signs, record the free decay, or excite around \
+                     the table's natural frequency"
+                .into(),
         });
     }
     let fits = validation::fits(whole, fitted, &estimate.parameters);

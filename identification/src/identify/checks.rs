@@ -67,6 +67,7 @@ pub(crate) fn check(
             });
         }
     }
+    motion(recording)?;
     feedback(recording, command)?;
     excitation(recording, command)
 }
@@ -78,6 +79,68 @@ fn high_frequency_noise(values: &[f64]) -> f64 {
         .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2))
         .sum();
     (square / (20.0 * values.len().max(1) as f64)).sqrt()
+}
+
+/// Corner of the low-pass behind which channels of one motion are compared, rad/s.
+const CORNER: f64 = 2.0 * std::f64::consts::PI * 3.0;
+/// Correlation from which two channels belong together, whatever their scale.
+const RELATED: f64 = 0.8;
+
+/// `values`, sampled every `period` s, behind the low-pass, and the second derivative of that.
+fn low_passed(values: &[f64], period: f64) -> [Vec<f64>; 2] {
+    let mut state = (values.first().copied().unwrap_or(0.0), 0.0);
+    let mut both = [Vec::new(), Vec::new()];
+    for &value in values {
+        let second = CORNER * (CORNER * (value - state.0) - 1.4 * state.1);
+        both[0].push(state.0);
+        both[1].push(second);
+        state.1 += period * second;
+        state.0 += period * state.1;
+    }
+    both
+}
+
+/// Correlation of two series and the second over the first by least squares.
+fn related(first: &[f64], second: &[f64]) -> (f64, f64) {
+    let (mean, size) = mean_and_deviation(first);
+    let (other_mean, other_size) = mean_and_deviation(second);
+    let products = first
+        .iter()
+        .zip(second)
+        .map(|(a, b)| (a - mean) * (b - other_mean));
+    let together = products.sum::<f64>() / first.len().max(1) as f64;
+    (together / (size * other_size), together / (size * size))
+}
+
+/// Whether acceleration and displacement are of one motion (the one the other's second derivative,
+/// within a factor of two), and the displacement goes where the reference asks it to.
+fn motion(recording: &Recording) -> Result<(), IdentificationError> {
+    let period = recording.period();
+    let [x, a, reference] = [
+        Channel::Displacement,
+        Channel::Acceleration,
+        Channel::Reference,
+    ]
+    .map(|channel| low_passed(recording.channel(channel).unwrap_or_default(), period));
+    let (correlation, ratio) = related(&x[1], &a[0]);
+    let what = if correlation < -RELATED && (0.5..2.0).contains(&-ratio) {
+        "`acceleration` and `displacement` have opposite signs: the one is the other's second \
+         derivative turned over"
+            .into()
+    } else if correlation.abs() > RELATED && !(0.5..2.0).contains(&ratio) {
+        format!(
+            "`acceleration` is {ratio:.3e} times the second derivative of `displacement` where it \
+             should be once"
+        )
+    } else if related(&x[0], &reference[0]).0 < -RELATED {
+        "`displacement` goes against `reference`".into()
+    } else {
+        return Ok(());
+    };
+    Err(IdentificationError::Contradiction {
+        recording: recording.name.clone(),
+        what,
+    })
 }
 
 /// Whether the command is a fixed function of its own past and of the outputs.

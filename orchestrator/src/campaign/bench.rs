@@ -4,14 +4,14 @@ use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::carry_out::Runs;
 use super::command::{command, quoted};
 use super::factor::Values;
 use super::journal::Head;
 use super::row::{FIGURES, figures, nominal, number_unit, output, outputs, times, written};
+use super::runs::Runs;
 use super::setting::{Key, OWN_MODEL};
 use super::study::{Limit, Study};
-use super::table::{Cell, Column, Kind, Role};
+use super::table::{Cell, Column, Kind, Role, Row};
 use crate::commission::rules_on_recordings;
 use crate::error::Error;
 use crate::fmu::Held;
@@ -26,15 +26,6 @@ const RECORDED: f64 = 60.0;
 
 /// Rigs whose rules are kept: runs on one rig follow each other.
 const MOST_RIGS: usize = 32;
-
-/// A row of the results.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    /// The run's name.
-    pub run: String,
-    /// Its cells, one a column but for those that say which run it is.
-    pub cells: Vec<Cell>,
-}
 
 /// Carries out a study's runs; what they have in common is read once.
 pub struct Bench<'a> {

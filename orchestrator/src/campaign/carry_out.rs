@@ -11,37 +11,14 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::bench::{Bench, Row};
+use super::bench::Bench;
 use super::journal::{self, Head, IDENTITY, Journal};
+use super::runs::Runs;
 use super::study::Study;
 use super::table::{Cell, Table};
 use crate::error::Error;
 use crate::master::Ending;
 use crate::results::may_overwrite;
-
-/// Runs that can be carried out: those of a study, or others that want its journal, shards and table.
-pub trait Runs: Sync {
-    /// Finds what is wrong before the first run.
-    ///
-    /// # Errors
-    /// What is wrong.
-    fn check(&self) -> Result<(), Error>;
-
-    /// With which rows theirs may stand in one table, and the columns.
-    ///
-    /// # Errors
-    /// As [`Runs::check`].
-    fn head(&self) -> Result<Head, Error>;
-
-    /// How many there are.
-    fn count(&self) -> u64;
-
-    /// The name of a run: what it is, not where it stands.
-    fn name(&self, number: u64) -> String;
-
-    /// Carries a run out; one that fails is a row too.
-    fn run(&self, number: u64) -> Row;
-}
 
 /// A part of a study: every `of`-th run from the `part`-th on, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use crate::fmu::FmiVersion;
-use crate::run::experiment::{Request, Scale, is_file};
+use crate::motion::Scaling;
+use crate::run::experiment::{Request, is_file};
 
 /// The command that carries a request out.
 pub(super) fn command(request: &Request) -> String {
@@ -32,10 +33,10 @@ pub(super) fn command(request: &Request) -> String {
         (None, None) => option("seed", request.seed.to_string()),
     }
     match request.scaling {
-        Some(Scale::Factor(factor)) => option("scale", format!("{factor:?}")),
-        Some(Scale::PeakAcceleration(peak)) => option("pga", format!("{:?} m/s2", peak)),
-        Some(Scale::PeakDisplacement(peak)) => option("peak", format!("{peak:?} m")),
-        None => {}
+        Some(Scaling::Factor(factor)) => option("scale", format!("{factor:?}")),
+        Some(Scaling::PeakAcceleration(peak)) => option("pga", format!("{:?} m/s2", peak)),
+        Some(Scaling::PeakDisplacement(peak)) => option("peak", format!("{peak:?} m")),
+        Some(Scaling::Within { .. }) | None => {}
     }
     if request.fmi == FmiVersion::V2 {
         option("fmi", "2".to_string());

@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::bench::Row;
-use super::table::{Cell, Column};
+use super::table::{Cell, Column, Row};
 use crate::error::Error;
 use crate::pack;
 

@@ -10,21 +10,24 @@ mod files;
 mod journal;
 pub mod page;
 mod row;
+mod runs;
 mod setting;
 mod study;
 pub mod table;
 
 use std::path::{Path, PathBuf};
 
-pub use bench::{Bench, Row};
-pub use carry_out::{Carried, Left, Plan, Progress, Runs, Shard, Summary, carry_out, rows};
+pub use bench::Bench;
+pub use carry_out::{Carried, Left, Plan, Progress, Shard, Summary, carry_out, rows};
 pub use design::{Design, Points};
 pub(crate) use factor::with_unit;
 pub use factor::{Distribution, Drawn, Values};
 pub use journal::Head;
 pub(crate) use journal::IDENTITY;
+pub use runs::Runs;
 pub use setting::Key;
 pub use study::{Factor, Limit, Study};
+pub use table::Row;
 
 use crate::error::Error;
 use crate::report::identity::{entry, version};

@@ -7,7 +7,8 @@ use crate::fmu::{Causality, Datum, Kind};
 use crate::master::Outcome;
 use crate::metrics;
 use crate::run::experiment::Prepared;
-use crate::run::summary::{Table, asked};
+use crate::run::summary::asked;
+use crate::run::table::Table;
 use crate::system::{Component, Link, Setting, System};
 use crate::units::{STANDARD_GRAVITY, hint};
 

@@ -6,7 +6,8 @@ use clap::ValueEnum;
 
 use crate::fmu::FmiVersion;
 use crate::master::Algorithm;
-use crate::run::experiment::{Request, Scale, is_file};
+use crate::motion::Scaling;
+use crate::run::experiment::{Request, is_file};
 use crate::system::built_in;
 use crate::system::tuning::Tuning;
 use crate::system::{Setting, SystemFile};
@@ -245,11 +246,11 @@ impl Key {
                     other => return Err(format!("`{other}` is no seed; expected 0, 1, 2, ...")),
                 };
             }
-            Self::Scale => request.scaling = Some(Scale::Factor(number()?)),
+            Self::Scale => request.scaling = Some(Scaling::Factor(number()?)),
             Self::PeakAcceleration => {
-                request.scaling = Some(Scale::PeakAcceleration(number()? * STANDARD_GRAVITY));
+                request.scaling = Some(Scaling::PeakAcceleration(number()? * STANDARD_GRAVITY));
             }
-            Self::PeakDisplacement => request.scaling = Some(Scale::PeakDisplacement(number()?)),
+            Self::PeakDisplacement => request.scaling = Some(Scaling::PeakDisplacement(number()?)),
             Self::Duration => request.duration_s = Some(number()?),
             Self::Step => request.step_s = Some(number()?),
             Self::Algorithm => request.algorithm = Some(choice::<Algorithm>(&text()?)?),

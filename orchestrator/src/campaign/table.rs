@@ -2,6 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
+/// A row of the results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The run's name.
+    pub run: String,
+    /// Its cells, one a column but for those that say which run it is.
+    pub cells: Vec<Cell>,
+}
+
 /// What stands in a row's place of a column.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]

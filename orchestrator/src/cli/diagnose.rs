@@ -11,6 +11,7 @@ use identification::diagnosis::engine::{Observer, Progress};
 use super::progress;
 use crate::diagnosis::{diagnose, files, foreign, model, template, text};
 use crate::error::Error;
+use crate::fmu::Isolation;
 use crate::results::unused;
 
 /// What `diagnose` takes.
@@ -42,16 +43,21 @@ pub struct Arguments {
     /// oscillator, damper or transfer system; with --fmu, `map`
     #[arg(long, value_name = "KIND", conflicts_with_all = ["cases", "model", "data"])]
     template: Option<String>,
-    /// Extended model of a rig that a diagnosis wrote; nothing is fitted
+    /// Extended model that a diagnosis wrote, of a table, a rig or an FMU; nothing is fitted
     #[arg(long, value_name = "EXTENDED.toml", conflicts_with_all = ["cases", "data"])]
     model: Option<PathBuf>,
     /// Diagnose a model that came as an FMU, by effects at its inputs and outputs and drifts of its
     /// parameters, on data files in place of CASE
-    #[arg(long, value_name = "MODEL.fmu", conflicts_with_all = ["model", "columns"])]
+    #[arg(long, value_name = "MODEL.fmu", conflicts_with = "columns")]
     fmu: Option<PathBuf>,
-    /// Which column of the data is which input and output of the FMU
-    #[arg(long, value_name = "MAP.toml", requires = "fmu")]
+    /// Which column of the data is which input and output of the FMU; with --model, in place of the map
+    /// beside it
+    #[arg(long, value_name = "MAP.toml")]
     map: Option<PathBuf>,
+    /// FMUs in a process of their own: without it foreign ones, but for the many simulations of a
+    /// diagnosis, which then run in this process once the nominal model came to its end
+    #[arg(long, value_enum)]
+    isolate: Option<Isolation>,
     /// Score the model on these files
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "model")]
     validate: Vec<PathBuf>,
@@ -100,6 +106,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     if let Some(path) = &arguments.model {
         return with_model(arguments, path);
+    }
+    if arguments.map.is_some() && arguments.fmu.is_none() {
+        return Err(Error::Option {
+            option: "--map",
+            reason: "it says which column is which input and output of an FMU: expected --fmu MODEL.fmu or \
+                     --model with it"
+                .into(),
+        });
     }
     let case = match (&arguments.fmu, arguments.cases.as_slice()) {
         (Some(fmu), _) => fmu,
@@ -178,16 +192,23 @@ fn of_fmu(
         map,
         &files.cloned().collect::<Vec<_>>(),
         folder,
+        arguments.isolate,
         observer,
     )
 }
 
 fn with_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
-    let columns = arguments.columns.as_deref();
+    let asked = model::Asked {
+        model: path,
+        columns: arguments.columns.as_deref(),
+        fmu: arguments.fmu.as_deref(),
+        map: arguments.map.as_deref(),
+        isolate: arguments.isolate,
+    };
     if let Some(file) = &arguments.predict {
         let out = arguments.out.clone();
         let out = out.unwrap_or_else(|| PathBuf::from("prediction.csv"));
-        let found = model::predict(path, columns, file, arguments.periodic, &out)?;
+        let found = model::predict(&asked, file, arguments.periodic, &out)?;
         if arguments.json {
             println!("{}", serde_json::json!(found));
         } else {
@@ -206,7 +227,7 @@ fn with_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
             reason: "expected --validate FILE... or --predict FILE with it".into(),
         });
     } else {
-        let found = model::validate(path, columns, &arguments.validate)?;
+        let found = model::validate(&asked, &arguments.validate)?;
         if arguments.json {
             println!("{}", serde_json::json!(found));
         } else {

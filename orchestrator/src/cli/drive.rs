@@ -5,14 +5,13 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::run::quantity;
+use super::motion::MotionArguments;
+use super::quantity::band;
 use crate::error::Error;
 use crate::iteration::circle::{self, Circle, Plan};
 use crate::iteration::on_model::Search;
-use crate::motion::{self, Scaling};
 use crate::report::columns::aligned;
 use crate::results::{Results, unused};
-use crate::units::STANDARD_GRAVITY;
 
 /// Options of `shakebench drive`.
 #[derive(Debug, Args)]
@@ -27,26 +26,8 @@ pub struct Arguments {
     /// Extended model that `shakebench diagnose` made of the case
     #[arg(long, value_name = "MODEL.toml")]
     model: PathBuf,
-    /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
-    #[arg(
-        long,
-        alias = "motion",
-        value_name = "FILE",
-        conflicts_with = "reference"
-    )]
-    record: Option<PathBuf>,
-    /// Reference: .csv with time, displacement, velocity, acceleration, played as given
-    #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
-    /// Scale of the motion: peak acceleration in g
-    #[arg(long, value_name = "G", conflicts_with = "peak")]
-    pga: Option<String>,
-    /// Scale of the motion: peak displacement, such as "1.2 in" (a number alone is in m)
-    #[arg(long, value_name = "L")]
-    peak: Option<String>,
-    /// Seed of the built-in motion [default: 1]
-    #[arg(long, conflicts_with_all = ["record", "reference"])]
-    seed: Option<u64>,
+    #[command(flatten)]
+    motion: MotionArguments,
     /// Most corrections
     #[arg(long, default_value_t = Search::default().corrections)]
     corrections: usize,
@@ -89,30 +70,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 }
 
 fn plan(arguments: &Arguments) -> Result<Plan, Error> {
-    let [low, high] = [0, 1].map(|i| arguments.band.get(i).copied().unwrap_or(f64::NAN));
-    if !(low > 0.0 && high > low && high <= 100.0) {
-        return Err(Error::Option {
-            option: "--band",
-            reason: format!("{low} to {high} Hz; expected 0 < LOW < HIGH <= 100"),
-        });
-    }
-    let scaling = match (&arguments.pga, &arguments.peak) {
-        (Some(pga), _) => Some(Scaling::PeakAcceleration(
-            quantity("--pga", pga, "g")? * STANDARD_GRAVITY,
-        )),
-        (_, Some(peak)) => Some(Scaling::PeakDisplacement(quantity("--peak", peak, "m")?)),
-        _ => None,
-    };
     Ok(Plan {
         case: arguments.case.clone(),
         model: arguments.model.clone(),
-        record: arguments.record.clone(),
-        reference: arguments.reference.clone(),
-        scaling,
-        seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),
+        record: arguments.motion.record.clone(),
+        reference: arguments.motion.reference.clone(),
+        scaling: arguments.motion.scaling()?,
+        seed: arguments.motion.seed(),
         search: Search {
             corrections: arguments.corrections,
-            band: [low, high],
+            band: band(&arguments.band)?,
         },
     })
 }

@@ -5,6 +5,8 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
+use super::motion::MotionArguments;
+use super::quantity::if_given;
 use super::rig::RigArguments;
 use super::run;
 use crate::error::Error;
@@ -26,12 +28,8 @@ pub struct Arguments {
     /// Archive to write (System Structure and Parameterization)
     #[arg(long, value_name = "FILE")]
     ssp: PathBuf,
-    /// Ground motion that goes into the archive
-    #[arg(long, value_name = "FILE", conflicts_with = "reference")]
-    record: Option<PathBuf>,
-    /// Reference that goes into the archive
-    #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
+    #[command(flatten)]
+    motion: MotionArguments,
     #[command(flatten)]
     rig: RigArguments,
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
@@ -69,19 +67,15 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Version::Two => FmiVersion::V2,
         Version::Three => FmiVersion::V3,
     };
-    let duration = arguments.duration.as_deref();
-    let duration = duration.map(|text| run::quantity("--duration", text, "s"));
     let request = Request {
         fmi,
         algorithm: Some(arguments.algorithm),
-        duration_s: duration.transpose()?,
+        duration_s: if_given("--duration", &arguments.duration, "s")?,
         ..run::request(&run::Arguments::of(
             Some(arguments.system.clone()),
-            [arguments.record.clone(), arguments.reference.clone()],
+            arguments.motion.clone(),
             arguments.rig.clone(),
             arguments.set.clone(),
-            [None, None],
-            None,
         ))?
     };
     let prepared = prepare(&request)?;

@@ -6,6 +6,8 @@ use std::process::ExitCode;
 use clap::Args;
 use indicatif::ProgressBar;
 
+use super::motion::MotionArguments;
+use super::quantity::{band, if_given};
 use super::rig::RigArguments;
 use super::run;
 use crate::error::Error;
@@ -23,31 +25,13 @@ pub struct Arguments {
     /// Built-in system or .toml file [default: three-variable]
     #[arg(value_name = "SYSTEM")]
     system: Option<String>,
-    /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
-    #[arg(
-        long,
-        alias = "motion",
-        value_name = "FILE",
-        conflicts_with = "reference"
-    )]
-    record: Option<PathBuf>,
-    /// Reference: .csv with time, displacement, velocity, acceleration, played as given
-    #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
+    #[command(flatten)]
+    motion: MotionArguments,
     #[command(flatten)]
     rig: RigArguments,
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
-    /// Scale of the motion: peak acceleration in g
-    #[arg(long, value_name = "G", conflicts_with = "peak")]
-    pga: Option<String>,
-    /// Scale of the motion: peak displacement, such as "1.2 in" (a number alone is in m)
-    #[arg(long, value_name = "L")]
-    peak: Option<String>,
-    /// Seed of the built-in motion [default: 1]
-    #[arg(long, conflicts_with_all = ["record", "reference"])]
-    seed: Option<u64>,
     /// Most corrections
     #[arg(long, default_value_t = 3)]
     iterations: usize,
@@ -128,13 +112,7 @@ fn plan(arguments: &Arguments) -> Result<Plan, Error> {
     if !(gain > 0.0 && gain <= 1.0) {
         return fault("--gain", format!("{gain} is not above 0 and at most 1"));
     }
-    let [low, high] = [0, 1].map(|i| arguments.band.get(i).copied().unwrap_or(f64::NAN));
-    if !(low > 0.0 && high > low && high <= 100.0) {
-        return fault(
-            "--band",
-            format!("{low} to {high} Hz; expected 0 < LOW < HIGH <= 100"),
-        );
-    }
+    let band = band(&arguments.band)?;
     if !arguments.target.is_finite() || arguments.target < 0.0 {
         return fault("--target", format!("{} is no error in %", arguments.target));
     }
@@ -147,27 +125,20 @@ fn plan(arguments: &Arguments) -> Result<Plan, Error> {
             format!("{exposure} is less than the one run that shows the error"),
         );
     }
-    let quantity = |option, text: &Option<String>, unit| {
-        text.as_deref()
-            .map(|text| run::quantity(option, text, unit))
-            .transpose()
-    };
     Ok(Plan {
         request: run::request(&run::Arguments::of(
             arguments.system.clone(),
-            [arguments.record.clone(), arguments.reference.clone()],
+            arguments.motion.clone(),
             arguments.rig.clone(),
             arguments.set.clone(),
-            [arguments.pga.clone(), arguments.peak.clone()],
-            arguments.seed,
         ))?,
         iterations: arguments.iterations,
         gain,
         target_percent: arguments.target,
-        band: [low, high],
+        band,
         exposure: arguments.exposure,
-        measurement_delay: quantity("--measurement-delay", &arguments.measurement_delay, "s")?,
-        dummy_mass: quantity("--dummy-mass", &arguments.dummy_mass, "kg")?,
+        measurement_delay: if_given("--measurement-delay", &arguments.measurement_delay, "s")?,
+        dummy_mass: if_given("--dummy-mass", &arguments.dummy_mass, "kg")?,
         drive: arguments.drive.clone(),
     })
 }

@@ -10,22 +10,22 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::OneVersion;
 use super::interrupt;
+use super::motion::MotionArguments;
+use super::quantity::{at_least_one, if_given, percent, positive};
 use super::rig::RigArguments;
 use crate::error::Error;
 use crate::fmu::{Isolation, Options, Trace};
 use crate::live::{Scene, Server, Tap};
 use crate::master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Simulation};
-use crate::motion;
 use crate::results::{Results, allow_overwriting, unused};
 use crate::run::checkpoint::{self, Checkpoints, Unfinished};
-use crate::run::experiment::{Prepared, Request, Scale, is_file, prepare};
+use crate::run::experiment::{Prepared, Request, is_file, prepare};
 use crate::run::manifest::Manifest;
 use crate::run::page;
 use crate::run::refinement::refine;
 use crate::run::summary::Summary;
 use crate::run::text::text;
-use crate::system::{self, built_in};
-use crate::units::{self, STANDARD_GRAVITY};
+use crate::system::built_in;
 
 /// Options of `shakebench run`.
 #[derive(Debug, Default, Args)]
@@ -43,12 +43,8 @@ pub struct Arguments {
     /// Built-in system, .toml file, .ssp archive or single .fmu [default: three-variable]
     #[arg(value_name = "SYSTEM")]
     system: Option<String>,
-    /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
-    #[arg(long, value_name = "FILE", conflicts_with = "reference")]
-    record: Option<PathBuf>,
-    /// Reference: .csv with time, displacement, velocity, acceleration, played as given
-    #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
+    #[command(flatten)]
+    motion: MotionArguments,
     #[command(flatten)]
     rig: RigArguments,
     /// Hybrid simulation: a computed structure between the ground, which the motion then is, and the
@@ -85,18 +81,6 @@ pub struct Arguments {
     /// Play only the beginning of the motion, such as "10 s"
     #[arg(long, value_name = "T")]
     duration: Option<String>,
-    /// Scale of the motion: a factor
-    #[arg(long, value_name = "FACTOR", group = "scaling")]
-    scale: Option<f64>,
-    /// Scale of the motion: peak acceleration in g
-    #[arg(long, value_name = "G", group = "scaling")]
-    pga: Option<String>,
-    /// Scale of the motion: peak displacement, such as "1.2 in" (a number alone is in m)
-    #[arg(long, value_name = "L", group = "scaling")]
-    peak: Option<String>,
-    /// Seed of the built-in motion [default: 1]
-    #[arg(long, conflicts_with_all = ["record", "reference"])]
-    seed: Option<u64>,
     /// Keep pace with real time, and say how well that went
     #[arg(long)]
     real_time: bool,
@@ -135,36 +119,30 @@ pub struct Arguments {
     /// Go on with the run in this folder from its last checkpoint
     #[arg(long, value_name = "DIR", conflicts_with_all = [
         "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
-        "variable_step", "least_step",        "duration", "scaling", "seed", "manifest", "out", "record_every", "checkpoint_every",
+        "variable_step", "least_step", "duration", "scaling", "seed", "manifest", "out", "record_every", "checkpoint_every",
     ])]
     resume: Option<PathBuf>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
         "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
-        "variable_step", "least_step",        "duration", "scaling", "seed",
+        "variable_step", "least_step", "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
 }
 
 impl Arguments {
-    /// A run of `system` on the `[record, reference]` or the built-in motion, scaled by `[pga, peak]`.
+    /// A run of a system on a motion, otherwise as usual.
     pub(super) fn of(
         system: Option<String>,
-        [record, reference]: [Option<PathBuf>; 2],
+        motion: MotionArguments,
         rig: RigArguments,
         set: Vec<String>,
-        [pga, peak]: [Option<String>; 2],
-        seed: Option<u64>,
     ) -> Self {
         Self {
             system,
-            record,
-            reference,
+            motion,
             rig,
             set,
-            pga,
-            peak,
-            seed,
             ..Self::default()
         }
     }
@@ -233,7 +211,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             checkpoint::refuse_unfinished(&folder)?;
             simulation.keep_every(arguments.record_every);
             if let Some(every) = &arguments.checkpoint_every {
-                let every = quantity("--checkpoint-every", every, "s")? / motion.dt;
+                let every = positive("--checkpoint-every", every, "s")? / motion.dt;
                 let every = (every.round() as usize).max(1);
                 let plan = (arguments.record_every, every);
                 simulation.check_checkpoints()?;
@@ -406,7 +384,7 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
     });
     let limit = arguments.call_limit.as_deref();
     let limit = limit.map(|text| {
-        let seconds = quantity("--call-limit", text, "s")?;
+        let seconds = positive("--call-limit", text, "s")?;
         Duration::try_from_secs_f64(seconds).map_err(|error| Error::Option {
             option: "--call-limit",
             reason: error.to_string(),
@@ -440,20 +418,6 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
             return Err(Error::Option { option, reason });
         }
     }
-    let text = |option, given: &Option<String>, unit: &'static str| {
-        given
-            .as_ref()
-            .map(|text| quantity(option, text, unit))
-            .transpose()
-    };
-    let scaling = match (arguments.scale, &arguments.pga, &arguments.peak) {
-        (Some(factor), _, _) => Some(Scale::Factor(factor)),
-        (_, Some(pga), _) => Some(Scale::PeakAcceleration(
-            quantity("--pga", pga, "g")? * STANDARD_GRAVITY,
-        )),
-        (_, _, Some(peak)) => Some(Scale::PeakDisplacement(quantity("--peak", peak, "m")?)),
-        _ => None,
-    };
     Ok(Request {
         system: if is_file {
             absolute(Path::new(&system)).display().to_string()
@@ -465,47 +429,26 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
         structure: arguments.structure.clone(),
         tuning: arguments.rig.tuning,
         control_model: arguments.rig.control_model.as_deref().map(absolute),
-        record: arguments.record.as_deref().map(absolute),
-        reference: arguments.reference.as_deref().map(absolute),
-        seed: arguments.seed.unwrap_or(motion::DEFAULT_SEED),
-        scaling,
+        record: arguments.motion.record.as_deref().map(absolute),
+        reference: arguments.motion.reference.as_deref().map(absolute),
+        seed: arguments.motion.seed(),
+        scaling: arguments.motion.scaling()?,
         set: arguments.set.clone(),
         fmi: arguments.fmi.into(),
         algorithm: arguments.algorithm,
-        step_s: text("--step", &arguments.step, "s")?,
+        step_s: if_given("--step", &arguments.step, "s")?,
         variable_step_percent: match &arguments.variable_step {
             Some(share) => Some(percent("--variable-step", share)?),
             None => None,
         },
-        least_step_s: text("--least-step", &arguments.least_step, "s")?,
-        duration_s: text("--duration", &arguments.duration, "s")?,
+        least_step_s: if_given("--least-step", &arguments.least_step, "s")?,
+        duration_s: if_given("--duration", &arguments.duration, "s")?,
         inputs: arguments.input.iter().map(|path| absolute(path)).collect(),
     })
 }
 
 fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
-}
-
-/// A positive quantity; a number alone is in `unit`.
-pub(super) fn quantity(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
-    let fault = |reason: String| Error::Option { option, reason };
-    let value = units::value_in(text, unit).map_err(|error| fault(error.to_string()))?;
-    if value > 0.0 {
-        return Ok(value);
-    }
-    Err(fault(format!("`{text}` is not positive")))
-}
-
-/// A positive share, per cent.
-fn percent(option: &'static str, text: &str) -> Result<f64, Error> {
-    system::percent(text).map_err(|reason| Error::Option { option, reason })
-}
-
-/// A whole number above 0.
-fn at_least_one(text: &str) -> Result<usize, String> {
-    let number = text.parse().ok().filter(|number| *number > 0);
-    number.ok_or_else(|| "expected a whole number from 1".to_string())
 }
 
 fn progress_bar(samples: usize) -> ProgressBar {

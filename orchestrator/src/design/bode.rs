@@ -7,7 +7,7 @@ use plant::linear::FrequencyResponse;
 
 use super::figures::{Figures, LoopFigures};
 use super::loops::NamedLoop;
-use super::page::{gain_panel, line, phase_panel, response};
+use super::panels::{gain_panel, line, phase_panel, response};
 use crate::report::{Abscissa, Axis, Panel, Section, Series, Style, Units};
 
 /// Colours of the loop in continuous time, as sampled, and of its margins.

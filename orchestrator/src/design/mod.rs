@@ -5,6 +5,7 @@ mod figures;
 mod loops;
 pub mod model;
 mod page;
+mod panels;
 mod table;
 
 use std::str::FromStr;

@@ -1,30 +1,22 @@
 //! The frequency responses of `shakebench design`: the content of Fig 3-3, 3-4, 3-7, 3-9 and 3-10, and
 //! every loop in continuous time beside the one that is sampled.
 
-use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use controllers::loop_shaping::LoopShapingCoefficients;
 use controllers::loops::Time;
 use controllers::synthesis::{self, LoopShapingDesign};
 use nalgebra::Complex;
 use plant::identified::shake_table::ShakeTable;
-use plant::linear::{FrequencyResponse, log_space};
-use units::constants::SAMPLING_PERIOD;
+use plant::linear::FrequencyResponse;
 
 use super::loops::{LoopName, NamedLoop};
+use super::panels::{gain_panel, line, phase_panel, response};
 use super::table::table;
 use super::{Design, bode};
 use crate::error::Error;
 use crate::figures::Figure;
-use crate::report::{
-    self, Abscissa, Axis, Panel, Report, Section, Series, Style, Table, Units, identity,
-};
-
-const POINTS: usize = 600;
-/// Drawn from 0.01 Hz to the Nyquist frequency.
-const FIRST_HZ: f64 = 0.01;
+use crate::report::{self, Report, Section, Style, Table, identity};
 
 /// Writes `report.html` into `folder`; says where.
 ///
@@ -228,34 +220,5 @@ fn shaping(design: &LoopShapingDesign) -> Section {
             ),
         ],
         ..Section::default()
-    }
-}
-
-pub(super) fn response(value: impl Fn(f64) -> Complex<f64>) -> FrequencyResponse {
-    let last = 0.499 / SAMPLING_PERIOD;
-    FrequencyResponse::continuous(&log_space(TAU * FIRST_HZ, TAU * last, POINTS), |s| {
-        value(s.im)
-    })
-}
-
-pub(super) fn line(name: &str, response: &FrequencyResponse, values: Vec<f64>) -> Series {
-    let places: Arc<[f64]> = response.omega.iter().map(|omega| omega / TAU).collect();
-    Series::line(name, Abscissa::At(places), values)
-}
-
-pub(super) fn gain_panel(title: &str, series: Vec<Series>) -> Panel {
-    panel(title, Axis::linear("gain", Units::DECIBEL), series)
-}
-
-pub(super) fn phase_panel(title: &str, series: Vec<Series>) -> Panel {
-    panel(title, Axis::linear("phase", Units::DEGREE), series)
-}
-
-fn panel(title: &str, y: Axis, series: Vec<Series>) -> Panel {
-    Panel {
-        title: title.into(),
-        x: Axis::logarithmic("frequency", Units::FREQUENCY),
-        y,
-        series,
     }
 }

@@ -11,8 +11,9 @@ use identification::diagnosis::rigs::shake_table::{ExtendedTable, TableErrors};
 use identification::diagnosis::rigs::{DescriptionError, ExtendedRig, FileErrors, renamed};
 use serde::Serialize;
 
-use super::{fault, file_fault};
+use super::{fault, file_fault, foreign};
 use crate::error::Error;
+use crate::fmu::Isolation;
 use crate::report::columns::aligned;
 use crate::results::Results;
 
@@ -51,17 +52,29 @@ pub struct Predicted {
     pub given: usize,
 }
 
-/// Errors of the model in the file `model` on `files`, whose columns the file `columns` may name
-/// otherwise.
+/// An extended model that a diagnosis wrote, and what is said of it beside.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<'a> {
+    /// The file.
+    pub model: &'a Path,
+    /// File that names the columns otherwise; not of an FMU.
+    pub columns: Option<&'a Path>,
+    /// Of an FMU, where it is now, if not where the file says.
+    pub fmu: Option<&'a Path>,
+    /// Of an FMU, the map of the data, if not the one beside the file.
+    pub map: Option<&'a Path>,
+    /// Of an FMU, whether it runs in a process of its own; absent: it does.
+    pub isolate: Option<Isolation>,
+}
+
+/// Errors of the model that is `asked` for on `files`.
 ///
 /// # Errors
 /// A file that cannot be read or understood, by place.
-pub fn validate(
-    model: &Path,
-    columns: Option<&Path>,
-    files: &[PathBuf],
-) -> Result<Validation, Error> {
-    let (records, tables) = match read(model, columns)? {
+pub fn validate(asked: &Asked<'_>, files: &[PathBuf]) -> Result<Validation, Error> {
+    let model = asked.model;
+    let (records, tables) = match read(asked)? {
+        Read::Foreign(foreign) => (foreign.validate(files)?, Vec::new()),
         Read::Rig(rig) => {
             let found = rig.validate(files);
             let found = found.map_err(|error| fault(model, error.into()))?;
@@ -80,21 +93,22 @@ pub fn validate(
     })
 }
 
-/// Writes what the model in the file `model` puts out for every row of `file` to `out`; the output's
+/// Writes what the model that is `asked` for puts out for every row of `file` to `out`; the output's
 /// cells may be empty. A file without a given output begins at rest, or in the steady state of a
 /// motion that repeats it where it `is_periodic`.
 ///
 /// # Errors
 /// As [`validate`]; a file that cannot be written.
 pub fn predict(
-    model: &Path,
-    columns: Option<&Path>,
+    asked: &Asked<'_>,
     file: &Path,
     is_periodic: bool,
     out: &Path,
 ) -> Result<Predicted, Error> {
-    let read = match read(model, columns)? {
+    let model = asked.model;
+    let read = match read(asked)? {
         Read::Rig(read) => read,
+        Read::Foreign(foreign) => return predict_foreign(&foreign, file, is_periodic, out),
         Read::Table(table, called) => {
             return predict_table(&table, &called, file, is_periodic, out);
         }
@@ -180,6 +194,49 @@ fn predict_table(
     })
 }
 
+/// As [`predict`], of an FMU: the output that was asked for in the file's unit, and all in the model's beside
+/// the time.
+fn predict_foreign(
+    model: &foreign::Extended,
+    file: &Path,
+    is_periodic: bool,
+    out: &Path,
+) -> Result<Predicted, Error> {
+    if is_periodic {
+        return Err(Error::Option {
+            option: "--periodic",
+            reason: format!(
+                "{} is an FMU's, which begins with its start values",
+                model.path.display()
+            ),
+        });
+    }
+    let found = model.predict(file)?;
+    let (unit, factor) = &found.in_file;
+    write(out, |file| {
+        let mut csv = csv::Writer::from_writer(file);
+        let heads = found.outputs.iter().map(foreign::head);
+        let first = [PREDICTION.to_owned(), "time [s]".to_owned()];
+        csv.write_record(first.into_iter().chain(heads))?;
+        for (k, time) in found.time.iter().enumerate() {
+            let wanted = found.values[found.wanted][k] / factor;
+            let own = found.values.iter().map(|own| own[k]);
+            let row = [wanted, *time].into_iter().chain(own);
+            csv.write_record(row.map(|value| value.to_string()))?;
+        }
+        csv.flush()
+    })?;
+    Ok(Predicted {
+        model: model.path.clone(),
+        file: file.into(),
+        prediction: out.into(),
+        channel: found.outputs[found.wanted].name.clone(),
+        unit: unit.clone(),
+        rows: found.time.len(),
+        given: found.given,
+    })
+}
+
 /// Writes the file `out`, all or nothing.
 fn write(
     out: &Path,
@@ -198,11 +255,34 @@ fn write(
 enum Read {
     Rig(Box<ExtendedRig>),
     Table(Box<ExtendedTable>, Vec<Called>),
+    Foreign(Box<foreign::Extended>),
 }
 
-fn read(model: &Path, columns: Option<&Path>) -> Result<Read, Error> {
-    let is_table = std::fs::read_to_string(model).is_ok_and(|text| ExtendedTable::is_one(&text));
-    if is_table {
+fn read(asked: &Asked<'_>) -> Result<Read, Error> {
+    let (model, columns) = (asked.model, asked.columns);
+    let text = std::fs::read_to_string(model).unwrap_or_default();
+    if foreign::is_one(&text) {
+        if columns.is_some() {
+            return Err(Error::Option {
+                option: "--columns",
+                reason: format!(
+                    "{} is an FMU's: expected --map, the map of its data",
+                    model.display()
+                ),
+            });
+        }
+        let read = foreign::Extended::read(model, asked.fmu, asked.map, asked.isolate)?;
+        return Ok(Read::Foreign(Box::new(read)));
+    }
+    for (option, given) in [("--fmu", asked.fmu), ("--map", asked.map)] {
+        if given.is_some() {
+            return Err(Error::Option {
+                option,
+                reason: format!("{} is not the model of an FMU", model.display()),
+            });
+        }
+    }
+    if ExtendedTable::is_one(&text) {
         let table = ExtendedTable::read(model).map_err(|error| fault(model, error.into()))?;
         let called = columns.map(called).transpose();
         let called = called.map_err(|error: DiagnosisError| fault(model, error))?;
@@ -222,6 +302,14 @@ impl Validation {
         if !self.tables.is_empty() {
             return self.text_of_tables();
         }
+        // Between the model as described and the extended one of an FMU stands no refitted one.
+        let refitted = |one: &FileErrors| one.nominal_percent != one.described_percent;
+        let has_refitted = self.records.iter().any(refitted);
+        let row = |cells: [String; 6]| -> Vec<String> {
+            let cells = cells.into_iter().enumerate();
+            let cells = cells.filter(|(place, _)| has_refitted || *place != 3);
+            cells.map(|(_, cell)| cell).collect()
+        };
         let heading = [
             "file",
             "channel",
@@ -230,20 +318,26 @@ impl Validation {
             "extended",
             "rms error",
         ];
-        let mut rows = vec![heading.map(String::from).to_vec()];
+        let mut rows = vec![row(heading.map(String::from))];
         for one in &self.records {
             let percent = |value: f64| format!("{value:.2} %");
-            rows.push(vec![
+            rows.push(row([
                 one.file.display().to_string(),
                 one.channel.clone(),
                 percent(one.described_percent),
                 percent(one.nominal_percent),
                 percent(one.extended_percent),
                 format!("{:.3e} {}", one.extended_rms, one.unit),
-            ]);
+            ]));
         }
+        let has_own = self.records.iter().any(|one| !one.session.is_empty());
+        let but = if has_own {
+            " but what a file has for itself"
+        } else {
+            ""
+        };
         let mut text = format!(
-            "error over variation, nothing fitted but what a file has for itself\n{}",
+            "error over variation, nothing fitted{but}\n{}",
             aligned(&rows)
         );
         for one in &self.records {

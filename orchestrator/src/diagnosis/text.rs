@@ -1,5 +1,6 @@
 //! A diagnosis on the terminal, and the tables that it shares with the report.
 
+use identification::diagnosis::engine::Verdict;
 use identification::diagnosis::rigs::foreign::KIND;
 use identification::diagnosis::rigs::shake_table::{laboratory_unit, with_error};
 use identification::diagnosis::rigs::{PartReport, RigDiagnosis};
@@ -140,7 +141,11 @@ pub(super) fn remarks(report: &DiagnosisReport) -> Vec<String> {
         }
     };
     if let Some(experiment) = &report.separating_experiment {
-        lines.push(format!("what would separate them: {experiment}"));
+        let what = match report.verdict {
+            Verdict::Unexplained => "what to measure next",
+            _ => "what would separate them",
+        };
+        lines.push(format!("{what}: {experiment}"));
         if let Some(motion) = &report.separating_motion {
             let motion = motion.display();
             lines.push(format!(

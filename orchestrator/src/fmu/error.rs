@@ -89,8 +89,8 @@ pub struct CallError {
     pub variables: Vec<String>,
     /// What came of it, as a clause.
     pub outcome: String,
-    /// Whether it is a step that the FMU discarded: it can go on from a saved state.
-    pub is_discarded_step: bool,
+    /// Whether a shorter step from a saved state may do: the FMU discarded it, or came to what is no number.
+    pub may_be_of_the_step: bool,
     /// What the FMU logged since the last call that went well.
     pub messages: Vec<String>,
 }

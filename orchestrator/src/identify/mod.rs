@@ -198,6 +198,8 @@ fn form(
         {
             return Ok(Form::General(Box::new(found)));
         }
+        // Nothing is to be had from channels that contradict each other.
+        Err(error @ IdentificationError::Contradiction { .. }) => return Err(error),
         // A specimen that is given is one of the general form.
         other if options.specimen.is_some() => {
             return other.map(|found| Form::General(Box::new(found)));

@@ -103,7 +103,7 @@ impl MasterError {
     /// Whether a shorter step may help: an FMU that discarded it, values that did not settle over it.
     pub(super) fn is_of_the_step(&self) -> bool {
         match self {
-            Self::Call(error) => error.is_discarded_step,
+            Self::Call(error) => error.may_be_of_the_step,
             Self::NotConverged { .. } | Self::Loop { .. } => true,
             _ => false,
         }

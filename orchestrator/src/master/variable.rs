@@ -188,6 +188,13 @@ impl StepControl {
 
     /// What the user should know before the run.
     pub(super) fn notes(&self, parts: &[Part]) -> Vec<String> {
+        if self.greatest == 1 {
+            return vec![
+                "the least step is as long as the greatest, so that there is none to choose; a longer \
+                 --step or a shorter --least-step leaves a choice"
+                    .to_string(),
+            ];
+        }
         if self.watched.is_empty() {
             return vec![
                 "nothing continuous goes from one component to another, nor from an input table, so that \

@@ -1,9 +1,12 @@
 //! How a record becomes a motion.
 
+use serde::{Deserialize, Serialize};
+
 use crate::units::{INCH, STANDARD_GRAVITY};
 
 /// How large a motion is played.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Scaling {
     /// The largest scale that keeps both peaks within these limits.
     Within {

@@ -2,9 +2,8 @@
 
 use roxmltree::Document;
 
-use super::supply::VERSION;
-use super::variant::escape;
 use crate::fmu::FmiVersion;
+use crate::program::VERSION;
 
 /// Name of the annotation of FMI 2.0, and of the element in both.
 const TOOL: &str = "Shakebench";
@@ -42,4 +41,11 @@ pub fn build_of(document: &Document) -> Option<String> {
         .descendants()
         .find(|node| node.has_tag_name("Release"))?;
     release.attribute("build").map(str::to_string)
+}
+
+pub(super) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }

@@ -27,6 +27,35 @@ pub struct PackedFmu {
     pub path: PathBuf,
 }
 
+/// The FMUs in a folder, sorted by name, then version.
+///
+/// # Errors
+/// A folder that cannot be read. A missing one holds no FMUs.
+pub fn fmus_in(folder: &Path) -> Result<Vec<PackedFmu>, PackError> {
+    let mut found = Vec::new();
+    for version in FmiVersion::ALL {
+        let below = folder.join(version.folder());
+        let entries = match fs::read_dir(&below) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            entries => entries.map_err(file_error(&below))?,
+        };
+        for entry in entries {
+            let path = entry.map_err(file_error(&below))?.path();
+            if path.extension().is_some_and(|extension| extension == "fmu")
+                && let Some(stem) = path.file_stem()
+            {
+                found.push(PackedFmu {
+                    name: stem.to_string_lossy().into_owned(),
+                    version,
+                    path: path.clone(),
+                });
+            }
+        }
+    }
+    found.sort_by(|a, b| (&a.name, a.version).cmp(&(&b.name, b.version)));
+    Ok(found)
+}
+
 const LICENCE: &str = "This FMU is licensed under either of the Apache License, Version 2.0, or \
                        the MIT license, at your option; both texts lie beside this file, and the \
                        notices of what is linked into it in third-party.txt.\n";

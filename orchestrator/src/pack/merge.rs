@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::archive::{Entries, PackedFmu, read_archive, write_archive};
+use super::archive::{Entries, PackedFmu, fmus_in, read_archive, write_archive};
 use super::error::{PackError, file_error};
-use super::supply;
 use crate::fmu::FmiVersion;
 
 /// Joins the FMUs of several folders (each with `fmi2/NAME.fmu` and `fmi3/NAME.fmu`) into `out`.
@@ -18,7 +17,7 @@ use crate::fmu::FmiVersion;
 pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<PackedFmu>, PackError> {
     let mut joined: BTreeMap<(String, FmiVersion), (PathBuf, Entries)> = BTreeMap::new();
     for folder in folders {
-        let found = supply::fmus_in(folder)?;
+        let found = fmus_in(folder)?;
         if found.is_empty() {
             return Err(PackError::EmptyFolder {
                 folder: folder.clone(),

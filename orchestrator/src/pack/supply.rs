@@ -3,7 +3,7 @@
 
 use std::{
     env,
-    fs::{self, File},
+    fs::File,
     io::{self, Read},
     path::{Path, PathBuf},
     sync::OnceLock,
@@ -13,18 +13,15 @@ use roxmltree::Document;
 use serde::Serialize;
 use zip::ZipArchive;
 
-use super::archive::PackedFmu;
-use super::error::{PackError, file_error};
+use super::archive::{PackedFmu, fmus_in};
+use super::error::PackError;
 use super::up_to_date::{self, Sources};
 use super::workspace::Workspace;
 use crate::fmu::FmiVersion;
-use crate::program;
+use crate::program::{self, VERSION};
 
 /// The environment variable that names a folder of packed FMUs.
 pub const VARIABLE: &str = "SHAKEBENCH_FMUS";
-
-/// Version that FMUs must be of, the program's.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Why a folder was chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -115,35 +112,6 @@ fn find_all() -> Result<Vec<PackedFmu>, PackError> {
             folder: path,
         });
     }
-    Ok(found)
-}
-
-/// The FMUs in a folder, sorted by name, then version.
-///
-/// # Errors
-/// A folder that cannot be read. A missing one holds no FMUs.
-pub fn fmus_in(folder: &Path) -> Result<Vec<PackedFmu>, PackError> {
-    let mut found = Vec::new();
-    for version in FmiVersion::ALL {
-        let below = folder.join(version.folder());
-        let entries = match fs::read_dir(&below) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-            entries => entries.map_err(file_error(&below))?,
-        };
-        for entry in entries {
-            let path = entry.map_err(file_error(&below))?.path();
-            if path.extension().is_some_and(|extension| extension == "fmu")
-                && let Some(stem) = path.file_stem()
-            {
-                found.push(PackedFmu {
-                    name: stem.to_string_lossy().into_owned(),
-                    version,
-                    path: path.clone(),
-                });
-            }
-        }
-    }
-    found.sort_by(|a, b| (&a.name, a.version).cmp(&(&b.name, b.version)));
     Ok(found)
 }
 

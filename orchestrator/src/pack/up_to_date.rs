@@ -18,8 +18,7 @@ use std::{
 
 use serde::Deserialize;
 
-use super::archive::PackedFmu;
-use super::supply::fmus_in;
+use super::archive::{PackedFmu, fmus_in};
 use super::workspace::Workspace;
 use crate::program;
 

@@ -5,7 +5,8 @@ use std::{ops::Range, path::Path};
 use fmu_kit::resources::{START_VALUES, variant_token};
 use roxmltree::{Document, Node};
 
-use super::archive::{archive_bytes, read_archive, write_archive};
+use super::annotation::escape;
+use super::archive::{Entries, archive_bytes, read_archive, write_archive};
 use super::error::{PackError, file_error};
 
 /// A parameter that starts differently.
@@ -13,7 +14,7 @@ use super::error::{PackError, file_error};
 pub struct StartValue {
     /// The parameter's name.
     pub name: String,
-    /// Its new start value, SI.
+    /// Its new start value, SI; of an enumeration the number of the choice.
     pub value: f64,
     /// What is added to its description, such as a standard error; may be empty.
     pub note: String,
@@ -25,13 +26,35 @@ pub struct StartValue {
 /// setting anything. The variant has its own token.
 ///
 /// # Errors
-/// When the original is no FMU of this project, or one of the names no Float64 parameter of it.
+/// When the original is no FMU of this project, or one of the names no Float64 or enumeration parameter
+/// of it.
 pub fn write_variant(
     original: &Path,
     out: &Path,
     model_name: &str,
     start_values: &[StartValue],
 ) -> Result<(), PackError> {
+    let entries = variant(original, Some(model_name), start_values)?;
+    write_archive(out, &entries, None)
+}
+
+/// The bytes of the FMU `original` with other start values.
+///
+/// # Errors
+/// As [`write_variant`].
+pub(crate) fn variant_bytes(
+    original: &Path,
+    start_values: &[StartValue],
+) -> Result<Vec<u8>, PackError> {
+    let entries = variant(original, None, start_values)?;
+    archive_bytes(&entries).map_err(file_error(original))
+}
+
+fn variant(
+    original: &Path,
+    model_name: Option<&str>,
+    start_values: &[StartValue],
+) -> Result<Entries, PackError> {
     let fail = |problem: String| PackError::Variant {
         path: original.into(),
         problem,
@@ -52,7 +75,7 @@ pub fn write_variant(
     let changed = change(&description, model_name, start_values, &table).map_err(fail)?;
     entries.insert("modelDescription.xml".into(), changed.into_bytes());
     entries.insert(resource, table.into_bytes());
-    write_archive(out, &entries, None)
+    Ok(entries)
 }
 
 /// The bytes of the FMU `original` with a further file in its resources.
@@ -72,7 +95,7 @@ pub(crate) fn with_resource(
 /// The description with the values of some attributes replaced.
 fn change(
     description: &str,
-    model_name: &str,
+    model_name: Option<&str>,
     start_values: &[StartValue],
     table: &str,
 ) -> Result<String, String> {
@@ -85,7 +108,9 @@ fn change(
         changes.push((place.range_value(), escape(&value)));
         Ok(())
     };
-    replace(root, "modelName", model_name.into())?;
+    if let Some(name) = model_name {
+        replace(root, "modelName", name.into())?;
+    }
     let name = if root.has_attribute("guid") {
         "guid"
     } else {
@@ -101,8 +126,16 @@ fn change(
             .ok_or_else(|| format!("`{}` is no parameter of it", start.name))?;
         // In FMI 2.0 type and start value stand in an element of their own.
         let typed = variable.first_element_child().unwrap_or(variable);
-        if !["Real", "Float64"].contains(&typed.tag_name().name()) || !start.value.is_finite() {
-            return Err(format!("`{}` = {} is no Float64", start.name, start.value));
+        let fits = match typed.tag_name().name() {
+            "Real" | "Float64" => start.value.is_finite(),
+            "Enumeration" => start.value.fract() == 0.0,
+            _ => false,
+        };
+        if !fits {
+            return Err(format!(
+                "`{}` = {} is neither Float64 nor an enumeration",
+                start.name, start.value
+            ));
         }
         replace(typed, "start", start.value.to_string())?;
         if !start.note.is_empty() {
@@ -116,11 +149,4 @@ fn change(
         text.replace_range(range, &value);
     }
     Ok(text)
-}
-
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }

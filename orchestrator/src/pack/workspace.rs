@@ -26,6 +26,15 @@ pub(super) struct Component {
     pub(super) libraries: Vec<(Platform, PathBuf)>,
 }
 
+/// The crate of a component, not built.
+struct ComponentCrate {
+    package: String,
+    /// Its folder.
+    folder: PathBuf,
+    /// Name of its library, which is the FMU's.
+    library: String,
+}
+
 impl Workspace {
     /// Looks upwards from the package that cargo runs, the present folder and the program.
     pub(super) fn find() -> Result<Self, PackError> {
@@ -73,19 +82,19 @@ impl Workspace {
         Ok(String::from_utf8_lossy(&output.stdout).into_owned())
     }
 
-    /// Lets cargo build the libraries of every default member, and returns the dynamic ones.
+    /// Lets cargo build the libraries of packages and returns the dynamic ones.
     ///
-    /// All of them, though components alone are asked for: cargo compiles a dependency once for
-    /// every set of features that it is asked for, and only the selection of `cargo run` and
-    /// `cargo test` finds what those have compiled.
-    pub(super) fn build(&self) -> Result<Vec<Component>, PackError> {
-        let answer = self.cargo(&[
+    /// Cargo compiles a dependency once for every set of features that it is asked for. Every
+    /// selection with the program in it asks for the same as `cargo run` and `cargo test`.
+    fn build(&self, packages: &[&str]) -> Result<Vec<Component>, PackError> {
+        let arguments = [
             "build",
             "--release",
             "--lib",
             "--message-format",
             "json-render-diagnostics",
-        ])?;
+        ];
+        let answer = self.cargo(&[&arguments, packages].concat())?;
         let fail = |problem: String| PackError::Answer {
             command: "build",
             problem,
@@ -124,14 +133,17 @@ impl Workspace {
 
     /// The components under `fmus/`: what the project publishes.
     pub(super) fn published(&self) -> Result<Vec<Component>, PackError> {
-        let mut components = self.build()?;
+        let crates = self.crates()?;
+        let mut packages = vec!["-p", "shakebench"];
+        packages.extend(crates.iter().flat_map(|own| ["-p", &own.package]));
+        let mut components = self.build(&packages)?;
         components.retain(|component| component.folder.parent() == Some(&self.root.join("fmus")));
         Ok(components)
     }
 
     /// The component whose crate lies in a folder, such as `tests/importers/faulty`.
     pub(super) fn component_in(&self, folder: &str) -> Result<Component, PackError> {
-        let mut components = self.build()?.into_iter();
+        let mut components = self.build(&["--workspace"])?.into_iter();
         components
             .find(|component| component.folder == self.root.join(folder))
             .ok_or_else(|| PackError::Answer {
@@ -149,37 +161,43 @@ impl Workspace {
         let own = folders
             .iter()
             .find(|(platform, _)| Some(platform) == here.as_ref());
-        let Some((own_platform, own)) = own else {
+        let Some((own_platform, own_folder)) = own else {
             let here = here.map_or("this platform".to_string(), |here| here.to_string());
             return Err(PackError::NoOwnLibraries(here));
         };
+        let components = self.crates()?.into_iter().map(|own| {
+            let name = &own.library;
+            let file = |(platform, from): &(Platform, PathBuf)| {
+                (platform.clone(), from.join(platform.library_file(name)))
+            };
+            Component {
+                library: own_folder.join(own_platform.library_file(name)),
+                libraries: folders.iter().map(file).collect(),
+                folder: own.folder,
+            }
+        });
+        Ok(components.collect())
+    }
+
+    /// The crates of components under `fmus/`.
+    fn crates(&self) -> Result<Vec<ComponentCrate>, PackError> {
         let metadata: serde_json::Value =
             serde_json::from_str(&self.metadata()?).map_err(|error| PackError::Answer {
                 command: "metadata",
                 problem: error.to_string(),
             })?;
-        let mut components = Vec::new();
-        for package in metadata["packages"].as_array().into_iter().flatten() {
-            let manifest = package["manifest_path"].as_str().map(Path::new);
-            let folder = manifest
-                .and_then(Path::parent)
-                .filter(|folder| folder.parent() == Some(&self.root.join("fmus")));
-            let mut targets = package["targets"].as_array().into_iter().flatten();
-            let library = targets.find(|target| kinds(target, "cdylib"));
-            let (Some(folder), Some(name)) = (folder, library.and_then(|l| l["name"].as_str()))
-            else {
-                continue;
-            };
-            let file = |(platform, from): &(Platform, PathBuf)| {
-                (platform.clone(), from.join(platform.library_file(name)))
-            };
-            components.push(Component {
+        let packages = metadata["packages"].as_array().into_iter().flatten();
+        let crates = packages.filter_map(|package| {
+            let folder = Path::new(package["manifest_path"].as_str()?).parent()?;
+            let mut targets = package["targets"].as_array()?.iter();
+            let library = targets.find(|target| kinds(target, "cdylib"))?;
+            (folder.parent() == Some(&self.root.join("fmus"))).then_some(ComponentCrate {
+                package: package["name"].as_str()?.into(),
                 folder: folder.into(),
-                library: own.join(own_platform.library_file(name)),
-                libraries: folders.iter().map(file).collect(),
-            });
-        }
-        Ok(components)
+                library: library["name"].as_str()?.into(),
+            })
+        });
+        Ok(crates.collect())
     }
 
     /// What cargo tells of the packages and what they are built on.

@@ -1,85 +1,25 @@
 //! What is run: a system on a motion, from what was asked for to what has been checked.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use clap::ValueEnum;
-use serde::{Deserialize, Serialize};
 
 pub use super::motions::Motions;
-use super::summary::Table;
+pub use super::request::Request;
+use super::table::Table;
 use crate::error::Error;
-use crate::fmu::{FmiVersion, Options};
+use crate::fmu::Options;
 use crate::library::FmuLibrary;
 use crate::master::{Algorithm, Ended, MasterError, Outcome, Pace, Plan, Simulation, VariableStep};
-use crate::motion::{self, Motion};
+use crate::motion::Motion;
 use crate::ssp;
 use crate::system::jacobi;
-use crate::system::tuning::{Rules, Tuning, Wanted};
+use crate::system::tuning::{Rules, Wanted};
 use crate::system::{
     self, Between, InputTable, Link, Origin, Quantity, System, SystemFile, VariableName, built_in,
 };
 use crate::units::hint;
-
-/// What a run is asked to be; a manifest keeps it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Request {
-    /// Built-in system or path of a file.
-    pub system: String,
-    /// Plant of a built-in system.
-    pub plant: String,
-    /// Specimen of a built-in system.
-    pub specimen: String,
-    /// Computed structure under the specimen of a built-in system.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub structure: Option<String>,
-    /// Parameters of a built-in system's controllers; absent: by its plant.
-    #[serde(default)]
-    pub tuning: Option<Tuning>,
-    /// Model file on which the controllers of a built-in system are tuned.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub control_model: Option<PathBuf>,
-    /// Record to play.
-    pub record: Option<PathBuf>,
-    /// Reference to play.
-    pub reference: Option<PathBuf>,
-    /// Seed of the built-in motion.
-    pub seed: u64,
-    /// How large it is played.
-    pub scaling: Option<Scale>,
-    /// Parameters.
-    pub set: Vec<String>,
-    /// Version of FMI of the project's own components.
-    pub fmi: FmiVersion,
-    /// Order of calls; absent: what the system says, otherwise in the order of dependencies.
-    #[serde(default)]
-    pub algorithm: Option<Algorithm>,
-    /// Coupling step, s.
-    pub step_s: Option<f64>,
-    /// Error by which the steps are chosen, where they vary, per cent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub variable_step_percent: Option<f64>,
-    /// Least step where they vary, s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub least_step_s: Option<f64>,
-    /// Length played, s.
-    pub duration_s: Option<f64>,
-    /// Input tables, whose columns are named as the inputs that they drive.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub inputs: Vec<PathBuf>,
-}
-
-/// How large a motion is played.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Scale {
-    /// A factor.
-    Factor(f64),
-    /// Peak acceleration, m/s².
-    PeakAcceleration(f64),
-    /// Peak displacement, m.
-    PeakDisplacement(f64),
-}
 
 /// A request with everything it needs, checked.
 pub struct Prepared {
@@ -97,32 +37,6 @@ pub struct Prepared {
     pub samples: usize,
     /// How FMUs are run.
     pub options: Options,
-}
-
-impl Request {
-    /// A built-in system with its usual rig on the built-in motion.
-    pub fn built_in(system: &str) -> Self {
-        Self {
-            system: system.to_string(),
-            plant: built_in::DEFAULT_PLANT.to_string(),
-            specimen: built_in::DEFAULT_SPECIMEN.to_string(),
-            structure: None,
-            tuning: None,
-            control_model: None,
-            record: None,
-            reference: None,
-            seed: motion::DEFAULT_SEED,
-            scaling: None,
-            set: Vec::new(),
-            fmi: FmiVersion::V3,
-            algorithm: None,
-            step_s: None,
-            variable_step_percent: None,
-            least_step_s: None,
-            duration_s: None,
-            inputs: Vec::new(),
-        }
-    }
 }
 
 impl Prepared {

@@ -1,7 +1,8 @@
 //! What a run was, in words for people: rig, controllers, motion, and what differs from defaults.
 
-use super::experiment::{Request, is_file};
+use super::experiment::is_file;
 use super::manifest::Manifest;
+use super::request::Request;
 use crate::motion::Motion;
 use crate::report::identity::entry;
 use crate::report::{Cell, Changed, UnitSystem, Units, Whole};

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::experiment::Request;
+use super::request::Request;
 use crate::error::Error;
 use crate::fmu::{Causality, hexadecimal};
 use crate::json;

@@ -7,6 +7,8 @@ pub mod manifest;
 mod motions;
 pub mod page;
 pub mod refinement;
+mod request;
 pub mod signals;
 pub mod summary;
+pub(crate) mod table;
 pub mod text;

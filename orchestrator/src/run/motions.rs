@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::experiment::{Request, Scale};
+use super::request::Request;
 use crate::error::Error;
-use crate::motion::{self, Motion, Scaling, Unscaled};
+use crate::motion::{self, Motion, Unscaled};
 use crate::system::SystemFile;
 
 /// Records that have been made playable but for their scale, for requests that play the same.
@@ -25,11 +25,7 @@ impl Motions {
         let usual = motion::Options::default();
         let options = motion::Options {
             sample_time: file.sampling()?.unwrap_or(usual.sample_time),
-            scaling: request.scaling.map(|scale| match scale {
-                Scale::Factor(factor) => Scaling::Factor(factor),
-                Scale::PeakAcceleration(peak) => Scaling::PeakAcceleration(peak),
-                Scale::PeakDisplacement(peak) => Scaling::PeakDisplacement(peak),
-            }),
+            scaling: request.scaling,
             ..usual
         };
         let record = match source(request, file)? {

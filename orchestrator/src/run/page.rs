@@ -11,7 +11,8 @@ use super::manifest::Manifest;
 use super::signals::{
     COLUMNS, PARQUET, RESULTS, columns, read_csv, write_columns, write_csv, write_parquet,
 };
-use super::summary::{Summary, Table, asked};
+use super::summary::{Summary, asked};
+use super::table::Table;
 use super::text::steps_in_words;
 use crate::error::Error;
 use crate::fmu::hexadecimal;

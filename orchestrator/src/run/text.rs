@@ -18,12 +18,12 @@ pub(super) fn steps_in_words(summary: &Summary) -> String {
         }
     };
     match &summary.variable_step {
-        Some(taken) => format!(
+        Some(taken) if taken.shortest_s < taken.longest_s => format!(
             "{} to {} ms",
             milliseconds(taken.shortest_s),
             milliseconds(taken.longest_s)
         ),
-        None => format!("{} ms", milliseconds(summary.step_s)),
+        _ => format!("{} ms", milliseconds(summary.step_s)),
     }
 }
 

@@ -4,7 +4,7 @@ use super::{ComparedRun, RunComparison};
 use crate::report::{
     Axis, Bar, BarGroup, Bars, Cell, Panel, Report, Section, Series, Table, Units, identity,
 };
-use crate::run::summary::Table as ShakeTable;
+use crate::run::table::Table as ShakeTable;
 
 /// Values that a page holds in all, and those of one series.
 const MOST_VALUES: usize = 400_000;

@@ -9,7 +9,7 @@ use super::package::{Package, resolve};
 use super::parameters::{Parameters, mapped, read_mapping, read_set};
 use super::structure::{self, Binding, Component, Element, File, Names, Structure, System, Values};
 use super::wiring::{Port, Wiring};
-use super::{STRUCTURE, split, xml};
+use super::{BEFORE, STRUCTURE, split, xml};
 use crate::system::{
     ComponentFile, ExperimentFile, Link, Origin, Setting, SystemFile, VariableName,
 };
@@ -444,7 +444,12 @@ impl Flat<'_> {
             .enumerate()
             .filter_map(|(at, link)| match &link.from {
                 Origin::Output(name) if name.component == MOTION => {
-                    Some((at, link.from.to_string().parse().ok()?))
+                    let text = link.from.to_string();
+                    let text = match text.strip_suffix(BEFORE) {
+                        Some(own) => format!("{own}[-1]"),
+                        None => text,
+                    };
+                    Some((at, text.parse().ok()?))
                 }
                 _ => None,
             })

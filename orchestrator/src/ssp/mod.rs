@@ -21,6 +21,8 @@ pub const STRUCTURE: &str = "SystemStructure.ssd";
 
 /// Type of our annotations.
 pub(crate) const ANNOTATION: &str = "org.shakebench.experiment";
+/// What outputs of the component that plays the motion end with that are one sample late.
+const BEFORE: &str = "_before";
 
 /// Whether a system is named by an SSP archive or a system structure description; the name of one
 /// of several descriptions in an archive may follow behind `#`.

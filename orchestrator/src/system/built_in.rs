@@ -77,13 +77,11 @@ const AIDS: [(&str, &str); 7] = [
     ("friction", "friction_compensation"),
     ("specimen", "specimen_compensation"),
     ("observer", "disturbance_observer"),
-    ("delta-p", PRESSURE_STABILISATION),
+    ("delta-p", tuning::PRESSURE_STABILISATION),
     ("notch", "notch_filter"),
     ("amplitude-phase", "amplitude_phase_control"),
     ("harmonics", "harmonic_cancellation"),
 ];
-/// The switch by which the rig is another one to the controllers.
-pub(super) const PRESSURE_STABILISATION: &str = "pressure_stabilisation";
 /// No specimen, no structure.
 pub const NONE: &str = "none";
 

@@ -39,7 +39,6 @@ use identification::closed_loop::equations::HydraulicRig;
 use identification::closed_loop::friction::SealShape;
 use serde::{Deserialize, Serialize};
 
-use super::built_in::PRESSURE_STABILISATION;
 use super::control_model::ControlModel;
 use super::file::{ComponentFile, SystemFile};
 use super::link::{Link, Origin};
@@ -47,6 +46,9 @@ use super::rule::Rule;
 use super::value::Setting;
 use plant::identified::nominal::shake_table_values;
 use plant::specimens::YieldingSpecimen;
+
+/// The switch of the aids by which the rig is another one to the controllers.
+pub(super) const PRESSURE_STABILISATION: &str = "pressure_stabilisation";
 
 /// Which parameters the controllers of a built-in system have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]

@@ -134,6 +134,39 @@ fn an_fmu_that_ends_its_process_ends_the_run_only() {
     );
 }
 
+#[test]
+fn an_fmu_that_ends_its_process_ends_its_diagnosis_with_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    pack(folder, "SEGFAULT", "");
+    fs::write(
+        folder.join("map.toml"),
+        "inputs = { u = 'u' }\noutputs = { y = 'y' }\n",
+    )
+    .unwrap();
+    let rows: String = (0..300)
+        .map(|k| format!("{},{},{}\n", 0.01 * f64::from(k), k % 7, k % 5))
+        .collect();
+    fs::write(folder.join("data.csv"), format!("time [s],u,y\n{rows}")).unwrap();
+    let arguments = [
+        "diagnose",
+        "--fmu",
+        "hostile.fmu",
+        "--map",
+        "map.toml",
+        "data.csv",
+        "--out",
+        "out",
+    ];
+    let output = shakebench(folder, &arguments);
+    assert_eq!(output.status.code(), Some(2));
+    let said = stderr(&output);
+    for word in ["hostile.fmu", "data", "segmentation fault", "at 1 s"] {
+        assert!(said.contains(word), "`{word}` is not in {said}");
+    }
+    assert!(!folder.join("out").exists());
+}
+
 /// The archive with another library in it.
 fn replace_library(folder: &Path, library: &[u8]) {
     let path = folder.join("hostile.fmu");

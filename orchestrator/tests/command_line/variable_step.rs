@@ -217,10 +217,15 @@ fn what_cannot_go_back_is_stepped_by_the_error_of_the_step_before() {
 }
 
 #[test]
-fn a_step_that_an_fmu_discards_is_made_again_with_a_shorter_one() {
+fn a_step_that_an_fmu_discards_or_loses_its_way_in_is_made_again_with_a_shorter_one() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     pack(folder, [ANY, ANY]);
+    let limit = ["--set", "a.longest=-0.004"];
+    let chosen = run(folder, &[&limit[..], &["--variable-step", "1 %"]].concat());
+    assert!(chosen.of_steps("longest_s") <= 0.004 * (1.0 + 1e-9));
+    let equal = shakebench(folder, &[&["run", "masses.toml"][..], &limit].concat());
+    assert_eq!(equal.status.code(), Some(1));
     let limit = ["--set", "a.longest=0.004"];
     let chosen = run(folder, &[&limit[..], &["--variable-step", "1 %"]].concat());
     assert!(chosen.of_steps("longest_s") <= 0.004 * (1.0 + 1e-9));

@@ -147,8 +147,7 @@ impl ServoHydraulicTable {
             name,
             value,
             expected: if name == FRICTION {
-                "zero, or so much that the seals give 0.1 nm before they slide (inner steps of 2 µs): \
-                 times `seal_stiffness`"
+                "zero, or at least 1e-10 m times `seal_stiffness`, which inner steps of 2 µs still follow"
             } else {
                 "a value whose equation is slower than 175,000 1/s (inner steps of 2 µs)"
             },

@@ -3,7 +3,8 @@
  *     m x'' = force - c x' - k x + coupling (other - x),
  *
  * stepped exactly for what it is given, which it holds over a step. It discards steps that are longer
- * than `longest`, where that is not 0.
+ * than `longest`, where that is above 0, and comes to no number after one longer than -`longest`, where that
+ * is below.
  *
  * Value references: x 0, v 1, other 2, force 3, m 4, c 5, k 6, coupling 7, x0 8, longest 9. */
 #include <math.h>
@@ -61,6 +62,7 @@ Status fmi2DoStep(void *c, double time, double h, int none) {
     double fade = exp(-decay * h), co = cos(w * h), si = sin(w * h);
     v[X] = rest + fade * (a * co + b * si);
     v[V] = fade * ((b * w - decay * a) * co - (a * w + decay * b) * si);
+    if (v[LONGEST] < 0 && h > -v[LONGEST] * (1 + 1e-9)) v[X] = NAN;
     i->reached = time + h;
     return 0;
 }

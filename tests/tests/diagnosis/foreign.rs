@@ -12,7 +12,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use shakebench::diagnosis::foreign::{diagnose, template};
-use shakebench::fmu::FmiVersion;
+use shakebench::diagnosis::model::{self, Asked};
+use shakebench::fmu::{FmiVersion, Isolation};
 use shakebench::library;
 use shakebench::master::Algorithm;
 use shakebench::run::experiment::{Request, prepare};
@@ -53,6 +54,7 @@ fn found(folder: &Path, fmu: &Path, map: &str) -> DiagnosisReport {
         &place,
         &[folder.join("data.csv")],
         &out,
+        Some(Isolation::None),
         Observer::none(),
     )
     .unwrap()
@@ -176,37 +178,36 @@ fn our_own_specimen_and_the_system_around_it() {
     let [mass, damping, stiffness] = ["mass", "damping", "stiffness"].map(start);
     let softer = 0.85 * stiffness;
     const LAG: f64 = 0.03;
-    let ground = |t: f64| 2.0 * (9.0 * t).sin() + 1.5 * (23.0 * t + 0.4).sin() + (5.1 * t).cos();
-    let (step, fine) = (0.002, 20);
-    let (mut x, mut v, mut read) = (0.0, 0.0, 0.0_f64);
-    let (mut input, mut force) = (Vec::new(), Vec::new());
-    for k in 0..5000 {
-        let a = ground(step * f64::from(k));
-        input.push(a);
-        let h = step / f64::from(fine);
-        for part in 0..fine {
-            let pull: f64 = damping * v + softer * x;
-            if k == 0 && part == 0 {
-                read = pull;
+    // m (x'' + a) = -c x' - k x, the acceleration held over a sample of `step` s; seen through the lag.
+    let recorded = |name: &str, header: &str, step: f64, ground: &dyn Fn(f64) -> f64| {
+        let fine = 20;
+        let (mut x, mut v, mut read) = (0.0, 0.0, 0.0_f64);
+        let (mut input, mut force) = (Vec::new(), Vec::new());
+        for k in 0..5000 {
+            let a = ground(step * f64::from(k));
+            input.push(a);
+            let h = step / f64::from(fine);
+            for part in 0..fine {
+                let pull: f64 = damping * v + softer * x;
+                if k == 0 && part == 0 {
+                    read = pull;
+                }
+                v += h * (-pull / mass - a);
+                x += h * v;
+                if part == 0 {
+                    force.push(read);
+                }
+                read += h / LAG * (pull - read);
             }
-            // m (x'' + a) = -c x' - k x, the acceleration held over a sample.
-            v += h * (-pull / mass - a);
-            x += h * v;
-            if part == 0 {
-                force.push(read);
-            }
-            read += h / LAG * (pull - read);
         }
-    }
-    let time = (0..5000).map(|k| step * k as f64).collect();
-    let data = folder.path().join("data.csv");
-    write(
-        &data,
-        "time [s],a [m/s2],F [N]",
-        &[time, input, force],
-        1,
-        0.01,
-    );
+        let time = (0..5000).map(|k| step * k as f64).collect();
+        let path = folder.path().join(name);
+        write(&path, header, &[time, input, force], 1, 0.01);
+        path
+    };
+    recorded("data.csv", "time [s],a [m/s2],F [N]", 0.002, &|t| {
+        2.0 * (9.0 * t).sin() + 1.5 * (23.0 * t + 0.4).sin() + (5.1 * t).cos()
+    });
     let map = "inputs = { table_acceleration = 'a' }\noutputs = { force = 'F' }\n\
                parameters = { stiffness = {}, mass = {}, damping = {} }\n";
     let report = found(folder.path(), fmu, map);
@@ -250,6 +251,73 @@ fn our_own_specimen_and_the_system_around_it() {
         .fold(0.0, f64::max);
     let size = identification::data::mean_and_deviation(&extended).1;
     assert!(worst < 1e-9 * size, "{worst} of {size} in {name}");
+
+    // A later record, sampled otherwise and in other units, without a fit.
+    let later = recorded("later.csv", "time [s],a [m/s2],F [N]", 0.001, &|t| {
+        3.0 * (6.0 * t).sin() + 1.2 * (31.0 * t).cos()
+    });
+    let asked = Asked {
+        model: system,
+        columns: None,
+        fmu: None,
+        map: None,
+        isolate: Some(Isolation::None),
+    };
+    let found = model::validate(&asked, std::slice::from_ref(&later)).unwrap();
+    let [of_later] = &found.records[..] else {
+        panic!("{found:?}");
+    };
+    assert!(of_later.described_percent > 15.0, "{of_later:?}");
+    assert!(of_later.extended_percent < 1.5, "{of_later:?}");
+    assert_eq!(
+        (of_later.channel.as_str(), of_later.unit.as_str()),
+        ("force", "N")
+    );
+
+    // And predicted, its force unknown but for its unit, which is the prediction's.
+    let text = fs::read_to_string(&later).unwrap();
+    let measured: Vec<f64> = text
+        .lines()
+        .skip(1)
+        .map(|row| row.rsplit(',').next().unwrap().parse().unwrap())
+        .collect();
+    let unknown: String = text
+        .lines()
+        .enumerate()
+        .map(|(row, line)| match row {
+            0 => "time [s],a [m/s2],F [kN]\n".to_owned(),
+            _ => format!("{},\n", line.rsplit_once(',').unwrap().0),
+        })
+        .collect();
+    let input = folder.path().join("input.csv");
+    fs::write(&input, unknown).unwrap();
+    let out = folder.path().join("prediction.csv");
+    let told = model::predict(&asked, &input, false, &out).unwrap();
+    assert_eq!((told.unit.as_str(), told.rows, told.given), ("kN", 5000, 0));
+    let predicted: Vec<f64> = fs::read_to_string(&out)
+        .unwrap()
+        .lines()
+        .skip(1)
+        .map(|row| 1e3 * row.split(',').next().unwrap().parse::<f64>().unwrap())
+        .collect();
+    let missed: Vec<f64> = measured
+        .iter()
+        .zip(&predicted)
+        .map(|(a, b)| a - b)
+        .collect();
+    let [missed, size] =
+        [&missed, &measured].map(|all| identification::data::mean_and_deviation(all).1);
+    assert!(missed < 0.015 * size, "{missed} {size}");
+
+    // Nothing is known of a motion that repeats, and an FMU that has moved is asked for.
+    let error = model::predict(&asked, &input, true, &out).unwrap_err();
+    assert!(error.to_string().contains("--periodic"), "{error}");
+    let moved = Asked {
+        fmu: Some(Path::new("Gone.fmu")),
+        ..asked
+    };
+    let error = model::validate(&moved, &[later]).unwrap_err();
+    assert!(error.to_string().contains("Gone.fmu"), "{error}");
 }
 
 #[test]
@@ -300,7 +368,15 @@ fn bad_maps_are_refused_by_place_and_cure() {
         fs::write(&place, map).unwrap();
         let out = folder.path().join("out");
         let data = [folder.path().join("data.csv")];
-        let error = diagnose(fmu, &place, &data, &out, Observer::none()).unwrap_err();
+        let error = diagnose(
+            fmu,
+            &place,
+            &data,
+            &out,
+            Some(Isolation::None),
+            Observer::none(),
+        )
+        .unwrap_err();
         let text = error.to_string();
         assert!(text.contains(told), "{text} does not tell of {told}");
         assert!(!out.exists());

@@ -5,6 +5,7 @@ mod extended_model;
 mod foreign;
 mod hidden_effects;
 mod measured;
+mod next_measurement;
 mod spreadsheet_files;
 mod transfer_system;
 mod walkthrough;

@@ -155,3 +155,18 @@ fn a_force_of_the_wrong_sign_is_an_unstable_result() {
         "{message}"
     );
 }
+
+#[test]
+fn a_displacement_of_the_wrong_sign_or_unit_is_named() {
+    let recording = good();
+    let displacement = recording.channel(Channel::Displacement).unwrap();
+    for (factor, part) in [
+        (-1.0, "have opposite signs"),
+        (1e3, "times the second derivative of `displacement`"),
+    ] {
+        let values = displacement.iter().map(|x| factor * x).collect();
+        let message = refused(with(&recording, Channel::Displacement, values));
+        assert!(message.contains(part), "{message}");
+        assert!(message.contains("no channels are swapped"), "{message}");
+    }
+}

@@ -9,7 +9,7 @@ use identification::closed_loop::{Found, Settings, identify};
 use identification::data::{Channel, Recording};
 
 /// Kinds of the default run; `SHAKEBENCH_ALL` asks for all nine.
-const DEFAULT: [usize; 3] = [3, 4, 9];
+const DEFAULT: [usize; 3] = [2, 4, 9];
 
 #[test]
 fn kinds_of_recordings_are_identified_and_predict_other_motions() {
@@ -21,16 +21,23 @@ fn kinds_of_recordings_are_identified_and_predict_other_motions() {
         let recordings: Vec<Recording> = tests.iter().map(|t| t.record().unwrap()).collect();
         let found = identify(&recordings, Settings::default()).unwrap();
         assert!(found.holds(), "{name}: {:?}", found.mean_squares);
+        let truth = tests[0].rig().table.friction.coulomb;
+        let off = (found.rig.seal_friction - truth) / found.standard_error[6];
+        println!("{number} {name}: friction off by {off:.2} standard errors");
+        assert!(
+            truth == 0.0 || off.abs() < 2.6,
+            "{name}: {off} standard errors"
+        );
         for (index, test) in tests.iter().enumerate() {
             let payload = index.checked_sub(1).map_or(0.0, |i| found.payloads[i]);
             for other in other_motions(test) {
                 let made = prediction(&found, payload, &other).unwrap();
                 println!("{number} {name}: {made:.3?}");
-                // At 0.07 g the seals hold for the most part of the time, at 0.2 g for some.
-                let allowed = match (test.friction > 0.0, test.level < 0.1, test.level < 0.3) {
-                    (false, ..) => 0.05,
-                    (_, true, _) => 0.35,
-                    (_, _, true) => 0.13,
+                // At 0.07 g the seals hold for the most part of the time: the rig itself, played twice
+                // with other noise in its loop, differs by 11 to 14 % there.
+                let allowed = match (test.friction > 0.0, test.level < 0.1) {
+                    (false, _) => 0.05,
+                    (_, true) => 0.28,
                     _ => 0.08,
                 };
                 assert!(made.largest < allowed, "{name}: {made:?}");

@@ -155,6 +155,11 @@ fn timing(recording: &Recording, nominal: &Nominal) -> Option<String> {
             time[at],
             gap / period - 1.0
         )
+    } else if gap < 0.0 {
+        format!(
+            "{name}: time goes back by {:.4} s after {:.4} s: expected one recording a file",
+            -gap, time[at]
+        )
     } else {
         format!(
             "{name}: time is no steady clock after {:.4} s (step {gap:.3e} s)",

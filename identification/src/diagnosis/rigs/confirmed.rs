@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::diagnosis::NamedValue;
+use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part, file};
 use crate::diagnosis::engine::resampling::gain_interval;
 use crate::diagnosis::engine::{Point, Role, all_errors, completed, estimates, refit};

@@ -2,29 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::super::report::{ends_or_not_a_number, or_not_a_number};
+use super::super::report::ends_or_not_a_number;
 use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
 use super::measured::Measured;
+use super::named_value::NamedValue;
 use super::parts::{InParts, Part};
 use super::{Description, DescriptionError, Measurement};
 use crate::diagnosis::engine::resampling::gain_interval;
 use crate::diagnosis::engine::{
     Observer, Point, Progress, Selected, Verdict, all_errors, completed, select,
 };
-
-/// A parameter of the extended model, SI.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NamedValue {
-    /// Its name.
-    pub name: String,
-    /// The estimate.
-    pub value: f64,
-    /// SI unit.
-    pub unit: String,
-    /// One standard deviation, autocorrelation of the residuals counted.
-    #[serde(deserialize_with = "or_not_a_number")]
-    pub standard_error: f64,
-}
 
 /// An effect that one part of the data asks for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::description::{
     Column, Description, DescriptionError, LeftOut, Quantity, Windows, listed,
 };
-use super::diagnosis::{NamedValue, RigDiagnosis};
+use super::diagnosis::RigDiagnosis;
 use super::measured::Measured;
+use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts};
 use super::{Measurement, Rig, SessionParameter, SessionRole};
 use crate::diagnosis::engine::{Free, Point, SimulatedModel, completed, least_squares};

@@ -1,6 +1,6 @@
 //! A rig with its measurements, as the engine of the diagnosis sees it.
 
-use super::diagnosis::NamedValue;
+use super::named_value::NamedValue;
 use super::parts::{self, EVERYTHING, File, InParts, NAMES, places};
 use super::{Effect, Measurement, Natural, Rig, SessionRole, Values};
 use crate::diagnosis::engine::{Candidate, Point, SimulatedModel, WEAK, all_errors};

@@ -17,6 +17,7 @@ pub mod foreign;
 mod hysteretic_device;
 mod linear_axis;
 mod measured;
+mod named_value;
 mod natural;
 mod oscillator;
 mod parts;
@@ -32,8 +33,9 @@ pub use confirmed::Confirmed;
 pub use description::{
     Column, Description, DescriptionError, LeftOut, Quantity, Windows, column_map, renamed,
 };
-pub use diagnosis::{NamedValue, PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
+pub use diagnosis::{PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
 pub use extended::{ExtendedRig, FileErrors, Prediction};
+pub use named_value::NamedValue;
 
 pub use natural::Natural;
 pub use reading::{Measurement, even_period};

@@ -1,6 +1,6 @@
 //! A model whose data are cut in two: what the judgement of [`super::diagnosis`] asks of it.
 
-use super::diagnosis::NamedValue;
+use super::named_value::NamedValue;
 use crate::diagnosis::engine::{Point, SimulatedModel};
 
 /// Runs into which a part is cut for the check inside it.

@@ -1,5 +1,6 @@
 //! The records that a map leads to.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use identification::data::{DataError, Sheet, Wanted};
@@ -33,7 +34,8 @@ pub(super) fn trials(
 ) -> Result<Vec<Trial>, Error> {
     let mut all = Vec::new();
     for file in files {
-        all.push(trial(map, place, file, inputs, outputs)?);
+        let read = trial(map, place, file, inputs, outputs, &TO_FIT)?;
+        all.push(read.trial);
     }
     leave_out(map, place, files, &mut all)?;
     Ok(all)
@@ -81,13 +83,49 @@ fn factor(sheet: &Sheet, place: usize, given: Option<&str>, unit: &str) -> Resul
     })
 }
 
-fn trial(
+/// What a file must hold.
+pub(super) struct Needs {
+    rows: usize,
+    /// Whether a column of every output must be there.
+    outputs: bool,
+}
+
+/// To be fitted.
+const TO_FIT: Needs = Needs {
+    rows: SHORTEST,
+    outputs: true,
+};
+/// To be scored.
+pub(super) const TO_SCORE: Needs = Needs {
+    rows: 2,
+    outputs: true,
+};
+/// To be predicted.
+pub(super) const TO_PREDICT: Needs = Needs {
+    rows: 2,
+    outputs: false,
+};
+
+/// A file's record.
+pub(super) struct Record {
+    pub trial: Trial,
+    /// Of every output its unit in the file and what brings that into the model's; none where the file has
+    /// no such column.
+    pub in_file: Vec<Option<(String, f64)>>,
+}
+
+/// Reads one file, as [`trials`] does, without leaving anything out.
+///
+/// # Errors
+/// As [`trials`].
+pub(super) fn trial(
     map: &Map,
     place: &Path,
     file: &Path,
     inputs: &[Signal],
     outputs: &[Signal],
-) -> Result<Trial, Error> {
+    needs: &Needs,
+) -> Result<Record, Error> {
     let named = map.inputs.values().chain(map.outputs.values());
     let wanted: Vec<&str> = named
         .chain(&map.time)
@@ -101,8 +139,8 @@ fn trial(
             header: &wanted.join(","),
         },
     )?;
-    if sheet.len() < SHORTEST {
-        let what = format!("{} rows: expected at least {SHORTEST}", sheet.len());
+    if sheet.len() < needs.rows {
+        let what = format!("{} rows: expected at least {}", sheet.len(), needs.rows);
         return Err(DataError::file(file, what).into());
     }
     let column = |named: &Named, unit: &str, is_full: bool| -> Result<Vec<f64>, Error> {
@@ -160,17 +198,37 @@ fn trial(
             steps.round() as usize
         }
     };
-    let measured = |of: &[Signal], by: &std::collections::BTreeMap<String, Named>, is_full| {
-        let own = of.iter().map(|signal| {
-            let named = by.get(&signal.name);
-            // The signals are those of the map.
-            let named = named.cloned().unwrap_or(Named::Header(signal.name.clone()));
-            column(&named, &signal.unit, is_full)
-        });
-        own.collect::<Result<Vec<_>, Error>>()
+    // The signals are those of the map.
+    let named = |by: &BTreeMap<String, Named>, signal: &Signal| {
+        let named = by.get(&signal.name);
+        named
+            .cloned()
+            .unwrap_or_else(|| Named::Header(signal.name.clone()))
     };
-    let inputs = measured(inputs, &map.inputs, true)?;
-    Ok(Trial {
+    let inputs = inputs
+        .iter()
+        .map(|signal| column(&named(&map.inputs, signal), &signal.unit, true))
+        .collect::<Result<Vec<_>, Error>>()?;
+    let mut measured = Vec::new();
+    let mut in_file = Vec::new();
+    for signal in outputs {
+        let named = named(&map.outputs, signal);
+        let (head, given) = named.parts();
+        let at = match find(&sheet, head) {
+            Err(_) if !needs.outputs => {
+                measured.push(vec![f64::NAN; sheet.len()]);
+                in_file.push(None);
+                continue;
+            }
+            found => found?,
+        };
+        measured.push(column(&named, &signal.unit, false)?);
+        let own = given.or(split_header(&sheet.heads()[at]).1);
+        let own = own.or(sheet.unit_below(at).map(|(_, unit)| unit));
+        let factor = factor(&sheet, at, given, &signal.unit)?;
+        in_file.push(Some((own.unwrap_or(&signal.unit).to_owned(), factor)));
+    }
+    let trial = Trial {
         name: file
             .file_stem()
             .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned()),
@@ -180,9 +238,10 @@ fn trial(
             .iter()
             .map(|own| finer(own, stride, map.between))
             .collect(),
-        outputs: measured(outputs, &map.outputs, false)?,
+        outputs: measured,
         left_out: vec![false; sheet.len()],
-    })
+    };
+    Ok(Record { trial, in_file })
 }
 
 /// A value a step, from one a sample.

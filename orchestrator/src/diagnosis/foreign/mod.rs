@@ -1,6 +1,7 @@
 //! Diagnosis of a model that came as an FMU, ours or not: `shakebench diagnose --fmu`.
 
 mod data;
+mod further;
 mod map;
 mod pictures;
 mod simulator;
@@ -15,17 +16,23 @@ use identification::diagnosis::rigs::foreign::{self, ForeignDiagnosis, ForeignMo
 
 use super::{DIAGNOSIS, EXTENDED_MODEL, file_fault, page};
 use crate::error::Error;
+use crate::fmu::Isolation;
 use crate::report;
 use crate::results::Results;
+pub(super) use further::{Extended, is_one};
 use map::Map;
 use simulator::{Alone, Mapped, mapped, open};
+pub(super) use written::head;
 
 /// Files beside those of every diagnosis.
-pub(super) const FILES: [&str; 2] = [written::TRACES, written::INPUTS];
+pub(super) const FILES: [&str; 3] = [written::TRACES, written::INPUTS, MAP];
+/// The map of the data, kept beside the extended model, which is read back with it.
+const MAP: &str = "map.toml";
 
 /// Diagnoses the FMU `model` on the records `files`, whose columns are those of the `map`, and writes the
-/// extended model, curves, the JSON object and the report into `folder`, all or nothing. `observer` is
-/// told what is tried.
+/// extended model, its map, curves, the JSON object and the report into `folder`, all or nothing. The nominal
+/// model is run once in a process of its own, so that a crash is an error, then in this one, unless `isolate` says
+/// otherwise; `observer` is told what is tried.
 ///
 /// # Errors
 /// What cannot be read, names that the model has not, a model that does not come to the end of a
@@ -35,18 +42,20 @@ pub fn diagnose(
     map: &Path,
     files: &[PathBuf],
     folder: &Path,
+    isolate: Option<Isolation>,
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
     let begun = Instant::now();
     Results::check(folder)?;
     let place = map;
     let map = Map::read(place)?;
+    let written_map = std::fs::read_to_string(place).map_err(|error| file_fault(place, error))?;
     let Mapped {
         alone,
         inputs,
         outputs,
         parameters,
-    } = mapped(model, &map, place)?;
+    } = mapped(model, &map, place, isolate.unwrap_or(Isolation::None))?;
     let trials = data::trials(&map, place, files, &inputs, &outputs)?;
     let stem = model.file_stem().unwrap_or_default().to_string_lossy();
     let subject = ForeignModel {
@@ -57,7 +66,8 @@ pub fn diagnose(
         parameters,
         trials,
     };
-    let told = nominal(&alone, model, &subject)?;
+    let first = alone.isolated(isolate.unwrap_or(Isolation::Foreign));
+    let told = nominal(&first, model, &subject)?;
     let found = foreign::diagnose(&subject, observer).ok_or_else(|| {
         file_fault(
             model,
@@ -93,6 +103,7 @@ pub fn diagnose(
         EXTENDED_MODEL,
         &written::system(&alone, model, &subject, &found)?,
     )?;
+    results.write_text(MAP, &written_map)?;
     if !subject.inputs.is_empty() {
         results.write(written::INPUTS, |file| written::inputs(&subject, file))?;
     }

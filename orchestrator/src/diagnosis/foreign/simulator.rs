@@ -8,7 +8,7 @@ use identification::diagnosis::rigs::foreign::{Parameter, Signal, Simulator};
 use super::map::{Map, Stated};
 use crate::diagnosis::file_fault;
 use crate::error::Error;
-use crate::fmu::{Causality, FmiVersion, Fmu, Kind, Options, Variable};
+use crate::fmu::{Causality, FmiVersion, Fmu, Isolation, Kind, Options, Variable};
 use crate::library::FmuLibrary;
 use crate::master::{Algorithm, Outcome, Pace, Simulation};
 use crate::motion::Motion;
@@ -18,9 +18,10 @@ use crate::system::{
 use crate::units::hint;
 
 /// The table that drives the inputs.
-const TABLE: &str = "record";
+pub(super) const TABLE: &str = "record";
 
 /// The FMU as a system with a table of its inputs.
+#[derive(Clone)]
 pub(super) struct Alone {
     system: System,
     /// Names of the outputs in a record.
@@ -31,6 +32,8 @@ pub(super) struct Alone {
     pub component: String,
     /// What was set at the start, as the map has it.
     pub file: SystemFile,
+    /// How the FMU is run.
+    options: Options,
 }
 
 /// A model with the signals and parameters that its map names.
@@ -108,7 +111,12 @@ pub(super) fn is_file(path: &Path) -> bool {
 ///
 /// # Errors
 /// An FMU that cannot be read; names that it has not; values that cannot be set.
-pub(super) fn mapped(path: &Path, map: &Map, place: &Path) -> Result<Mapped, Error> {
+pub(super) fn mapped(
+    path: &Path,
+    map: &Map,
+    place: &Path,
+    isolation: Isolation,
+) -> Result<Mapped, Error> {
     let wrong = |at: String, reason: String| file_fault(place, format!("`{at}`: {reason}"));
     let mut file = SystemFile::of_fmu(path);
     let fmu = open(path)?;
@@ -134,16 +142,7 @@ pub(super) fn mapped(path: &Path, map: &Map, place: &Path) -> Result<Mapped, Err
             }
         }
     }
-    if !inputs.is_empty() {
-        file.own_tables.push(InputTable {
-            name: TABLE.to_owned(),
-            columns: inputs.iter().map(|input| input.name.clone()).collect(),
-            units: vec![None; inputs.len()],
-            times: vec![0.0],
-            values: vec![vec![0.0]; inputs.len()],
-            between: Between::Hold,
-        });
-    }
+    file.own_tables.extend(table(&inputs));
     for input in &inputs {
         file.connect(
             Origin::output(TABLE, &input.name),
@@ -181,10 +180,26 @@ pub(super) fn mapped(path: &Path, map: &Map, place: &Path) -> Result<Mapped, Err
             component,
             file,
             system,
+            options: Options {
+                isolation,
+                ..Options::default()
+            },
         },
         inputs,
         outputs,
         parameters,
+    })
+}
+
+/// The table that drives `inputs`, to be filled for every run; none without an input.
+fn table(inputs: &[Signal]) -> Option<InputTable> {
+    (!inputs.is_empty()).then(|| InputTable {
+        name: TABLE.to_owned(),
+        columns: inputs.iter().map(|input| input.name.clone()).collect(),
+        units: vec![None; inputs.len()],
+        times: vec![0.0],
+        values: vec![vec![0.0]; inputs.len()],
+        between: Between::Hold,
     })
 }
 
@@ -205,6 +220,38 @@ fn check(value: f64, stated: &Stated) -> Result<(), String> {
 }
 
 impl Alone {
+    /// The system `file` whose component is that of `self`, driven by a table of `inputs` in place of its
+    /// own; `columns` are its outputs.
+    ///
+    /// # Errors
+    /// A system that does not fit its FMUs.
+    pub(super) fn within(
+        &self,
+        mut file: SystemFile,
+        inputs: &[Signal],
+        columns: Vec<String>,
+    ) -> Result<Self, Error> {
+        file.tables.remove(TABLE);
+        file.own_tables.extend(table(inputs));
+        let mut library = FmuLibrary::of(FmiVersion::V3, &file);
+        let system = assemble(&file, &[], &mut |name| library.find(name))?;
+        Ok(Self {
+            system,
+            columns,
+            parameters: Vec::new(),
+            component: self.component.clone(),
+            file,
+            options: self.options.clone(),
+        })
+    }
+
+    /// The same, run otherwise.
+    pub(super) fn isolated(&self, isolation: Isolation) -> Self {
+        let mut own = self.clone();
+        own.options.isolation = isolation;
+        own
+    }
+
     /// A run of `steps` steps.
     ///
     /// # Errors
@@ -237,9 +284,8 @@ impl Alone {
             seed: None,
         };
         let plan = (step, steps as f64 * step);
-        let options = Options::default();
-        let simulation =
-            Simulation::with(&system, &motion, Algorithm::GaussSeidel, plan, &options)?;
+        let algorithm = Algorithm::GaussSeidel;
+        let simulation = Simulation::with(&system, &motion, algorithm, plan, &self.options)?;
         Ok(simulation.run(steps, Pace::Fastest, &mut |_| {}))
     }
 
@@ -248,7 +294,8 @@ impl Alone {
         &self.system.notes
     }
 
-    fn outputs(&self, outcome: &Outcome, steps: usize) -> Option<Vec<Vec<f64>>> {
+    /// The outputs of a run of `steps` steps; none where it ended before.
+    pub(super) fn outputs(&self, outcome: &Outcome, steps: usize) -> Option<Vec<Vec<f64>>> {
         if !outcome.ended.is_regular() || outcome.record.len() < steps {
             return None;
         }

@@ -18,7 +18,7 @@ pub(super) const INPUTS: &str = "inputs.csv";
 /// File with measured and simulated outputs.
 pub(super) const TRACES: &str = "traces.csv";
 /// Component that stands on a signal's way.
-const PATH: &str = "SignalPath";
+pub(super) const PATH: &str = "SignalPath";
 
 /// Place of the record that the extended model plays.
 pub(super) fn shown(subject: &ForeignModel<'_>) -> usize {
@@ -28,7 +28,7 @@ pub(super) fn shown(subject: &ForeignModel<'_>) -> usize {
 }
 
 /// A header with the unit where the grammar of units knows it.
-fn head(signal: &Signal) -> String {
+pub(in crate::diagnosis) fn head(signal: &Signal) -> String {
     match Unit::parse(&signal.unit) {
         Ok(_) if !signal.unit.is_empty() => format!("{} [{}]", signal.name, signal.unit),
         _ => signal.name.clone(),

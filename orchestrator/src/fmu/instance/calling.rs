@@ -118,7 +118,7 @@ impl Instance {
             call: function.name(self.version()),
             variables: references.iter().map(name).collect(),
             outcome,
-            is_discarded_step: false,
+            may_be_of_the_step: false,
             messages: messages.into_iter().map(|message| message.text).collect(),
         })
     }

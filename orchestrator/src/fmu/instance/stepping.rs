@@ -1,7 +1,7 @@
 //! Steps, and the events on the way.
 
 use super::super::FmiVersion;
-use super::super::call::{Call, Function, Lost};
+use super::super::call::{Call, Function, Lost, Stepped};
 use super::{Instance, Outcome, Phase};
 
 /// How often events may follow each other at one moment.
@@ -33,19 +33,27 @@ impl Instance {
             if matches!(stepped.status, 0 | 1) && !stepped.end && !stepped.early {
                 return Ok(Progress::Whole);
             }
-            let (end, early, last) = (stepped.end, stepped.early, stepped.last);
-            return self.stepped(
-                Ok(stepped.status),
-                (end, early, last),
-                &Call::plain(Function::DoStep),
-            );
+            return self.stepped_otherwise(stepped);
         }
+        self.step_by_call(time, step)
+    }
+
+    #[inline(never)]
+    fn step_by_call(&mut self, time: f64, step: f64) -> Outcome<Progress> {
         let mut call = Call::plain(Function::DoStep);
         call.numbers = [time, step, 0.0];
         let done = self.carry_out(&mut call);
         let [_, end, early, ..] = call.flags;
         let last = call.numbers[0];
         self.stepped(done, (end, early, last), &call)
+    }
+
+    /// A step that did not go as most do.
+    #[cold]
+    fn stepped_otherwise(&mut self, stepped: Stepped) -> Outcome<Progress> {
+        let outcome = (stepped.end, stepped.early, stepped.last);
+        let call = Call::plain(Function::DoStep);
+        self.stepped(Ok(stepped.status), outcome, &call)
     }
 
     /// What came of a step: whether the FMU asks to end the run, came back early, and how far it came.
@@ -120,7 +128,7 @@ impl Instance {
         let reached = last.map_or(String::new(), |last| format!(" (it came to {last} s)"));
         let outcome = format!("returned discard{reached}");
         let mut error = self.failure(Function::DoStep, &[], outcome);
-        error.is_discarded_step = true;
+        error.may_be_of_the_step = true;
         Err(error)
     }
 

@@ -4,6 +4,13 @@ use super::super::call::{Call, Function, Scalar, Texts, Values};
 use super::super::{Datum, Kind, convert};
 use super::{Instance, Outcome};
 
+/// Whether all are finite: each is looked at, so that nothing branches.
+#[inline]
+fn are_finite(values: &[f64]) -> bool {
+    let all = values.iter();
+    all.fold(true, |all, value| all & value.is_finite())
+}
+
 impl Instance {
     /// Reads the variables `references`, all of type `kind`, into `values`.
     ///
@@ -11,18 +18,29 @@ impl Instance {
     /// The FMU's refusal, or a value that is not finite.
     #[inline]
     pub fn get(&mut self, kind: &Kind, references: &[u32], values: &mut [f64]) -> Outcome {
-        let scalar = self.scalar(kind);
-        if scalar == Scalar::Float64
+        if matches!(kind, Kind::Float64)
             && self.trace.is_none()
             && let Some(status) = self.endpoint.get_reals(references, values)
         {
-            if !matches!(status, 0 | 1) {
-                let mut call = Call::plain(Function::Get(scalar));
-                call.references = references;
-                return self.judge(Ok(status), &call);
+            if matches!(status, 0 | 1) && are_finite(values) {
+                return Ok(());
             }
-            return self.finite(scalar, references, values);
+            return self.not_read(status, references, values);
         }
+        self.get_by_call(kind, references, values)
+    }
+
+    #[cold]
+    fn not_read(&mut self, status: i32, references: &[u32], values: &[f64]) -> Outcome {
+        let mut call = Call::plain(Function::Get(Scalar::Float64));
+        call.references = references;
+        self.judge(Ok(status), &call)?;
+        self.finite(Scalar::Float64, references, values)
+    }
+
+    #[inline(never)]
+    fn get_by_call(&mut self, kind: &Kind, references: &[u32], values: &mut [f64]) -> Outcome {
+        let scalar = self.scalar(kind);
         let mut call = Call::plain(Function::Get(scalar));
         call.references = references;
         call.count = values.len();
@@ -45,11 +63,7 @@ impl Instance {
     /// Whether all that was read is finite.
     #[inline]
     fn finite(&self, scalar: Scalar, references: &[u32], values: &[f64]) -> Outcome {
-        // All of them, so that nothing branches.
-        if values
-            .iter()
-            .fold(true, |all, value| all & value.is_finite())
-        {
+        if are_finite(values) {
             return Ok(());
         }
         let at = values.iter().position(|value| !value.is_finite());
@@ -59,7 +73,9 @@ impl Instance {
             true => &references[at..=at],
             false => references,
         };
-        Err(self.failure(Function::Get(scalar), one, outcome))
+        let mut error = self.failure(Function::Get(scalar), one, outcome);
+        error.may_be_of_the_step = true;
+        Err(error)
     }
 
     /// Sets the variables `references`, all of type `kind`.
@@ -68,18 +84,28 @@ impl Instance {
     /// The FMU's refusal.
     #[inline]
     pub fn set(&mut self, kind: &Kind, references: &[u32], values: &[f64]) -> Outcome {
-        let scalar = self.scalar(kind);
-        if scalar == Scalar::Float64
+        if matches!(kind, Kind::Float64)
             && self.trace.is_none()
             && let Some(status) = self.endpoint.set_reals(references, values)
         {
             if matches!(status, 0 | 1) {
                 return Ok(());
             }
-            let mut call = Call::plain(Function::Set(scalar));
-            call.references = references;
-            return self.judge(Ok(status), &call);
+            return self.not_set(status, references);
         }
+        self.set_by_call(kind, references, values)
+    }
+
+    #[cold]
+    fn not_set(&mut self, status: i32, references: &[u32]) -> Outcome {
+        let mut call = Call::plain(Function::Set(Scalar::Float64));
+        call.references = references;
+        self.judge(Ok(status), &call)
+    }
+
+    #[inline(never)]
+    fn set_by_call(&mut self, kind: &Kind, references: &[u32], values: &[f64]) -> Outcome {
+        let scalar = self.scalar(kind);
         let mut call = Call::plain(Function::Set(scalar));
         call.references = references;
         call.count = values.len();

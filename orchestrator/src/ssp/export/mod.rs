@@ -14,10 +14,10 @@ use std::path::{Path, PathBuf};
 use super::ANNOTATION;
 use super::STRUCTURE;
 use crate::error::Error;
-use crate::fmu::{BaseUnit, Causality, FmiVersion, Item, Variable};
+use crate::fmu::{BaseUnit, Causality, FmiVersion, Item, Kind, Variable};
 use crate::motion::Motion;
-use crate::pack;
-use crate::system::{Component, Quantity, Source, System};
+use crate::pack::{self, StartValue};
+use crate::system::{Component, Quantity, Source, System, Value};
 use elements::Connector;
 use text::{connector_name, escape, tap};
 use values::{array, typed};
@@ -98,11 +98,11 @@ impl Writer<'_> {
             if let Source::Reference { quantity, ahead } = connection.source
                 && !from_motion.contains(&(quantity, ahead))
             {
-                if !(0..=AHEAD).contains(&ahead) {
+                if !(-1..=AHEAD).contains(&ahead) {
                     let origin = self.system.origin(connection.source);
                     return Err(self.fault(format!(
                         "`{origin}` cannot be written: the component that plays the motion knows \
-                         it up to {AHEAD} samples ahead"
+                         it from one sample before to {AHEAD} samples ahead"
                     )));
                 }
                 from_motion.push((quantity, ahead));
@@ -219,7 +219,8 @@ impl Writer<'_> {
 
     fn component(&mut self, index: usize) -> Result<String, Error> {
         let part = &self.system.components[index];
-        let file = self.fmu(part)?;
+        let choices = choices(part);
+        let file = self.fmu(part, &choices)?;
         let variables = &part.fmu.description.variables;
         let mut connectors: Vec<Connector> = Vec::new();
         let mut add = |position: usize, kind: &'static str| {
@@ -240,8 +241,19 @@ impl Writer<'_> {
                 add(position, "input");
             }
         }
+        // Not every reader bears a connector of an enumeration.
+        let is_connected = |position: usize| {
+            let wanted = Source::Output {
+                component: index,
+                variable: position,
+            };
+            let mut all = self.system.connections.iter();
+            all.any(|connection| connection.source == wanted)
+        };
         for position in part.fmu.description.of(Causality::Output) {
-            if variables[position].kind.travels() {
+            let kind = &variables[position].kind;
+            let is_choice = matches!(kind, Kind::Enumeration(_));
+            if kind.travels() && (!is_choice || is_connected(position)) {
                 add(position, "output");
             }
         }
@@ -254,6 +266,12 @@ impl Writer<'_> {
                 if !arrays.contains(&first) {
                     arrays.push(first);
                 }
+                continue;
+            }
+            if choices
+                .iter()
+                .any(|start| start.name == variables[*position].name)
+            {
                 continue;
             }
             // Without a unit, it is in the variable's.
@@ -270,10 +288,13 @@ impl Writer<'_> {
         Ok(self.element(&part.name, &file, &connectors, &values, part.period))
     }
 
-    /// The file of a component's FMU in the archive.
-    fn fmu(&mut self, part: &Component) -> Result<String, Error> {
-        let sum = &part.fmu.sha256;
-        let known = self.fmus.iter().find(|(_, content)| content.sum == *sum);
+    /// The file of a component's FMU in the archive, with these start values.
+    fn fmu(&mut self, part: &Component, starts: &[StartValue]) -> Result<String, Error> {
+        let mut sum = part.fmu.sha256.clone();
+        for start in starts {
+            let _ = write!(sum, ",{}={}", start.name, start.value);
+        }
+        let known = self.fmus.iter().find(|(_, content)| content.sum == sum);
         if let Some((name, _)) = known {
             return Ok(name.clone());
         }
@@ -288,15 +309,36 @@ impl Writer<'_> {
             number += 1;
         }
         let file: &PathBuf = part.fmu.file();
-        let bytes = fs::read(file).map_err(|error| Error::File {
-            path: file.clone(),
-            reason: error.to_string(),
-        })?;
-        let content = Content {
-            sum: sum.clone(),
-            bytes,
+        let bytes = match starts {
+            [] => fs::read(file).map_err(|error| Error::File {
+                path: file.clone(),
+                reason: error.to_string(),
+            })?,
+            starts => pack::variant_bytes(file, starts)?,
         };
-        self.fmus.insert(name.clone(), content);
+        self.fmus.insert(name.clone(), Content { sum, bytes });
         Ok(name)
     }
+}
+
+/// The choices that a component of this project is given, which its FMU starts with in the archive: not
+/// every reader sets an enumeration.
+fn choices(part: &Component) -> Vec<StartValue> {
+    let variables = &part.fmu.description.variables;
+    let is_choice = |position: usize| {
+        let variable = &variables[position];
+        matches!(variable.kind, Kind::Enumeration(_))
+            && variable.causality == Causality::Parameter
+            && !variable.is_element
+    };
+    let given = part.parameters.iter();
+    let chosen = given.filter_map(|(position, value)| match value {
+        Value::Number(value) if part.fmu.is_own && is_choice(*position) => Some(StartValue {
+            name: variables[*position].name.clone(),
+            value: *value,
+            note: String::new(),
+        }),
+        _ => None,
+    });
+    chosen.collect()
 }

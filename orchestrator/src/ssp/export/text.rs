@@ -1,11 +1,13 @@
 //! Names and texts as they stand in the archive's files.
 
+use super::super::BEFORE;
 use crate::system::{Component, Quantity};
 
 /// The output of the motion's component for a tap.
 pub(super) fn tap(quantity: Quantity, ahead: isize) -> String {
     match ahead {
         0 => quantity.name().to_string(),
+        -1 => format!("{}{BEFORE}", quantity.name()),
         ahead => format!("{}[{ahead}]", quantity.name()),
     }
 }

@@ -10,11 +10,12 @@ use plant::specimens::linear::LinearSpecimen;
 use super::experiment::{self, SeparatingExperiment};
 use super::gain::{Gain, gain};
 use super::health::{RelationReport, health};
+use super::left_over::{self, Residual};
 use super::relations::{misfit, relations};
 use super::sentence::sentence;
 use crate::data::{Channel, OUTPUT_NAMES, Recording};
 use crate::diagnosis::case::{
-    Case, CaseError, Nominal, blind_spot, noise_ratios, problems, too_little_excitation,
+    Case, CaseError, ControlLaw, Nominal, blind_spot, noise_ratios, problems, too_little_excitation,
 };
 use crate::diagnosis::engine::{ExtensibleModel, NamedEffect, Verdict, judge};
 use crate::diagnosis::engine::{Observer, Point, Role, Test};
@@ -74,7 +75,7 @@ pub struct Diagnosis {
     pub effects: Vec<NamedEffect>,
     /// Rival sets of effects.
     pub alternatives: Vec<Vec<&'static str>>,
-    /// The experiment that would tell the first rival apart.
+    /// The experiment that would tell the first rival apart, or show more of what is not explained.
     pub separating_experiment: Option<SeparatingExperiment>,
     /// What the extended model brings on the validation record.
     pub gain: Gain,
@@ -161,6 +162,17 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
         let to_be_moved = [&case.identification, &case.validation];
         let still = |recording: &&Recording| too_little_excitation(recording, nominal);
         found.extend(to_be_moved.iter().filter_map(still));
+    }
+    let (fitted, unseen) = (&case.identification, &case.validation);
+    let is_same = |channel: &Channel| fitted.samples(*channel) == unseen.samples(*channel);
+    if [Channel::ValveCommand, Channel::Displacement]
+        .iter()
+        .all(is_same)
+    {
+        found.push(format!(
+            "{}: its samples are those of {}: expected another record, on which the model is tested",
+            unseen.name, fitted.name
+        ));
     }
     let has = |recording: &Recording| {
         Channel::OUTPUTS.map(|channel| recording.channel(channel).is_some())
@@ -277,15 +289,13 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
     );
     let rig = model.rig(&judgement.all.point);
     let effects = readable(judgement.effects);
-    let separating_experiment = judgement.rival_points.first().and_then(|rival| {
-        let law = case.nominal.controller?;
-        experiment::separate(
-            &rig,
-            &model.rig(rival),
-            &law,
-            &case.nominal.noise,
-            model.period,
-        )
+    let separating_experiment = case.nominal.controller.and_then(|law| {
+        if judgement.verdict == Verdict::Unexplained {
+            return unexplained(&model, &judgement.best.point, &law);
+        }
+        let rival = model.rig(judgement.rival_points.first()?);
+        let noise = &case.nominal.noise;
+        experiment::separate(&rig, &rival, &law, noise, model.period)
     });
     let fits_fitted = {
         let squares: f64 = judgement.best.residuals.iter().map(|r| r * r).sum();
@@ -379,6 +389,24 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
             after: after.1,
         },
     })
+}
+
+/// The motion that shows more of what the model at `point` does not explain.
+fn unexplained(
+    model: &ShakeTableModel,
+    point: &Point,
+    law: &ControlLaw,
+) -> Option<SeparatingExperiment> {
+    let records = model.records.iter().enumerate();
+    let records = records.filter(|(_, record)| record.with_effects);
+    let left: Vec<(&Samples, Vec<f64>)> = records
+        .filter_map(|(place, record)| Some((&record.samples, prediction(model, point, place)?.1)))
+        .collect();
+    let residuals: Vec<Residual<'_>> = left
+        .iter()
+        .map(|(samples, whitened)| Residual { samples, whitened })
+        .collect();
+    left_over::probe(&model.rig(point), law, &residuals, model.period)
 }
 
 /// Effects whose size ran to the end of what is tried: no cause, but a nominal model of another rig.

@@ -9,15 +9,32 @@ use units::constants::INCH;
 
 use crate::diagnosis::case::ControlLaw;
 
-/// A motion and how well it separates two models.
+/// What a proposed experiment is for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Aim {
+    /// To tell two models apart.
+    Rivals {
+        /// Root mean square difference of the channels, in standard deviations of their noise.
+        separation: f64,
+    },
+    /// To show more of what no model explains.
+    LeftOver {
+        /// Where that is, in words.
+        place: String,
+        /// How many times as much of it a sample is expected as in the record that shows most.
+        times: f64,
+    },
+}
+
+/// A motion and what it is to show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeparatingExperiment {
     /// Kind of motion.
     pub kind: &'static str,
     /// Peak displacement of its reference, m.
     pub peak: f64,
-    /// Root mean square difference of the channels, in standard deviations of their noise.
-    pub separation: f64,
+    /// What it is for.
+    pub aim: Aim,
     /// Sampling period of the reference, s.
     pub period: f64,
     /// The reference, m, from rest to rest.
@@ -27,15 +44,47 @@ pub struct SeparatingExperiment {
 impl SeparatingExperiment {
     /// It in words.
     pub fn sentence(&self) -> String {
-        format!(
-            "{} with a peak of {:.2} in ({:.1} mm): the rivals differ there by {:.1} standard deviations \
-             of the noise",
+        let motion = format!(
+            "{} with a peak of {:.2} in ({:.1} mm)",
             self.kind,
             self.peak / INCH,
-            1e3 * self.peak,
-            self.separation
-        )
+            1e3 * self.peak
+        );
+        match &self.aim {
+            Aim::Rivals { separation } => format!(
+                "{motion}: the rivals differ there by {separation:.1} standard deviations of the noise"
+            ),
+            Aim::LeftOver { place, times } => format!(
+                "{motion}: what is left over is largest at {place}, and this motion is expected to show \
+                 {times:.1} times as much of it a sample as the record that shows most"
+            ),
+        }
     }
+}
+
+/// A motion that may be proposed.
+pub struct Motion {
+    /// Its kind in words.
+    pub kind: &'static str,
+    /// Peak displacement, m.
+    pub peak: f64,
+    /// Displacement, m.
+    pub reference: Vec<f64>,
+}
+
+/// Every motion that may be proposed.
+pub fn motions(period: f64) -> impl Iterator<Item = Motion> {
+    let samples = (DURATION / period) as usize;
+    KINDS
+        .into_iter()
+        .enumerate()
+        .flat_map(move |(index, kind)| {
+            PEAKS.map(|peak| Motion {
+                kind,
+                peak,
+                reference: reference(index, peak, samples, period),
+            })
+        })
 }
 
 /// Length of a proposed motion, s.
@@ -43,13 +92,14 @@ const DURATION: f64 = 20.0;
 /// Over which it begins and ends, s.
 const RAMP: f64 = 1.0;
 /// Proposed amplitudes stay inside the stroke with room to spare, m.
-const PEAKS: [f64; 4] = [0.1 * INCH, 0.3 * INCH, 0.7 * INCH, 1.1 * INCH];
-const KINDS: [&str; 5] = [
+const PEAKS: [f64; 5] = [0.03 * INCH, 0.1 * INCH, 0.3 * INCH, 0.7 * INCH, 1.1 * INCH];
+const KINDS: [&str; 6] = [
     "slow triangle of 0.1 Hz",
     "sine sweep from 0.2 to 12 Hz",
     "steady sine of 1 Hz",
     "noise from 0.2 to 3 Hz",
     "noise from 2 to 12 Hz",
+    "noise from 8 to 30 Hz",
 ];
 /// Share of the law's limit that a proposed motion may ask of the command: beyond it both rigs saturate.
 const OF_THE_LIMIT: f64 = 0.9;
@@ -94,7 +144,8 @@ fn reference(kind: usize, peak: f64, samples: usize, period: f64) -> Vec<f64> {
             .map(|k| (std::f64::consts::TAU * time(k)).sin())
             .collect(),
         3 => noise(0.2, 3.0, samples, period),
-        _ => noise(2.0, 12.0, samples, period),
+        4 => noise(2.0, 12.0, samples, period),
+        _ => noise(8.0, 30.0, samples, period),
     };
     let ramp = |k: usize| {
         let from_the_ends = time(k).min(time(samples - 1 - k)) / RAMP;
@@ -129,11 +180,15 @@ pub fn play(
         .collect())
 }
 
-/// Largest command that `law` gives `rig` on `reference`, V.
-fn largest_command(law: &ControlLaw, reference: &[f64], shown: &[[f64; 4]], period: f64) -> f64 {
+/// The commands (V) that `law` gives where `reference` is asked and the sensors have `shown` what they did.
+pub fn commands(law: &ControlLaw, reference: &[f64], shown: &[[f64; 4]], period: f64) -> Vec<f64> {
     let channel = |i: usize| -> Vec<f64> { shown.iter().map(|y| y[i]).collect() };
-    let commands = law.commands(reference, &channel(0), &channel(1), period);
-    commands.iter().fold(0.0, |m, u| u.abs().max(m))
+    law.commands(reference, &channel(0), &channel(1), period)
+}
+
+/// Whether `commands` stay within the limit of `law`.
+pub fn is_playable(law: &ControlLaw, commands: &[f64]) -> bool {
+    commands.iter().all(|u| u.abs() <= OF_THE_LIMIT * law.limit)
 }
 
 /// The most telling of the proposed motions for `a` against `b`, of those that neither drives to the
@@ -145,43 +200,29 @@ pub fn separate(
     noise: &[f64; 4],
     period: f64,
 ) -> Option<SeparatingExperiment> {
-    let samples = (DURATION / period) as usize;
-    let mut best: Option<SeparatingExperiment> = None;
-    for (index, kind) in KINDS.into_iter().enumerate() {
-        for peak in PEAKS {
-            let motion = reference(index, peak, samples, period);
-            let (Ok(one), Ok(other)) =
-                (play(a, law, &motion, period), play(b, law, &motion, period))
-            else {
-                continue;
-            };
-            let command = |shown| largest_command(law, &motion, shown, period);
-            if command(&one).max(command(&other)) > OF_THE_LIMIT * law.limit {
-                continue;
-            }
-            let sum: f64 = one
-                .iter()
-                .zip(&other)
-                .flat_map(|(y, z)| (0..4).map(move |i| (y[i] - z[i]) / noise[i]))
-                .map(|d| d * d)
-                .sum();
-            let separation = (sum / (4 * samples) as f64).sqrt();
-            if separation.is_finite()
-                && best
-                    .as_ref()
-                    .is_none_or(|best| separation > best.separation)
-            {
-                best = Some(SeparatingExperiment {
-                    kind,
-                    peak,
-                    separation,
-                    period,
-                    reference: motion,
-                });
-            }
+    let separated = motions(period).filter_map(|motion| {
+        let shown = |rig| play(rig, law, &motion.reference, period).ok();
+        let (one, other) = (shown(a)?, shown(b)?);
+        let stays = |shown| is_playable(law, &commands(law, &motion.reference, shown, period));
+        if !(stays(&one) && stays(&other)) {
+            return None;
         }
-    }
-    best
+        let differences = one
+            .iter()
+            .zip(&other)
+            .flat_map(|(y, z)| (0..4).map(move |i| (y[i] - z[i]) / noise[i]));
+        let sum: f64 = differences.map(|d| d * d).sum();
+        let separation = (sum / (4 * one.len()) as f64).sqrt();
+        separation.is_finite().then_some((separation, motion))
+    });
+    let (separation, motion) = separated.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(SeparatingExperiment {
+        kind: motion.kind,
+        peak: motion.peak,
+        aim: Aim::Rivals { separation },
+        period,
+        reference: motion.reference,
+    })
 }
 
 #[cfg(test)]
@@ -213,12 +254,10 @@ mod tests {
         dry.effects.friction.coulomb_force = 10.0;
         viscous.shake_table.table.damping += 60.0;
         let found = separate(&dry, &viscous, &LAW, &NOISE, PERIOD).unwrap();
-        assert!(
-            found.separation > 1.0,
-            "{} {}",
-            found.kind,
-            found.separation
-        );
+        let Aim::Rivals { separation } = found.aim else {
+            panic!("{}", found.sentence());
+        };
+        assert!(separation > 1.0, "{} {separation}", found.kind);
         let x = &found.reference;
         let ends = [x[0], x[1], x[x.len() - 2], x[x.len() - 1]];
         assert!(ends.iter().all(|x| x.abs() < 1e-4 * found.peak), "{ends:?}");

@@ -6,6 +6,7 @@ pub mod experiment;
 mod extended;
 pub mod gain;
 mod health;
+pub mod left_over;
 pub mod predictor;
 pub mod relations;
 mod sentence;

@@ -1,0 +1,60 @@
+//! The motion that is played, as options.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::quantity::positive;
+use crate::error::Error;
+use crate::motion::{self, Scaling};
+use crate::units::STANDARD_GRAVITY;
+
+/// Options that choose a motion and how large it is played.
+#[derive(Debug, Clone, Default, Args)]
+pub struct MotionArguments {
+    /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
+    #[arg(
+        long,
+        alias = "motion",
+        value_name = "FILE",
+        conflicts_with = "reference"
+    )]
+    pub record: Option<PathBuf>,
+    /// Reference: .csv with time, displacement, velocity, acceleration, played as given
+    #[arg(long, value_name = "FILE")]
+    pub reference: Option<PathBuf>,
+    /// Scale of the motion: a factor
+    #[arg(long, value_name = "FACTOR", group = "scaling")]
+    pub scale: Option<f64>,
+    /// Scale of the motion: peak acceleration in g
+    #[arg(long, value_name = "G", group = "scaling")]
+    pub pga: Option<String>,
+    /// Scale of the motion: peak displacement, such as "1.2 in" (a number alone is in m)
+    #[arg(long, value_name = "L", group = "scaling")]
+    pub peak: Option<String>,
+    /// Seed of the built-in motion [default: 1]
+    #[arg(long, conflicts_with_all = ["record", "reference"])]
+    pub seed: Option<u64>,
+}
+
+impl MotionArguments {
+    /// How large the motion is played, where that is said.
+    ///
+    /// # Errors
+    /// No positive quantity.
+    pub fn scaling(&self) -> Result<Option<Scaling>, Error> {
+        Ok(match (self.scale, &self.pga, &self.peak) {
+            (Some(factor), _, _) => Some(Scaling::Factor(factor)),
+            (_, Some(pga), _) => Some(Scaling::PeakAcceleration(
+                positive("--pga", pga, "g")? * STANDARD_GRAVITY,
+            )),
+            (_, _, Some(peak)) => Some(Scaling::PeakDisplacement(positive("--peak", peak, "m")?)),
+            _ => None,
+        })
+    }
+
+    /// The seed, chosen or not.
+    pub fn seed(&self) -> u64 {
+        self.seed.unwrap_or(motion::DEFAULT_SEED)
+    }
+}

@@ -1,0 +1,64 @@
+//! Numbers with units, as options.
+
+use crate::error::Error;
+use crate::system;
+use crate::units;
+
+/// A positive quantity; a number alone is in `unit`.
+///
+/// # Errors
+/// Another thing.
+pub fn positive(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
+    let fault = |reason: String| Error::Option { option, reason };
+    let value = units::value_in(text, unit).map_err(|error| fault(error.to_string()))?;
+    if value > 0.0 {
+        return Ok(value);
+    }
+    Err(fault(format!("`{text}` is not positive")))
+}
+
+/// The positive quantity, where one is given.
+///
+/// # Errors
+/// Another thing.
+pub fn if_given(
+    option: &'static str,
+    text: &Option<String>,
+    unit: &'static str,
+) -> Result<Option<f64>, Error> {
+    text.as_deref()
+        .map(|text| positive(option, text, unit))
+        .transpose()
+}
+
+/// A positive share, per cent.
+///
+/// # Errors
+/// Another thing.
+pub fn percent(option: &'static str, text: &str) -> Result<f64, Error> {
+    system::percent(text).map_err(|reason| Error::Option { option, reason })
+}
+
+/// Lowest and highest frequency of `--band`, Hz.
+///
+/// # Errors
+/// No band below 100 Hz.
+pub fn band(given: &[f64]) -> Result<[f64; 2], Error> {
+    let [low, high] = [0, 1].map(|i| given.get(i).copied().unwrap_or(f64::NAN));
+    if low > 0.0 && high > low && high <= 100.0 {
+        return Ok([low, high]);
+    }
+    Err(Error::Option {
+        option: "--band",
+        reason: format!("{low} to {high} Hz; expected 0 < LOW < HIGH <= 100"),
+    })
+}
+
+/// A whole number above 0.
+///
+/// # Errors
+/// Another thing.
+pub fn at_least_one(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|number| *number > 0);
+    number.ok_or_else(|| "expected a whole number from 1".to_string())
+}
