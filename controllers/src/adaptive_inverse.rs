@@ -46,7 +46,7 @@ impl Default for Parameters {
         Self {
             rig: KnownRig::default(),
             hold_gain: 2.0 / INCH,
-            adaptation: 0.02,
+            adaptation: 0.005,
             leak: 0.05,
             limit: VALVE_LIMIT,
             period: SAMPLING_PERIOD,

@@ -36,7 +36,7 @@ impl Default for Adaptation {
     fn default() -> Self {
         Self {
             spread: 0.2,
-            drift: 0.01,
+            drift: 0.001,
             acceleration_noise: 0.1,
             force_noise: 4.0,
         }

@@ -145,6 +145,8 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
         ("receding-horizon", 4.0),
         ("multiple-surface", 5.0),
         ("dynamic-surface", 6.5),
+        ("adaptive-inverse", 6.0),
+        ("adaptive-preview", 1.5),
     ] {
         assert!(median(&json, controller) < largest, "{controller}");
     }
