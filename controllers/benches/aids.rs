@@ -1,4 +1,5 @@
-//! One step of the aids, all on, and of each variant of sliding mode down to the valve, timed step by step.
+//! One step of the aids, all on, of each variant of sliding mode down to the valve, and of the laws that learn, timed step
+//! by step.
 //!
 //! ```text
 //! cargo bench -p controllers --bench aids
@@ -10,10 +11,17 @@ use std::error::Error;
 use std::hint::black_box;
 use std::time::Instant;
 
+use controllers::adaptive_inverse::{
+    AdaptiveInverse, AdaptiveInverseInput, LEAD, Parameters as AdaptiveInverseParameters,
+};
 use controllers::aids::{AidsInput, OperatorAids, Switches};
+use controllers::clipped_optimal::{ClippedOptimalDesign, ClippedOptimalInput};
+use controllers::preview::adaptation::Adaptation;
 use controllers::preview::feedforward::PREVIEW;
+use controllers::preview::{self, PreviewControl, PreviewInput};
 use controllers::surface_control::{Parameters, SurfaceControl, SurfaceInput, Variant};
 use controllers::{Controller, Motion};
+use plant::specimens::{MAX_STOREYS, YieldingSpecimen};
 
 const STEPS: usize = 40_000;
 const PERIOD: f64 = 0.002;
@@ -89,5 +97,39 @@ fn main() -> Result<(), Box<dyn Error>> {
             law.step(&input, PERIOD)
         });
     }
+    let mut inverse = AdaptiveInverse::new(AdaptiveInverseParameters::default())?;
+    time("adaptive-inverse", |k| {
+        let input = AdaptiveInverseInput {
+            ahead: motion(k + LEAD).velocity,
+            reference: motion(k),
+            measured: motion(k + 1),
+        };
+        inverse.step(&input, PERIOD)
+    });
+    let mut preview = preview::Parameters {
+        adaptation: Some(Adaptation::default()),
+        ..preview::Parameters::default()
+    };
+    preview.load.friction = 13.0;
+    preview.load.specimen = Some(YieldingSpecimen::default());
+    let mut preview = PreviewControl::new(preview)?;
+    time("adaptive-preview", |k| {
+        let input = PreviewInput {
+            reference: std::array::from_fn(|j| motion(k + j)),
+            measured: motion(k + 1),
+            specimen_acceleration: 0.7 * motion(k).acceleration,
+            actuator_force: 60.0 * motion(k).acceleration,
+            ..PreviewInput::default()
+        };
+        preview.step(&input, PERIOD)
+    });
+    let mut clipped = ClippedOptimalDesign::default().law(PERIOD)?;
+    time("clipped-optimal", |k| {
+        let input = ClippedOptimalInput {
+            floor_acceleration: [motion(k).acceleration; MAX_STOREYS],
+            damper_force: 30.0 * motion(k).velocity,
+        };
+        clipped.step(&input, PERIOD)
+    });
     Ok(())
 }

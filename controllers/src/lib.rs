@@ -4,8 +4,10 @@
 //! period with what the sensors gave, and the command they return is held until the next call.
 
 pub mod acceleration_tracking;
+pub mod adaptive_inverse;
 pub mod aids;
 pub mod allocation;
+pub mod clipped_optimal;
 pub mod hierarchy;
 pub mod hybrid;
 pub mod interlock;

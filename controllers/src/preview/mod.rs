@@ -17,9 +17,13 @@
 //! and the same feedback acts on what is left of displacement, velocity and acceleration against the
 //! motion itself.
 //!
+//! With [`adaptation`] mass, stiffness and strength of the specimen are estimated on the way, and the forces ahead
+//! follow them.
+//!
 //! The first two with a table that stands still make a compensation of friction and specimen that
 //! any other controller can have ([`Role::Compensation`]).
 
+pub mod adaptation;
 pub mod feedback;
 pub mod feedforward;
 pub mod load;
@@ -28,6 +32,7 @@ pub mod model;
 use nalgebra::SVector;
 use units::constants::{INCH, LBF, SAMPLING_PERIOD};
 
+use self::adaptation::{Adaptation, AdaptationState, Measured};
 use self::feedback::{Feedback, FeedbackState, MAXIMUM_DELAY, Uncertainty};
 use self::feedforward::{Feedforward, PREVIEW};
 use self::load::{KnownLoad, LoadState};
@@ -36,6 +41,7 @@ use crate::acceleration_tracking::{SHAPES, SHAPING};
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};
 use plant::identified::seal_shape::SealShape;
+use plant::specimens::YieldingSpecimen;
 
 /// What the law does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -61,6 +67,8 @@ pub struct Parameters {
     pub rig: RigModel,
     /// Forces on its table.
     pub load: KnownLoad,
+    /// How the specimen is learnt while the motion goes on, if it is. For [`Role::Control`].
+    pub adaptation: Option<Adaptation>,
     /// Whether the motion ahead is known; else it is extrapolated.
     pub preview: bool,
     /// Samples by which measurements are late.
@@ -101,6 +109,7 @@ impl Default for Parameters {
                 },
                 specimen: None,
             },
+            adaptation: None,
             preview: true,
             delay: 0,
             shaping: [0.0; SHAPING],
@@ -130,6 +139,9 @@ impl Parameters {
     pub fn validate(&self) -> Result<(), ModelError> {
         self.rig.validate()?;
         self.load.validate()?;
+        self.adaptation
+            .as_ref()
+            .map_or(Ok(()), Adaptation::validate)?;
         if self.delay > MAXIMUM_DELAY {
             return Err(ModelError::Parameter {
                 name: "loop_delay_samples",
@@ -178,6 +190,10 @@ pub struct PreviewInput {
     pub measured: Motion,
     /// Another controller's command, V; for [`Role::Compensation`] alone.
     pub command: f64,
+    /// Measured absolute acceleration of the specimen, m/s²; for [`Parameters::adaptation`] alone.
+    pub specimen_acceleration: f64,
+    /// Measured force of the actuator on the table, N; for [`Parameters::adaptation`] alone.
+    pub actuator_force: f64,
 }
 
 /// What preview control remembers: plain data.
@@ -196,6 +212,8 @@ pub struct Memory {
     last: Option<Motion>,
     /// The wanted motions up to now, the present one first.
     past: [Motion; MAXIMUM_DELAY + 1],
+    /// What was learnt of the specimen.
+    adaptation: AdaptationState,
     /// The shaped acceleration of the sample before, m/s²; absent before the first.
     shaped: Option<f64>,
 }
@@ -249,6 +267,31 @@ impl PreviewControl {
         &self.feedback
     }
 
+    /// The specimen as it is known now, if one stands on the table.
+    pub fn specimen(&self) -> Option<YieldingSpecimen> {
+        let p = &self.parameters;
+        let learnt = |known| match p.adaptation {
+            Some(_) => self.memory.adaptation.specimen(&known),
+            None => known,
+        };
+        p.load.specimen.map(learnt)
+    }
+
+    /// Learns the specimen from what is measured.
+    fn adapt(&mut self, input: &PreviewInput) {
+        let p = &self.parameters;
+        if let (Some(settings), Some(known)) = (&p.adaptation, &p.load.specimen) {
+            let measured = Measured {
+                table: input.measured,
+                specimen_acceleration: input.specimen_acceleration,
+                actuator_force: input.actuator_force,
+            };
+            let table = &p.rig.shake_table.table;
+            let learnt = &mut self.memory.adaptation;
+            learnt.learn(settings, known, table, &measured, p.period);
+        }
+    }
+
     /// A sample of [`Role::MultiMetric`].
     fn multi_metric(&mut self, input: &PreviewInput) -> f64 {
         let p = &self.parameters;
@@ -276,6 +319,10 @@ impl PreviewControl {
     /// Brings the known forces up to the furthest sample known.
     fn look_ahead(&mut self, reference: &[Motion; PREVIEW + 1]) {
         let p = &self.parameters;
+        let load = KnownLoad {
+            specimen: self.specimen(),
+            ..p.load
+        };
         let memory = &mut self.memory;
         let furthest = if p.preview { PREVIEW } else { 0 };
         let first = if memory.last.is_none() { 0 } else { furthest };
@@ -283,9 +330,9 @@ impl PreviewControl {
         for slot in first..=furthest {
             let to = reference[slot];
             let from = memory.last.unwrap_or(to);
-            memory.load = p.load.advance(&memory.load, [&from, &to], p.period);
+            memory.load = load.advance(&memory.load, [&from, &to], p.period);
             memory.last = Some(to);
-            memory.forces[slot] = p.load.force(&memory.load, &to);
+            memory.forces[slot] = load.force(&memory.load, &to);
         }
         let beyond = memory.forces[furthest];
         memory.forces[furthest..].fill(beyond);
@@ -308,6 +355,9 @@ impl Controller for PreviewControl {
     fn step(&mut self, input: &PreviewInput, _period: f64) -> f64 {
         if self.parameters.role == Role::MultiMetric {
             return self.multi_metric(input);
+        }
+        if self.parameters.role == Role::Control {
+            self.adapt(input);
         }
         self.look_ahead(&input.reference);
         let limit = self.parameters.limit;

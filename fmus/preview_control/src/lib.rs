@@ -23,6 +23,11 @@ pub struct PreviewControl {
     command: f64,
     memory: Memory,
     valve_command: f64,
+    specimen_acceleration: f64,
+    actuator_force: f64,
+    specimen_mass: f64,
+    specimen_stiffness: f64,
+    specimen_yield_force: f64,
     #[serde(skip)]
     built: Built<Settings, Law>,
 }
@@ -48,6 +53,8 @@ impl Component for PreviewControl {
         let mut inputs = fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured);
         inputs.extend(fmu_kit::table! { Self, s:
             input("controller_command", s.command, "Another controller's command, where this compensates", "V").nominal(10.0);
+            input("specimen_acceleration", s.specimen_acceleration, "Absolute acceleration of the specimen, where it is estimated", "m/s2" => "g").nominal(10.0);
+            input("measured_force", s.actuator_force, "Force of the actuator on the table, where the specimen is estimated", "N" => "lbf").nominal(400.0);
         });
         inputs.extend(fmu_kit::reference_ahead::<Self>(
             PREVIEW,
@@ -64,6 +71,11 @@ impl Component for PreviewControl {
         let mut variables = inputs;
         variables.extend(outputs);
         variables.extend(settings::variables());
+        variables.extend(fmu_kit::table! { Self, s:
+            local("estimated_specimen_mass", s.specimen_mass, "Mass of the specimen as it is known now", "kg" => "lbf.s2/in").discrete();
+            local("estimated_specimen_stiffness", s.specimen_stiffness, "Its stiffness before it yields", "N/m" => "lbf/in").discrete();
+            local("estimated_specimen_yield_force", s.specimen_yield_force, "Its yield force", "N" => "lbf").discrete();
+        });
         variables.push(
             Variable::choice("role", ROLES, |s: &mut Self| &mut s.settings.role)
                 .about("What the law does"),
@@ -89,9 +101,16 @@ impl Component for PreviewControl {
             ]),
             measured: self.measured,
             command: self.command,
+            specimen_acceleration: self.specimen_acceleration,
+            actuator_force: self.actuator_force,
         };
         self.valve_command = control.step(&input, step_size);
         self.memory = control.memory;
+        if let Some(specimen) = control.specimen() {
+            self.specimen_mass = specimen.mass;
+            self.specimen_stiffness = specimen.columns.stiffness();
+            self.specimen_yield_force = specimen.columns.yield_force;
+        }
         Ok(())
     }
 }

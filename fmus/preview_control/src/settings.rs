@@ -1,5 +1,6 @@
 //! The parameters of the FMU and what the controller is built from.
 
+use controllers::preview::adaptation::Adaptation;
 use controllers::preview::load::KnownLoad;
 use controllers::preview::model::{Hydraulics, RigModel};
 use controllers::preview::{Parameters, Role};
@@ -42,6 +43,8 @@ pub struct Settings {
     hydraulics_known: bool,
     specimen: YieldingSpecimen,
     specimen_known: bool,
+    adaptive: bool,
+    adaptation: Adaptation,
     pub(crate) role: i32,
     loop_delay_samples: i32,
     shaping_lead_samples: i32,
@@ -56,6 +59,8 @@ impl Default for Settings {
             hydraulics_known: false,
             specimen: YieldingSpecimen::default(),
             specimen_known: false,
+            adaptive: false,
+            adaptation: Adaptation::default(),
             role: 1,
             loop_delay_samples: 0,
             shaping_lead_samples: 0,
@@ -80,6 +85,7 @@ impl Settings {
                 specimen: self.specimen_known.then_some(self.specimen),
                 ..self.law.load
             },
+            adaptation: self.adaptive.then_some(self.adaptation),
             delay: ModelError::count("loop_delay_samples", self.loop_delay_samples)?,
             shaping_lead: ModelError::count("shaping_lead_samples", self.shaping_lead_samples)?,
             period,
@@ -126,6 +132,11 @@ pub fn variables() -> Vec<Variable<PreviewControl>> {
         parameter("specimen_yield_force", s.settings.specimen.columns.yield_force, "Yield force of its columns", "N" => "lbf");
         parameter("specimen_yield_displacement", s.settings.specimen.columns.yield_displacement, "Drift at which they yield", "m" => "in");
         parameter("specimen_post_yield_ratio", s.settings.specimen.columns.post_yield_ratio, "Stiffness after yielding over that before; 1: elastic");
+        parameter("adaptive", s.settings.adaptive, "Whether the specimen's mass, stiffness and strength are estimated");
+        parameter("adaptation_spread", s.settings.adaptation.spread, "Standard deviation of what is known of them, relative");
+        parameter("adaptation_drift", s.settings.adaptation.drift, "Standard deviation of what they change by in a second, relative");
+        parameter("adaptation_acceleration_noise", s.settings.adaptation.acceleration_noise, "What specimen and model differ by", "m/s2" => "g");
+        parameter("adaptation_force_noise", s.settings.adaptation.force_noise, "What the balance of forces is off by", "N" => "lbf");
         parameter("hydraulics_known", s.settings.hydraulics_known, "Whether valve and oil stand for the actuator of Eq 2-4");
         parameter("spool_lag", s.settings.hydraulics.spool_lag, "2 D/w of the spool", "s");
         parameter("spool_inertia", s.settings.hydraulics.spool_inertia, "1/w^2 of the spool", "s2");

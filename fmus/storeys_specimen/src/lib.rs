@@ -4,7 +4,10 @@
 use fmu_kit::{Causality, Component, ComponentResult, Terminal, Variable};
 use plant::ModelError;
 use plant::specimens::hysteresis::BoucWen;
-use plant::specimens::{MAX_STOREYS, Storeys, StoreysState, YieldingSpecimen};
+use plant::specimens::{
+    ControlledState, ControlledStoreys, MAX_STOREYS, MagnetorheologicalDamper, Storeys, TunedMass,
+    YieldingSpecimen,
+};
 use serde::{Deserialize, Serialize};
 
 /// A value of each storey, the lowest first.
@@ -19,8 +22,16 @@ pub struct StoreysSpecimen {
     yield_force: EachStorey,
     yield_displacement: EachStorey,
     post_yield_ratio: EachStorey,
-    state: StoreysState,
+    /// Storey of the damper, from 1; 0 for none.
+    damper_storey: i32,
+    damper: MagnetorheologicalDamper,
+    /// Floor of the tuned mass, from 1; 0 for none.
+    tuned_mass_floor: i32,
+    tuned_mass: TunedMass,
+    state: ControlledState,
     table_acceleration: f64,
+    damper_voltage: f64,
+    damper_force: f64,
     force: f64,
     acceleration: f64,
     floor_acceleration: EachStorey,
@@ -41,8 +52,25 @@ impl Default for StoreysSpecimen {
             yield_force: strength,
             yield_displacement: strength.map(|force| force / STIFFNESS),
             post_yield_ratio: [0.05; MAX_STOREYS],
-            state: StoreysState::default(),
+            damper_storey: 0,
+            // With all voltage half of the strength of the lowest storey, 3 % of the building's weight: some
+            // 5 N without voltage, 15 N with all of it.
+            damper: MagnetorheologicalDamper {
+                size: 0.011,
+                ..MagnetorheologicalDamper::default()
+            },
+            tuned_mass_floor: 0,
+            // A twentieth of the building, tuned to its first mode.
+            tuned_mass: TunedMass {
+                floor: 0,
+                mass: 2.27,
+                frequency: 11.8,
+                damping_ratio: 0.135,
+            },
+            state: ControlledState::default(),
             table_acceleration: 0.0,
+            damper_voltage: 0.0,
+            damper_force: 0.0,
             force: 0.0,
             acceleration: 0.0,
             floor_acceleration: [0.0; MAX_STOREYS],
@@ -52,7 +80,7 @@ impl Default for StoreysSpecimen {
 }
 
 impl StoreysSpecimen {
-    fn building(&self) -> Result<Storeys, ModelError> {
+    fn building(&self) -> Result<ControlledStoreys, ModelError> {
         let storey = |i: usize| YieldingSpecimen {
             mass: self.mass[i],
             damping: self.damping[i],
@@ -64,9 +92,20 @@ impl StoreysSpecimen {
             },
         };
         let count = usize::try_from(self.storeys).unwrap_or(0);
-        let building = Storeys {
-            storey: std::array::from_fn(storey),
-            count,
+        // 0 is none; what is no index is refused as too large.
+        let place = |from_one: i32| {
+            (from_one != 0).then(|| usize::try_from(from_one - 1).unwrap_or(usize::MAX - 1))
+        };
+        let building = ControlledStoreys {
+            storeys: Storeys {
+                storey: std::array::from_fn(storey),
+                count,
+            },
+            damper: place(self.damper_storey).map(|storey| (storey, self.damper)),
+            tuned_mass: place(self.tuned_mass_floor).map(|floor| TunedMass {
+                floor,
+                ..self.tuned_mass
+            }),
         };
         building.validate()?;
         Ok(building)
@@ -116,8 +155,31 @@ impl Component for StoreysSpecimen {
             output("force", s.force, "Force on the table", "N" => "lbf").nominal(400.0);
             output("acceleration", s.acceleration, "Acceleration that times the whole mass is the force", "m/s2" => "g")
                 .nominal(10.0);
+            input("damper_voltage", s.damper_voltage, "Voltage of the magnetorheological damper's driver", "V").nominal(1.0);
+            output("damper_force", s.damper_force, "Force of the damper against the drift of its storey", "N" => "lbf").nominal(50.0);
             parameter("storeys", s.storeys, "Number of storeys").min(1.0).max(10.0);
         };
+        variables.extend(fmu_kit::table! { Self, s:
+            parameter("damper_storey", s.damper_storey, "Storey with a magnetorheological damper, the lowest 1; 0 is none").min(0.0).max(10.0);
+            parameter("damper_size", s.damper.size, "Factor on the damper's force").min(0.0);
+            parameter("damper_damping", s.damper.damping, "c0 without voltage", "N.s/m").min(0.0);
+            parameter("damper_damping_rise", s.damper.damping_rise, "Rise of c0 with voltage", "N.s/(m.V)").min(0.0);
+            parameter("damper_roll_off_damping", s.damper.roll_off_damping, "c1 without voltage", "N.s/m").min(0.0);
+            parameter("damper_roll_off_damping_rise", s.damper.roll_off_damping_rise, "Rise of c1 with voltage", "N.s/(m.V)").min(0.0);
+            parameter("damper_stiffness", s.damper.stiffness, "k0", "N/m").min(0.0);
+            parameter("damper_accumulator_stiffness", s.damper.accumulator_stiffness, "k1, stiffness of the accumulator", "N/m").min(0.0);
+            parameter("damper_hysteresis", s.damper.hysteresis, "alpha without voltage", "N/m").min(0.0);
+            parameter("damper_hysteresis_rise", s.damper.hysteresis_rise, "Rise of alpha with voltage", "N/(m.V)").min(0.0);
+            parameter("damper_gamma", s.damper.gamma, "gamma", "1/m2").min(0.0);
+            parameter("damper_beta", s.damper.beta, "beta", "1/m2").min(0.0);
+            parameter("damper_sharpness", s.damper.sharpness, "A").min(0.0);
+            parameter("damper_driver_rate", s.damper.driver_rate, "eta, rate of the current's driver", "1/s").min(0.0);
+            parameter("damper_largest_voltage", s.damper.largest_voltage, "Largest voltage that counts", "V").min(0.0);
+            parameter("tuned_mass_floor", s.tuned_mass_floor, "Floor with a tuned mass damper, the lowest 1; 0 is none").min(0.0).max(10.0);
+            parameter("tuned_mass", s.tuned_mass.mass, "Its mass", "kg" => "lbf.s2/in").min(0.0);
+            parameter("tuned_mass_frequency", s.tuned_mass.frequency, "Its own frequency", "rad/s").min(0.0);
+            parameter("tuned_mass_damping_ratio", s.tuned_mass.damping_ratio, "Its own damping ratio").min(0.0);
+        });
         let mut add = |more: Vec<Variable<Self>>| variables.extend(more);
         let (output, parameter) = (Causality::Output, Causality::Parameter);
         add(each(
@@ -170,7 +232,7 @@ impl Component for StoreysSpecimen {
 
     fn initialize(&mut self) -> ComponentResult {
         self.building()?;
-        self.state = StoreysState::default();
+        self.state = ControlledState::default();
         Ok(())
     }
 
@@ -179,18 +241,19 @@ impl Component for StoreysSpecimen {
         let Ok(building) = self.building() else {
             return;
         };
-        let whole: f64 = self.mass[..building.count].iter().sum();
         self.force = building.force(&self.state);
-        self.acceleration = -self.force / whole;
+        self.acceleration = -self.force / building.mass();
         self.floor_acceleration = building.accelerations(&self.state);
-        self.drift = self.state.storey.map(|storey| storey.drift);
+        self.drift = self.state.storeys.storey.map(|storey| storey.drift);
+        self.damper_force = building.damper_force(&self.state);
     }
 
     fn step(&mut self, time: f64, step_size: f64) -> ComponentResult {
         let building = self.building()?;
-        self.state = building.advance(&self.state, self.table_acceleration, step_size);
+        let (shaken, voltage) = (self.table_acceleration, self.damper_voltage);
+        self.state = building.advance(&self.state, shaken, voltage, step_size);
         let finite = |storey: &plant::specimens::YieldingState| storey.drift.is_finite();
-        if self.state.storey.iter().all(finite) {
+        if self.state.storeys.storey.iter().all(finite) {
             return Ok(());
         }
         Err(format!(

@@ -13,7 +13,8 @@ pub struct RigArguments {
     /// Plant of a built-in system: identified, servohydraulic, or a .toml file of one [default: identified]
     #[arg(long)]
     pub plant: Option<String>,
-    /// Specimen of a built-in system: none, linear, yielding, storeys [default: linear]
+    /// Specimen of a built-in system: none, linear, yielding, storeys,
+    /// storeys-tuned-mass, storeys-damped [default: linear]
     #[arg(long)]
     pub specimen: Option<String>,
     /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]

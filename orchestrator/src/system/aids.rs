@@ -21,6 +21,18 @@ pub(super) fn unyielding(specimen: &YieldingSpecimen) -> LinearSpecimen {
     }
 }
 
+/// Valve, oil and table by the names that components have for them.
+pub(super) fn known_rig_values(rig: &KnownRig) -> Vec<(&'static str, f64)> {
+    let table = &rig.table;
+    let mut values = hydraulic_values(&rig.hydraulics).to_vec();
+    values.extend([
+        ("table_mass", table.mass),
+        ("table_damping", table.damping),
+        ("table_stiffness", table.stiffness),
+    ]);
+    values
+}
+
 impl Rules {
     /// Valve, oil and table as the model has them, or as they come nearest to it. The actuator that the thesis
     /// prints has none: for it they are those of the physical rig's commissioning.
@@ -87,8 +99,7 @@ impl Rules {
         specimen: Option<&YieldingSpecimen>,
     ) -> Result<(), String> {
         let aids = self.aids(specimen)?;
-        let (own, table) = (&aids.rig.hydraulics, &aids.rig.table);
-        set(component, &hydraulic_values(own));
+        set(component, &known_rig_values(&aids.rig));
         set(
             component,
             &friction_values(aids.friction.friction, &aids.friction.shape),
@@ -96,9 +107,6 @@ impl Rules {
         set(
             component,
             &[
-                ("table_mass", table.mass),
-                ("table_damping", table.damping),
-                ("table_stiffness", table.stiffness),
                 ("specimen_corner", aids.specimen.corner),
                 ("observer_corner", aids.observer.corner),
                 ("pressure_gain", aids.pressure.gain),

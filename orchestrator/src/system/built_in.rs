@@ -29,7 +29,7 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 16] = [
+const CONTROLLERS: [Part; 18] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
@@ -46,6 +46,8 @@ const CONTROLLERS: [Part; 16] = [
     part!("", "multiple-surface"),
     part!("", "dynamic-surface"),
     part!("", "receding-horizon"),
+    part!("", "adaptive-inverse"),
+    part!("", "adaptive-preview"),
 ];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [
@@ -55,7 +57,7 @@ const PLANTS: [Part; 2] = [
 /// What controllers may know of a specimen: one storey or nothing.
 type Known = fn() -> Option<YieldingSpecimen>;
 /// What stands on the table.
-const SPECIMENS: [(Part, Known); 3] = [
+const SPECIMENS: [(Part, Known); 5] = [
     (part!("specimen/", "linear"), || {
         Some(LinearSpecimen::appendix_a().into())
     }),
@@ -63,6 +65,8 @@ const SPECIMENS: [(Part, Known); 3] = [
         Some(YieldingSpecimen::default())
     }),
     (part!("specimen/", "storeys"), || None),
+    (part!("specimen/", "storeys-tuned-mass"), || None),
+    (part!("specimen/", "storeys-damped"), || None),
 ];
 /// Computed structures between the ground and the specimen.
 const STRUCTURES: [Part; 1] = [part!("structure/", "two-storeys")];

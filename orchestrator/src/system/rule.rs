@@ -6,6 +6,8 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
+    /// Rig and hold of adaptive inverse control.
+    AdaptiveInverse,
     /// All gains of the dual loop of acceleration and force.
     DualLoop,
     /// The gain of displacement PID.

@@ -1,15 +1,29 @@
-//! Sliding mode down to the valve by rule.
+//! Sliding mode down to the valve and adaptive inverse control by rule.
 
 use controllers::preview::feedback::Uncertainty;
 use controllers::surface_control::{Parameters, Variant};
+use controllers::three_variable::ThreeVariableGains;
 use plant::specimens::YieldingSpecimen;
 
-use super::aids::unyielding;
+use super::aids::{known_rig_values, unyielding};
 use super::file::ComponentFile;
-use super::tuning::{Rules, hydraulic_values, set};
+use super::tuning::{Rules, set};
 use super::value::Setting;
 
 impl Rules {
+    /// Model and hold.
+    pub(super) fn adaptive_inverse(&self, component: &mut ComponentFile) -> Result<(), String> {
+        let rig = self.known_rig()?;
+        let measurements = self.model.measurements();
+        let (delay, period) = (measurements.delay(), measurements.period);
+        let gains = ThreeVariableGains::tuned(&self.model.rig, delay, period);
+        let gains = gains.map_err(|error| error.to_string())?;
+        set(component, &known_rig_values(&rig));
+        set(component, &[("hold_gain", 0.5 * gains.proportional)]);
+        component.set("loop_delay_samples", self.model.delay as i64);
+        Ok(())
+    }
+
     /// Model, noise, surfaces and lead of the variant that the file names.
     pub(super) fn surface_control(
         &self,
@@ -34,14 +48,11 @@ impl Rules {
         };
         let tuned = own.tuned(measurements.late, specimen.map(unyielding).as_ref());
         let tuned = tuned.map_err(|error| error.to_string())?;
-        let (table, noise) = (&tuned.rig.table, &tuned.uncertainty.measurement);
-        set(component, &hydraulic_values(&tuned.rig.hydraulics));
+        let noise = &tuned.uncertainty.measurement;
+        set(component, &known_rig_values(&tuned.rig));
         set(
             component,
             &[
-                ("table_mass", table.mass),
-                ("table_damping", table.damping),
-                ("table_stiffness", table.stiffness),
                 ("surface_rate", tuned.surface_rate),
                 ("motion_reaching_rate", tuned.reaching_rates[0]),
                 ("oil_reaching_rate", tuned.reaching_rates[1]),

@@ -18,6 +18,7 @@
 //! - minimal control synthesis: [`MinimalControlSynthesis::tuned`];
 //! - multiple surfaces, dynamic surface, receding horizon:
 //!   [`Parameters::tuned`](controllers::surface_control::Parameters::tuned);
+//! - adaptive inverse control: a quarter of the displacement gain at which the loop oscillates holds;
 //! - the aids of operators: [`AidsDesign::tuned`](controllers::tuning::aids::AidsDesign::tuned); behind a stabilised actuator the other rules have the
 //!   [`stabilised`](controllers::tuning::aids::stabilised) rig for theirs;
 //! - sliding mode and model predictive control have the model as theirs and know the delay; the
@@ -231,6 +232,16 @@ impl Rules {
                     self.linear_quadratic_gaussian(component, specimen)?;
                 }
                 Rule::MultiMetric => self.multi_metric(component, specimen)?,
+                Rule::AdaptiveInverse => {
+                    self.adaptive_inverse(component)?;
+                    let compared = |variable: &str| variable.starts_with("reference_");
+                    place_references(
+                        &mut file.connections,
+                        name,
+                        compared,
+                        -(self.model.delay as isize),
+                    );
+                }
                 Rule::SurfaceControl => self.surface_control(component, specimen)?,
                 Rule::TrajectoryTracking => {
                     let tuning = AccelerationTracking::trajectory;
@@ -293,6 +304,7 @@ impl Rules {
                 | Rule::DualLoop
                 | Rule::OperatorAids
                 | Rule::SurfaceControl
+                | Rule::AdaptiveInverse
                 | Rule::MinimalControlSynthesis => continue,
             };
             let values = suite.named(member).map_err(|error| error.to_string())?;

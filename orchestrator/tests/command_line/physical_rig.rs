@@ -130,7 +130,7 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
     let Some(folder) = records() else { return };
     let records = folder.display().to_string();
     let (status, json, said) = compare(&["--specimen", "yielding", "--records", &records]);
-    holds_its_order(&json, status, &said, 16);
+    holds_its_order(&json, status, &said, 18);
     // Stated in docs/physical-rig.md, docs/preview-control.md and docs/published-methods.md.
     for (controller, largest) in [
         ("preview", 1.5),
@@ -145,6 +145,8 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
         ("receding-horizon", 4.0),
         ("multiple-surface", 5.0),
         ("dynamic-surface", 6.5),
+        ("adaptive-inverse", 6.0),
+        ("adaptive-preview", 1.5),
     ] {
         assert!(median(&json, controller) < largest, "{controller}");
     }

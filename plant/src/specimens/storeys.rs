@@ -61,11 +61,20 @@ impl Storeys {
 
     /// Absolute accelerations of the floors, the lowest first, m/s²; zero beyond the top.
     pub fn accelerations(&self, state: &StoreysState) -> [f64; MAX_STOREYS] {
+        self.accelerations_under(state, &[0.0; MAX_STOREYS])
+    }
+
+    /// As [`Self::accelerations`], with forces on the floors besides (N).
+    pub fn accelerations_under(
+        &self,
+        state: &StoreysState,
+        on_floors: &[f64; MAX_STOREYS],
+    ) -> [f64; MAX_STOREYS] {
         let mut accelerations = [0.0; MAX_STOREYS];
         let mut above = 0.0;
         for i in (0..self.count).rev() {
             let force = self.storey[i].force(&state.storey[i]);
-            accelerations[i] = (above - force) / self.storey[i].mass;
+            accelerations[i] = (above - force + on_floors[i]) / self.storey[i].mass;
             above = force;
         }
         accelerations
@@ -73,7 +82,16 @@ impl Storeys {
 
     /// Time derivative of the state under `table_acceleration` (m/s²).
     pub fn derivatives(&self, state: &StoreysState, table_acceleration: f64) -> StoreysState {
-        let accelerations = self.accelerations(state);
+        self.rates(state, &self.accelerations(state), table_acceleration)
+    }
+
+    /// Time derivative of the state whose floors have `accelerations` (m/s²).
+    pub(super) fn rates(
+        &self,
+        state: &StoreysState,
+        accelerations: &[f64; MAX_STOREYS],
+        table_acceleration: f64,
+    ) -> StoreysState {
         let mut rates = StoreysState::default();
         let mut below = table_acceleration;
         for i in 0..self.count {
