@@ -36,14 +36,9 @@ const INPUTS: [&str; 5] = [
 ];
 
 fn build(settings: &Settings) -> Result<Law, ModelError> {
-    let samples = settings.loop_delay_samples;
     let mut parameters = settings.law;
     parameters.period = AdaptiveInverseControl::STEP_SIZE;
-    parameters.rig.delay = usize::try_from(samples).map_err(|_| ModelError::Parameter {
-        name: "loop_delay_samples",
-        value: f64::from(samples),
-        expected: "zero or a positive number",
-    })?;
+    parameters.rig.delay = ModelError::count("loop_delay_samples", settings.loop_delay_samples)?;
     Law::new(parameters)
 }
 
@@ -69,7 +64,7 @@ impl Component for AdaptiveInverseControl {
                 ("acceleration", "measured_acceleration"),
             ],
         ),
-        Terminal::plug("valve", "valve", &[("command", "valve_command")]),
+        Terminal::VALVE,
     ];
     const ANY_STEP_SIZE: bool = false;
 
