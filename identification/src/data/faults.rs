@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::clipping::{cuts_a_peak, step};
 use super::{Recording, is_constant};
 
 /// Something about a recording that its reader should know.
@@ -45,12 +46,14 @@ impl Recording {
                 .fold((f64::MAX, f64::MIN), |(low, high), &value| {
                     (low.min(value), high.max(value))
                 });
+            let step = step(values);
             let mut clipped = 0;
             for extreme in [low, high] {
                 clipped += runs(values, |value| value == extreme)
                     .iter()
+                    .filter(|run| run.1 - run.0 >= CLIPPED_RUN)
+                    .filter(|run| cuts_a_peak(values, run.0, run.1, step))
                     .map(|run| run.1 - run.0)
-                    .filter(|&length| length >= CLIPPED_RUN)
                     .sum::<usize>();
             }
             if clipped > 0 {

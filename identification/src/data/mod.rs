@@ -1,6 +1,7 @@
 //! Measured data: one type, [`Recording`], and one reader of the files that laboratories keep.
 
 mod channel;
+pub(crate) mod clipping;
 mod error;
 mod even_base;
 mod faults;

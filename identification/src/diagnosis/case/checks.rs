@@ -1,6 +1,7 @@
 //! What makes a recording unfit for a diagnosis, said by name.
 
 use super::nominal::Nominal;
+use crate::data::clipping::{cuts_a_peak, step};
 use crate::data::{Channel, OUTPUT_NAMES, Recording, RoundedStamps, TimeBase, mean_and_deviation};
 
 /// Shortest recording that is looked at, samples.
@@ -191,6 +192,7 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
         .len()
         .checked_sub(1 + ends)
         .map_or(low, |place| levels[place]);
+    let step = step(values);
     let (mut run, mut start) = (1, 0);
     let (mut clipped, mut beside) = (0, 0);
     for k in 1..=values.len() {
@@ -210,7 +212,9 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
             return found;
         }
         if run >= CLIPPED_RUN && is_extreme {
-            clipped += run;
+            if cuts_a_peak(values, start, k, step) {
+                clipped += run;
+            }
         } else if run >= CLIPPED_RUN && (value >= next_to_high || value <= next_to_low) {
             beside += run;
         }

@@ -8,6 +8,8 @@ use super::model::{ExtensibleModel, Point};
 const DIFFERENCE: f64 = 1e-3;
 /// No nuisance moves farther than this many standard deviations in one step.
 const LONGEST_STEP: f64 = 4.0;
+/// Times that the nuisance is held four times as strongly, from a prior's own strength on.
+const HOLDS: usize = 40;
 /// Expected gains below this may be outweighed by the predictor's change along the step.
 const WITHIN_GAINS_REACH: f64 = 1e3;
 
@@ -286,15 +288,11 @@ pub fn fit<M: ExtensibleModel>(
             for i in 0..count {
                 damped[(i, i)] *= 1.0 + damping;
             }
-            let Some(mut step) = damped.cholesky().map(|factor| factor.solve(&gradient)) else {
+            let Some(step) = bounded_step(damped, &gradient, start.nuisance.len()) else {
                 damping = (damping * 20.0).max(1e-6);
                 continue;
             };
             expected = gradient.dot(&step);
-            let longest = step.rows(0, start.nuisance.len()).amax();
-            if longest > LONGEST_STEP {
-                step *= LONGEST_STEP / longest;
-            }
             let moved = best.point.moved(step.as_slice(), model.candidates());
             if let Some(next) = evaluate(model, &moved, records) {
                 gained = best.cost - next.cost;
@@ -321,6 +319,30 @@ pub fn fit<M: ExtensibleModel>(
         }
     }
     Some(best)
+}
+
+/// The step that solves `hessian` x = `gradient`, its first `nuisance` coordinates held as strongly as it
+/// takes for none to go beyond [`LONGEST_STEP`]: a trust region in those alone. Shortening the whole step
+/// instead would hold back what an effect explains where the nuisance pulls at what is still missing.
+fn bounded_step(
+    mut hessian: DMatrix<f64>,
+    gradient: &DVector<f64>,
+    nuisance: usize,
+) -> Option<DVector<f64>> {
+    let mut held = 0.0;
+    for _ in 0..HOLDS {
+        let step = hessian.clone().cholesky()?.solve(gradient);
+        let longest = step.rows(0, nuisance).amax();
+        if longest <= LONGEST_STEP {
+            return Some(step);
+        }
+        let more = if held == 0.0 { 1.0 } else { 3.0 * held };
+        for i in 0..nuisance {
+            hessian[(i, i)] += more;
+        }
+        held += more;
+    }
+    None
 }
 
 /// Fits with derivatives taken anew at every round until the cost settles.

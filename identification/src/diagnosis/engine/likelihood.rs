@@ -3,7 +3,8 @@
 use super::fit::{Fit, Jacobian, evaluate, fit, polish_to, residuals};
 use super::model::{Candidate, ExtensibleModel, Point, Role, Scale};
 use super::progress::{Observer, Progress, Step};
-use super::search::Selection;
+use super::search::{Found, Selection};
+use super::verdict::{NEARLY_NOISE, NEWS, left_over};
 
 /// What an effect must earn, in units of `2 log` likelihood, before it is named. An effect that is
 /// not there earns χ² with one degree of freedom (Wilks, Ann. Math. Stat. 9, 1938), more than 18
@@ -22,7 +23,7 @@ pub const RIVAL_WITHIN: f64 = 12.0;
 /// Mean square of whitened residuals up to which a model may be right. That of `N` values of unit
 /// variance scatters by `(2/N)^{1/2}`: 0.005 with two records of 20 s, four channels at 500 Hz, so
 /// that this is six deviations.
-const NEAR_NOISE: f64 = 1.03;
+pub(super) const NEAR_NOISE: f64 = 1.03;
 /// Mean square beyond which a third effect is no longer looked for: two that leave as much as the
 /// noise itself were not the causes. Chosen; saves time only.
 const HOPEFUL: f64 = 2.0;
@@ -34,6 +35,9 @@ const MOST_EFFECTS: usize = 3;
 const BEHIND: f64 = 6.0;
 /// And what a short fit may still gain, `2 log` likelihood.
 const NOISE_OF_A_RACE: f64 = 1e4;
+
+/// Rivals that are fitted anew when other noises were learned.
+const REFITTED: usize = 3;
 
 /// Rounds of a fit at most; curved valleys take many.
 pub(super) const ROUNDS: usize = 12;
@@ -128,6 +132,57 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
             fit,
             jacobian,
             score,
+        })
+    }
+
+    /// The hypotheses of an earlier search under other noises, fitted anew; none where the nominal model
+    /// cannot be simulated. The best is the best of all.
+    pub fn refitted(&self, found: &Found<Hypothesis>) -> Option<Found<Hypothesis>> {
+        let again = |earlier: &Hypothesis| {
+            let fitted = evaluate(self.model, &earlier.fit.point, &self.records)
+                .and_then(|start| self.hypothesis(&start));
+            if let Some(fitted) = &fitted {
+                self.tell(Step::Refitted, fitted);
+            }
+            fitted
+        };
+        let nominal = again(&found.nominal)?;
+        let others = found.others.iter().take(REFITTED);
+        let mut all: Vec<Hypothesis> = found
+            .best
+            .iter()
+            .chain(others)
+            .filter_map(again)
+            .filter(|own| matters(self.model.candidates(), &own.fit.point))
+            .collect();
+        all.sort_by(|a, b| a.score.total_cmp(&b.score));
+        all.retain(|own| own.score < nominal.score);
+        let mut all = all.into_iter();
+        Some(Found {
+            nominal,
+            best: all.next(),
+            others: all.collect(),
+        })
+    }
+
+    /// Whether other noises than the assumed ones explain what `current` leaves over: then no further
+    /// effect is looked for under the assumed ones. Saves time only, since the search goes on with the noises
+    /// that are learned after it.
+    fn is_other_noise(&self, current: &Hypothesis) -> bool {
+        let Fit {
+            point, residuals, ..
+        } = &current.fit;
+        let lesson = self
+            .model
+            .with_learned_noise(point, residuals, &self.records);
+        let Some(lesson) = lesson.filter(|own| own.is_believable && own.gain > NEWS) else {
+            return false;
+        };
+        let explained = evaluate(&lesson.model, point, &self.records)
+            .and_then(|start| polish_to(&lesson.model, &start, &self.records, ROUNDS, SETTLED));
+        explained.is_some_and(|(fit, _)| {
+            let tests = left_over(&lesson.model, &fit, &self.records);
+            tests.iter().all(|test| test.deviate < NEARLY_NOISE)
         })
     }
 
@@ -326,7 +381,9 @@ impl<M: ExtensibleModel> Selection for PenalisedLikelihood<'_, M> {
         } else if current.fit.point.effects.is_empty() {
             // A strong effect bends the nominal fit: begin at the nominal values themselves.
             self.extend(&[&self.origin()], 6)
-        } else if self.effects(current) > 1 && current.mean_square() > HOPEFUL {
+        } else if self.effects(current) > 1 && current.mean_square() > HOPEFUL
+            || self.is_other_noise(current)
+        {
             Vec::new()
         } else {
             let excess = |hypothesis: &Hypothesis| hypothesis.mean_square() - 1.0;

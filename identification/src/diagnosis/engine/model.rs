@@ -35,6 +35,10 @@ pub trait ExtensibleModel: Sync {
     where
         Self: Sized;
 
+    /// Records of `among` in which an effect hardly shows that grows with the motion: those of low level,
+    /// and those from before an effect.
+    fn quiet_records(&self, among: &[usize]) -> Vec<usize>;
+
     /// Length of a record's residual vector.
     fn residual_count(&self, record: usize) -> usize;
 
@@ -63,6 +67,8 @@ pub struct Lesson<M> {
     pub model: M,
     /// By how much they lower twice the negative log likelihood.
     pub gain: f64,
+    /// False where a sensor would be far louder than stated: a wrong model looks like that.
+    pub is_believable: bool,
     /// What was learned, by name.
     pub figures: Vec<(&'static str, f64)>,
 }

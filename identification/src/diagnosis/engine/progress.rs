@@ -32,6 +32,8 @@ pub enum Step {
     Nominal,
     /// A candidate's sensitivity promises to pay.
     Screened,
+    /// An earlier search found it under other noises.
+    Refitted,
     /// It has one more effect.
     Extended,
     /// It lacks an effect, or what one has beyond its special case, that no longer pays.
@@ -57,6 +59,7 @@ impl fmt::Display for Progress {
                 f.write_str(match step {
                     Step::Nominal => "  nominal",
                     Step::Screened => "    screened",
+                    Step::Refitted => "  refitted",
                     Step::Extended => "  extended",
                     Step::Reduced => "  reduced",
                 })?;

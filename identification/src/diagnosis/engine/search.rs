@@ -42,11 +42,27 @@ pub struct Found<H> {
     pub others: Vec<H>,
 }
 
-/// Forward as long as an effect pays, then backward as long as one does not.
+/// Forward from the nominal model as long as an effect pays, then backward as long as one does not.
 pub fn search<S: Selection>(selection: &mut S) -> Option<Found<S::Hypothesis>> {
     let nominal = selection.nominal()?;
-    let mut best: Option<S::Hypothesis> = None;
-    let mut others = Vec::new();
+    let found = Found {
+        nominal,
+        best: None,
+        others: Vec::new(),
+    };
+    resumed(selection, found)
+}
+
+/// As [`search`], from what an earlier one `found`.
+pub fn resumed<S: Selection>(
+    selection: &mut S,
+    found: Found<S::Hypothesis>,
+) -> Option<Found<S::Hypothesis>> {
+    let Found {
+        nominal,
+        mut best,
+        mut others,
+    } = found;
     loop {
         let current = best.as_ref().unwrap_or(&nominal);
         if selection.effects(current) >= selection.most_effects() {

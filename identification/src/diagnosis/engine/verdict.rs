@@ -2,10 +2,12 @@
 
 use super::adequacy::{self, Test};
 use super::fit::{Fit, Jacobian, evaluate, fit as refit, polish_to};
-use super::likelihood::{Hypothesis, PenalisedLikelihood, RIVAL_WITHIN, ROUNDS, SETTLED};
-use super::model::{Candidate, ExtensibleModel, Point, Role};
+use super::likelihood::{
+    Hypothesis, NEAR_NOISE, PenalisedLikelihood, RIVAL_WITHIN, ROUNDS, SETTLED,
+};
+use super::model::{Candidate, ExtensibleModel, Lesson, Point, Role};
 use super::progress::{Observer, Progress};
-use super::search::{Found, search};
+use super::search::{Found, Selection, resumed, search};
 use serde::{Deserialize, Serialize};
 
 /// Largest deviate that noise alone may show among the few hundred tests. Were they exact, 4.5
@@ -16,7 +18,10 @@ pub const LARGEST_DEVIATE: f64 = 5.6;
 
 /// Twice the log likelihood that other noises must gain before the search is repeated with them. Where
 /// the assumed ones are right, a dozen parameters gain about a dozen.
-const NEWS: f64 = 60.0;
+pub(super) const NEWS: f64 = 60.0;
+/// Largest deviate up to which noises that were learned are taken for most of what a model leaves over:
+/// what remains is the work of further effects. Saves time only.
+pub(super) const NEARLY_NOISE: f64 = 4.0 * LARGEST_DEVIATE;
 /// Times that they are learned at most: at the first model found, and at what was found with them.
 const LESSONS: usize = 2;
 
@@ -137,38 +142,162 @@ fn names<M: ExtensibleModel>(model: &M, hypothesis: &Hypothesis) -> Vec<&'static
 
 /// Searches on the records `fitted`, judges on all of them and `held_out`. Where the noises that the
 /// model assumes are not those of the records, they are learned along, and `model` has them afterwards.
+///
+/// The search begins with what the quiet records show of the noises, where they show it. What is there of
+/// an effect at low level is then partly taken for noise, until the search has found it; where it names
+/// nothing, the search is made with the assumed noises as well, and that counts.
 pub fn judge<M: ExtensibleModel>(
     model: &mut M,
     fitted: &[usize],
     held_out: &[usize],
     observer: Observer<'_>,
 ) -> Option<Judgement> {
-    let searched = |model: &M| {
-        search(&mut PenalisedLikelihood {
-            model,
-            records: fitted.to_vec(),
-            observer,
-        })
-    };
-    let mut found = searched(model)?;
+    let quiet = model.quiet_records(fitted);
+    if let Some((lesson, is_noise)) = learned_at_rest(model, &quiet) {
+        tell(observer, &lesson);
+        let concluded = concluded(&lesson.model, fitted, held_out, observer);
+        if let Some((judgement, learned)) = concluded
+            && (is_noise || judgement.verdict == Verdict::Named)
+        {
+            *model = learned.unwrap_or(lesson.model);
+            return Some(judgement);
+        }
+    }
+    let (judgement, learned) = concluded(model, fitted, held_out, observer)?;
+    if let Some(learned) = learned {
+        *model = learned;
+    }
+    Some(judgement)
+}
+
+fn tell<M>(observer: Observer<'_>, lesson: &Lesson<M>) {
+    observer.tell(|| Progress::Noise {
+        gain: lesson.gain,
+        figures: lesson.figures.clone(),
+    });
+}
+
+/// A search from the noises that `model` assumes, with those that were learned after it.
+fn concluded<M: ExtensibleModel>(
+    model: &M,
+    fitted: &[usize],
+    held_out: &[usize],
+    observer: Observer<'_>,
+) -> Option<(Judgement, Option<M>)> {
+    let mut found = search(&mut PenalisedLikelihood {
+        model,
+        records: fitted.to_vec(),
+        observer,
+    })?;
+    let mut learned: Option<M> = None;
     for _ in 0..LESSONS {
+        let current = learned.as_ref().unwrap_or(model);
         let best = found.best.as_ref().unwrap_or(&found.nominal);
-        let lesson = model.with_learned_noise(&best.fit.point, &best.fit.residuals, fitted);
+        let lesson = current.with_learned_noise(&best.fit.point, &best.fit.residuals, fitted);
         let Some(lesson) = lesson else { break };
-        observer.tell(|| Progress::Noise {
-            gain: lesson.gain,
-            figures: lesson.figures.clone(),
-        });
-        if lesson.gain < NEWS {
+        tell(observer, &lesson);
+        if lesson.gain < NEWS || !lesson.is_believable {
             break;
         }
-        let Some(next) = searched(&lesson.model) else {
+        let mut again = PenalisedLikelihood {
+            model: &lesson.model,
+            records: fitted.to_vec(),
+            observer,
+        };
+        let Some(next) = searched_again(&mut again, &found) else {
             break;
         };
         found = next;
-        *model = lesson.model;
+        learned = Some(lesson.model);
     }
-    Some(weigh(model, found, fitted, held_out))
+    let judgement = weigh(learned.as_ref().unwrap_or(model), found, fitted, held_out);
+    Some((judgement, learned))
+}
+
+/// The noises that the `quiet` records show under the nominal model, and whether with them nothing but
+/// noise is left there: what the model lacks then shows at a higher level only, and is no part of them.
+/// None where they are what was assumed, or far from explaining those records.
+fn learned_at_rest<M: ExtensibleModel>(model: &M, quiet: &[usize]) -> Option<(Lesson<M>, bool)> {
+    if quiet.is_empty() {
+        return None;
+    }
+    let fitted = |model: &M| {
+        let records = quiet.to_vec();
+        PenalisedLikelihood {
+            model,
+            records,
+            observer: Observer::none(),
+        }
+        .nominal()
+    };
+    let before = fitted(model)?.fit;
+    let lesson = model.with_learned_noise(&before.point, &before.residuals, quiet)?;
+    if lesson.gain < NEWS || !lesson.is_believable {
+        return None;
+    }
+    let after = fitted(&lesson.model)?.fit;
+    let tests = left_over(&lesson.model, &after, quiet);
+    let worst = tests
+        .iter()
+        .fold(0.0f64, |worst, test| worst.max(test.deviate));
+    (worst < NEARLY_NOISE).then_some((lesson, worst < LARGEST_DEVIATE))
+}
+
+/// A search under noises that were learned after an earlier one had `found` something: what that found is
+/// a start. Where it comes near the noise nothing but small effects can be missing; elsewhere the search
+/// begins anew, and the better one counts.
+fn searched_again<M: ExtensibleModel>(
+    selection: &mut PenalisedLikelihood<'_, M>,
+    found: &Found<Hypothesis>,
+) -> Option<Found<Hypothesis>> {
+    let earlier = selection.refitted(found)?;
+    let best = earlier.best.as_ref().unwrap_or(&earlier.nominal);
+    if best.mean_square() < NEAR_NOISE {
+        return resumed(selection, earlier);
+    }
+    let mut anew = search(selection)?;
+    let score = |found: &Found<Hypothesis>| {
+        let best = found.best.as_ref().unwrap_or(&found.nominal);
+        best.score
+    };
+    if score(&anew) <= score(&earlier) {
+        anew.others.extend(earlier.best);
+        return Some(anew);
+    }
+    Some(earlier)
+}
+
+/// Tests of whether what `fit` leaves over on `records` is noise, and its parameters plausible.
+pub(super) fn left_over<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usize]) -> Vec<Test> {
+    let mut tests = Vec::new();
+    let mut rest = fit.residuals.as_slice();
+    for &record in records {
+        let count = model.residual_count(record).min(rest.len());
+        let (mine, others) = rest.split_at(count);
+        rest = others;
+        tests.extend(adequacy::tests(
+            model.record_name(record),
+            mine,
+            model.channels(),
+            &model.regressors(record),
+        ));
+    }
+    let nuisance = &fit.point.nuisance;
+    tests.push(Test {
+        what: "nominal parameters against their stated uncertainty".into(),
+        deviate: adequacy::chi_square_deviate(
+            nuisance.iter().map(|p| p * p).sum(),
+            nuisance.len() as f64,
+        ),
+    });
+    let priors = fit.point.prior_rows(model.candidates());
+    for (_, off, spread) in priors {
+        tests.push(Test {
+            what: "form of an effect against what is usual".into(),
+            deviate: (off / spread).abs(),
+        });
+    }
+    tests
 }
 
 fn weigh<M: ExtensibleModel>(
@@ -200,34 +329,7 @@ fn weigh<M: ExtensibleModel>(
         Some((fit, jacobian)) => (fit, Some(jacobian)),
         None => (best.fit.clone(), None),
     };
-    let mut tests = Vec::new();
-    let mut rest = joint_fit.residuals.as_slice();
-    for &record in &everything {
-        let count = model.residual_count(record).min(rest.len());
-        let (mine, others) = rest.split_at(count);
-        rest = others;
-        tests.extend(adequacy::tests(
-            model.record_name(record),
-            mine,
-            model.channels(),
-            &model.regressors(record),
-        ));
-    }
-    let nuisance = &joint_fit.point.nuisance;
-    tests.push(Test {
-        what: "nominal parameters against their stated uncertainty".into(),
-        deviate: adequacy::chi_square_deviate(
-            nuisance.iter().map(|p| p * p).sum(),
-            nuisance.len() as f64,
-        ),
-    });
-    let priors = joint_fit.point.prior_rows(model.candidates());
-    for (_, off, spread) in priors {
-        tests.push(Test {
-            what: "form of an effect against what is usual".into(),
-            deviate: (off / spread).abs(),
-        });
-    }
+    let mut tests = left_over(model, &joint_fit, &everything);
     tests.sort_by(|a, b| b.deviate.total_cmp(&a.deviate));
     let effects = best.fit.point.effects.iter();
     let tolerance = effects.fold(1.0f64, |most, (i, _)| {

@@ -19,7 +19,9 @@ use crate::diagnosis::case::{
 };
 use crate::diagnosis::engine::{ExtensibleModel, NamedEffect, Verdict, judge};
 use crate::diagnosis::engine::{Observer, Point, Role, Test};
-use crate::diagnosis::rigs::shake_table::catalogue::{Prepared, ShakeTableModel};
+use crate::diagnosis::rigs::shake_table::catalogue::{
+    Prepared, ShakeTableModel, TOO_LOUD, loudest,
+};
 use crate::diagnosis::rigs::shake_table::predictor::{Predictor, Samples};
 
 /// R5 fires, and the recorded command is used, where it misses the law by more than this many
@@ -31,9 +33,6 @@ const INTERVAL_95: f64 = 1.96;
 
 /// A channel whose noise is this many times what is stated is said to be loud.
 const LOUD: f64 = 2.0;
-/// And beyond this many times it is another sensor than the one described, or a broken one: no cause is
-/// claimed from it. The prior of a level is a factor of 2.7 at its 95 % ends.
-const TOO_LOUD: f64 = 4.0;
 
 /// The parameter set that the FMUs of table, specimen and instrumentation take, SI.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -274,7 +273,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
     if judgement.verdict != Verdict::Unexplained {
         doubts.extend(judgement.effects.iter().filter_map(indistinct));
     }
-    if !doubts.is_empty() || loudest(&model) > TOO_LOUD {
+    if !doubts.is_empty() || loudest(&model.noise, &model.stated_noise) > TOO_LOUD {
         judgement.verdict = Verdict::Unexplained;
     }
     notes.extend(doubts);
@@ -446,19 +445,6 @@ fn indistinct(effect: &NamedEffect) -> Option<String> {
                 effect.effect
             )
         })
-}
-
-/// The learned noise of a sensor over what is stated, of the loudest.
-fn loudest(model: &ShakeTableModel) -> f64 {
-    let noise = &model.noise;
-    let ratios = (0..4).filter_map(|i| {
-        let stated = model.stated_noise.white[i];
-        let slow = noise.slow[i].map_or(0.0, |slow| slow.sigma);
-        stated
-            .is_finite()
-            .then(|| noise.white[i].hypot(slow) / stated)
-    });
-    ratios.fold(0.0, f64::max)
 }
 
 /// The noises that were learned, where they are not those that were stated.

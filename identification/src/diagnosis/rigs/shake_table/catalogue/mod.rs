@@ -9,12 +9,26 @@ use plant::identified::effects::Effect;
 use plant::identified::nominal::{NominalRig, PARAMETERS};
 use plant::identified::rig::IdentifiedRig;
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
 use crate::data::OUTPUT_NAMES;
 use crate::diagnosis::case::Nominal;
 use crate::diagnosis::engine::{Candidate, ExtensibleModel, Lesson, Point};
 use crate::diagnosis::rigs::shake_table::predictor::{
-    Disturbance, Noise, Predictor, Samples, learn,
+    Disturbance, Innovations, Noise, Predictor, Samples, learn,
 };
+
+/// A sensor whose noise is this many times what is stated is another than the one described, or a broken
+/// one: no cause is claimed from it. The prior of a level is a factor of 2.7 at its 95 % ends.
+pub const TOO_LOUD: f64 = 4.0;
+/// Seed of the voltage that probes how much of one passes.
+const PROBE_SEED: u64 = 20_261_122;
+/// Share of an unseen voltage's power that passes at least, so that a level remains defined.
+const LEAST_PASSED: f64 = 1e-3;
+/// A record with less than this share of the loudest one's command is one of low level.
+const LOW_LEVEL: f64 = 0.5;
 
 /// A recording prepared for the predictor, and whether the effects were there when it was taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,6 +119,49 @@ impl ShakeTableModel {
         }
     }
 
+    /// The rig at `point` as it was when `record` was taken.
+    fn rig_of(&self, record: usize, point: &Point) -> IdentifiedRig {
+        if self.records[record].with_effects {
+            self.rig(point)
+        } else {
+            self.rig_without_effects(&point.nuisance)
+        }
+    }
+
+    /// Power that an unseen voltage leaves in the innovations of `rig` on `record` (`whitened` without
+    /// it) over that on the linear part: from both with the same small voltage added. None where they
+    /// cannot be predicted.
+    fn passed(&self, rig: &IdentifiedRig, record: usize, whitened: &[f64]) -> Option<f64> {
+        let samples = &self.records[record].samples;
+        let mut random = ChaCha8Rng::seed_from_u64(PROBE_SEED);
+        let unseen = self.stated_noise.unseen;
+        let mut voltage = 0.0;
+        let probe = |_| -> f64 {
+            let new: f64 = StandardNormal.sample(&mut random);
+            voltage = unseen.phi * voltage + unseen.drive() * new;
+            voltage
+        };
+        let probe: Vec<f64> = (0..samples.len()).map(probe).collect();
+        let predictor = Predictor::design(rig, self.period, &self.noise).ok()?;
+        let response = |rig: &IdentifiedRig, samples: &Samples| {
+            let sampled = predictor.sample(rig).ok()?;
+            let mut out = vec![0.0; 4 * samples.len()];
+            predictor
+                .disturbed_innovations(&sampled, samples, |k| probe[k], &mut out)
+                .then_some(out)
+        };
+        let at_rest = Samples {
+            command: vec![0.0; samples.len()],
+            channels: vec![[0.0; 4]; samples.len()],
+        };
+        let disturbed = response(rig, samples)?;
+        let linear = response(&rig.linear_part(), &at_rest)?;
+        let pairs = disturbed.iter().zip(whitened);
+        let left: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
+        let expected: f64 = linear.iter().map(|r| r * r).sum();
+        Some((left / expected.max(f64::MIN_POSITIVE)).max(LEAST_PASSED))
+    }
+
     /// The rig at `point`.
     pub fn rig(&self, point: &Point) -> IdentifiedRig {
         let mut rig = self.rig_without_effects(&point.nuisance);
@@ -114,6 +171,16 @@ impl ShakeTableModel {
         }
         rig
     }
+}
+
+/// The level of a sensor's noise over what is `stated`, of the loudest.
+pub fn loudest(noise: &Noise, stated: &Noise) -> f64 {
+    let ratios = (0..4).filter_map(|i| {
+        let own = stated.white[i];
+        let slow = noise.slow[i].map_or(0.0, |slow| slow.sigma);
+        own.is_finite().then(|| noise.white[i].hypot(slow) / own)
+    });
+    ratios.fold(0.0, f64::max)
 }
 
 /// Predictors of the rig with and without its effects.
@@ -145,7 +212,6 @@ impl ExtensibleModel for ShakeTableModel {
         &OUTPUT_NAMES
     }
 
-    // A baseline has another predictor, whose innovations tell no more than the others'.
     fn with_learned_noise(
         &self,
         point: &Point,
@@ -155,19 +221,16 @@ impl ExtensibleModel for ShakeTableModel {
         let mut rest = residuals;
         let mut innovations = Vec::new();
         for &record in records {
-            let (mine, others) = rest.split_at_checked(self.residual_count(record))?;
+            let (whitened, others) = rest.split_at_checked(self.residual_count(record))?;
             rest = others;
-            if self.records[record].with_effects {
-                innovations.push(mine);
-            }
+            let rig = self.rig_of(record, point);
+            innovations.push(Innovations {
+                rig,
+                whitened,
+                passed: self.passed(&rig, record, whitened)?,
+            });
         }
-        let learned = learn(
-            &self.rig(point),
-            self.period,
-            &self.noise,
-            &self.stated_noise,
-            &innovations,
-        )?;
+        let learned = learn(&innovations, self.period, &self.noise, &self.stated_noise)?;
         let mut model = self.clone();
         model.noise = learned.noise;
         let mut figures = vec![
@@ -185,8 +248,20 @@ impl ExtensibleModel for ShakeTableModel {
         Some(Lesson {
             model,
             gain: learned.gain,
+            is_believable: loudest(&learned.noise, &self.stated_noise) < TOO_LOUD,
             figures,
         })
+    }
+
+    fn quiet_records(&self, among: &[usize]) -> Vec<usize> {
+        let size = |record: &usize| -> f64 {
+            let command = &self.records[*record].samples.command;
+            let square: f64 = command.iter().map(|u| u * u).sum();
+            (square / command.len().max(1) as f64).sqrt()
+        };
+        let loudest = among.iter().map(size).fold(0.0, f64::max);
+        let is_quiet = |r: &usize| !self.records[*r].with_effects || size(r) < LOW_LEVEL * loudest;
+        among.iter().copied().filter(is_quiet).collect()
     }
 
     // From the measured signals one sample before: the noise of the sample itself is in its

@@ -66,19 +66,44 @@ fn density(phi: f64, cycles: f64) -> f64 {
     (1.0 - phi * phi) / (Complex::from(1.0) - turn * phi).norm_sqr()
 }
 
-/// The noises that fit whitened `innovations` (four a sample, record by record) of the predictor
-/// designed for `rig` and `assumed`; `stated` is what was known beforehand. None where the rig has no
-/// predictor or the records are too short.
+/// What the predictor of a rig made of a record.
+pub struct Innovations<'a> {
+    /// The rig, of which the predictor follows the linear part.
+    pub rig: IdentifiedRig,
+    /// Whitened innovations, four a sample.
+    pub whitened: &'a [f64],
+    /// Power that an unseen voltage leaves in them, over that on the linear part: less where the supply
+    /// droops or friction holds the table.
+    pub passed: f64,
+}
+
+/// The noises that fit the innovations of `records`, whose predictors were designed for `assumed`;
+/// `stated` is what was known beforehand. None where a rig has no predictor, the rigs do not show the
+/// same channels, or the records are too short.
 pub fn learn(
-    rig: &IdentifiedRig,
+    records: &[Innovations<'_>],
     period: f64,
     assumed: &Noise,
     stated: &Noise,
-    innovations: &[&[f64]],
 ) -> Option<Learned> {
-    let linear = Linear::design(rig, period, assumed).ok()?;
+    let mut designed: Vec<(IdentifiedRig, Linear)> = Vec::new();
+    let mut bands = Vec::new();
+    for record in records {
+        if !designed.iter().any(|(rig, _)| *rig == record.rig) {
+            let linear = Linear::design(&record.rig, period, assumed).ok()?;
+            designed.push((record.rig, linear));
+        }
+        let (_, linear) = designed.iter().find(|(rig, _)| *rig == record.rig)?;
+        bands.extend(bands_of(linear, period, record)?);
+    }
+    let (_, linear) = designed.first()?;
+    if designed
+        .iter()
+        .any(|(_, other)| other.measured != linear.measured)
+    {
+        return None;
+    }
     let outputs = linear.measured.len();
-    let bands = bands(&linear, period, innovations)?;
     let white = |j: usize| assumed.white[linear.measured[j]];
     let mut parameters = Vec::new();
     let mut start = Vec::new();
@@ -130,7 +155,6 @@ pub fn learn(
         parameters,
         outputs,
         period,
-        unseen_scale: linear.scale[linear.unseen()],
     };
     // What the assumed noise costs, without slow parts that it does not have.
     let mut at_rest = start.clone();
@@ -165,43 +189,41 @@ pub fn learn(
     })
 }
 
-/// Averaged periodograms of the innovations, with the predictor's responses to every source.
-fn bands(linear: &Linear, period: f64, innovations: &[&[f64]]) -> Option<Vec<Band>> {
+/// Averaged periodograms of a record's innovations, with the predictor's responses to every source.
+fn bands_of(linear: &Linear, period: f64, record: &Innovations<'_>) -> Option<Vec<Band>> {
     let outputs = linear.measured.len();
     let highest: f64 = 0.5;
     let lowest = LOWEST * period;
     let ratio = (highest / lowest).ln() / BANDS as f64;
+    let n = record.whitened.len() / 4;
+    if n < 64 {
+        return None;
+    }
     let mut sums: Vec<(f64, f64, Complexes)> =
         vec![(0.0, 0.0, DMatrix::zeros(outputs, outputs)); BANDS];
-    let mut planner = RealFftPlanner::<f64>::new();
-    for record in innovations {
-        let n = record.len() / 4;
-        if n < 64 {
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let mut spectra = Vec::new();
+    for &channel in &linear.measured {
+        let series = record.whitened.iter().skip(channel).step_by(4);
+        let mut series: Vec<f64> = series.copied().collect();
+        series.truncate(n);
+        let mut spectrum = transform.make_output_vec();
+        transform.process(&mut series, &mut spectrum).ok()?;
+        spectra.push(spectrum);
+    }
+    for line in 1..n.div_ceil(2) {
+        let cycles = line as f64 / n as f64;
+        if cycles < lowest {
             continue;
         }
-        let transform = planner.plan_fft_forward(n);
-        let mut spectra = Vec::new();
-        for &channel in &linear.measured {
-            let mut series: Vec<f64> = record.iter().skip(channel).step_by(4).copied().collect();
-            series.truncate(n);
-            let mut spectrum = transform.make_output_vec();
-            transform.process(&mut series, &mut spectrum).ok()?;
-            spectra.push(spectrum);
-        }
-        for line in 1..n.div_ceil(2) {
-            let cycles = line as f64 / n as f64;
-            if cycles < lowest {
-                continue;
-            }
-            let band = (((cycles / lowest).ln() / ratio) as usize).min(BANDS - 1);
-            let (count, sum, observed) = &mut sums[band];
-            *count += 1.0;
-            *sum += cycles;
-            for i in 0..outputs {
-                for j in 0..outputs {
-                    let product = spectra[i][line] * spectra[j][line].conj();
-                    observed[(i, j)] += Complex::new(product.re, product.im) / n as f64;
-                }
+        let band = (((cycles / lowest).ln() / ratio) as usize).min(BANDS - 1);
+        let (count, sum, observed) = &mut sums[band];
+        *count += 1.0;
+        *sum += cycles;
+        for i in 0..outputs {
+            for j in 0..outputs {
+                let product = spectra[i][line] * spectra[j][line].conj();
+                observed[(i, j)] += Complex::new(product.re, product.im) / n as f64;
             }
         }
     }
@@ -212,7 +234,9 @@ fn bands(linear: &Linear, period: f64, innovations: &[&[f64]]) -> Option<Vec<Ban
     let from_noise = complex(&(&linear.a * &linear.gain));
     let mut from_unseen = linear.a.column(linear.unseen()).into_owned();
     from_unseen[linear.unseen()] = 0.0;
-    let from_unseen = from_unseen.map(Complex::from);
+    // The balanced state counts the voltage in units of its scale.
+    let share = record.passed.sqrt() / linear.scale[linear.unseen()];
+    let from_unseen = from_unseen.map(|value| Complex::from(share * value));
     let whiten = complex(&linear.whiten);
     let seen = &whiten * complex(&linear.c);
     let mut found = Vec::new();
@@ -247,12 +271,10 @@ struct Problem {
     parameters: Vec<Parameter>,
     outputs: usize,
     period: f64,
-    /// The unseen voltage that counts as one in the balanced states.
-    unseen_scale: f64,
 }
 
 impl Problem {
-    /// Density of every source at `cycles`, in the units of the balanced system.
+    /// Density of every source at `cycles`: the voltage's in V², the sensors' in their white noise's.
     fn densities(&self, at: &[f64], cycles: f64) -> Vec<f64> {
         let mut sizes = vec![(0.0, None); 1 + 2 * self.outputs];
         for (parameter, &value) in self.parameters.iter().zip(at) {
@@ -263,7 +285,6 @@ impl Problem {
                 *size = (2.0 * value).exp();
             }
         }
-        sizes[0].0 /= self.unseen_scale * self.unseen_scale;
         let one = |(size, corner): &(f64, Option<f64>)| {
             let shape = corner.map_or(1.0, |corner| {
                 let phi = Disturbance::below(1.0, corner, self.period).phi;

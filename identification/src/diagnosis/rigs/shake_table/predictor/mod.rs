@@ -16,7 +16,7 @@ use plant::identified::rig::{IdentifiedRig, IdentifiedRigState, STATES, SampledR
 
 use crate::data::{Channel, Recording};
 
-pub use learning::{Learned, learn};
+pub use learning::{Innovations, Learned, learn};
 use linear::Linear;
 pub use noise::{Disturbance, Noise};
 
@@ -122,6 +122,17 @@ impl Predictor {
     /// Whitened innovations of `rig` on `samples`, four a sample, into `out` (which must have
     /// that length). A missing channel gives zeros. False where the prediction left the finite.
     pub fn innovations(&self, rig: &SampledRig, samples: &Samples, out: &mut [f64]) -> bool {
+        self.disturbed_innovations(rig, samples, |_| 0.0, out)
+    }
+
+    /// As [`Self::innovations`] of a rig with a voltage (V) `added` beside the command of every sample.
+    pub fn disturbed_innovations(
+        &self,
+        rig: &SampledRig,
+        samples: &Samples,
+        added: impl Fn(usize) -> f64,
+        out: &mut [f64],
+    ) -> bool {
         let mut state = IdentifiedRigState::default();
         let mut disturbance = 0.0;
         let mut slow = [0.0; 4];
@@ -145,7 +156,7 @@ impl Predictor {
             for (channel, phi, gain) in &self.slow {
                 slow[*channel] = phi * (slow[*channel] + dot(gain, &innovation));
             }
-            rig.step_disturbed(&mut state, command, disturbance);
+            rig.step_disturbed(&mut state, command, disturbance + added(k));
             disturbance *= self.phi;
         }
         out.iter().all(|value| value.is_finite())
