@@ -1,19 +1,22 @@
 //! Hides effects in fresh cases, diagnoses them and prints what came of it. With `--out` the cases are
 //! kept as those of a study: the same command goes on where it was stopped, and `--shard I/N` carries out
-//! a part.
+//! a part. Of several worlds each has a folder there and begins 1,000 seeds after the one before; they are shown
+//! beside each other, and `--picture` draws how often what is stated is true.
 //!
 //! `cargo run --release -p acceptance --example hidden_effects_suite -- [--one N] [--effect NAME]
 //! [--two N] [--nothing N] [--outside N] [--noise F,...] [--mismatch F,...] [--seed S] [--verbose 1]
-//! [--world plain|open|noisy] [--out DIR] [--shard I/N]`
+//! [--world plain,open,noisy] [--out DIR] [--shard I/N] [--picture FILE.svg]`
 
 use std::env;
+use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use acceptance::hidden_suite::{Plan, run_all, table};
+use acceptance::hidden_suite::{Plan, beside_each_other, picture, run_all, table};
 use hidden_effects::World;
 use hidden_effects::catalogue::entry;
 use shakebench::campaign::{Progress, Shard};
+use shakebench::report::svg;
 
 fn main() -> ExitCode {
     let mut plan = Plan {
@@ -28,7 +31,8 @@ fn main() -> ExitCode {
         world: World::Plain,
         verbose: false,
     };
-    let (mut out, mut shard) = (None, None);
+    let mut worlds = vec![World::Plain];
+    let (mut out, mut shard, mut drawn) = (None, None, None);
     let mut arguments = env::args().skip(1);
     while let Some(option) = arguments.next() {
         let text = arguments.next().unwrap_or_default();
@@ -41,22 +45,22 @@ fn main() -> ExitCode {
             continue;
         }
         if option == "--world" {
-            plan.world = match text.as_str() {
-                "plain" => World::Plain,
-                "open" => World::Open,
-                "noisy" => World::Noisy,
-                _ => {
-                    eprintln!("--world: `{text}` is unknown; expected plain, open or noisy");
+            let named: Result<Vec<World>, _> = text.split(',').map(str::parse).collect();
+            worlds = match named {
+                Ok(named) => named,
+                Err(reason) => {
+                    eprintln!("--world: {reason}");
                     return ExitCode::from(2);
                 }
             };
-            if plan.world == World::Noisy {
-                (plan.noise, plan.mismatch) = (vec![3.0], vec![0.02]);
-            }
             continue;
         }
         if option == "--out" {
             out = Some(PathBuf::from(text));
+            continue;
+        }
+        if option == "--picture" {
+            drawn = Some(PathBuf::from(text));
             continue;
         }
         if option == "--shard" {
@@ -86,26 +90,45 @@ fn main() -> ExitCode {
             _ => {
                 eprintln!(
                     "{option} is unknown; expected --one, --effect, --two, --nothing, --outside, --noise, \
-                     --mismatch, --seed, --world, --out, --shard or --verbose"
+                     --mismatch, --seed, --world, --out, --shard, --picture or --verbose"
                 );
                 return ExitCode::from(2);
             }
         }
     }
-    println!("{plan:?}");
     let temporary = tempfile::tempdir().expect("a temporary folder");
     let folder = out.unwrap_or_else(|| temporary.path().to_path_buf());
-    let results = run_all(&plan, &folder, shard, &|Progress { done, of }| {
-        eprintln!("{done} of {of} cases");
-    });
-    match results {
-        Ok(results) => {
-            println!("{}", table(&results));
-            ExitCode::SUCCESS
+    let mut results = Vec::new();
+    for (number, world) in worlds.iter().enumerate() {
+        let plan = Plan {
+            seed: plan.seed + 1000 * number as u64,
+            ..plan.clone()
         }
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
+        .set_in(*world);
+        println!("{plan:?}");
+        let own = if worlds.len() > 1 {
+            folder.join(world.to_string())
+        } else {
+            folder.clone()
+        };
+        let tell = |Progress { done, of }: Progress| eprintln!("{world}: {done} of {of} cases");
+        match run_all(&plan, &own, shard, &tell) {
+            Ok(scored) => {
+                println!("{}", table(&scored));
+                results.push((world.to_string(), scored));
+            }
+            Err(error) => {
+                eprintln!("error: {error}");
+                return ExitCode::from(2);
+            }
         }
     }
+    println!("{}", beside_each_other(&results));
+    if let Some(file) = drawn
+        && let Err(error) = fs::write(&file, svg(&picture(&results)))
+    {
+        eprintln!("{}: {error}", file.display());
+        return ExitCode::from(2);
+    }
+    ExitCode::SUCCESS
 }

@@ -5,7 +5,7 @@ use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::adaptive_inverse::AdaptiveInverse as Law;
 use controllers::hybrid::extrapolation::Extrapolation;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
+use fmu_kit::{Component, ComponentResult, Terminal, Variable};
 use plant::hybrid::{Deviation, PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
 
@@ -47,30 +47,16 @@ impl Component for AdaptiveInverse {
         "Tracking control by an inverse that is estimated during the test";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[("displacement", "desired_displacement")],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[("displacement", "measured_displacement")],
-        ),
-        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+        Terminal::DESIRED_DISPLACEMENT,
+        Terminal::MEASURED_DISPLACEMENT,
+        Terminal::ACTUATOR,
     ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 2] = ["desired_displacement", "measured_displacement"];
-        fmu_kit::table! { Self, s:
-            input("desired_displacement", s.input.desired, "Displacement that the numerical substructure wants", "m" => "mm")
-                .nominal(5e-3);
-            input("measured_displacement", s.input.measured, "Displacement of the specimen, as measured", "m" => "mm")
-                .nominal(5e-3);
-            output("command", s.command, "Command to the actuator", "m" => "mm")
-                .discrete().nominal(5e-3).depends_on(&INPUTS, Dependent);
+        let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
+        variables.extend(fmu_kit::table! { Self, s:
             parameter("lead_samples", s.lead, "Lead of the desired displacement, samples");
             parameter("stiffness_deviation", s.deviation.specimen_stiffness, "Standard deviation of the specimen's stiffness at the start", "N/m").min(0.0);
             parameter("beta1_deviation", s.deviation.valve_beta1, "Standard deviation of the valve's beta1 at the start", "1/s").min(0.0);
@@ -79,7 +65,8 @@ impl Component for AdaptiveInverse {
             parameter("corner", s.corner, "Corner of each lag of the estimation's filter", "rad/s");
             parameter("error_variance", s.error_variance, "Variance of the filtered equation's error times its correlation in samples", "m2");
             parameter("window_samples", s.window, "Samples that the derivatives of the desired displacement are fitted to").min(6.0).max(32.0);
-        }
+        });
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {

@@ -4,7 +4,7 @@
 use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::gradient_inverse::GradientInverse as Law;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
+use fmu_kit::{Component, ComponentResult, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Tracking control by the adaptive inverse of Galmez and Fermandois.
@@ -33,30 +33,16 @@ impl Component for GradientInverse {
         "Tracking control by the adaptive inverse of Galmez and Fermandois";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[("displacement", "desired_displacement")],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[("displacement", "measured_displacement")],
-        ),
-        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+        Terminal::DESIRED_DISPLACEMENT,
+        Terminal::MEASURED_DISPLACEMENT,
+        Terminal::ACTUATOR,
     ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 2] = ["desired_displacement", "measured_displacement"];
-        fmu_kit::table! { Self, s:
-            input("desired_displacement", s.input.desired, "Displacement that the numerical substructure wants", "m" => "mm")
-                .nominal(5e-3);
-            input("measured_displacement", s.input.measured, "Displacement of the specimen, as measured", "m" => "mm")
-                .nominal(5e-3);
-            output("command", s.command, "Command to the actuator", "m" => "mm")
-                .discrete().nominal(5e-3).depends_on(&INPUTS, Dependent);
+        let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
+        variables.extend(fmu_kit::table! { Self, s:
             parameter("initial_coefficient[1]", s.start.initial[0], "Coefficient 0 at the start, s^0");
             parameter("initial_coefficient[2]", s.start.initial[1], "Coefficient 1 at the start, s^1");
             parameter("initial_coefficient[3]", s.start.initial[2], "Coefficient 2 at the start, s^2");
@@ -66,7 +52,8 @@ impl Component for GradientInverse {
             parameter("adaptation_gain[3]", s.start.gains[2], "Gain of the adaptation of coefficient 2").min(0.0);
             parameter("adaptation_gain[4]", s.start.gains[3], "Gain of the adaptation of coefficient 3").min(0.0);
             parameter("corner", s.start.corner, "Corner of the filter of Butterworth", "Hz");
-        }
+        });
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {

@@ -52,6 +52,21 @@ macro_rules! tracking_inputs {
     };
 }
 
+/// Inputs and output of a law that makes a transfer system follow a displacement, as in
+/// `displacement_tracking!(Self, s: s.input, s.command)`: `desired_displacement`, `measured_displacement` and
+/// `command` (m). The input has the fields `desired` and `measured`.
+#[macro_export]
+macro_rules! displacement_tracking {
+    ($component:ty, $s:ident: $input:expr, $command:expr) => {
+        $crate::table! { $component, $s:
+            input("desired_displacement", $input.desired, "Displacement that the numerical substructure wants", "m" => "mm").nominal(5e-3);
+            input("measured_displacement", $input.measured, "Displacement of the specimen, as measured", "m" => "mm").nominal(5e-3);
+            output("command", $command, "Command to the actuator", "m" => "mm").discrete().nominal(5e-3)
+                .depends_on(&["desired_displacement", "measured_displacement"], $crate::Dependency::Dependent);
+        }
+    };
+}
+
 /// Gives a component's library every function of FMI 2.0 and FMI 3.0, and the private ones with
 /// which the packer asks for descriptions and the tests run the component without FMI.
 ///

@@ -64,6 +64,23 @@ impl Terminal {
     pub const CONTROLLER: Self =
         Self::plug("controller", "valve", &[("command", "controller_command")]);
 
+    /// The displacement that an actuator is asked for.
+    pub const DESIRED_DISPLACEMENT: Self = Self::bus(
+        "reference",
+        "reference",
+        &[("displacement", "desired_displacement")],
+    );
+
+    /// The displacement that an actuator reaches, as measured.
+    pub const MEASURED_DISPLACEMENT: Self = Self::bus(
+        "measured",
+        "motion",
+        &[("displacement", "measured_displacement")],
+    );
+
+    /// The command that an actuator takes.
+    pub const ACTUATOR: Self = Self::plug("command", "actuator-command", &[("command", "command")]);
+
     /// A terminal whose members have to be the same on both sides.
     pub const fn plug(
         name: &'static str,

@@ -6,7 +6,7 @@ use controllers::hybrid::TrackingInput;
 use controllers::hybrid::linear_quadratic::{
     LinearQuadraticDesign, LinearQuadraticTracking as Law,
 };
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
+use fmu_kit::{Component, ComponentResult, Terminal, Variable};
 use plant::hybrid::{PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
 
@@ -35,36 +35,23 @@ impl Component for LinearQuadraticTracking {
     const DESCRIPTION: &'static str = "Linear quadratic Gaussian tracking control";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[("displacement", "desired_displacement")],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[("displacement", "measured_displacement")],
-        ),
-        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+        Terminal::DESIRED_DISPLACEMENT,
+        Terminal::MEASURED_DISPLACEMENT,
+        Terminal::ACTUATOR,
     ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 2] = ["desired_displacement", "measured_displacement"];
-        fmu_kit::table! { Self, s:
-            input("desired_displacement", s.input.desired, "Displacement that the numerical substructure wants", "m" => "mm")
-                .nominal(5e-3);
-            input("measured_displacement", s.input.measured, "Displacement of the specimen, as measured", "m" => "mm")
-                .nominal(5e-3);
-            output("command", s.command, "Command to the actuator", "m" => "mm")
-                .discrete().nominal(5e-3).depends_on(&INPUTS, Dependent);
+        let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
+        variables.extend(fmu_kit::table! { Self, s:
             parameter("command_weight", s.design.command_weight, "Weight of the command against the displacement error");
             parameter("command_noise", s.design.command_noise, "White noise on the command, one standard deviation", "m");
             parameter("disturbance_step", s.design.disturbance_step, "Step of the disturbance at the command a sample, one standard deviation", "m");
             parameter("measurement_noise", s.design.measurement_noise, "Noise of the measured displacement, one standard deviation", "m");
             parameter("lead_samples", s.design.lead, "Lead of the desired displacement, samples");
-        }
+        });
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {

@@ -5,7 +5,7 @@ use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::extrapolation::Extrapolation;
 use controllers::hybrid::model_inverse::ModelInverse as Law;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
+use fmu_kit::{Component, ComponentResult, Terminal, Variable};
 use plant::hybrid::TransferSystemParameters;
 use serde::{Deserialize, Serialize};
 
@@ -40,30 +40,16 @@ impl Component for ModelInverse {
     const DESCRIPTION: &'static str = "Tracking control by the inverse of a model, with PI";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[("displacement", "desired_displacement")],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[("displacement", "measured_displacement")],
-        ),
-        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+        Terminal::DESIRED_DISPLACEMENT,
+        Terminal::MEASURED_DISPLACEMENT,
+        Terminal::ACTUATOR,
     ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 2] = ["desired_displacement", "measured_displacement"];
-        fmu_kit::table! { Self, s:
-            input("desired_displacement", s.input.desired, "Displacement that the numerical substructure wants", "m" => "mm")
-                .nominal(5e-3);
-            input("measured_displacement", s.input.measured, "Displacement of the specimen, as measured", "m" => "mm")
-                .nominal(5e-3);
-            output("command", s.command, "Command to the actuator", "m" => "mm")
-                .discrete().nominal(5e-3).depends_on(&INPUTS, Dependent);
+        let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
+        variables.extend(fmu_kit::table! { Self, s:
             parameter("proportional_gain", s.proportional, "Proportional gain");
             parameter("integral_gain", s.integral, "Integral gain", "1/s");
             parameter("lead_samples", s.lead, "Lead of the desired displacement beside that of the held command, samples");
@@ -72,7 +58,8 @@ impl Component for ModelInverse {
             parameter("actuator_a3", s.plant.actuator_a3, "a3 of the model's actuator", "1/s");
             parameter("specimen_mass", s.plant.specimen_mass, "Mass of the model's specimen", "kg");
             parameter("specimen_stiffness", s.plant.specimen_stiffness, "Stiffness of the model's specimen", "N/m");
-        }
+        });
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {

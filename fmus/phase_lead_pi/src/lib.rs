@@ -4,7 +4,7 @@
 use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::phase_lead_pi::PhaseLeadPi as Law;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
+use fmu_kit::{Component, ComponentResult, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Tracking control by PI with phase lead.
@@ -32,30 +32,16 @@ impl Component for PhaseLeadPi {
     const DESCRIPTION: &'static str = "Tracking control by PI with phase lead";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[("displacement", "desired_displacement")],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[("displacement", "measured_displacement")],
-        ),
-        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+        Terminal::DESIRED_DISPLACEMENT,
+        Terminal::MEASURED_DISPLACEMENT,
+        Terminal::ACTUATOR,
     ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 2] = ["desired_displacement", "measured_displacement"];
-        fmu_kit::table! { Self, s:
-            input("desired_displacement", s.input.desired, "Displacement that the numerical substructure wants", "m" => "mm")
-                .nominal(5e-3);
-            input("measured_displacement", s.input.measured, "Displacement of the specimen, as measured", "m" => "mm")
-                .nominal(5e-3);
-            output("command", s.command, "Command to the actuator", "m" => "mm")
-                .discrete().nominal(5e-3).depends_on(&INPUTS, Dependent);
+        let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
+        variables.extend(fmu_kit::table! { Self, s:
             parameter("proportional_gain", s.start.proportional, "Proportional gain");
             parameter("integral_gain", s.start.integral, "Integral gain", "1/s");
             parameter("lead_gain", s.start.lead_gain, "Gain of the lead at high frequency");
@@ -63,7 +49,8 @@ impl Component for PhaseLeadPi {
             parameter("lead_pole", s.start.lead_pole, "Pole of the lead", "1/s");
             parameter("converter_quantum", s.start.converter.quantum, "Step of the converters, 0 for none", "m").min(0.0);
             parameter("converter_limit", s.start.converter.limit, "Limit of the converters, 0 for none", "m").min(0.0);
-        }
+        });
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {

@@ -4,7 +4,7 @@
 use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::robust_tracking::RobustTracking as Law;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
+use fmu_kit::{Component, ComponentResult, Terminal, Variable};
 use plant::hybrid::{PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
 
@@ -37,34 +37,21 @@ impl Component for RobustTracking {
     const DESCRIPTION: &'static str = "Tracking control by synthesised loop shaping";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[("displacement", "desired_displacement")],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[("displacement", "measured_displacement")],
-        ),
-        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+        Terminal::DESIRED_DISPLACEMENT,
+        Terminal::MEASURED_DISPLACEMENT,
+        Terminal::ACTUATOR,
     ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 2] = ["desired_displacement", "measured_displacement"];
-        fmu_kit::table! { Self, s:
-            input("desired_displacement", s.input.desired, "Displacement that the numerical substructure wants", "m" => "mm")
-                .nominal(5e-3);
-            input("measured_displacement", s.input.measured, "Displacement of the specimen, as measured", "m" => "mm")
-                .nominal(5e-3);
-            output("command", s.command, "Command to the actuator", "m" => "mm")
-                .discrete().nominal(5e-3).depends_on(&INPUTS, Dependent);
+        let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
+        variables.extend(fmu_kit::table! { Self, s:
             parameter("crossover", s.crossover, "Crossover of the weight's integrator", "rad/s");
             parameter("zero", s.zero, "Zero of the weight", "rad/s");
             parameter("lead_samples", s.lead, "Lead of the desired displacement, samples");
-        }
+        });
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {

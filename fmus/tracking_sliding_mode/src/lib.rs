@@ -4,7 +4,7 @@
 use controllers::Controller;
 use controllers::hybrid::TrackingInput;
 use controllers::hybrid::sliding_mode::TrackingSlidingMode as Law;
-use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
+use fmu_kit::{Component, ComponentResult, Terminal, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Tracking control by sliding mode.
@@ -40,36 +40,23 @@ impl Component for TrackingSlidingMode {
     const DESCRIPTION: &'static str = "Tracking control by sliding mode";
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
-        Terminal::bus(
-            "reference",
-            "reference",
-            &[("displacement", "desired_displacement")],
-        ),
-        Terminal::bus(
-            "measured",
-            "motion",
-            &[("displacement", "measured_displacement")],
-        ),
-        Terminal::plug("command", "actuator-command", &[("command", "command")]),
+        Terminal::DESIRED_DISPLACEMENT,
+        Terminal::MEASURED_DISPLACEMENT,
+        Terminal::ACTUATOR,
     ];
     const STEP_SIZE: f64 = plant::hybrid::PERIOD;
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 2] = ["desired_displacement", "measured_displacement"];
-        fmu_kit::table! { Self, s:
-            input("desired_displacement", s.input.desired, "Displacement that the numerical substructure wants", "m" => "mm")
-                .nominal(5e-3);
-            input("measured_displacement", s.input.measured, "Displacement of the specimen, as measured", "m" => "mm")
-                .nominal(5e-3);
-            output("command", s.command, "Command to the actuator", "m" => "mm")
-                .discrete().nominal(5e-3).depends_on(&INPUTS, Dependent);
+        let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
+        variables.extend(fmu_kit::table! { Self, s:
             parameter("rate", s.rate, "lambda", "1/s");
             parameter("reaching", s.reaching, "eta", "m/s2");
             parameter("boundary_layer", s.boundary_layer, "phi", "m/s");
             parameter("damping_uncertainty", s.damping_uncertainty, "beta_b").min(0.0);
             parameter("stiffness_uncertainty", s.stiffness_uncertainty, "beta_c").min(0.0);
-        }
+        });
+        variables
     }
 
     fn initialize(&mut self) -> ComponentResult {

@@ -162,13 +162,22 @@ fn truth_in_a_class(hidden: &BTreeSet<&str>, verdict: &Verdict) -> bool {
     })
 }
 
-/// Relative errors and whether the 95 % interval holds the truth, for every parameter of every
-/// effect named rightly. `convert` turns a value from one unit into another.
+/// How far an estimate is off.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ParameterError {
+    /// Against the truth.
+    pub relative: f64,
+    /// In its standard error.
+    pub deviate: f64,
+}
+
+/// The error of every parameter of every effect named rightly. `convert` turns a value from one unit
+/// into another.
 pub fn parameter_errors(
     truth: &Truth,
     verdict: &Verdict,
     convert: impl Fn(f64, &str, &str) -> Option<f64>,
-) -> Vec<(f64, bool)> {
+) -> Vec<ParameterError> {
     let mut errors = Vec::new();
     for hidden in &truth.effects {
         let Some(named) = verdict.effects.iter().find(|e| e.effect == hidden.effect) else {
@@ -185,7 +194,10 @@ pub fn parameter_errors(
                 continue;
             };
             let difference = (value - wanted.value).abs();
-            errors.push((difference / wanted.value.abs(), difference <= 1.96 * error));
+            errors.push(ParameterError {
+                relative: difference / wanted.value.abs(),
+                deviate: difference / error,
+            });
         }
     }
     errors

@@ -1,5 +1,8 @@
 //! What disturbs a rig and its sensors beside the hidden effect.
 
+use std::fmt;
+use std::str::FromStr;
+
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -19,6 +22,34 @@ pub enum World {
     Open,
     /// As the plain one with three times the noise and 2 % mismatch.
     Noisy,
+}
+
+impl World {
+    /// All of them with their names.
+    const NAMES: [(&str, World); 3] = [
+        ("plain", World::Plain),
+        ("open", World::Open),
+        ("noisy", World::Noisy),
+    ];
+}
+
+impl fmt::Display for World {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named = Self::NAMES.iter().find(|(_, world)| world == self);
+        f.write_str(named.map_or("", |(name, _)| name))
+    }
+}
+
+impl FromStr for World {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Self::NAMES.iter().find(|(name, _)| *name == text);
+        named.map(|(_, world)| *world).ok_or_else(|| {
+            let names = Self::NAMES.map(|(name, _)| name);
+            format!("`{text}` is unknown; expected {}", names.join(", "))
+        })
+    }
 }
 
 /// Standard deviations of displacement, acceleration, force, specimen acceleration, voltage.

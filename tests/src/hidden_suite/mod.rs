@@ -1,12 +1,15 @@
 //! The hidden-effect suite: fresh cases, the diagnosis of each, and what came of them.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
+mod calibration;
+mod tables;
+
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::UNIX_EPOCH;
 
-use hidden_effects::score::{Estimate, NamedEffect, names, outcome, parameter_errors, wilson};
+pub use calibration::{beside_each_other, picture};
+use hidden_effects::score::{Estimate, NamedEffect, ParameterError, outcome, parameter_errors};
 use hidden_effects::{Case, Kind, Outcome, Settings, Truth, Verdict, World};
 use identification::diagnosis::case::Case as Laboratory;
 use identification::diagnosis::engine::{self, Observer};
@@ -16,6 +19,7 @@ use shakebench::campaign::table::{Cell, Column, Kind as ColumnKind, Role};
 use shakebench::campaign::{self, Head, Progress, Row, Runs, Shard, carry_out};
 use shakebench::error::Error;
 use shakebench::master::Ending;
+pub use tables::{line, rates, table};
 
 /// How many cases of each kind, and from which seed.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,8 +59,8 @@ pub struct Scored {
     pub verdict: Verdict,
     /// Right, wrong or silent.
     pub outcome: Outcome,
-    /// Relative error of each parameter and whether its 95 % interval holds the truth.
-    pub errors: Vec<(f64, bool)>,
+    /// Of each parameter that was hidden and named.
+    pub errors: Vec<ParameterError>,
     /// Seconds of one core that the diagnosis took.
     pub seconds: f64,
     /// The diagnosis's sentence, or why it refused.
@@ -147,6 +151,28 @@ pub fn as_scored(diagnosis: &Diagnosis) -> Verdict {
 }
 
 impl Plan {
+    /// The kinds of cases, in words and by name.
+    pub const KINDS: [(&str, &str); 4] = [
+        ("one effect", "one"),
+        ("two effects", "two"),
+        ("nothing hidden", "nothing"),
+        ("outside the catalogue", "outside"),
+    ];
+
+    /// The same plan in a world, with that world's noise and mismatch.
+    #[must_use]
+    pub fn set_in(self, world: World) -> Self {
+        if world == World::Noisy {
+            return Self {
+                world,
+                noise: vec![3.0],
+                mismatch: vec![0.02],
+                ..self
+            };
+        }
+        Self { world, ..self }
+    }
+
     /// Kind and settings of the case of a number.
     fn case(&self, number: u64) -> Option<(&'static str, Settings)> {
         let number = usize::try_from(number).ok()?;
@@ -174,11 +200,12 @@ impl Plan {
     }
 
     fn kinds(&self) -> [(&'static str, Kind, usize); 4] {
+        let [one, two, nothing, outside] = Self::KINDS.map(|(_, name)| name);
         [
-            ("one", self.effect.map_or(Kind::One, Kind::This), self.one),
-            ("two", Kind::Two, self.two),
-            ("nothing", Kind::Nothing, self.nothing),
-            ("outside", Kind::Outside, self.outside),
+            (one, self.effect.map_or(Kind::One, Kind::This), self.one),
+            (two, Kind::Two, self.two),
+            (nothing, Kind::Nothing, self.nothing),
+            (outside, Kind::Outside, self.outside),
         ]
     }
 }
@@ -271,195 +298,6 @@ pub fn run_all(
         .collect())
 }
 
-/// Rates with Wilson intervals by kind, strength and excitation, parameter errors, coverage, time
-/// and every case that is not right.
-pub fn table(results: &[Scored]) -> String {
-    let mut text = String::new();
-    let _ = writeln!(
-        text,
-        "{:<34}{:>6}{:>7}{:>7}{:>8}   right, 95 % interval",
-        "cases", "all", "right", "wrong", "silent"
-    );
-    let mut row = |name: &str, filter: &dyn Fn(&Scored) -> bool| {
-        let chosen: Vec<&Scored> = results.iter().filter(|r| filter(r)).collect();
-        if chosen.is_empty() {
-            return;
-        }
-        let count = |o: Outcome| chosen.iter().filter(|r| r.outcome == o).count();
-        let (right, wrong) = (count(Outcome::Right), count(Outcome::Wrong));
-        let (low, high) = wilson(right, chosen.len());
-        let _ = writeln!(
-            text,
-            "{name:<34}{:>6}{right:>7}{wrong:>7}{:>8}   {:.1} to {:.1} %",
-            chosen.len(),
-            count(Outcome::Silent),
-            100.0 * low,
-            100.0 * high
-        );
-    };
-    row("all", &|_| true);
-    for kind in ["one", "two", "nothing", "outside"] {
-        row(kind, &|r| r.kind == kind);
-    }
-    for (name, low, high) in [
-        ("weak (lower third)", 0.0, 0.33),
-        ("middling", 0.33, 0.67),
-        ("strong", 0.67, 1.01),
-    ] {
-        row(&format!("strength: {name}"), &|r| {
-            r.truth.strength.is_some_and(|s| (low..high).contains(&s))
-        });
-    }
-    for excitation in hidden_effects::excitation::EXCITATIONS {
-        row(&format!("identified on: {excitation:?}"), &|r| {
-            r.truth.excitation.first() == Some(&excitation)
-        });
-    }
-    for usual in [true, false] {
-        let name = if usual { "the usual" } else { "others" };
-        row(&format!("forms of the effects: {name}"), &|r| {
-            r.truth.usual_form == usual && matches!(r.kind.as_str(), "one" | "two")
-        });
-    }
-    let distinct = |value: fn(&Truth) -> f64| {
-        let mut values: Vec<f64> = results.iter().map(|r| value(&r.truth)).collect();
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        values
-    };
-    for noise in distinct(|truth| truth.noise) {
-        row(&format!("noise: {noise} times"), &|r| {
-            r.truth.noise == noise
-        });
-    }
-    for mismatch in distinct(|truth| truth.mismatch) {
-        row(&format!("mismatch: {} %", 100.0 * mismatch), &|r| {
-            r.truth.mismatch == mismatch
-        });
-    }
-    let outside: BTreeSet<&str> = results
-        .iter()
-        .filter_map(|r| r.truth.outside.as_deref())
-        .collect();
-    for kind in outside {
-        row(&format!("outside: {kind}"), &|r| {
-            r.truth.outside.as_deref() == Some(kind)
-        });
-    }
-    let mut by_effect: BTreeMap<&str, Vec<&Scored>> = BTreeMap::new();
-    for scored in results.iter().filter(|r| r.kind == "one") {
-        for effect in &scored.truth.effects {
-            by_effect.entry(&effect.effect).or_default().push(scored);
-        }
-    }
-    for effect in by_effect.keys() {
-        row(effect, &|r| {
-            r.kind == "one" && r.truth.effects[0].effect == *effect
-        });
-    }
-
-    let mut errors: Vec<f64> = results
-        .iter()
-        .flat_map(|r| &r.errors)
-        .map(|e| e.0)
-        .collect();
-    errors.sort_by(f64::total_cmp);
-    let mut seconds: Vec<f64> = results.iter().map(|r| r.seconds).collect();
-    seconds.sort_by(f64::total_cmp);
-    if !errors.is_empty() {
-        let held = results
-            .iter()
-            .flat_map(|r| &r.errors)
-            .filter(|e| e.1)
-            .count();
-        let (low, high) = wilson(held, errors.len());
-        let _ = writeln!(
-            text,
-            "\nparameter error: median {:.2} %, 90th percentile {:.1} % ({} parameters)\n\
-             95 % intervals that hold the truth: {:.1} % ({:.1} to {:.1})",
-            100.0 * quantile(&errors, 0.5),
-            100.0 * quantile(&errors, 0.9),
-            errors.len(),
-            100.0 * held as f64 / errors.len() as f64,
-            100.0 * low,
-            100.0 * high
-        );
-    }
-    if !seconds.is_empty() {
-        let _ = writeln!(
-            text,
-            "seconds of one core a case: median {:.1}, longest {:.1}",
-            quantile(&seconds, 0.5),
-            quantile(&seconds, 1.0)
-        );
-    }
-    text.push_str(&reliability(results));
-    text.push_str(&confusions(results));
-    for scored in results.iter().filter(|r| r.outcome != Outcome::Right) {
-        let _ = writeln!(text, "{}", line(scored));
-    }
-    text
-}
-
-/// Bounds of the confidences that are counted together.
-const SURE: [f64; 6] = [0.0, 0.5, 0.9, 0.99, 0.999, 1.0];
-
-/// Of the effects named with a confidence, how many are there.
-fn reliability(results: &[Scored]) -> String {
-    let all: Vec<(f64, bool)> = results
-        .iter()
-        .flat_map(|scored| names(&scored.truth, &scored.verdict))
-        .collect();
-    let mut text = String::from("\nconfidence -> named, there, 95 % interval\n");
-    for bounds in SURE.windows(2) {
-        let last = bounds[1] == 1.0;
-        let within = |sure: f64| bounds[0] <= sure && (sure < bounds[1] || last);
-        let own: Vec<&(f64, bool)> = all.iter().filter(|(sure, _)| within(*sure)).collect();
-        if own.is_empty() {
-            continue;
-        }
-        let there = own.iter().filter(|(_, there)| *there).count();
-        let mean = own.iter().map(|(sure, _)| sure).sum::<f64>() / own.len() as f64;
-        let (low, high) = wilson(there, own.len());
-        let _ = writeln!(
-            text,
-            "{} to {} (mean {mean:.4}) -> {}, {there}, {:.1} to {:.1} %",
-            bounds[0],
-            bounds[1],
-            own.len(),
-            100.0 * low,
-            100.0 * high
-        );
-    }
-    text
-}
-
-/// The confusion matrix without its zeros: what was hidden, what was said, how often.
-fn confusions(results: &[Scored]) -> String {
-    let mut counts: BTreeMap<(String, String), usize> = BTreeMap::new();
-    for scored in results {
-        let mut said: Vec<&str> = scored
-            .verdict
-            .effects
-            .iter()
-            .map(|e| e.effect.as_str())
-            .collect();
-        said.sort_unstable();
-        let said = match scored.verdict.verdict.as_str() {
-            "named" => said.join(" + "),
-            "ambiguous" => format!("one of several, such as {}", said.join(" + ")),
-            "" => "refused".into(),
-            other => other.to_string(),
-        };
-        *counts.entry((hidden(&scored.truth), said)).or_default() += 1;
-    }
-    let mut text = String::from("\nhidden -> said: cases\n");
-    for ((hidden, said), count) in counts {
-        let _ = writeln!(text, "{hidden} -> {said}: {count}");
-    }
-    text
-}
-
 /// Names of what was hidden.
 fn hidden(truth: &Truth) -> String {
     let mut names: Vec<&str> = truth.effects.iter().map(|e| e.effect.as_str()).collect();
@@ -469,53 +307,4 @@ fn hidden(truth: &Truth) -> String {
     } else {
         names.join(" + ")
     }
-}
-
-/// One case in one line: what was hidden and what was said.
-pub fn line(scored: &Scored) -> String {
-    let named: Vec<&str> = scored
-        .verdict
-        .effects
-        .iter()
-        .map(|e| e.effect.as_str())
-        .collect();
-    format!(
-        "seed {} {:?}: hidden {} {}(strength {:.2}, {:?}{}), said {} {named:?} {:?}",
-        scored.seed,
-        scored.outcome,
-        hidden(&scored.truth),
-        scored
-            .truth
-            .outside
-            .as_ref()
-            .map(|o| format!("[{o}] "))
-            .unwrap_or_default(),
-        scored.truth.strength.unwrap_or(0.0),
-        scored.truth.excitation,
-        if scored.truth.usual_form {
-            ""
-        } else {
-            ", another form"
-        },
-        if scored.verdict.verdict.is_empty() {
-            &scored.sentence
-        } else {
-            &scored.verdict.verdict
-        },
-        scored.verdict.alternatives,
-    )
-}
-
-/// The outcome rates of a kind: right and wrong as fractions.
-pub fn rates(results: &[Scored], kind: &str) -> (f64, f64) {
-    let chosen: Vec<&Scored> = results.iter().filter(|r| r.kind == kind).collect();
-    let share = |o: Outcome| {
-        chosen.iter().filter(|r| r.outcome == o).count() as f64 / chosen.len().max(1) as f64
-    };
-    (share(Outcome::Right), share(Outcome::Wrong))
-}
-
-fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let last = sorted.len() - 1;
-    sorted[((last as f64 * share).round() as usize).min(last)]
 }
