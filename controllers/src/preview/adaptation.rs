@@ -97,6 +97,9 @@ impl Default for AdaptationState {
     }
 }
 
+/// Time for which an error of the model of the specimen lasts, s: so many samples tell as much as one. Without it the
+/// estimates lurch for the first seconds, while the models have yet to forget that they began as others.
+const ERRORS_LAST: f64 = 0.1;
 /// Step of a logarithm for the gradient.
 const PROBE: f64 = 0.05;
 /// Estimates stay between half and twice what is known.
@@ -163,10 +166,12 @@ impl AdaptationState {
 
     fn learn_shape(&mut self, settings: &Adaptation, g: [f64; 2], error: f64, period: f64) {
         let variance = settings.spread * settings.spread;
-        let noise = settings.acceleration_noise * settings.acceleration_noise / variance;
-        if g[0] * g[0] + g[1] * g[1] < noise {
+        let gate = settings.acceleration_noise * settings.acceleration_noise / variance;
+        if g[0] * g[0] + g[1] * g[1] < gate {
             return;
         }
+        let alike = (ERRORS_LAST / period).max(1.0);
+        let noise = alike * gate;
         let p = &mut self.shape_covariance;
         let pg = [0, 1].map(|i| p[i][0] * g[0] + p[i][1] * g[1]);
         let all = noise + g[0] * pg[0] + g[1] * pg[1];

@@ -67,7 +67,7 @@ pub struct Parameters {
     pub rig: RigModel,
     /// Forces on its table.
     pub load: KnownLoad,
-    /// How the specimen is learnt while the motion goes on, if it is. For [`Role::Control`].
+    /// How the specimen is learnt while the motion goes on, if it is. Not for [`Role::MultiMetric`].
     pub adaptation: Option<Adaptation>,
     /// Whether the motion ahead is known; else it is extrapolated.
     pub preview: bool,
@@ -356,9 +356,7 @@ impl Controller for PreviewControl {
         if self.parameters.role == Role::MultiMetric {
             return self.multi_metric(input);
         }
-        if self.parameters.role == Role::Control {
-            self.adapt(input);
-        }
+        self.adapt(input);
         self.look_ahead(&input.reference);
         let limit = self.parameters.limit;
         let compensates = self.parameters.role == Role::Compensation;

@@ -29,7 +29,7 @@ macro_rules! part {
 }
 
 /// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 18] = [
+const CONTROLLERS: [Part; 19] = [
     part!("", "displacement-pid"),
     part!("", "three-variable"),
     part!("", "loop-shaping"),
@@ -48,6 +48,7 @@ const CONTROLLERS: [Part; 18] = [
     part!("", "receding-horizon"),
     part!("", "adaptive-inverse"),
     part!("", "adaptive-preview"),
+    part!("", "adaptive-mpc"),
 ];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [

@@ -130,7 +130,7 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
     let Some(folder) = records() else { return };
     let records = folder.display().to_string();
     let (status, json, said) = compare(&["--specimen", "yielding", "--records", &records]);
-    holds_its_order(&json, status, &said, 18);
+    holds_its_order(&json, status, &said, 19);
     // Stated in docs/physical-rig.md, docs/preview-control.md and docs/published-methods.md.
     for (controller, largest) in [
         ("preview", 1.5),
@@ -146,9 +146,22 @@ fn the_eight_records_with_the_yielding_specimen_keep_the_order() {
         ("multiple-surface", 5.0),
         ("dynamic-surface", 6.5),
         ("adaptive-inverse", 6.0),
-        ("adaptive-preview", 1.5),
+        ("adaptive-preview", 0.85),
+        ("adaptive-mpc", 1.8),
     ] {
         assert!(median(&json, controller) < largest, "{controller}");
+    }
+    // Who learns never loses to who does not.
+    let rows = json["rows"].as_array().unwrap();
+    let error = |controller: &str, row: &Value| {
+        let own = |r: &&Value| r["controller"] == controller && r["record"] == row["record"];
+        rows.iter().find(own).unwrap()["time_domain_percent"]
+            .as_f64()
+            .unwrap()
+    };
+    for row in rows.iter().filter(|row| row["controller"] == "preview") {
+        let (learns, does_not) = (error("adaptive-preview", row), error("preview", row));
+        assert!(learns < does_not, "{}: {learns} {does_not}", row["record"]);
     }
 }
 
