@@ -25,6 +25,7 @@ pub struct Fit {
 }
 
 /// Derivatives of the residuals by coordinates of a point.
+#[derive(Debug, Clone)]
 pub struct Jacobian {
     columns: Vec<Vec<f64>>,
     gram: DMatrix<f64>,

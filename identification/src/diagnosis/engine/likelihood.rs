@@ -45,6 +45,7 @@ pub(super) const ROUNDS: usize = 12;
 pub(super) const SETTLED: f64 = 0.003;
 
 /// A fitted model with its derivatives.
+#[derive(Clone)]
 pub struct Hypothesis {
     /// The fit.
     pub fit: Fit,
@@ -122,6 +123,17 @@ pub struct PenalisedLikelihood<'a, M: ExtensibleModel> {
     pub records: Vec<usize>,
     /// Who is told of every fit.
     pub observer: Observer<'a>,
+}
+
+impl<'a, M: ExtensibleModel> PenalisedLikelihood<'a, M> {
+    /// Of `model` on some records.
+    pub fn of(model: &'a M, records: &[usize], observer: Observer<'a>) -> Self {
+        Self {
+            model,
+            records: records.to_vec(),
+            observer,
+        }
+    }
 }
 
 impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {

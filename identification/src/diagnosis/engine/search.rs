@@ -33,6 +33,7 @@ pub trait Selection {
 }
 
 /// What a search found.
+#[derive(Clone)]
 pub struct Found<H> {
     /// The nominal model.
     pub nominal: H,

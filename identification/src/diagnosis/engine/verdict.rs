@@ -146,7 +146,7 @@ fn names<M: ExtensibleModel>(model: &M, hypothesis: &Hypothesis) -> Vec<&'static
 /// The search begins with what the quiet records show of the noises, where they show it. What is there of
 /// an effect at low level is then partly taken for noise, until the search has found it; where it names
 /// nothing, the search is made with the assumed noises as well, and that counts.
-pub fn judge<M: ExtensibleModel>(
+pub fn judge<M: ExtensibleModel + Clone>(
     model: &mut M,
     fitted: &[usize],
     held_out: &[usize],
@@ -155,18 +155,16 @@ pub fn judge<M: ExtensibleModel>(
     let quiet = model.quiet_records(fitted);
     if let Some((lesson, is_noise)) = learned_at_rest(model, &quiet) {
         tell(observer, &lesson);
-        let concluded = concluded(&lesson.model, fitted, held_out, observer);
-        if let Some((judgement, learned)) = concluded
+        let models = [&lesson.model, &*model];
+        if let Some((judgement, learned)) = concluded(&models, fitted, held_out, observer)
             && (is_noise || judgement.verdict == Verdict::Named)
         {
-            *model = learned.unwrap_or(lesson.model);
+            *model = learned;
             return Some(judgement);
         }
     }
-    let (judgement, learned) = concluded(model, fitted, held_out, observer)?;
-    if let Some(learned) = learned {
-        *model = learned;
-    }
+    let (judgement, learned) = concluded(&[&*model], fitted, held_out, observer)?;
+    *model = learned;
     Some(judgement)
 }
 
@@ -177,18 +175,18 @@ fn tell<M>(observer: Observer<'_>, lesson: &Lesson<M>) {
     });
 }
 
-/// A search from the noises that `model` assumes, with those that were learned after it.
-fn concluded<M: ExtensibleModel>(
-    model: &M,
+/// A search from the noises that the first of `models` assumes, then with those that were learned after it;
+/// the judgement and the model with its noises. What is adequate with noises that were assumed is adequate,
+/// whatever was learned after: where that leaves something over, what was found is weighed with those of
+/// `models` as well.
+fn concluded<M: ExtensibleModel + Clone>(
+    models: &[&M],
     fitted: &[usize],
     held_out: &[usize],
     observer: Observer<'_>,
-) -> Option<(Judgement, Option<M>)> {
-    let mut found = search(&mut PenalisedLikelihood {
-        model,
-        records: fitted.to_vec(),
-        observer,
-    })?;
+) -> Option<(Judgement, M)> {
+    let model = *models.first()?;
+    let mut found = search(&mut PenalisedLikelihood::of(model, fitted, observer))?;
     let mut learned: Option<M> = None;
     for _ in 0..LESSONS {
         let current = learned.as_ref().unwrap_or(model);
@@ -199,19 +197,29 @@ fn concluded<M: ExtensibleModel>(
         if lesson.gain < NEWS || !lesson.is_believable {
             break;
         }
-        let mut again = PenalisedLikelihood {
-            model: &lesson.model,
-            records: fitted.to_vec(),
-            observer,
-        };
+        let mut again = PenalisedLikelihood::of(&lesson.model, fitted, observer);
         let Some(next) = searched_again(&mut again, &found) else {
             break;
         };
         found = next;
         learned = Some(lesson.model);
     }
-    let judgement = weigh(learned.as_ref().unwrap_or(model), found, fitted, held_out);
-    Some((judgement, learned))
+    let last = learned.as_ref().unwrap_or(model);
+    let judgement = weigh(last, found.clone(), fitted, held_out);
+    if judgement.verdict != Verdict::Unexplained {
+        return Some((judgement, last.clone()));
+    }
+    let assumed = models.iter().skip(usize::from(learned.is_none()));
+    let explained = assumed.copied().find_map(|model| {
+        let mut selection = PenalisedLikelihood::of(model, fitted, observer);
+        let earlier = selection.refitted(&found)?;
+        let best = earlier.best.as_ref().unwrap_or(&earlier.nominal);
+        let near = best.mean_square() < NEAR_NOISE;
+        let again = near.then(|| resumed(&mut selection, earlier))??;
+        let again = weigh(model, again, fitted, held_out);
+        (again.verdict != Verdict::Unexplained).then(|| (again, model.clone()))
+    });
+    Some(explained.unwrap_or_else(|| (judgement, last.clone())))
 }
 
 /// The noises that the `quiet` records show under the nominal model, and whether with them nothing but
@@ -221,15 +229,7 @@ fn learned_at_rest<M: ExtensibleModel>(model: &M, quiet: &[usize]) -> Option<(Le
     if quiet.is_empty() {
         return None;
     }
-    let fitted = |model: &M| {
-        let records = quiet.to_vec();
-        PenalisedLikelihood {
-            model,
-            records,
-            observer: Observer::none(),
-        }
-        .nominal()
-    };
+    let fitted = |model: &M| PenalisedLikelihood::of(model, quiet, Observer::none()).nominal();
     let before = fitted(model)?.fit;
     let lesson = model.with_learned_noise(&before.point, &before.residuals, quiet)?;
     if lesson.gain < NEWS || !lesson.is_believable {
