@@ -154,15 +154,23 @@ fn the_press_has_delay_and_unequal_areas() {
     let Some(report) = report("servohydraulic_press") else {
         return;
     };
-    names(&report, &["delay", "asymmetric_gain", "shared_disturbance"]);
+    names(
+        &report,
+        &[
+            "delay",
+            "asymmetric_gain",
+            "reduced_null_gain",
+            "shared_disturbance",
+        ],
+    );
     assert_eq!(report.verdict, Verdict::Named);
     assert!(
-        report.as_described.extended_error < 0.034,
+        report.as_described.extended_error < 0.03,
         "{}",
         report.as_described.extended_error
     );
     assert!(
-        report.swapped.extended_error < 0.034,
+        report.swapped.extended_error < 0.03,
         "{}",
         report.swapped.extended_error
     );
@@ -221,8 +229,8 @@ fn the_coupon_hardens() {
 }
 
 #[test]
-#[ignore = "minutes, and not reached or not seen since rigs are fitted by least squares"]
-fn open_four_more_milliseconds_of_delay_are_found_on_the_press() {
+#[ignore = "minutes"]
+fn four_more_milliseconds_of_delay_are_found_on_the_press() {
     let Some((description, measurement)) = rig("servohydraulic_press") else {
         return;
     };
@@ -261,8 +269,8 @@ fn open_a_bent_transducer_is_found_on_the_press() {
 }
 
 #[test]
-#[ignore = "minutes, and not reached or not seen since rigs are fitted by least squares"]
-fn open_viscous_friction_put_on_the_damper_is_found() {
+#[ignore = "minutes"]
+fn viscous_friction_put_on_the_damper_is_found() {
     let Some((description, measurement)) = rig("friction_damper_one_inch") else {
         return;
     };
@@ -281,8 +289,8 @@ fn open_viscous_friction_put_on_the_damper_is_found() {
 }
 
 #[test]
-#[ignore = "minutes, and not reached or not seen since rigs are fitted by least squares"]
-fn open_a_delay_put_on_the_damper_is_found() {
+#[ignore = "minutes"]
+fn a_delay_put_on_the_damper_is_found() {
     let Some((description, measurement)) = rig("friction_damper_one_inch") else {
         return;
     };
@@ -303,8 +311,8 @@ fn open_a_delay_put_on_the_damper_is_found() {
 }
 
 #[test]
-#[ignore = "minutes, and not reached or not seen since rigs are fitted by least squares"]
-fn open_misalignment_put_on_the_drive_is_found() {
+#[ignore = "minutes"]
+fn misalignment_put_on_the_drive_is_found() {
     let Some((description, measurement)) = rig("positioning_drive") else {
         return;
     };
@@ -383,7 +391,7 @@ fn put_on_top(
 }
 
 #[test]
-#[ignore = "minutes, and not reached or not seen since rigs are fitted by least squares"]
+#[ignore = "named by every part, but 0.201 +- 0.032 where 0.15 was put on top of a coupon whose own is not known"]
 fn open_a_strength_differential_put_on_the_coupon_is_found() {
     let Some((description, measurement)) = rig("steel_coupon") else {
         return;

@@ -195,7 +195,8 @@ impl<'a> Carriage<'a> {
                 self.load_position += h * self.load_speed;
                 drive += pull;
             }
-            let mut level = coulomb * (1.0 + slope * (self.position - self.middle));
+            // Farther out than the records went it does not drive.
+            let mut level = coulomb * (1.0 + slope * (self.position - self.middle)).max(0.0);
             if excess != 0.0 {
                 level *= 1.0 + excess * (-self.speed.abs() / slow).exp();
             }
@@ -286,4 +287,33 @@ pub fn start_speed(positions: &[f64], sample: f64) -> f64 {
         bottom += (i as f64 - middle).powi(2);
     }
     top / bottom / sample
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::EffectTable;
+    use super::*;
+
+    #[test]
+    fn friction_that_falls_along_the_travel_never_drives() {
+        // At 2 m the line through the fitted travel would be at minus the Coulomb friction.
+        let mut effects = Effects::off().unwrap();
+        effects.position_dependent_friction.slope = -1.0;
+        let mechanics = Mechanics {
+            mass: 1.0,
+            viscous: 0.1,
+            coulomb: 5.0,
+            offset: 0.0,
+            force_gain: 1.0,
+        };
+        let mut carriage = Carriage::new(mechanics, &effects, 1e-3, (2.0, 0.1), &[]);
+        for _ in 0..2000 {
+            carriage.advance(0.0);
+        }
+        assert!(
+            carriage.speed >= 0.0 && carriage.speed < 0.1,
+            "{}",
+            carriage.speed
+        );
+    }
 }

@@ -6,7 +6,7 @@
 //!
 //! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
 
-use super::table::{effects, nominal_parameters, session_parameters, size};
+use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Equations, Natural, RigRecording};
 use crate::data::Channel;
 
@@ -46,7 +46,13 @@ effects! {
     /// Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
     dead_band: DeadBand {
         half_width: size("m", 3e-3, (0.0, 3.0)),
-    } from [[0.02], [0.15]];
+    } from [[0.02], [0.15]], like ["reduced_null_gain"];
+    /// Lands that overlap and leak, so that the flow gain is lower around null (higher where
+    /// they underlap): x' = K (e - s w tanh(e / w)) (Merritt 1967, section 5-2).
+    reduced_null_gain: ReducedNullGain {
+        reduction: size("1", 0.05, (-1.0, 1.0)),
+        width: shape("m", 0.1, 1.0),
+    } from [[0.4, 0.1], [-0.3, 0.1]], like ["dead_band"];
     /// Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
     /// of Hydraulic Servosystems, 1980).
     asymmetric_gain: AsymmetricGain {
@@ -110,6 +116,7 @@ impl Equations for ClosedLoopActuator {
             dead_band: DeadBand {
                 half_width: dead_band,
             },
+            reduced_null_gain: null,
             asymmetric_gain: AsymmetricGain { asymmetry },
             valve_lag: ValveLag {
                 time_constant: valve,
@@ -147,7 +154,10 @@ impl Equations for ClosedLoopActuator {
         let slope = |[u, x, w]: [f64; 3], r: f64| {
             let u_now = if command_pole > 0.0 { u } else { r };
             let error = u_now - x;
-            let open = (error.abs() - dead_band).max(0.0).copysign(error);
+            let mut open = (error.abs() - dead_band).max(0.0).copysign(error);
+            if null.reduction != 0.0 {
+                open -= null.reduction * null.width * (error / null.width).tanh();
+            }
             let flow = gain * (open + asymmetry * open.abs());
             let flow = flow / (1.0 + compression * flow.abs());
             let moving = if valve_pole > 0.0 { w } else { flow };
@@ -228,5 +238,39 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn around_null_the_loop_is_slower_and_far_from_it_as_ever() {
+        // A step: half the gain while the error is small against the width of null.
+        let (gain, rate, n) = (40.0, 1000.0, 60);
+        let moved = |step: f64, at: usize| {
+            let command: Vec<f64> = (0..n).map(|k| if k > 0 { step } else { 0.0 }).collect();
+            let channels = vec![(COMMAND, command), (Channel::Displacement, vec![0.0; n])];
+            let recording = Recording::new("step", 1.0 / rate, channels).unwrap();
+            let recording =
+                RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
+            let nominal = Nominal {
+                loop_gain: gain,
+                command_lag: 0.0,
+                scale: 1.0,
+                offset: 0.0,
+            };
+            let effects = Effects {
+                reduced_null_gain: ReducedNullGain {
+                    reduction: 0.5,
+                    width: 1e-4,
+                },
+                ..Effects::off().unwrap()
+            };
+            let mut out = vec![0.0; n];
+            let session = Session::default();
+            ClosedLoopActuator.simulate(&recording, &nominal, &effects, &session, &mut out);
+            out[at] / step
+        };
+        // The command rises over the first sample.
+        let closed = |gain: f64, at: usize| 1.0 - (-gain * (at as f64 - 0.5) / rate).exp();
+        assert!((moved(1e-6, 50) - closed(0.5 * gain, 50)).abs() < 1e-3);
+        assert!((moved(1.0, 50) - closed(gain, 50)).abs() < 1e-3);
     }
 }

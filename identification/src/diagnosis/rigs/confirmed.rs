@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part, file};
-use crate::diagnosis::engine::resampling::gain_interval;
+use crate::data::mean_and_deviation;
+use crate::diagnosis::engine::resampling::{correlation_time, gain_interval};
 use crate::diagnosis::engine::{Point, Role, all_errors, completed, estimates, refit};
 use crate::diagnosis::report::ends_or_not_a_number;
 
@@ -15,6 +16,8 @@ use crate::diagnosis::report::ends_or_not_a_number;
 const DIFFERS: f64 = 3.5;
 /// A refitted nominal parameter is surprising where it lies this many stated deviations off.
 const SURPRISING: f64 = 3.0;
+/// Standard deviations of an interval of 95 %.
+const CLEAR: f64 = 1.96;
 /// Samples that a file must bring to be fitted by itself.
 const FEWEST: usize = 500;
 
@@ -50,9 +53,17 @@ pub struct Confirmed {
 /// An effect with a reason why it is not named.
 pub(super) type Refused = (usize, String);
 
-/// Why an effect of `point` is not to be named: a size at its bound, or no size whose interval of 95 %
-/// leaves zero out.
-pub(super) fn unfit<M: InParts>(measured: &M, point: &Point, deviations: &[f64]) -> Vec<Refused> {
+/// Why effects of `point`, fitted to `record`, are not to be named: a size at its bound, or sizes of
+/// which none differs from zero. Where standard errors do not show that one does, since its parameters
+/// or others make up for each other or stand near where they must end, the effect itself is tested: its
+/// interval by the profile of the likelihood (Venzon and Moolgavkar, Applied Statistics 37, 1988)
+/// holds zero where the fit without it is as good.
+pub(super) fn unfit<M: InParts>(
+    measured: &M,
+    point: &Point,
+    deviations: &[f64],
+    record: usize,
+) -> Vec<Refused> {
     let mut refused = Vec::new();
     let mut place = point.nuisance.len();
     for (index, internal) in &point.effects {
@@ -63,7 +74,7 @@ pub(super) fn unfit<M: InParts>(measured: &M, point: &Point, deviations: &[f64])
             place += 1;
             if !matches!(parameter.role, Role::Shape { .. }) {
                 sizes = true;
-                clear |= q.abs() > 1.96 * error;
+                clear |= q.abs() > CLEAR * error;
             }
         }
         let bound = candidate.bound(internal).map(|parameter| {
@@ -78,7 +89,7 @@ pub(super) fn unfit<M: InParts>(measured: &M, point: &Point, deviations: &[f64])
         });
         if let Some(reason) = bound {
             refused.push((*index, reason));
-        } else if sizes && !clear {
+        } else if sizes && !clear && !is_missed(measured, point, *index, record) {
             refused.push((
                 *index,
                 "the 95 % interval of its size holds zero".to_owned(),
@@ -86,6 +97,32 @@ pub(super) fn unfit<M: InParts>(measured: &M, point: &Point, deviations: &[f64])
         }
     }
     refused
+}
+
+/// Whether the fit to `record` without an effect is worse by more than chance.
+fn is_missed<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize) -> bool {
+    let mut without = point.clone();
+    without.effects.retain(|(index, _)| *index != effect);
+    let Some((without, _)) = refit(measured, &without, record) else {
+        return false;
+    };
+    let after = all_errors(measured, point, record);
+    let before = all_errors(measured, &without.point, record);
+    clearly_better(&before, &after)
+}
+
+/// Whether the squared errors `after` are smaller than those `before` by more than chance, correlated
+/// samples counted once: by the ratio of the likelihoods, or, where slow drift in both hides that, by the
+/// differences (Vuong, Econometrica 57, 1989; for nested models half the root of the ratio's chi-square
+/// at most).
+fn clearly_better(before: &[f64], after: &[f64]) -> bool {
+    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
+    let independent = |values: &[f64]| values.len() as f64 / correlation_time(values);
+    let ratio = independent(after) * (squares(before) / squares(after)).ln();
+    let pairs = before.iter().zip(after);
+    let differences: Vec<f64> = pairs.map(|(b, a)| b * b - a * a).collect();
+    let (mean, deviation) = mean_and_deviation(&differences);
+    ratio > CLEAR * CLEAR || mean > CLEAR * deviation / independent(&differences).sqrt()
 }
 
 /// Parameters of the effects at `point` with standard errors, under the model's names.
@@ -162,10 +199,15 @@ pub(super) fn confirm<M: InParts>(
     let mut start = start.clone();
     let fits = loop {
         let fits = fits(measured, &start)?;
-        let mut out = Vec::new();
-        for (point, deviations) in [&fits.everything, &fits.parts[0], &fits.parts[1]] {
-            out.extend(unfit(measured, point, deviations));
-        }
+        let all = [
+            (&fits.everything, EVERYTHING),
+            (&fits.parts[0], Part::Fitted as usize),
+            (&fits.parts[1], Part::LeftOut as usize),
+        ];
+        let out: Vec<Refused> = all
+            .into_iter()
+            .flat_map(|((point, deviations), record)| unfit(measured, point, deviations, record))
+            .collect();
         if out.is_empty() {
             break fits;
         }
@@ -322,5 +364,31 @@ fn surprises<M: InParts>(
                 unit = value.unit,
             ));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn a_gain_all_along_is_clear_and_one_by_chance_or_of_a_slow_drift_is_not() {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let noise: Vec<f64> = (0..2000).map(|_| random.random_range(-1.0..1.0)).collect();
+        let wave = |k: usize| 0.3 * (0.05 * k as f64).sin();
+        let with = |more: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            let all = noise.iter().enumerate();
+            all.map(|(k, e)| e + more(k)).collect()
+        };
+        assert!(clearly_better(&with(&wave), &noise));
+        assert!(!clearly_better(&noise, &with(&wave)));
+        let chance = |k: usize| 1e-3 * wave(k);
+        assert!(!clearly_better(&with(&chance), &noise));
+        // A drift that is few samples in truth.
+        let drift: Vec<f64> = (0..2000).map(|k| (2e-3 * f64::from(k)).sin()).collect();
+        let shifted: Vec<f64> = drift.iter().map(|e| e + 0.05).collect();
+        assert!(!clearly_better(&shifted, &drift));
     }
 }

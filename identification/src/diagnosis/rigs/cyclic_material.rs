@@ -189,8 +189,12 @@ impl Equations for CyclicMaterial {
                 stride = (next - now).abs();
                 let legs = [if missed { peak } else { now }, next];
                 if interpolated {
-                    let mut ahead = state;
-                    let path = ahead.walk(now, legs, compliance, f64::INFINITY).0;
+                    let path = if compliance == 0.0 {
+                        (legs[0] - now).abs() + (legs[1] - legs[0]).abs()
+                    } else {
+                        let mut ahead = state;
+                        ahead.walk(now, legs, compliance, f64::INFINITY).0
+                    };
                     out[k] = state.walk(now, legs, compliance, 0.5 * path).1;
                 } else {
                     for leg in legs {
@@ -262,13 +266,21 @@ impl Steel {
 
     fn step(&mut self, strain: f64) {
         let (share, share_rate) = self.degradation;
-        let modulus = self.modulus * (1.0 - share * (1.0 - (-share_rate * self.path).exp()));
+        let mut modulus = self.modulus;
+        if share != 0.0 {
+            modulus *= 1.0 - share * (1.0 - (-share_rate * self.path).exp());
+        }
         let back: f64 = self.back.iter().sum();
         let trial = self.stress + modulus * strain;
         let side = (trial - back).signum();
         let mut radius = self.yield_stress + self.lasting * self.path;
         let mut slope = self.lasting;
-        for (limit, rate) in self.isotropic {
+        // What is off costs nothing.
+        for (limit, rate) in self
+            .isotropic
+            .into_iter()
+            .filter(|(limit, _)| *limit != 0.0)
+        {
             let left = (-rate * self.path).exp();
             radius += limit * (1.0 - left);
             slope += limit * rate * left;
@@ -285,7 +297,8 @@ impl Steel {
             slope += c - g * a * side;
         }
         let plastic = over / (modulus + slope.max(-0.5 * modulus));
-        for ((c, g), a) in self.backstresses.iter().zip(&mut self.back) {
+        let parts = self.backstresses.iter().zip(&mut self.back);
+        for ((c, g), a) in parts.filter(|((c, _), _)| *c != 0.0) {
             // Exact for a constant direction of flow.
             let left = (-g * plastic).exp();
             *a = *a * left + side * c / g * (1.0 - left);

@@ -250,7 +250,7 @@ fn part_report<M: InParts>(measured: &M, fitted: Part, selected: &Selected) -> P
     let extended = all_errors(measured, &point, tested);
     let after = squares(&extended);
     let found = &selected.extended.point;
-    let objections = unfit(measured, found, &selected.deviations);
+    let objections = unfit(measured, found, &selected.deviations, own);
     let mut effects = Vec::new();
     for (i, (effect, parameters)) in named_values(measured, found, &selected.deviations)
         .into_iter()

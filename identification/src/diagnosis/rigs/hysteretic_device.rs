@@ -6,6 +6,8 @@
 //! Effects are counted in natural units: the standard deviation of the displacement, the Coulomb
 //! force, and the time in which the displacement passes at its mean speed.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use realfft::RealFftPlanner;
 
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
@@ -32,6 +34,9 @@ const SECOND_INNER_FORCE: Channel = Channel::Other {
 
 /// A device whose first force is less than this share of its friction stands in its gap.
 const HELD: f64 = 0.05;
+
+/// Greatest asymmetry: one side holds a twentieth.
+const ONE_SIDED: f64 = 0.95;
 
 nominal_parameters! {
     /// F: force at which it slides.
@@ -98,10 +103,10 @@ effects! {
         damping: size("N s/m", 2e-3, (-10.0, 10.0)),
     } from [[0.02], [-0.02]];
     /// y follows the force through ω² / (s² + 2 ζ ω s + ω²): mass and spring between device and
-    /// load cell.
+    /// load cell. With ζ from 1/√2 up nothing resonates, it only lags.
     load_path_resonance: LoadPathResonance {
         frequency: shape("rad/s", 50.0, 1.5).off_at(0.0),
-        damping_ratio: shape("1", 0.1, 1.0),
+        damping_ratio: size("1", 0.02, (0.0, FRAC_1_SQRT_2)),
     } from [[12.0, 0.1], [25.0, 0.1], [50.0, 0.1], [100.0, 0.1]];
     /// A force measured inside the device acts on its end, by a lever: the ends of a band around a drum
     /// pull against each other (Coble, Cao, Downey and Ricles, J. Mech. Des. 140, 2018).
@@ -226,7 +231,8 @@ impl Equations for HystereticDevice {
             let mut move_left = now - position;
             position = now;
             greatest = greatest.max((now - rest).abs());
-            let asymmetry = asymmetry * (-decay * greatest).exp();
+            // A memory that grows with the excursion ends where one side holds nothing.
+            let asymmetry = (asymmetry * (-decay * greatest).exp()).clamp(-ONE_SIDED, ONE_SIDED);
             let mut level = 1.0 + rate * speed.abs();
             if excess != 0.0 {
                 level += excess * (-speed.abs() / slow).exp();
