@@ -116,7 +116,7 @@ fmu_kit::export!(OperatorAids);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fmu_kit::conformance::number;
+    use fmu_kit::conformance::{allocations, number};
 
     #[test]
     fn inputs_arrive_where_they_belong() {
@@ -149,6 +149,27 @@ mod tests {
             force,
         ];
         assert_eq!(arrived, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+    }
+
+    #[test]
+    fn steps_with_every_aid_on_do_not_allocate() {
+        let mut component = OperatorAids::default();
+        let law = &mut component.law;
+        (law.on.friction, law.on.specimen, law.on.observer) = (true, true, true);
+        (law.on.pressure, law.on.notch) = (true, true);
+        (law.harmonics.fundamental, law.harmonics.cancellation) = (true, true);
+        component.initialize().unwrap();
+        let counted = allocations(|| {
+            for k in 0..1000 {
+                let time = OperatorAids::STEP_SIZE * f64::from(k);
+                component.input.reference.acceleration = 3.0 * (12.0 * time).sin();
+                component.input.measured = component.input.reference;
+                component.input.force = 30.0 * (12.0 * time).sin();
+                component.step(time, OperatorAids::STEP_SIZE).unwrap();
+            }
+        });
+        assert_eq!(counted, 0);
+        assert!(component.added.abs() > 1e-6);
     }
 
     #[test]

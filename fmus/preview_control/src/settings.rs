@@ -158,3 +158,46 @@ pub fn variables() -> Vec<Variable<PreviewControl>> {
         parameter("actuator_e0", s.settings.shake_table.actuator.velocity_to_force[2], "Velocity to force, constant", "N/(m.s2)" => "lbf/(in.s2)");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmu_kit::Component;
+    use fmu_kit::conformance::allocations;
+
+    #[test]
+    fn no_role_allocates_in_its_steps_learning_or_not() {
+        for role in ROLES.items {
+            for adaptive in [false, true] {
+                let mut component = PreviewControl::default();
+                let settings = &mut component.settings;
+                settings.role = role.value;
+                settings.adaptive = adaptive;
+                settings.specimen_known = true;
+                settings.hydraulics_known = true;
+                settings.law.load.friction = 13.0;
+                settings.loop_delay_samples = 1;
+                component.initialize().unwrap();
+                let counted = allocations(|| {
+                    for k in 0..1000 {
+                        let time = PreviewControl::STEP_SIZE * f64::from(k);
+                        component.reference.acceleration = 3.0 * (12.0 * time).sin();
+                        component
+                            .acceleration_ahead
+                            .fill(component.reference.acceleration);
+                        component.measured.acceleration = 0.9 * component.reference.acceleration;
+                        component.specimen_acceleration = -2.0 * (12.0 * time).sin();
+                        component.actuator_force = 30.0 * (12.0 * time).sin();
+                        component.step(time, PreviewControl::STEP_SIZE).unwrap();
+                    }
+                });
+                assert_eq!(counted, 0, "{} {adaptive}", role.name);
+                // What stands still would prove nothing.
+                assert!(component.valve_command.abs() > 1e-6, "{}", role.name);
+                let known = component.settings.specimen.mass;
+                let learns = adaptive && role.name != "multi-metric";
+                assert_eq!(component.specimen_mass != known, learns, "{}", role.name);
+            }
+        }
+    }
+}

@@ -151,18 +151,8 @@ impl Component for SlidingMode {
 
     fn initialize(&mut self) -> ComponentResult {
         self.law.prediction = None;
-        let [loop_delay, command_delay] = [
-            ("loop_delay_samples", self.loop_delay_samples),
-            ("command_delay_samples", self.command_delay_samples),
-        ]
-        .map(|(name, samples)| {
-            usize::try_from(samples).map_err(|_| ModelError::Parameter {
-                name,
-                value: f64::from(samples),
-                expected: "zero or a positive whole number",
-            })
-        });
-        let (loop_delay, command_delay) = (loop_delay?, command_delay?);
+        let loop_delay = ModelError::count("loop_delay_samples", self.loop_delay_samples)?;
+        let command_delay = ModelError::count("command_delay_samples", self.command_delay_samples)?;
         self.law.validate()?;
         if loop_delay > 0 || command_delay > 0 {
             let table = ShakeTable {

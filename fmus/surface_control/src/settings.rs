@@ -101,3 +101,31 @@ pub fn variables() -> Vec<Variable<SurfaceControl>> {
         parameter("table_stiffness", s.settings.law.rig.table.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmu_kit::Component;
+    use fmu_kit::conformance::allocations;
+
+    #[test]
+    fn no_variant_allocates_in_its_steps() {
+        for variant in VARIANTS.items {
+            let mut component = SurfaceControl::default();
+            component.settings.variant = variant.value;
+            component.settings.loop_delay_samples = 1;
+            component.initialize().unwrap();
+            let counted = allocations(|| {
+                for k in 0..1000 {
+                    let time = SurfaceControl::STEP_SIZE * f64::from(k);
+                    component.reference.velocity = -0.25 * (12.0 * time).cos();
+                    component.reference.acceleration = 3.0 * (12.0 * time).sin();
+                    component.velocity_ahead.fill(component.reference.velocity);
+                    component.step(time, SurfaceControl::STEP_SIZE).unwrap();
+                }
+            });
+            assert_eq!(counted, 0, "{}", variant.name);
+            assert!(component.valve_command.abs() > 1e-6, "{}", variant.name);
+        }
+    }
+}
