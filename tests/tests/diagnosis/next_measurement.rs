@@ -1,6 +1,9 @@
 //! Where no effect explains the records, the diagnosis proposes the motion that shows more of what is left.
 
+use hidden_effects::case::{Case, Kind, Settings};
+use hidden_effects::outside::Outside;
 use identification::diagnosis::case::ControlLaw;
+use identification::diagnosis::engine::{Observer, Verdict};
 use identification::diagnosis::rigs::shake_table::experiment::{self, Motion, motions};
 use identification::diagnosis::rigs::shake_table::left_over::{Residual, left_over, play, probe};
 use identification::diagnosis::rigs::shake_table::predictor::{
@@ -11,6 +14,9 @@ use plant::specimens::linear::LinearSpecimen;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use shakebench::diagnosis::diagnose;
+use shakebench::master::Algorithm;
+use shakebench::run::experiment::{Request, prepare};
 use units::constants::INCH;
 
 const PERIOD: f64 = 2e-3;
@@ -108,4 +114,27 @@ fn what_does_not_follow_the_motion_asks_for_none() {
     let (samples, whitened) = (&samples, whitened.as_slice());
     let residual = Residual { samples, whitened };
     assert_eq!(probe(&model, &LAW, &[residual], PERIOD), None);
+}
+
+/// From files to a motion that `run` plays.
+#[test]
+fn an_unexplained_case_leaves_a_motion_that_run_plays() {
+    let folder = tempfile::tempdir().unwrap();
+    let (case, out) = (folder.path().join("case"), folder.path().join("out"));
+    let kind = Kind::ThisOutside(Outside::QuadraticDrag);
+    Case::draw(31, &Settings::new(kind)).write(&case).unwrap();
+    let report = diagnose(&case, &[], None, &out, Observer::none()).unwrap();
+    assert_eq!(report.verdict, Verdict::Unexplained, "{}", report.sentence);
+    let told = report.separating_experiment.unwrap();
+    assert!(told.contains("what is left over is largest at"), "{told}");
+    let motion = report.separating_motion.unwrap();
+    assert_eq!(motion, out.join("separating_motion.csv"));
+    let request = Request {
+        reference: Some(motion),
+        duration_s: Some(2.0),
+        ..Request::built_in("three-variable")
+    };
+    let outcome = prepare(&request).unwrap().run(Algorithm::GaussSeidel);
+    let outcome = outcome.unwrap();
+    assert!(outcome.ended.is_regular(), "{}", outcome.ended.message());
 }
