@@ -6,8 +6,14 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use identification::data::Channel;
 use identification::diagnosis::engine::Observer;
 use identification::diagnosis::rigs::{Description, ExtendedRig, diagnose, renamed};
+
+const FORCE: Channel = Channel::Other {
+    name: "force",
+    unit: "N",
+};
 
 const RIG: &str = r#"name = "Isolator"
 kind = "oscillator"
@@ -179,6 +185,11 @@ fn descriptions_are_refused_by_place_with_a_cure() {
             &["rig.toml", "columns.force", "mm", "N"],
         ),
         (
+            "another unit than the header's",
+            changed("unit = \"kN\" }", "unit = \"N\" }"),
+            &["record.csv", "line 1", "Load (kN)", "its header, kN"],
+        ),
+        (
             "a column without a unit",
             changed(
                 "column = \"Load (kN)\", unit = \"kN\"",
@@ -271,6 +282,18 @@ fn descriptions_are_refused_by_place_with_a_cure() {
             &["rig.toml", "columns.time", "time_step"],
         ),
     ]);
+}
+
+#[test]
+fn columns_are_called_with_or_without_their_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rig.toml");
+    std::fs::write(&path, with(RIG, "\"Load (kN)\"", "\"Load\"")).unwrap();
+    std::fs::write(folder.path().join("record.csv"), record()).unwrap();
+    let measurement = Description::read(&path).unwrap().measurement(&[]).unwrap();
+    let force = measurement.recordings[0].input(FORCE);
+    let largest = force.iter().fold(0.0f64, |most, f| most.max(f.abs()));
+    assert!((99.0..101.0).contains(&largest), "{largest} N");
 }
 
 #[test]

@@ -7,6 +7,10 @@ const FLANK: (usize, usize) = (3, 12);
 /// that it rounds leave less.
 const BEYOND: f64 = 2.0;
 
+/// Steps of the converter to the next reading after a dwell at most, where the signal only turned: a parabola that
+/// stays within a step for four samples falls by two and a quarter to the next one.
+const NEXT: f64 = 3.0;
+
 /// Usual distance between neighbouring levels of `values`: a converter's step where it is coarse.
 pub fn step(values: &[f64]) -> f64 {
     let mut levels = values.to_vec();
@@ -18,8 +22,9 @@ pub fn step(values: &[f64]) -> f64 {
 }
 
 /// Whether the signal went beyond the level at which `values[start..end]` stand: a parabola through the
-/// samples to either side passes that level by more than two of the converter's steps. A dwell at the end
-/// of a record, of which nothing is known on one side, counts as one.
+/// samples to either side passes that level by more than two of the converter's steps, or the next reading is
+/// farther away than a turn leaves it. A dwell at the end of a record, of which nothing is known on one side,
+/// counts as one.
 pub fn cuts_a_peak(values: &[f64], start: usize, end: usize, step: f64) -> bool {
     let flank = ((end - start) / 2).clamp(FLANK.0, FLANK.1);
     let flank = flank.min(start).min(values.len().saturating_sub(end));
@@ -27,6 +32,10 @@ pub fn cuts_a_peak(values: &[f64], start: usize, end: usize, step: f64) -> bool 
         return true;
     }
     let level = values[start];
+    let next = [values[start - 1], values[end]].map(|value| (value - level).abs());
+    if next[0].max(next[1]) > NEXT * step {
+        return true;
+    }
     let middle = 0.5 * (start + end - 1) as f64;
     // The even part of the flanks about the middle, against the square of the distance from it.
     let pairs: Vec<(f64, f64)> = (0..flank)

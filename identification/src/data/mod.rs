@@ -18,7 +18,7 @@ pub use faults::Finding;
 pub use reader::{Called, Named, Pick, known_column, named_columns};
 pub use recording::{Recording, TimeBase};
 pub use rounded_stamps::RoundedStamps;
-pub use sheet::{Sheet, Wanted};
+pub use sheet::{Sheet, Wanted, is_called, name_and_unit};
 pub use text::{Text, decode, read_text};
 
 /// Mean, and root mean square about it.

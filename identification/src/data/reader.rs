@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
-use units::{factor_meant, split_header};
+use units::factor_meant;
 
 use super::channel::Heading;
 use super::text::Text;
-use super::{Channel, DataError, Recording, Sheet, TimeBase, Wanted, read_text};
+use super::{
+    Channel, DataError, Recording, Sheet, TimeBase, Wanted, is_called, name_and_unit, read_text,
+};
 
 /// The header that a shake table's recording should have, for messages.
 const HEADER: &str = "such as `time [s],valve_command [V],displacement [in],acceleration \
@@ -36,7 +38,7 @@ pub struct Called {
 
 impl Called {
     fn is(&self, cell: &str) -> bool {
-        self.head == cell || self.head == split_header(cell).0
+        is_called(cell, &self.head)
     }
 }
 
@@ -168,10 +170,12 @@ impl Recording {
     /// Channels of the columns that are asked for, in that order; `Time` becomes the time stamps.
     ///
     /// # Errors
-    /// A column that is missing, a unit of another dimension, a cell that is no number.
+    /// A column that is missing, a unit of another dimension or another one than the header's, a cell that is
+    /// no number.
     pub fn pick(sheet: &Sheet, name: &str, picks: &[Pick<'_>]) -> Result<Self, DataError> {
         let columns = picks.iter().map(|pick| {
             let place = sheet.place(pick.head)?;
+            agree(sheet, place, pick)?;
             let unit = Some((sheet.header_line(), pick.unit.to_string()));
             let column = Column {
                 channel: pick.channel,
@@ -187,6 +191,26 @@ impl Recording {
         });
         let columns = columns.collect::<Result<_, DataError>>()?;
         assemble(sheet, name, columns)
+    }
+}
+
+/// Refuses a column whose header names another unit of the same kind than the one it is said to be in: one of
+/// the two is wrong, by a factor that no fit would find.
+fn agree(sheet: &Sheet, place: usize, pick: &Pick<'_>) -> Result<(), DataError> {
+    let head = &sheet.heads()[place];
+    let Some(own) = name_and_unit(head).1 else {
+        return Ok(());
+    };
+    match units::convert(1.0, own, pick.unit) {
+        Ok(factor) if (factor - 1.0).abs() > 1e-9 => Err(DataError::line(
+            sheet.file(),
+            sheet.header_line(),
+            format!(
+                "column `{head}` is described in {}; expected the unit of its header, {own}",
+                pick.unit
+            ),
+        )),
+        _ => Ok(()),
     }
 }
 
@@ -229,7 +253,7 @@ fn columns(sheet: &Sheet, called: &[Called]) -> Result<Vec<Column>, DataError> {
         let exact = heads.iter().position(|cell| *cell == own.head);
         let place = exact.or_else(|| heads.iter().position(|cell| own.is(cell)));
         let place = place.map_or_else(|| sheet.place(&own.head), Ok)?;
-        let given = own.unit.as_deref().or(split_header(&heads[place]).1);
+        let given = own.unit.as_deref().or(name_and_unit(&heads[place]).1);
         let given = given.map(|unit| (sheet.header_line(), unit.to_string()));
         found.push(Column {
             channel: own.channel,

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
-use units::Unit;
+use units::{Unit, hint, split_header};
 
 use super::DataError;
 use super::number::Decimals;
@@ -132,22 +132,29 @@ impl Sheet {
         &self.heads
     }
 
-    /// The place of the column with this text in the header.
+    /// The place of the column with this text in the header, or with it before the unit: `Load` is
+    /// `Load [kN]` or `Load (kN)`, too.
     ///
     /// # Errors
     /// It is not there, where what is there is said, or stands there twice.
     pub fn place(&self, head: &str) -> Result<usize, DataError> {
-        let all = self.heads.iter().enumerate();
-        let places: Vec<usize> = all
-            .filter(|(_, own)| *own == head)
-            .map(|(i, _)| i)
-            .collect();
+        let places = |name: fn(&str) -> &str| -> Vec<usize> {
+            let all = self.heads.iter().enumerate();
+            all.filter(|(_, own)| name(own) == head)
+                .map(|(i, _)| i)
+                .collect()
+        };
+        let mut found = places(|own| own);
+        if found.is_empty() {
+            found = places(|own| name_and_unit(own).0);
+        }
         let wrong = |reason: String| DataError::line(&self.file, self.header_line, reason);
-        match places[..] {
+        match found[..] {
             [place] => Ok(place),
             [] => Err(wrong(format!(
-                "no column `{head}` among {}",
-                self.heads.join(", ")
+                "no column `{head}` among {}{}",
+                self.heads.join(", "),
+                hint(head, self.heads.iter().map(|own| name_and_unit(own).0))
             ))),
             [first, second, ..] => Err(wrong(format!(
                 "columns {} and {} are both called `{head}`; expected names that tell them apart",
@@ -389,4 +396,24 @@ fn units_row(row: Option<&Row>) -> Option<(u64, Vec<String>)> {
             row.cells.iter().map(|cell| bare(cell.trim())).collect(),
         )
     })
+}
+
+/// A header's cell as its name and its unit: `Load [kN]`, or `Load (kN)` where what stands in parentheses is a unit.
+#[must_use]
+pub fn name_and_unit(cell: &str) -> (&str, Option<&str>) {
+    let cell = cell.trim();
+    if let (name, Some(unit)) = split_header(cell) {
+        return (name, Some(unit));
+    }
+    let inside = cell.strip_suffix(')').and_then(|own| own.rsplit_once('('));
+    match inside.filter(|(_, unit)| Unit::parse(unit).is_ok()) {
+        Some((name, unit)) => (name.trim(), Some(unit.trim())),
+        None => (cell, None),
+    }
+}
+
+/// Whether a header's cell is called so, with or without its unit.
+#[must_use]
+pub fn is_called(cell: &str, head: &str) -> bool {
+    cell == head || name_and_unit(cell).0 == head
 }

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use identification::data::{Channel, Named, Pick, Recording, Sheet, Wanted, named_columns};
+use identification::data::{
+    Channel, Named, Pick, Recording, Sheet, Wanted, is_called, named_columns,
+};
 use identification::diagnosis::rigs::renamed;
 
 use crate::error::Error;
@@ -18,7 +20,7 @@ pub(super) fn read(file: &Path, columns: Option<&Path>) -> Result<Recording, Err
         return Ok(Recording::read(file, &name)?);
     };
     let all = mapped(map)?;
-    let is_column = |cell: &str| all.iter().any(|own| own.head == cell);
+    let is_column = |cell: &str| all.iter().any(|own| is_called(cell, &own.head));
     let heads: Vec<&str> = all.iter().map(|own| own.head.as_str()).collect();
     let header = format!("with the columns {}", heads.join(", "));
     let wanted = Wanted {

@@ -15,6 +15,7 @@ use super::least_squares::{
     squares,
 };
 use super::model::Point;
+use super::opening::opened;
 use super::progress::{Observer, Progress, Step};
 use super::resampling::correlation_time;
 use super::search::{Selection, search};
@@ -133,10 +134,16 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         starts.push(start);
     }
     let screen = model.screen(record);
-    let looked: Vec<Solution> = starts
+    let begun = model.begun(&stated, screen);
+    let begun: Vec<&Point> = begun
+        .iter()
+        .filter(|point| point.effects.is_empty())
+        .collect();
+    let mut looked: Vec<Solution> = starts
         .par_iter()
         .filter_map(|start| least_squares(model, start, screen, &Free::All, LOOK))
         .collect();
+    looked.extend(opened(model, &begun, screen, LOOK));
     let first = looked.first()?.clone();
     let best = looked
         .into_iter()
@@ -308,6 +315,11 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             base.point.effects.iter().any(|(i, _)| held(*i))
         };
         let suggested = model.starts(&base.point, screen);
+        let begun = if base.point.effects.is_empty() {
+            model.begun(&base.point, screen)
+        } else {
+            Vec::new()
+        };
         let mut quick: Vec<(usize, Solution)> = among
             .par_iter()
             .filter(|effect| !in_base(**effect))
@@ -323,7 +335,10 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
                         least_squares(model, &point, screen, &Free::Frozen(frozen), LOOK)
                     })
                 });
-                let best = starts.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+                let with_it = |point: &Point| point.effects.iter().any(|(i, _)| *i == effect);
+                let begun: Vec<&Point> = begun.iter().filter(|point| with_it(point)).collect();
+                let all = starts.chain(opened(model, &begun, screen, LOOK));
+                let best = all.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
                 Some((effect, best))
             })
             .collect();

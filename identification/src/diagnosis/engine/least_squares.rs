@@ -87,6 +87,12 @@ pub trait SimulatedModel: Sync {
     fn starts(&self, _base: &Point, _record: usize) -> Vec<(usize, Vec<f64>)> {
         Vec::new()
     }
+
+    /// Whole models with one effect at most from which fits to `record` begin as well, where `base` loses the
+    /// motion.
+    fn begun(&self, _base: &Point, _record: usize) -> Vec<Point> {
+        Vec::new()
+    }
 }
 
 /// Errors on all blocks of `record`, one after another.

@@ -6,6 +6,7 @@ mod fit;
 mod least_squares;
 mod likelihood;
 mod model;
+mod opening;
 mod progress;
 pub mod resampling;
 mod search;

@@ -3,10 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::super::report::ends_or_not_a_number;
-use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
+use super::confirmed::{
+    Confirmed, Refused, confirm, effects as named_values, is_surprising, unfit,
+};
 use super::measured::Measured;
 use super::named_value::NamedValue;
-use super::parts::{InParts, Part};
+use super::parts::{InParts, LOST, Part};
 use super::{Description, DescriptionError, Measurement};
 use crate::diagnosis::engine::resampling::gain_interval;
 use crate::diagnosis::engine::{
@@ -202,8 +204,13 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         .rivals
         .iter()
         .any(|(rival, against)| is_named(against) && !alike(against, rival));
+    let is_as_stated = as_described
+        .parameters
+        .iter()
+        .enumerate()
+        .all(|(i, own)| !is_surprising(measured, i, own));
     let verdict = match (
-        here.is_empty() && there.is_empty(),
+        here.is_empty() && there.is_empty() && is_as_stated && confirmed.error < LOST,
         named.is_empty() || !pays,
         rivalled,
     ) {
@@ -348,6 +355,19 @@ impl RigDiagnosis {
                      {falls}.",
                     listed(&self.named),
                     listed(&rivals)
+                )
+            }
+            Verdict::Unexplained if part.effects.is_empty() && self.swapped.effects.is_empty() => {
+                format!(
+                    "{name}: no effect pays, and the nominal model is not adequate: refitted, its error of {} \
+                     on the data left out is {:.1} %{}.",
+                    self.output,
+                    100.0 * part.refitted_error,
+                    if self.findings.is_empty() {
+                        ""
+                    } else {
+                        ", with parameters that are not what was stated"
+                    }
                 )
             }
             Verdict::Unexplained => format!(

@@ -1,8 +1,8 @@
 //! A rig with its measurements, as the engine of the diagnosis sees it.
 
 use super::named_value::NamedValue;
-use super::parts::{self, EVERYTHING, File, InParts, NAMES, places};
-use super::{Effect, Measurement, Natural, Rig, SessionRole, Values};
+use super::parts::{self, EVERYTHING, File, InParts, LOST, NAMES, places};
+use super::{Begun, Effect, Measurement, Natural, Rig, SessionRole, Values};
 use crate::diagnosis::engine::{Candidate, Point, SimulatedModel, WEAK, all_errors};
 
 /// Samples up to which more may be tried.
@@ -107,6 +107,34 @@ impl<'a> Measured<'a> {
             };
         }
         values
+    }
+
+    /// The point of a model that was read from recording `block`; none where it has an unknown effect.
+    fn point_of(&self, own: &Begun, block: usize) -> Option<Point> {
+        let mut nuisance = vec![0.0; self.nuisance()];
+        for (p, &i) in nuisance.iter_mut().zip(&self.uncertain) {
+            let ((value, deviation), read) = (self.nominal[i], own.nominal[i]);
+            // The inverse of `nominal_values`.
+            *p = if value > 0.0 && deviation <= value {
+                (read / value).ln() * value / deviation
+            } else {
+                (read - value) / deviation
+            };
+        }
+        let first = self.uncertain.len() + block * self.session.len();
+        let session = own.session.iter().zip(&self.session);
+        for (p, (read, one)) in nuisance.iter_mut().skip(first).zip(session) {
+            *p = read / one;
+        }
+        let effects = match &own.effect {
+            None => Vec::new(),
+            Some((name, values)) => {
+                let index = self.candidates.iter().position(|c| c.effect == *name)?;
+                vec![(index, self.candidates[index].internal(values))]
+            }
+        };
+        let is_finite = nuisance.iter().all(|p| p.is_finite());
+        is_finite.then_some(Point { nuisance, effects })
     }
 
     /// Names of the uncertain nominal parameters, in the order of the nuisance.
@@ -315,6 +343,20 @@ impl SimulatedModel for Measured<'_> {
             .filter_map(|(name, values)| Some((place(name)?, values)))
             .filter(|(i, _)| !self.candidates[*i].starts.is_empty())
             .collect()
+    }
+
+    fn begun(&self, base: &Point, record: usize) -> Vec<Point> {
+        if self.normalised_error(base, record) < LOST {
+            return Vec::new();
+        }
+        let Some(block) = (0..self.blocks()).max_by_key(|&b| self.samples(record, b)) else {
+            return Vec::new();
+        };
+        let recording = &self.measurement.recordings[block];
+        let stated: Vec<f64> = self.nominal.iter().map(|(value, _)| *value).collect();
+        let places = &self.places[record][block];
+        let all = self.rig.read_off(recording, places, &stated).into_iter();
+        all.filter_map(|own| self.point_of(&own, block)).collect()
     }
 }
 

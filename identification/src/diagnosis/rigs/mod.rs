@@ -24,6 +24,7 @@ mod parts;
 mod positioning_drive;
 mod reading;
 mod recording;
+mod restoring_force;
 pub mod shake_table;
 mod table;
 mod template;
@@ -104,6 +105,17 @@ pub trait Equations: Sync {
         Vec::new()
     }
 
+    /// Whole models with one effect at most, read from the measured samples at `places`, from which fits begin
+    /// as well: for where a simulation from the nominal values loses the motion.
+    fn read_off(
+        &self,
+        _recording: &RigRecording,
+        _places: &[usize],
+        _nominal: &Self::Nominal,
+    ) -> Vec<Begun> {
+        Vec::new()
+    }
+
     /// What the equations read out of a recording beside its inputs, a sentence each.
     fn notes(&self, _recording: &RigRecording, _nominal: &Self::Nominal) -> Vec<String> {
         Vec::new()
@@ -165,11 +177,25 @@ pub trait Rig: Sync {
         errors: &[f64],
     ) -> Vec<(&'static str, Vec<f64>)>;
 
+    /// As [`Equations::read_off`].
+    fn read_off(&self, recording: &RigRecording, places: &[usize], nominal: &[f64]) -> Vec<Begun>;
+
     /// As [`Equations::notes`].
     fn notes(&self, recording: &RigRecording, nominal: &[f64]) -> Vec<String>;
 
     /// Output for the inputs of `recording` alone, SI; not a number where a count is wrong.
     fn simulate(&self, recording: &RigRecording, values: &Values, out: &mut [f64]);
+}
+
+/// A model from which a fit begins, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Begun {
+    /// In the order of [`Rig::parameters`].
+    pub nominal: Vec<f64>,
+    /// In the order of [`Rig::session`], of the recording that it was read from.
+    pub session: Vec<f64>,
+    /// An effect with the values of its parameters.
+    pub effect: Option<(&'static str, Vec<f64>)>,
 }
 
 /// Values of everything that a rig's equations read, SI.
@@ -258,6 +284,12 @@ impl<E: Equations> Rig for E {
     ) -> Vec<(&'static str, Vec<f64>)> {
         E::Nominal::from_values(nominal).map_or_else(Vec::new, |nominal| {
             Equations::starts(self, recording, &nominal, errors)
+        })
+    }
+
+    fn read_off(&self, recording: &RigRecording, places: &[usize], nominal: &[f64]) -> Vec<Begun> {
+        E::Nominal::from_values(nominal).map_or_else(Vec::new, |nominal| {
+            Equations::read_off(self, recording, places, &nominal)
         })
     }
 

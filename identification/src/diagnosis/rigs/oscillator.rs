@@ -7,8 +7,11 @@
 //! Effects are counted in natural units: the standard deviation of the displacement `X`, the force
 //! `k X`, the time `(m/k)^{1/2}`.
 
+use std::f64::consts::PI;
+
+use super::restoring_force::read_off;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
-use super::{Equations, Natural, RigRecording};
+use super::{Begun, Equations, Natural, RigRecording};
 use crate::data::Channel;
 use crate::diagnosis::rigs::recording::PLACES;
 
@@ -248,6 +251,23 @@ impl Equations for Oscillator {
         }
     }
 
+    fn read_off(
+        &self,
+        recording: &RigRecording,
+        places: &[usize],
+        nominal: &Nominal,
+    ) -> Vec<Begun> {
+        let period = 2.0 * PI * (nominal.mass / nominal.stiffness).sqrt();
+        read_off(recording, FORCE, places, nominal.mass, period)
+            .into_iter()
+            .map(|own| Begun {
+                nominal: vec![own.mass, own.damping, own.stiffness, own.offset],
+                session: vec![0.0, own.start.0, own.start.1],
+                effect: own.effect,
+            })
+            .collect()
+    }
+
     fn simulate(
         &self,
         recording: &RigRecording,
@@ -262,8 +282,12 @@ impl Equations for Oscillator {
         }
         let law = Law::new(nominal, effects);
         let sample = recording.period();
+        let springs = nominal.stiffness
+            + effects.hysteresis.stiffness.abs()
+            + effects.stops.stiffness
+            + hardened(nominal, effects, between);
         let fast = [
-            (nominal.stiffness + effects.hysteresis.stiffness.abs()) / nominal.mass,
+            springs / nominal.mass,
             effects.second_mode.frequency.powi(2) * f64::from(u8::from(law.second.0 > 0.0)),
         ];
         let radians = fast.into_iter().fold(0.0, f64::max).sqrt() * sample;
@@ -358,6 +382,23 @@ impl Equations for Oscillator {
         let wanted = out.len().min(samples);
         pass(&mut state, wanted, out);
     }
+}
+
+/// What a hardening spring adds to the stiffness where it bears twice the largest force, so that steps stay
+/// short against the oscillation there.
+fn hardened(nominal: &Nominal, effects: &Effects, forces: &[f64]) -> f64 {
+    let cubic = effects.cubic_stiffness.stiffness;
+    if cubic <= 0.0 {
+        return 0.0;
+    }
+    let force = 2.0 * forces.iter().fold(0.0f64, |most, f| most.max(f.abs()));
+    // Newton's method on k y + k_3 y^3 = F from above, where it cannot overshoot.
+    let mut y = (force / cubic).cbrt();
+    for _ in 0..8 {
+        let slope = nominal.stiffness + 3.0 * cubic * y * y;
+        y -= (nominal.stiffness * y + cubic * y.powi(3) - force) / slope;
+    }
+    3.0 * cubic * y * y
 }
 
 /// The force at a sample.

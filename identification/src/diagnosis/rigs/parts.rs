@@ -8,6 +8,9 @@ const RUNS: usize = 16;
 /// Share of the output's variation that a first look must see.
 const SEEN: f64 = 0.3;
 
+/// Error over the output's deviation from which on a model has lost the motion, and nobody calls it adequate.
+pub(in crate::diagnosis::rigs) const LOST: f64 = 0.5;
+
 /// The selections of samples that can be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::diagnosis::rigs) enum Part {

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use super::description::{Description, DescriptionError, LeftOut, listed};
 use super::{KINDS, Rig, RigRecording};
 use crate::IdentificationError;
-use crate::data::{Channel, DataError, Pick, Recording, RoundedStamps, Sheet, TimeBase, Wanted};
+use crate::data::{
+    Channel, DataError, Pick, Recording, RoundedStamps, Sheet, TimeBase, Wanted, is_called,
+};
 
 /// Samples that a file must have at least.
 const SHORTEST: usize = 128;
@@ -159,7 +161,7 @@ impl Description {
         let sheet = Sheet::read(
             path,
             Wanted {
-                is_column: &|cell| heads.contains(&cell),
+                is_column: &|cell| heads.iter().any(|head| is_called(cell, head)),
                 header: &heads.join(","),
             },
         )?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use identification::data::{DataError, Sheet, Wanted};
+use identification::data::{DataError, Sheet, Wanted, is_called, name_and_unit};
 use identification::diagnosis::rigs::foreign::{Signal, Trial};
 use identification::diagnosis::rigs::{LeftOut, Quantity, even_period};
 
@@ -11,7 +11,7 @@ use super::map::{Map, Named};
 use crate::diagnosis::file_fault;
 use crate::error::Error;
 use crate::system::Between;
-use crate::units::{convert, hint, split_header};
+use crate::units::convert;
 
 /// Samples that a file must have at least.
 const SHORTEST: usize = 128;
@@ -54,26 +54,11 @@ fn seconds(place: &Path, what: &str, quantity: &Quantity) -> Result<f64, Error> 
     }
 }
 
-/// The place of a column by its header, or by what stands before the unit in it.
-fn find(sheet: &Sheet, head: &str) -> Result<usize, Error> {
-    let heads = sheet.heads();
-    let whole = heads.iter().position(|own| own == head);
-    let bare = || heads.iter().position(|own| split_header(own).0 == head);
-    whole.or_else(bare).ok_or_else(|| {
-        let reason = format!(
-            "no column `{head}` among {}{}",
-            heads.join(", "),
-            hint(head, heads.iter().map(|own| split_header(own).0))
-        );
-        DataError::line(sheet.file(), sheet.header_line(), reason).into()
-    })
-}
-
 /// The factor that brings a column into `unit`; what is in no unit is in that one.
 fn factor(sheet: &Sheet, place: usize, given: Option<&str>, unit: &str) -> Result<f64, Error> {
     let head = &sheet.heads()[place];
     let below = sheet.unit_below(place).map(|(_, unit)| unit);
-    let own = given.or(split_header(head).1).or(below);
+    let own = given.or(name_and_unit(head).1).or(below);
     let Some(own) = own.filter(|own| *own != unit && !unit.is_empty()) else {
         return Ok(1.0);
     };
@@ -131,7 +116,7 @@ pub(super) fn trial(
         .chain(&map.time)
         .map(|named| named.parts().0)
         .collect();
-    let is_column = |cell: &str| wanted.contains(&cell) || wanted.contains(&split_header(cell).0);
+    let is_column = |cell: &str| wanted.iter().any(|head| is_called(cell, head));
     let sheet = Sheet::read(
         file,
         Wanted {
@@ -145,7 +130,7 @@ pub(super) fn trial(
     }
     let column = |named: &Named, unit: &str, is_full: bool| -> Result<Vec<f64>, Error> {
         let (head, given) = named.parts();
-        let at = find(&sheet, head)?;
+        let at = sheet.place(head)?;
         let factor = factor(&sheet, at, given, unit)?;
         let values = match is_full {
             true => sheet.full_column(at, head)?,
@@ -159,7 +144,7 @@ pub(super) fn trial(
             sheet
                 .heads()
                 .iter()
-                .any(|own| split_header(own).0 == **name)
+                .any(|own| name_and_unit(own).0 == **name)
         };
         names
             .find(is_there)
@@ -214,7 +199,7 @@ pub(super) fn trial(
     for signal in outputs {
         let named = named(&map.outputs, signal);
         let (head, given) = named.parts();
-        let at = match find(&sheet, head) {
+        let at = match sheet.place(head) {
             Err(_) if !needs.outputs => {
                 measured.push(vec![f64::NAN; sheet.len()]);
                 in_file.push(None);
@@ -223,7 +208,7 @@ pub(super) fn trial(
             found => found?,
         };
         measured.push(column(&named, &signal.unit, false)?);
-        let own = given.or(split_header(&sheet.heads()[at]).1);
+        let own = given.or(name_and_unit(&sheet.heads()[at]).1);
         let own = own.or(sheet.unit_below(at).map(|(_, unit)| unit));
         let factor = factor(&sheet, at, given, &signal.unit)?;
         in_file.push(Some((own.unwrap_or(&signal.unit).to_owned(), factor)));

@@ -1,0 +1,96 @@
+//! Fits that would lose the motion over a whole record: over its begin first, then over more and more.
+
+use super::least_squares::{Free, SimulatedModel, Solution, least_squares, solution};
+use super::model::{Candidate, Point};
+
+/// The begin of every block of a model's records.
+struct Opening<'a, M> {
+    model: &'a M,
+    /// The share of a block's samples.
+    share: f64,
+}
+
+impl<M: SimulatedModel> SimulatedModel for Opening<'_, M> {
+    fn nuisance(&self) -> usize {
+        self.model.nuisance()
+    }
+
+    fn candidates(&self) -> &[Candidate] {
+        self.model.candidates()
+    }
+
+    fn blocks(&self) -> usize {
+        self.model.blocks()
+    }
+
+    fn block_of(&self, i: usize) -> Option<usize> {
+        self.model.block_of(i)
+    }
+
+    fn samples(&self, record: usize, block: usize) -> usize {
+        (self.share * self.model.samples(record, block) as f64).ceil() as usize
+    }
+
+    fn errors(&self, point: &Point, record: usize, block: usize) -> Vec<f64> {
+        let mut errors = self.model.errors(point, record, block);
+        errors.truncate(self.samples(record, block));
+        errors
+    }
+
+    fn folds(&self, record: usize) -> [usize; 2] {
+        self.model.folds(record)
+    }
+
+    fn screen(&self, record: usize) -> usize {
+        self.model.screen(record)
+    }
+
+    fn prior_width(&self) -> f64 {
+        self.model.prior_width()
+    }
+
+    fn held(&self) -> Self {
+        Self {
+            model: self.model,
+            share: self.share,
+        }
+    }
+
+    fn record_name(&self, record: usize) -> &str {
+        self.model.record_name(record)
+    }
+}
+
+/// Shares of a record that a fit which would lose the motion sees one after another.
+const OPENINGS: [f64; 6] = [
+    1.0 / 64.0,
+    1.0 / 32.0,
+    1.0 / 16.0,
+    1.0 / 8.0,
+    1.0 / 4.0,
+    1.0 / 2.0,
+];
+
+/// Fits the one of `starts` that is nearest to the begin of `record`, first to that and then to more and more of it:
+/// over a short time the motion is not lost.
+pub fn opened<M: SimulatedModel>(
+    model: &M,
+    starts: &[&Point],
+    record: usize,
+    iterations: usize,
+) -> Option<Solution> {
+    let begin = Opening {
+        model,
+        share: OPENINGS[0],
+    };
+    let looked = starts
+        .iter()
+        .filter_map(|start| solution(&begin, start, record));
+    let nearest = looked.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let mut point = nearest.point;
+    for share in OPENINGS {
+        let opening = Opening { model, share };
+        point = least_squares(&opening, &point, record, &Free::All, iterations)?.point;
+    }
+    least_squares(model, &point, record, &Free::All, iterations)
+}
