@@ -116,17 +116,20 @@ fn what_does_not_follow_the_motion_asks_for_none() {
     assert_eq!(probe(&model, &LAW, &[residual], PERIOD), None);
 }
 
-/// From files to a motion that `run` plays.
+/// From files to a motion that `run` plays: drag grows with speed, and so does what is left.
 #[test]
 fn an_unexplained_case_leaves_a_motion_that_run_plays() {
     let folder = tempfile::tempdir().unwrap();
     let (case, out) = (folder.path().join("case"), folder.path().join("out"));
     let kind = Kind::ThisOutside(Outside::QuadraticDrag);
-    Case::draw(31, &Settings::new(kind)).write(&case).unwrap();
+    Case::draw(32, &Settings::new(kind)).write(&case).unwrap();
     let report = diagnose(&case, &[], None, &out, Observer::none()).unwrap();
     assert_eq!(report.verdict, Verdict::Unexplained, "{}", report.sentence);
     let told = report.separating_experiment.unwrap();
-    assert!(told.contains("what is left over is largest at"), "{told}");
+    assert!(
+        told.contains("what is left over is largest at speeds"),
+        "{told}"
+    );
     let motion = report.separating_motion.unwrap();
     assert_eq!(motion, out.join("separating_motion.csv"));
     let request = Request {
