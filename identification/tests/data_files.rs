@@ -193,7 +193,7 @@ fn columns_of_any_name_are_picked_with_their_units() {
     let error = Recording::pick(&sheet, "rig", &[pick(FORCE, "f", "kN")]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "rig.csv, line 1: no column `f` among t_s, x_mm, F"
+        "rig.csv, line 1: no column `f` among t_s, x_mm, F; did you mean `F`?"
     );
 }
 

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
-use units::{Unit, hint, split_header};
+use units::{Unit, nearest, split_header};
 
 use super::DataError;
 use super::number::Decimals;
@@ -151,11 +151,15 @@ impl Sheet {
         let wrong = |reason: String| DataError::line(&self.file, self.header_line, reason);
         match found[..] {
             [place] => Ok(place),
-            [] => Err(wrong(format!(
-                "no column `{head}` among {}{}",
-                self.heads.join(", "),
-                hint(head, self.heads.iter().map(|own| name_and_unit(own).0))
-            ))),
+            [] => {
+                let near = nearest(head, self.heads.iter().map(|own| name_and_unit(own).0));
+                let near = near.map(|near| format!("; did you mean `{near}`?"));
+                Err(wrong(format!(
+                    "no column `{head}` among {}{}",
+                    self.heads.join(", "),
+                    near.unwrap_or_default()
+                )))
+            }
             [first, second, ..] => Err(wrong(format!(
                 "columns {} and {} are both called `{head}`; expected names that tell them apart",
                 first + 1,

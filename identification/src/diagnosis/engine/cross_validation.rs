@@ -453,7 +453,9 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
             .map(|i| {
                 let mut point = current.point.clone();
                 point.effects.remove(i);
-                let smaller = settle(self.model, &point, self.record, TO_THE_END)?;
+                // What runs away without an effect is compared with the model that has none.
+                let smaller = settle(self.model, &point, self.record, TO_THE_END)
+                    .or_else(|| nominal(self.model, self.record))?;
                 Some((compare(&self.crossed(&smaller)?, &after), smaller))
             })
             .collect();

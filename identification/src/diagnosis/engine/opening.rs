@@ -61,15 +61,9 @@ impl<M: SimulatedModel> SimulatedModel for Opening<'_, M> {
     }
 }
 
-/// Shares of a record that a fit which would lose the motion sees one after another.
-const OPENINGS: [f64; 6] = [
-    1.0 / 64.0,
-    1.0 / 32.0,
-    1.0 / 16.0,
-    1.0 / 8.0,
-    1.0 / 4.0,
-    1.0 / 2.0,
-];
+/// Share of a record that a fit which would lose the motion sees first, and by what factor more after each fit.
+const FIRST: f64 = 1.0 / 64.0;
+const MORE: f64 = 1.25;
 
 /// Fits the one of `starts` that is nearest to the begin of `record`, first to that and then to more and more of it:
 /// over a short time the motion is not lost.
@@ -81,16 +75,18 @@ pub fn opened<M: SimulatedModel>(
 ) -> Option<Solution> {
     let begin = Opening {
         model,
-        share: OPENINGS[0],
+        share: FIRST,
     };
     let looked = starts
         .iter()
         .filter_map(|start| solution(&begin, start, record));
     let nearest = looked.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     let mut point = nearest.point;
-    for share in OPENINGS {
+    let mut share = FIRST;
+    while share < 1.0 {
         let opening = Opening { model, share };
         point = least_squares(&opening, &point, record, &Free::All, iterations)?.point;
+        share *= MORE;
     }
     least_squares(model, &point, record, &Free::All, iterations)
 }
