@@ -343,13 +343,6 @@ fn differences<M: InParts>(
     }
 }
 
-/// Whether the nominal parameter `i` is far from what was stated of it, and surely so.
-pub(super) fn is_surprising<M: InParts>(measured: &M, i: usize, value: &NamedValue) -> bool {
-    let (stated, deviation) = measured.stated(i);
-    let off = (value.value - stated).abs();
-    off > SURPRISING * deviation && off > SURPRISING * value.standard_error
-}
-
 /// Tells which nominal parameters are not what was stated.
 fn surprises<M: InParts>(
     measured: &M,
@@ -359,8 +352,9 @@ fn surprises<M: InParts>(
 ) {
     // The effects' parameters follow the nominal ones.
     for (i, value) in all.iter().take(count).enumerate() {
-        if is_surprising(measured, i, value) {
-            let (stated, deviation) = measured.stated(i);
+        let (stated, deviation) = measured.stated(i);
+        let off = (value.value - stated).abs();
+        if off > SURPRISING * deviation && off > SURPRISING * value.standard_error {
             findings.push(format!(
                 "`{}` is {:.4e} ± {:.1e} {unit} by these data, stated were {stated:.4e} ± \
                  {deviation:.1e} {unit}",

@@ -3,9 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::super::report::ends_or_not_a_number;
-use super::confirmed::{
-    Confirmed, Refused, confirm, effects as named_values, is_surprising, unfit,
-};
+use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{InParts, LOST, Part};
@@ -204,13 +202,8 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         .rivals
         .iter()
         .any(|(rival, against)| is_named(against) && !alike(against, rival));
-    let is_as_stated = as_described
-        .parameters
-        .iter()
-        .enumerate()
-        .all(|(i, own)| !is_surprising(measured, i, own));
     let verdict = match (
-        here.is_empty() && there.is_empty() && is_as_stated && confirmed.error < LOST,
+        here.is_empty() && there.is_empty() && confirmed.error < LOST,
         named.is_empty() || !pays,
         rivalled,
     ) {
@@ -336,8 +329,13 @@ impl RigDiagnosis {
         let name = &self.name;
         match self.verdict {
             Verdict::Adequate => format!(
-                "{name}: the nominal model is adequate; refitted within its uncertainty, its error \
-                 of {} on the data left out is {:.1} %.",
+                "{name}: the nominal model is adequate; refitted{}, its error of {} on the data left \
+                 out is {:.1} %.",
+                if self.findings.is_empty() {
+                    " within its uncertainty"
+                } else {
+                    ""
+                },
                 self.output,
                 100.0 * part.refitted_error
             ),
@@ -360,14 +358,9 @@ impl RigDiagnosis {
             Verdict::Unexplained if part.effects.is_empty() && self.swapped.effects.is_empty() => {
                 format!(
                     "{name}: no effect pays, and the nominal model is not adequate: refitted, its error of {} \
-                     on the data left out is {:.1} %{}.",
+                     on the data left out is {:.1} %.",
                     self.output,
-                    100.0 * part.refitted_error,
-                    if self.findings.is_empty() {
-                        ""
-                    } else {
-                        ", with parameters that are not what was stated"
-                    }
+                    100.0 * part.refitted_error
                 )
             }
             Verdict::Unexplained => format!(
