@@ -1,11 +1,12 @@
 //! Hides effects in fresh cases, diagnoses them and prints what came of it. With `--out` the cases are
 //! kept as those of a study: the same command goes on where it was stopped, and `--shard I/N` carries out
 //! a part. Of several worlds each has a folder there and begins 1,000 seeds after the one before; they are shown
-//! beside each other, and `--picture` draws how often what is stated is true.
+//! beside each other, and `--picture` draws how often what is stated is true. `--carry-on 0` shows what is there
+//! of a study that was stopped.
 //!
 //! `cargo run --release -p acceptance --example hidden_effects_suite -- [--one N] [--effect NAME]
 //! [--two N] [--nothing N] [--outside N] [--noise F,...] [--mismatch F,...] [--seed S] [--verbose 1]
-//! [--world plain,open,noisy] [--out DIR] [--shard I/N] [--picture FILE.svg]`
+//! [--world plain,open,noisy] [--out DIR] [--shard I/N] [--picture FILE.svg] [--carry-on 0]`
 
 use std::env;
 use std::fs;
@@ -32,7 +33,7 @@ fn main() -> ExitCode {
         verbose: false,
     };
     let mut worlds = vec![World::Plain];
-    let (mut out, mut shard, mut drawn) = (None, None, None);
+    let (mut out, mut shard, mut drawn, mut carry_on) = (None, None, None, true);
     let mut arguments = env::args().skip(1);
     while let Some(option) = arguments.next() {
         let text = arguments.next().unwrap_or_default();
@@ -87,10 +88,11 @@ fn main() -> ExitCode {
             "--mismatch" => plan.mismatch = list,
             "--seed" => plan.seed = value as u64,
             "--verbose" => plan.verbose = value != 0.0,
+            "--carry-on" => carry_on = value != 0.0,
             _ => {
                 eprintln!(
                     "{option} is unknown; expected --one, --effect, --two, --nothing, --outside, --noise, \
-                     --mismatch, --seed, --world, --out, --shard, --picture or --verbose"
+                     --mismatch, --seed, --world, --out, --shard, --carry-on, --picture or --verbose"
                 );
                 return ExitCode::from(2);
             }
@@ -112,7 +114,7 @@ fn main() -> ExitCode {
             folder.clone()
         };
         let tell = |Progress { done, of }: Progress| eprintln!("{world}: {done} of {of} cases");
-        match run_all(&plan, &own, shard, &tell) {
+        match run_all(&plan, &own, shard, carry_on, &tell) {
             Ok(scored) => {
                 println!("{}", table(&scored));
                 results.push((world.to_string(), scored));

@@ -20,7 +20,7 @@ const INTERVALS: [(f64, f64); 6] = [
 ];
 
 /// Bounds of the confidences that are counted together.
-pub(super) const SURE: [f64; 6] = [0.0, 0.5, 0.9, 0.99, 0.999, 1.0];
+pub(super) const SURE: [f64; 4] = [0.0, 0.5, 0.9, 1.0];
 
 /// Names whose stated confidences lie together.
 pub(super) struct Names {
@@ -84,7 +84,7 @@ pub fn picture(worlds: &[(String, Vec<Scored>)]) -> Panel {
         ));
     }
     Panel {
-        title: "How sure, and how often right".to_string(),
+        title: "Stated and true".to_string(),
         x: Axis::linear("stated", Units::PERCENT).between(45.0, 101.0),
         y: Axis::linear("true", Units::PERCENT).between(45.0, 101.0),
         series,

@@ -275,7 +275,8 @@ impl Runs for Plan {
     }
 }
 
-/// All cases of a plan, on all cores; those that `folder` has are not diagnosed again.
+/// All cases of a plan, on all cores; those that `folder` has are not diagnosed again. The other ones are only
+/// where `carry_on`.
 ///
 /// # Errors
 /// A folder that cannot be written or holds other cases.
@@ -283,6 +284,7 @@ pub fn run_all(
     plan: &Plan,
     folder: &Path,
     shard: Option<Shard>,
+    carry_on: bool,
     tell: &(dyn Fn(Progress) + Sync),
 ) -> Result<Vec<Scored>, Error> {
     let how = campaign::Plan {
@@ -290,7 +292,7 @@ pub fn run_all(
         shard,
         jobs: None,
     };
-    let carried = carry_out(plan, &how, &AtomicBool::new(false), tell)?;
+    let carried = carry_out(plan, &how, &AtomicBool::new(!carry_on), tell)?;
     let scored = carried.table.texts("scored");
     Ok(scored
         .iter()

@@ -60,7 +60,7 @@ fn hidden_effects_are_found_and_nothing_where_nothing_is() {
         verbose: false,
     };
     let folder = tempfile::tempdir().unwrap();
-    let results = run_all(&plan, folder.path(), None, &|_| {}).unwrap();
+    let results = run_all(&plan, folder.path(), None, true, &|_| {}).unwrap();
     let report = table(&results);
     println!("{plan:?}\n{report}");
     // So few cases cannot measure rates: the bounds are those that a diagnosis with the required
@@ -95,7 +95,7 @@ fn effects_that_came_later_are_found_too() {
             verbose: false,
         };
         let folder = tempfile::tempdir().unwrap();
-        let results = run_all(&plan, folder.path(), None, &|_| {}).unwrap();
+        let results = run_all(&plan, folder.path(), None, true, &|_| {}).unwrap();
         println!("{plan:?}\n{}", table(&results));
         let (right, wrong) = rates(&results, "one");
         assert!(right == 1.0 && wrong == 0.0, "{}", entry.name);
