@@ -134,20 +134,23 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         starts.push(start);
     }
     let screen = model.screen(record);
-    let begun = model.begun(&stated, screen);
-    let begun: Vec<&Point> = begun
-        .iter()
-        .filter(|point| point.effects.is_empty())
-        .collect();
     let mut looked: Vec<Solution> = starts
         .par_iter()
         .filter_map(|start| least_squares(model, start, screen, &Free::All, LOOK))
         .collect();
-    looked.extend(opened(model, &begun, screen, LOOK));
     let first = looked.first()?.clone();
-    let best = looked
-        .into_iter()
-        .min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let best_of = |looked: &[Solution]| {
+        let all = looked.iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+        all.cloned()
+    };
+    // Read from the records only where no start finds the motion.
+    let begun = model.begun(&best_of(&looked)?.point, screen);
+    let begun: Vec<&Point> = begun
+        .iter()
+        .filter(|point| point.effects.is_empty())
+        .collect();
+    looked.extend(opened(model, &begun, screen, LOOK));
+    let best = best_of(&looked)?;
     // The look may have been at a part of the record only.
     let ends: Vec<Simulated> = [first, best]
         .par_iter()

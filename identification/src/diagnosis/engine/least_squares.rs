@@ -51,6 +51,13 @@ pub trait SimulatedModel: Sync {
     /// Errors at `point` on the samples of `block` in `record`.
     fn errors(&self, point: &Point, record: usize, block: usize) -> Vec<f64>;
 
+    /// The first `count` of them.
+    fn first_errors(&self, point: &Point, record: usize, block: usize, count: usize) -> Vec<f64> {
+        let mut errors = self.errors(point, record, block);
+        errors.truncate(count);
+        errors
+    }
+
     /// The two records that are the halves of `record`.
     fn folds(&self, record: usize) -> [usize; 2];
 

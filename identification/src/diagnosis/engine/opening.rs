@@ -32,9 +32,8 @@ impl<M: SimulatedModel> SimulatedModel for Opening<'_, M> {
     }
 
     fn errors(&self, point: &Point, record: usize, block: usize) -> Vec<f64> {
-        let mut errors = self.model.errors(point, record, block);
-        errors.truncate(self.samples(record, block));
-        errors
+        let count = self.samples(record, block);
+        self.model.first_errors(point, record, block, count)
     }
 
     fn folds(&self, record: usize) -> [usize; 2] {

@@ -270,7 +270,13 @@ impl SimulatedModel for Measured<'_> {
     }
 
     fn errors(&self, point: &Point, record: usize, block: usize) -> Vec<f64> {
+        self.first_errors(point, record, block, usize::MAX)
+    }
+
+    // No more is simulated than is asked for.
+    fn first_errors(&self, point: &Point, record: usize, block: usize, count: usize) -> Vec<f64> {
         let places = &self.places[record][block];
+        let places = &places[..count.min(places.len())];
         let length = places.last().map_or(0, |last| last + 1);
         let simulated = self.simulate_to(point, block, length);
         let measured = self.measurement.recordings[block].output();
