@@ -61,9 +61,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         on: Switches {
             friction: true,
             specimen: true,
-            observer: true,
             pressure: true,
-            notch: true,
+            valve: true,
         },
         ..OperatorAids::default()
     };

@@ -13,7 +13,9 @@
 //!   into a force.
 
 use nalgebra::Complex;
+use plant::identified::table::Table;
 use units::constants::{INCH, LBF};
+use units::{Parameters, vocabulary};
 
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};
@@ -29,17 +31,25 @@ pub const SHAPES: [&str; SHAPING] = [
 ];
 
 /// Parameters of both structures, and what they remember.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct AccelerationTracking {
     /// Command shaping: V/m, V s/m, V s²/m, V s³/m.
+    #[parameter(0, name = SHAPES[0], about = "F0 of command shaping", "V/m" => "V/in", finite)]
+    #[parameter(1, name = SHAPES[1], about = "F1 of command shaping", "V.s/m" => "V.s/in", finite)]
+    #[parameter(2, name = SHAPES[2], about = "F2 of command shaping", "V.s2/m" => "V.s2/in", finite)]
+    #[parameter(3, name = SHAPES[3], about = "F3 of command shaping", "V.s3/m" => "V.s3/in", finite)]
     pub shaping: [f64; SHAPING],
-    /// Displacement feedback, V/m.
+    /// K of the displacement feedback, V/m.
+    #[parameter("V/m" => "V/in", finite)]
     pub displacement_gain: f64,
     /// The displacement that is fed back.
+    #[parameters]
     pub filter: DisplacementFilter,
     /// Acceleration loop.
+    #[parameters]
     pub acceleration: AccelerationLoop,
     /// Force loop.
+    #[parameters]
     pub force: ForceLoop,
     /// Largest magnitude of the valve command, V.
     pub limit: f64,
@@ -50,11 +60,13 @@ pub struct AccelerationTracking {
 /// A table's displacement from noisy displacement and acceleration: the steady Kalman filter of a
 /// double integrator, `x⁻ = x + h v + h² a/2`, `v⁻ = v + h a`, `x = x⁻ + alpha (y - x⁻)`,
 /// `v = v⁻ + beta/h (y - x⁻)`.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct DisplacementFilter {
     /// Standard deviation of the measured displacement, m.
+    #[parameter("m" => "in", positive)]
     pub displacement_noise: f64,
-    /// Standard deviation of the measured acceleration, m/s².
+    /// Standard deviation of the measured acceleration, m/s2.
+    #[parameter("m/s2" => "g", positive)]
     pub acceleration_noise: f64,
 }
 
@@ -92,15 +104,22 @@ impl DisplacementFilter {
 }
 
 /// `u = Kp e + Ki i + Kii j`, `di/dt = e - leak i`, `dj/dt = i - leak j`, `e` the acceleration's error.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, Parameters,
+)]
+#[parameters(prefix = "acceleration_")]
 pub struct AccelerationLoop {
-    /// `Kp`, V s²/m.
+    /// Kp of the acceleration loop, V.s2/m.
+    #[parameter("V.s2/m" => "V.s2/in", name = "gain", finite)]
     pub proportional: f64,
-    /// `Ki`, V s/m.
+    /// Ki of the acceleration loop, V.s/m.
+    #[parameter("V.s/m" => "V.s/in", name = "integral_gain", finite)]
     pub integral: f64,
-    /// `Kii`, V/m.
+    /// Kii of the acceleration loop, V/m.
+    #[parameter("V/m" => "V/in", name = "double_integral_gain", finite)]
     pub double_integral: f64,
-    /// Rate at which the integrals leak away, 1/s.
+    /// Rate at which its integrals leak away, 1/s.
+    #[parameter("1/s", non_negative)]
     pub leak: f64,
 }
 
@@ -113,17 +132,24 @@ impl AccelerationLoop {
 }
 
 /// `u = K f`, `df/dt = corner (m r_a + c r_v + k r_d - F - f)`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, Parameters,
+)]
 pub struct ForceLoop {
-    /// `K`, V/N.
+    /// Kf of the force loop, V/N.
+    #[parameter("V/N" => "V/lbf", name = "force_gain", finite)]
     pub gain: f64,
     /// Corner of its lag, rad/s.
+    #[parameter("rad/s", name = "force_corner", positive)]
     pub corner: f64,
-    /// `m`, of the table, kg.
+    /// Mass of the table, for the wanted force, kg.
+    #[parameter("kg" => "lbf.s2/in", name = Table::TABLE_MASS, non_negative)]
     pub mass: f64,
-    /// `c`, N s/m.
+    /// Viscous damping of the table, N.s/m.
+    #[parameter("N.s/m" => "lbf.s/in", name = Table::TABLE_DAMPING, non_negative)]
     pub damping: f64,
-    /// `k`, N/m.
+    /// Stiffness from table to ground, N/m.
+    #[parameter("N/m" => "lbf/in", name = Table::TABLE_STIFFNESS, non_negative)]
     pub stiffness: f64,
 }
 
@@ -218,25 +244,8 @@ impl Controller for AccelerationTracking {
     type Output = f64;
 
     fn validate(&self) -> Result<(), ModelError> {
-        for (name, value) in SHAPES.into_iter().zip(self.shaping) {
-            ModelError::require_finite(name, value)?;
-        }
-        ModelError::require_finite("displacement_gain", self.displacement_gain)?;
-        let filter = &self.filter;
-        ModelError::require_positive("displacement_noise", filter.displacement_noise)?;
-        ModelError::require_positive("acceleration_noise", filter.acceleration_noise)?;
-        let own = &self.acceleration;
-        ModelError::require_finite("acceleration_gain", own.proportional)?;
-        ModelError::require_finite("acceleration_integral_gain", own.integral)?;
-        ModelError::require_finite("acceleration_double_integral_gain", own.double_integral)?;
-        ModelError::require_non_negative("acceleration_leak", own.leak)?;
-        let own = &self.force;
-        ModelError::require_finite("force_gain", own.gain)?;
-        ModelError::require_positive("force_corner", own.corner)?;
-        ModelError::require_non_negative("table_mass", own.mass)?;
-        ModelError::require_non_negative("table_damping", own.damping)?;
-        ModelError::require_non_negative("table_stiffness", own.stiffness)?;
-        ModelError::require_positive("valve_limit", self.limit)
+        self.check()?;
+        ModelError::require_positive(vocabulary::VALVE_LIMIT, self.limit)
     }
 
     fn step(&mut self, input: &AccelerationTrackingInput, period: f64) -> f64 {

@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DMatrix, DVector, SVector};
 use plant::linear::log_space;
 use units::constants::{INCH, SAMPLING_PERIOD};
+use units::{Parameters as _, vocabulary};
 
 use crate::aids::rig::{KnownRig, MAXIMUM_DELAY};
 use crate::pid::VALVE_LIMIT;
@@ -25,15 +26,22 @@ const BAND: (f64, f64) = (0.25, 20.0);
 const RIDGE: f64 = 1e-6;
 
 /// What the law is built from.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct Parameters {
     /// The rig.
     pub rig: KnownRig,
     /// Gain that holds the displacement, V/m.
+    #[parameter("V/m" => "V/in", min = 0.0, non_negative)]
     pub hold_gain: f64,
-    /// `mu`, between 0 (nothing is learnt) and 2.
+    /// mu; 0: nothing is learnt.
+    ///
+    /// Below 2.
+    #[parameter(min = 0.0, max = 2.0, non_negative)]
     pub adaptation: f64,
     /// Rate at which what was learnt leaks away, 1/s.
+    #[parameter("1/s", min = 0.0, non_negative)]
     pub leak: f64,
     /// Largest magnitude of the valve command, V.
     pub limit: f64,
@@ -61,17 +69,15 @@ impl Parameters {
     /// Names the first with which the law cannot run.
     pub fn validate(&self) -> Result<(), ModelError> {
         self.rig.validate()?;
-        ModelError::require_non_negative("hold_gain", self.hold_gain)?;
-        ModelError::require_non_negative("adaptation", self.adaptation)?;
+        self.check()?;
         if self.adaptation >= 2.0 {
             return Err(ModelError::Parameter {
-                name: "adaptation",
+                name: Self::ADAPTATION,
                 value: self.adaptation,
-                expected: "less than 2, from which on the weights grow",
+                expected: "less than 2, above which the weights diverge",
             });
         }
-        ModelError::require_non_negative("leak", self.leak)?;
-        ModelError::require_positive("valve_limit", self.limit)?;
+        ModelError::require_positive(vocabulary::VALVE_LIMIT, self.limit)?;
         ModelError::require_positive("period", self.period)
     }
 }

@@ -1,16 +1,21 @@
 //! Control allocation: how much of the valve each low-level loop gets (Fig 4-3).
 
+use units::{Parameters, vocabulary};
+
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError};
 
 /// `u = alpha u_d + beta u_f` from the commands of the displacement and the force loop.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct ControlAllocation {
-    /// Share of the displacement loop, `alpha`.
+    /// Share alpha of the displacement loop.
+    #[parameter("1", non_negative)]
     pub displacement_share: f64,
-    /// Share of the force loop, `beta`.
+    /// Share beta of the force loop.
+    #[parameter("1", non_negative)]
     pub force_share: f64,
     /// Largest magnitude of the valve command, V.
+    #[parameter("V", name = vocabulary::VALVE_LIMIT, positive)]
     pub limit: f64,
 }
 
@@ -39,17 +44,16 @@ impl Controller for ControlAllocation {
     type Output = f64;
 
     fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_non_negative("displacement_share", self.displacement_share)?;
-        ModelError::require_non_negative("force_share", self.force_share)?;
+        self.check()?;
         if self.displacement_share + self.force_share == 0.0 {
             return Err(ModelError::Parameter {
-                name: "force_share",
+                name: Self::FORCE_SHARE,
                 value: 0.0,
-                expected: "a positive number where displacement_share is 0: no loop would reach \
-                           the valve",
+                expected: "a positive number if displacement_share is 0, or no loop reaches the \
+                    valve",
             });
         }
-        ModelError::require_positive("valve_limit", self.limit)
+        Ok(())
     }
 
     fn step(&mut self, input: &LoopCommands, _period: f64) -> f64 {

@@ -9,7 +9,6 @@ pub mod aids;
 pub mod allocation;
 pub mod clipped_optimal;
 pub mod hierarchy;
-pub mod hybrid;
 pub mod interlock;
 pub mod loop_shaping;
 pub mod loops;

@@ -3,6 +3,7 @@
 
 use nalgebra::Complex;
 use units::constants::INCH;
+use units::{Parameters, vocabulary};
 
 use crate::pid::{PidInput, VALVE_LIMIT, limit_and_integrate};
 use crate::{Controller, ModelError};
@@ -26,15 +27,19 @@ pub struct LoopShaping {
 }
 
 /// Coefficients of a controller of the form of Eq 3-10.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct LoopShapingCoefficients {
-    /// `g`, V/m.
+    /// g of Eq 3-10, V/m.
+    #[parameter("V/m" => "V/in", positive)]
     pub gain: f64,
-    /// `n1`, 1/s.
+    /// Coefficient of s in the numerator, 1/s.
+    #[parameter("1/s", finite)]
     pub numerator_rate: f64,
-    /// `n0`, 1/s².
+    /// Constant of the numerator, 1/s2.
+    #[parameter("1/s2", finite)]
     pub numerator_constant: f64,
-    /// `p`, 1/s.
+    /// Rate p of the slow pole, 1/s.
+    #[parameter("1/s", non_negative)]
     pub pole: f64,
 }
 
@@ -42,15 +47,21 @@ pub struct LoopShapingCoefficients {
 pub const SECTIONS: usize = 2;
 
 /// `(b2 s² + b1 s + 1) / (a2 s² + a1 s + 1)`; one by default.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, Parameters,
+)]
 pub struct Section {
-    /// `b2`, s².
+    /// Numerator, s^2, s2.
+    #[parameter("s2", finite)]
     pub b2: f64,
-    /// `b1`, s.
+    /// Numerator, s, s.
+    #[parameter("s", finite)]
     pub b1: f64,
-    /// `a2`, s².
+    /// Denominator, s^2, s2.
+    #[parameter("s2", non_negative)]
     pub a2: f64,
-    /// `a1`, s.
+    /// Denominator, s, s.
+    #[parameter("s", non_negative)]
     pub a1: f64,
 }
 
@@ -60,13 +71,11 @@ impl Section {
     /// # Errors
     /// A coefficient that is not finite, or a pole that does not decay.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_finite("section_b2", self.b2)?;
-        ModelError::require_finite("section_b1", self.b1)?;
-        ModelError::require_non_negative("section_a2", self.a2)?;
+        self.check()?;
         if self.a2 > 0.0 {
-            return ModelError::require_positive("section_a1", self.a1);
+            return ModelError::require_positive(Self::A1, self.a1);
         }
-        ModelError::require_non_negative("section_a1", self.a1)
+        Ok(())
     }
 
     /// The difference equation by the trapezoidal rule at `period` s, in powers of `1/z`:
@@ -131,10 +140,7 @@ impl LoopShapingCoefficients {
     /// # Errors
     /// A coefficient with which there is no such controller, by name.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("gain", self.gain)?;
-        ModelError::require_finite("numerator_rate", self.numerator_rate)?;
-        ModelError::require_finite("numerator_constant", self.numerator_constant)?;
-        ModelError::require_non_negative("pole", self.pole)
+        Ok(self.check()?)
     }
 }
 
@@ -175,18 +181,11 @@ impl LoopShaping {
 
     /// The parameters with the names that the component gives them.
     pub fn named(&self) -> Vec<(String, f64)> {
-        let c = &self.coefficients;
-        let mut all = vec![
-            ("gain".to_string(), c.gain),
-            ("numerator_rate".to_string(), c.numerator_rate),
-            ("numerator_constant".to_string(), c.numerator_constant),
-            ("pole".to_string(), c.pole),
-        ];
+        let own = self.coefficients.named().into_iter();
+        let mut all: Vec<_> = own.map(|(name, value)| (name.to_string(), value)).collect();
         for (number, section) in (1..).zip(&self.sections) {
-            let Section { b2, b1, a2, a1 } = *section;
-            for (name, value) in [("b2", b2), ("b1", b1), ("a2", a2), ("a1", a1)] {
-                all.push((format!("section_{number}_{name}"), value));
-            }
+            let own = section.named().into_iter();
+            all.extend(own.map(|(name, value)| (format!("section_{number}_{name}"), value)));
         }
         all
     }
@@ -210,7 +209,7 @@ impl Controller for LoopShaping {
     fn validate(&self) -> Result<(), ModelError> {
         self.coefficients.validate()?;
         self.sections.iter().try_for_each(Section::validate)?;
-        ModelError::require_positive("valve_limit", self.limit)
+        ModelError::require_positive(vocabulary::VALVE_LIMIT, self.limit)
     }
 
     fn step(&mut self, input: &PidInput, period: f64) -> f64 {

@@ -1,4 +1,4 @@
-//! Every loop of the thesis as a linear system around the rig, broken at the valve: continuous as
+//! Every loop of the thesis as a linear system around the rig, opened at the valve: continuous as
 //! printed, and as sampled.
 //!
 //! The sampled loops hold the same difference equations as the laws that the FMUs run, with the
@@ -50,7 +50,7 @@ pub struct LinearLaw {
     period: f64,
 }
 
-/// Rig and law with the loop broken at the valve.
+/// Rig and law with the loop opened at the valve.
 #[derive(Debug, Clone)]
 pub struct Loop {
     plant: StateSpace,

@@ -3,6 +3,7 @@
 //! tables D. P. Stoten and E. G. Gómez, Philosophical Transactions of the Royal Society A 359, 2001).
 
 use units::constants::{INCH, STROKE};
+use units::{Parameters, vocabulary};
 
 use crate::pid::{VALVE_LIMIT, limit_and_integrate};
 use crate::{Controller, ModelError, Motion};
@@ -17,17 +18,22 @@ use crate::{Controller, ModelError, Motion};
 /// model; the law needs neither to know it nor the start near it. Integrals stand still while the
 /// command is at its limit and they would push it further, and leak at `leak`, for noise alone would
 /// raise them without end.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct MinimalControlSynthesis {
-    /// `a`, rad/s.
+    /// a of the reference model, rad/s.
+    #[parameter("rad/s", positive)]
     pub bandwidth: f64,
-    /// `alpha`, V/(m³ s).
+    /// alpha, V/(m3.s).
+    #[parameter("V/(m3.s)", non_negative)]
     pub integral_adaptation: f64,
-    /// `beta`, V/m³.
+    /// beta, V/m3.
+    #[parameter("V/m3", non_negative)]
     pub proportional_adaptation: f64,
     /// Rate at which what was learnt leaks away, 1/s.
+    #[parameter("1/s", non_negative)]
     pub leak: f64,
-    /// `Kr` and `-K` at the start, V/m.
+    /// Kr and -K at the start, V/m.
+    #[parameter("V/m" => "V/in", finite)]
     pub initial_gain: f64,
     /// Largest magnitude of the valve command, V.
     pub limit: f64,
@@ -70,17 +76,6 @@ impl MinimalControlSynthesis {
         }
     }
 
-    /// The parameters with the names of their component, SI.
-    pub fn named(&self) -> [(&'static str, f64); 5] {
-        [
-            ("bandwidth", self.bandwidth),
-            ("integral_adaptation", self.integral_adaptation),
-            ("proportional_adaptation", self.proportional_adaptation),
-            ("leak", self.leak),
-            ("initial_gain", self.initial_gain),
-        ]
-    }
-
     /// `[K, Kr]` now without their proportional part, V/m.
     pub fn gains(&self) -> [f64; 2] {
         [
@@ -95,12 +90,8 @@ impl Controller for MinimalControlSynthesis {
     type Output = f64;
 
     fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("bandwidth", self.bandwidth)?;
-        ModelError::require_non_negative("integral_adaptation", self.integral_adaptation)?;
-        ModelError::require_non_negative("proportional_adaptation", self.proportional_adaptation)?;
-        ModelError::require_non_negative("leak", self.leak)?;
-        ModelError::require_finite("initial_gain", self.initial_gain)?;
-        ModelError::require_positive("valve_limit", self.limit)
+        self.check()?;
+        ModelError::require_positive(vocabulary::VALVE_LIMIT, self.limit)
     }
 
     fn step(&mut self, input: &MinimalControlSynthesisInput, period: f64) -> f64 {

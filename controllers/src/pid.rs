@@ -1,6 +1,7 @@
 //! PID control of one measured quantity (Eq 3-1).
 
 use units::constants::{INCH, LBF};
+use units::{Parameters, vocabulary};
 
 use crate::{Controller, ModelError};
 
@@ -8,20 +9,28 @@ use crate::{Controller, ModelError};
 ///
 /// The integral takes in the error of the present sample and stands still while the command is at
 /// its limit and the error would push it further.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct Pid {
     /// Proportional gain, V per unit.
+    #[parameter(name = "proportional_gain", about = "Proportional gain", finite)]
     pub proportional: f64,
     /// Integral gain, V per unit and second.
+    #[parameter(name = "integral_gain", about = "Integral gain", finite)]
     pub integral: f64,
-    /// Rate at which the integral leaks away, 1/s: `I / (s + leak)` in place of `I / s`. Two loops
-    /// that integrate through one valve need it in one of them (see [`crate::sliding_mode`]).
+    /// Rate at which the integral leaks away, 1/s.
+    ///
+    /// `I / (s + leak)` in place of `I / s`. Two loops that integrate through one valve need it in
+    /// one of them (see [`crate::sliding_mode`]).
+    #[parameter("1/s", non_negative)]
     pub integral_leak: f64,
     /// Derivative gain, V s per unit.
+    #[parameter(name = "derivative_gain", about = "Derivative gain", finite)]
     pub derivative: f64,
-    /// Time constant of the lag on the derivative, s.
+    /// Time constant of the derivative's lag, s.
+    #[parameter("s", non_negative)]
     pub derivative_lag: f64,
     /// Largest magnitude of the valve command, V.
+    #[parameter("V", name = vocabulary::VALVE_LIMIT, positive)]
     pub limit: f64,
     /// What the law remembers.
     pub memory: PidMemory,
@@ -79,12 +88,7 @@ impl Controller for Pid {
     type Output = f64;
 
     fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_finite("proportional_gain", self.proportional)?;
-        ModelError::require_finite("integral_gain", self.integral)?;
-        ModelError::require_non_negative("integral_leak", self.integral_leak)?;
-        ModelError::require_finite("derivative_gain", self.derivative)?;
-        ModelError::require_non_negative("derivative_lag", self.derivative_lag)?;
-        ModelError::require_positive("valve_limit", self.limit)
+        Ok(self.check()?)
     }
 
     fn step(&mut self, input: &PidInput, period: f64) -> f64 {

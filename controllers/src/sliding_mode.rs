@@ -23,6 +23,7 @@
 
 use plant::identified::table::Table;
 use plant::specimens::linear::LinearSpecimen;
+use units::{Parameters, vocabulary};
 
 use crate::hierarchy::{LowLevelReferences, SlidingModeInput};
 use crate::prediction_over_delay::PredictionOverDelay;
@@ -32,19 +33,26 @@ use crate::{Controller, ModelError, Motion};
 pub const IDENTIFIED_RATE: f64 = 69.6;
 
 /// The sliding-mode law.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct SlidingMode {
     /// The table: `m`, `c`, `k`.
     pub table: Table,
-    /// Mass of the specimen whose acceleration is measured, `m_s`, kg.
+    /// Mass of the specimen whose acceleration is measured, kg.
+    #[parameter("kg", name = vocabulary::SPECIMEN_MASS, non_negative)]
     pub specimen_mass: f64,
-    /// `lambda`, 1/s.
+    /// lambda of Eq 4-7, 1/s.
+    #[parameter("1/s", positive)]
     pub surface_rate: f64,
-    /// `K`, 1/s.
+    /// K of Eq 4-12, 1/s.
+    #[parameter("1/s", positive)]
     pub reaching_rate: f64,
-    /// `K_s`, m/s²; zero for the law as printed.
+    /// K_s of the switching term, 0 for none, m/s2.
+    ///
+    /// Zero for the law as printed.
+    #[parameter("m/s2" => "g", non_negative)]
     pub switching_gain: f64,
-    /// `phi`, m/s.
+    /// phi of the switching term, m/s.
+    #[parameter("m/s" => "in/s", positive)]
     pub boundary_layer: f64,
     /// Prediction over transport delay; absent where the loop has none.
     pub prediction: Option<PredictionOverDelay>,
@@ -127,11 +135,7 @@ impl Controller for SlidingMode {
 
     fn validate(&self) -> Result<(), ModelError> {
         self.table.validate()?;
-        ModelError::require_non_negative("specimen_mass", self.specimen_mass)?;
-        ModelError::require_positive("surface_rate", self.surface_rate)?;
-        ModelError::require_positive("reaching_rate", self.reaching_rate)?;
-        ModelError::require_non_negative("switching_gain", self.switching_gain)?;
-        ModelError::require_positive("boundary_layer", self.boundary_layer)?;
+        self.check()?;
         self.prediction
             .as_ref()
             .map_or(Ok(()), PredictionOverDelay::validate)
@@ -168,6 +172,112 @@ impl Controller for SlidingMode {
     fn reset(&mut self) {
         if let Some(prediction) = &mut self.prediction {
             prediction.reset();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law() -> SlidingMode {
+        SlidingMode {
+            switching_gain: 0.8,
+            boundary_layer: 0.05,
+            ..SlidingMode::new(Table::default(), 150.0, 40.0, 70.0)
+        }
+    }
+
+    /// Motions on both sides of the surface, within the boundary layer and outside of it.
+    fn motions() -> Vec<(Motion, Motion, f64)> {
+        let reference = Motion {
+            displacement: 0.01,
+            velocity: -0.2,
+            acceleration: 1.5,
+        };
+        [
+            [0.0098, -0.19, 0.7],
+            [0.0103, -0.2, 1.0],
+            [0.03, 0.4, -2.0],
+            [-0.02, -0.6, 3.0],
+        ]
+        .into_iter()
+        .map(|[displacement, velocity, specimen_acceleration]| {
+            let measured = Motion {
+                displacement,
+                velocity,
+                acceleration: 0.0,
+            };
+            (reference, measured, specimen_acceleration)
+        })
+        .collect()
+    }
+
+    #[test]
+    fn under_the_law_the_surface_decays_as_it_says() {
+        let law = law();
+        let mut within = 0;
+        for (reference, measured, specimen_acceleration) in motions() {
+            let (displacement, motion) = law.forces(&reference, &measured, specimen_acceleration);
+            // Newton on the table (Eq 4-15): spring, damper and specimen pull back.
+            let acceleration = (displacement + motion
+                - law.table.stiffness * measured.displacement
+                - law.table.damping * measured.velocity
+                - law.specimen_mass * specimen_acceleration)
+                / law.table.mass;
+            let rate = acceleration - reference.acceleration
+                + law.surface_rate * (measured.velocity - reference.velocity);
+            let surface = law.surface(&reference, &measured);
+            let saturated = if surface.abs() < law.boundary_layer {
+                within += 1;
+                surface / law.boundary_layer
+            } else {
+                surface.signum()
+            };
+            let expected = -law.reaching_rate * surface - law.switching_gain * saturated;
+            assert!(
+                (rate - expected).abs() < 1e-9 * (1.0 + expected.abs()),
+                "S = {surface}: {rate} {expected}"
+            );
+        }
+        assert_eq!(within, 2);
+    }
+
+    #[test]
+    fn error_gains_are_the_slopes_of_the_force_within_the_boundary_layer() {
+        let law = law();
+        let (reference, measured, specimen_acceleration) = motions()[0];
+        let force = |change: [f64; 3]| {
+            let reference = Motion {
+                displacement: reference.displacement + change[0],
+                velocity: reference.velocity + change[1],
+                acceleration: reference.acceleration + change[2],
+            };
+            let (a, b) = law.forces(&reference, &measured, specimen_acceleration);
+            a + b
+        };
+        for (i, gain) in law.error_gains().into_iter().enumerate() {
+            let mut change = [0.0; 3];
+            change[i] = 1e-6;
+            let slope = (force(change) - force([0.0; 3])) / 1e-6;
+            assert!((slope / gain - 1.0).abs() < 1e-5, "{i}: {slope} {gain}");
+        }
+    }
+
+    #[test]
+    fn the_displacement_loop_gets_its_force_over_the_stiffness_and_the_force_loop_all() {
+        let mut law = law();
+        for (reference, measured, specimen_acceleration) in motions() {
+            let input = SlidingModeInput {
+                reference,
+                measured,
+                specimen_acceleration,
+                ..SlidingModeInput::default()
+            };
+            let (displacement, motion) = law.forces(&reference, &measured, specimen_acceleration);
+            let got = law.step(&input, 0.002);
+            assert!((got.displacement * law.table.stiffness - displacement).abs() < 1e-9);
+            assert!((got.force - displacement - motion).abs() < 1e-9);
         }
     }
 }

@@ -2,6 +2,7 @@
 //! (Section 3.3, Fig 3-5, Table 3-2).
 
 use units::constants::INCH;
+use units::{Parameters, vocabulary};
 
 use crate::pid::{VALVE_LIMIT, limit_and_integrate};
 use crate::{Controller, ModelError, Motion};
@@ -12,11 +13,13 @@ use crate::{Controller, ModelError, Motion};
 ///
 /// As a sampled law the integral takes in the error of the present sample and stands still while
 /// the command is at its limit and the error would push it further.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct ThreeVariableControl {
     /// The gains.
+    #[parameters]
     pub gains: ThreeVariableGains,
     /// Largest magnitude of the valve command, V.
+    #[parameter("V", name = vocabulary::VALVE_LIMIT, positive)]
     pub limit: f64,
     /// Integral part of the command, V.
     pub integral: f64,
@@ -24,21 +27,28 @@ pub struct ThreeVariableControl {
 
 /// The eight gains of Table 3-2 less the derivative one, which is zero there and which the
 /// velocity gain replaces.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct ThreeVariableGains {
-    /// `P`, V/m.
+    /// P of Table 3-2, V/m.
+    #[parameter(name = "proportional_gain", "V/m" => "V/in", finite)]
     pub proportional: f64,
-    /// `I`, V/(m s).
+    /// I of Table 3-2, V/(m.s).
+    #[parameter(name = "integral_gain", "V/(m.s)" => "V/(in.s)", finite)]
     pub integral: f64,
-    /// `Kbv`, V s/m.
+    /// Kbv of Table 3-2, V.s/m.
+    #[parameter(name = "velocity_feedback_gain", "V.s/m" => "V.s/in", finite)]
     pub velocity_feedback: f64,
-    /// `Kba`, V s²/m.
+    /// Kba of Table 3-2, V.s2/m.
+    #[parameter(name = "acceleration_feedback_gain", "V.s2/m" => "V.s2/in", finite)]
     pub acceleration_feedback: f64,
-    /// `Kfd`, V/m.
+    /// Kfd of Table 3-2, V/m.
+    #[parameter(name = "displacement_feedforward_gain", "V/m" => "V/in", finite)]
     pub displacement_feedforward: f64,
-    /// `Kfv`, V s/m.
+    /// Kfv of Table 3-2, V.s/m.
+    #[parameter(name = "velocity_feedforward_gain", "V.s/m" => "V.s/in", finite)]
     pub velocity_feedforward: f64,
-    /// `Kfa`, V s²/m.
+    /// Kfa of Table 3-2, V.s2/m.
+    #[parameter(name = "acceleration_feedforward_gain", "V.s2/m" => "V.s2/in", finite)]
     pub acceleration_feedforward: f64,
 }
 
@@ -66,25 +76,6 @@ impl ThreeVariableGains {
             velocity_feedforward: g.velocity_feedforward / INCH,
             acceleration_feedforward: g.acceleration_feedforward / INCH,
         }
-    }
-
-    /// The gains with the names of their parameters.
-    pub fn named(&self) -> [(&'static str, f64); 7] {
-        [
-            ("proportional_gain", self.proportional),
-            ("integral_gain", self.integral),
-            ("velocity_feedback_gain", self.velocity_feedback),
-            ("acceleration_feedback_gain", self.acceleration_feedback),
-            (
-                "displacement_feedforward_gain",
-                self.displacement_feedforward,
-            ),
-            ("velocity_feedforward_gain", self.velocity_feedforward),
-            (
-                "acceleration_feedforward_gain",
-                self.acceleration_feedforward,
-            ),
-        ]
     }
 
     /// The law as `u = K [rd rv ra]' - L [x v a]' + xi`: returns `(K, L)`.
@@ -134,10 +125,7 @@ impl Controller for ThreeVariableControl {
     type Output = f64;
 
     fn validate(&self) -> Result<(), ModelError> {
-        for (name, value) in self.gains.named() {
-            ModelError::require_finite(name, value)?;
-        }
-        ModelError::require_positive("valve_limit", self.limit)
+        Ok(self.check()?)
     }
 
     fn step(&mut self, input: &ThreeVariableInput, period: f64) -> f64 {
@@ -186,5 +174,59 @@ mod tests {
             + g.velocity_feedforward * 0.1
             + g.acceleration_feedback * 0.3;
         assert!((law.step(&input, 0.002) - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn each_gain_acts_on_its_own_signal() {
+        // Eight gains that no other sum gives: u = Kp e + xi + Kfd rd + Kbv (rv - v) + Kfv rv
+        // + Kba (ra - a) + Kfa ra, xi = Ki h times the sum of e.
+        let gains = ThreeVariableGains {
+            proportional: 3.0,
+            integral: 5.0,
+            velocity_feedback: 0.7,
+            acceleration_feedback: 0.011,
+            displacement_feedforward: 1.3,
+            velocity_feedforward: 0.17,
+            acceleration_feedforward: 0.023,
+        };
+        let mut law = ThreeVariableControl {
+            gains,
+            limit: 100.0,
+            integral: 0.0,
+        };
+        let period = 0.01;
+        let (mut summed, mut largest) = (0.0, 0.0_f64);
+        for k in 0..20 {
+            let t = 0.3 * f64::from(k);
+            let reference = Motion {
+                displacement: t.sin(),
+                velocity: t.cos(),
+                acceleration: 9.0 * (1.7 * t).sin(),
+            };
+            let measured = Motion {
+                displacement: 0.8 * t.cos(),
+                velocity: -0.4 * t.sin(),
+                acceleration: 5.0 * (0.6 * t).cos(),
+            };
+            let error = reference.displacement - measured.displacement;
+            summed += gains.integral * period * error;
+            let expected = gains.proportional * error
+                + summed
+                + gains.displacement_feedforward * reference.displacement
+                + gains.velocity_feedback * (reference.velocity - measured.velocity)
+                + gains.velocity_feedforward * reference.velocity
+                + gains.acceleration_feedback * (reference.acceleration - measured.acceleration)
+                + gains.acceleration_feedforward * reference.acceleration;
+            let got = law.step(
+                &ThreeVariableInput {
+                    reference,
+                    measured,
+                },
+                period,
+            );
+            assert!((got - expected).abs() < 1e-12, "{got} {expected}");
+            largest = largest.max(summed.abs());
+        }
+        assert!(largest > 0.1, "the integral took part");
     }
 }

@@ -1,11 +1,17 @@
-//! From measured data to a model, and what a model gets wrong
+//! From measured data to a model, and what a model gets wrong: the crates of this folder by one name.
 
-pub mod closed_loop;
-pub mod data;
-pub mod diagnosis;
-mod error;
-pub mod estimation;
-pub mod identify;
-pub mod one_input;
+pub use recordings as data;
+pub use recordings::IdentificationError;
+pub use rigs::{closed_loop, identify, one_input};
+pub use sysid as estimation;
 
-pub use error::IdentificationError;
+/// What a model gets wrong, the name of the cause, and what it brings to know it.
+pub mod diagnosis {
+    pub use ::diagnosis as engine;
+    pub use ::rigs::kinds as rigs;
+    pub use ::rigs::{
+        Diagnosis, DiagnosisError, DiagnosisReport, EffectReport, Evidence, GainAgainstNoise,
+        GainReport, ParameterReport, RigEvidence, ShakeTableEvidence, Subject, called, case,
+        diagnose,
+    };
+}

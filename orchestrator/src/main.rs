@@ -1,7 +1,9 @@
 //! The program `shakebench`.
 
+mod cli;
+
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    shakebench::cli::main()
+    cli::main()
 }

@@ -43,6 +43,16 @@ pub enum ModelError {
     },
 }
 
+impl From<units::OutOfRange> for ModelError {
+    fn from(wrong: units::OutOfRange) -> Self {
+        Self::Parameter {
+            name: wrong.parameter.name,
+            value: wrong.value,
+            expected: wrong.parameter.range.expected(),
+        }
+    }
+}
+
 impl ModelError {
     /// A parameter that counts.
     ///

@@ -5,7 +5,6 @@
 
 pub mod delay_line;
 pub mod error;
-pub mod hybrid;
 pub mod identified;
 pub mod integration;
 pub mod linear;
@@ -13,5 +12,6 @@ pub mod sensors;
 pub mod servo_hydraulic;
 pub mod signal_path;
 pub mod specimens;
+pub mod transfer_system;
 
 pub use error::ModelError;

@@ -9,9 +9,9 @@ use std::{
     time::Instant,
 };
 
+use fmi_import::{Causality, Fmu, Instance, Isolation, Kind, Options};
 use libloading::{Library, Symbol};
-use shakebench::fmu::{Causality, Fmu, Instance, Isolation, Kind, Options};
-use shakebench::pack::{FmiVersion, PackedFmu, all_fmus};
+use pack::{FmiVersion, PackedFmu, all_fmus};
 
 type Handle = *mut c_void;
 type Instantiate = unsafe extern "C" fn(

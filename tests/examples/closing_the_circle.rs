@@ -1,7 +1,7 @@
 //! Closes the circle on rigs with a hidden effect: the generator, which shares no code with the models,
-//! hides it; it is diagnosed from the records; the drive for a motion that was never recorded is found on
-//! the extended model; the generator's rig plays it, noise and disturbance on. Prints the table of
-//! `docs/closing-the-circle.md`.
+//! hides it; it is diagnosed from the records; the drive for a motion that was never recorded is
+//! computed on the extended model; the generator's rig plays it, noise and disturbance on. Prints
+//! the table of `docs/closing-the-circle.md`.
 //!
 //! `cargo run --release -p acceptance --example closing_the_circle -- [--seed S] [--record FILE] [--pga G]
 //! [--corrections N] [EFFECT...]`
@@ -15,11 +15,11 @@ use hidden_effects::catalogue::entry;
 use identification::diagnosis::case::Case as Laboratory;
 use identification::diagnosis::engine::Observer;
 use identification::diagnosis::rigs::shake_table::diagnose;
-use shakebench::extended_model::ExtendedModel;
-use shakebench::iteration::circle::{self, Plan};
-use shakebench::iteration::on_model::Search;
-use shakebench::metrics;
-use shakebench::motion::{Motion, Scaling};
+use laboratory::iteration::circle::{self, Plan};
+use laboratory::iteration::on_model::Search;
+use motion::metrics;
+use motion::{Motion, Scaling};
+use pack::extended_model::ExtendedModel;
 use units::constants::{G, INCH};
 
 /// Effects that are hidden when none is named.
@@ -56,7 +56,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--record" => record = Some(PathBuf::from(value()?)),
             "--pga" => pga = value()?.parse()?,
             "--corrections" => search.corrections = value()?.parse()?,
-            name => effects.push(entry(name).ok_or(format!("`{name}` is no effect"))?.name),
+            name => effects.push(
+                entry(name)
+                    .ok_or(format!("`{name}` is not an effect"))?
+                    .name,
+            ),
         }
     }
     if effects.is_empty() {

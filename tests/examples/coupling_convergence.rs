@@ -7,12 +7,12 @@
 use std::path::Path;
 
 use acceptance::monolithic::{table_acceleration, table_acceleration_under, worst_error};
+use fmi_master::Algorithm;
+use laboratory::run::experiment::{Request, prepare};
+use laboratory::run::refinement::refine;
+use pages::report::{Abscissa, Axis, Panel, Series, Units, svg};
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
-use shakebench::master::Algorithm;
-use shakebench::report::{Abscissa, Axis, Panel, Series, Units, svg};
-use shakebench::run::experiment::{Request, prepare};
-use shakebench::run::refinement::refine;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     draw()?;

@@ -9,18 +9,23 @@ use std::process::Command;
 
 use hidden_effects::case::{Case, Kind, Settings};
 use identification::diagnosis::engine::Observer;
-use shakebench::diagnosis::diagnose;
-use shakebench::report::FILE;
+use laboratory::diagnosis::diagnose;
+use pages::report::FILE;
 
 /// Seed of the case.
 const SEED: u64 = 7;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let folder = root.canonicalize()?.join("target/diagnosis-walkthrough");
-    let case = folder.join(format!("cases/case-{SEED:05}"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("..")
+        .canonicalize()?;
+    let folder = root.join("target/diagnosis-walkthrough");
+    // The page shows the place of the case as it is called.
+    std::fs::create_dir_all(&folder)?;
+    std::env::set_current_dir(&folder)?;
+    let case = Path::new("cases").join(format!("case-{SEED:05}"));
     Case::draw(SEED, &Settings::new(Kind::This("valve_dead_band"))).write(&case)?;
-    let report = diagnose(&case, &[], None, &folder.join("results"), Observer::none())?;
+    let report = diagnose(&case, &[], None, Path::new("results"), Observer::none())?;
     println!("{}", report.sentence);
     let page = folder.join("results").join(FILE);
     let picture = root.join("docs/diagnosis-report.png");
@@ -28,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let status = Command::new(&browser)
         .args(["--headless", "--no-sandbox", "--disable-gpu"])
         .args(["--hide-scrollbars", "--virtual-time-budget=4000"])
-        .arg("--window-size=1200,1245")
+        .arg("--window-size=1200,640")
         .arg(format!("--screenshot={}", picture.display()))
         .arg(format!("file://{}", page.display()))
         .status()

@@ -16,8 +16,8 @@ use std::process::ExitCode;
 use acceptance::hidden_suite::{Plan, beside_each_other, picture, run_all, table};
 use hidden_effects::World;
 use hidden_effects::catalogue::entry;
-use shakebench::campaign::{Progress, Shard};
-use shakebench::report::svg;
+use pages::report::svg;
+use study::campaign::{Progress, Shard};
 
 fn main() -> ExitCode {
     let mut plan = Plan {

@@ -7,12 +7,12 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use acceptance::native_rig::{NativeRig, PERIOD};
+use motion::{self, Options};
 use nalgebra::Complex;
+use pages::report::{Abscissa, Axis, Panel, Report, Section, Series, Style, Units, html, svg};
 use plant::identified::shake_table::ShakeTable;
 use plant::linear::log_space;
 use plant::servo_hydraulic::{ServoHydraulicInput, ServoHydraulicTable};
-use shakebench::motion::{self, Options};
-use shakebench::report::{Abscissa, Axis, Panel, Report, Section, Series, Style, Units, html, svg};
 
 /// Displacement of the rig without specimen under `command` (V at s), m.
 fn answer(rig: &ServoHydraulicTable, duration: f64, command: impl Fn(f64) -> f64) -> Vec<f64> {

@@ -7,8 +7,8 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use shakebench::master::Algorithm;
-use shakebench::run::experiment::{Request, prepare};
+use fmi_master::Algorithm;
+use laboratory::run::experiment::{Request, prepare};
 
 const STOREYS: usize = 3;
 /// Name, specimen, what the damper is told.

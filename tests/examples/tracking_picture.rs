@@ -4,9 +4,9 @@
 
 use std::path::Path;
 
-use shakebench::master::Algorithm;
-use shakebench::report::{Abscissa, Axis, Panel, Series, Units, svg};
-use shakebench::run::experiment::{Request, prepare};
+use fmi_master::Algorithm;
+use laboratory::run::experiment::{Request, prepare};
+use pages::report::{Abscissa, Axis, Panel, Series, Units, svg};
 
 /// Seconds shown.
 const WINDOW: [f64; 2] = [7.0, 9.0];

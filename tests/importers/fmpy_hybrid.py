@@ -1,7 +1,7 @@
 """Virtual real-time hybrid simulation in a loop of fmpy's own: the four partitions as FMUs, called
 one after another, and the benchmark's scores J1 to J9.
 
-Arguments: JOB.json FMU...; the job has `ground` (m/s2, a value a sample), `case`, `seed`, `stream`
+Arguments: JOB.json FMU...; the job has `ground` (m/s2, one value per sample), `case`, `seed`, `stream`
 and the frame's `mass`, `damping`, `stiffness`. Prints RESULT and the scores as JSON. Scores and
 reference structure are computed here, apart from the program's.
 """

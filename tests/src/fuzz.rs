@@ -8,17 +8,17 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use fmi_import::Fmu;
+use fmi_ssp as ssp;
+use fmi_system::{Between, InputTable, SystemFile};
 use identification::data::Recording;
 use identification::diagnosis::case::Nominal;
 use identification::diagnosis::rigs::{Description, ExtendedRig};
 use identification::identify::{model_file::ModelFile, specimen_file};
+use laboratory::error::clipped;
+use laboratory::run::{manifest::Manifest, signals::read_csv, summary::Summary};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use shakebench::error::clipped;
-use shakebench::fmu::Fmu;
-use shakebench::run::{manifest::Manifest, signals::read_csv, summary::Summary};
-use shakebench::system::{Between, InputTable, SystemFile};
-use shakebench::{motion, ssp, validate};
 use zip::{ZipWriter, write::SimpleFileOptions};
 
 /// Reads a file; an error is what the user would be told.
@@ -53,7 +53,7 @@ pub const PARSERS: [Parser; 16] = [
         name: "validate",
         extension: "fmu",
         is_archive: true,
-        read: |path| told(validate::validate(path)),
+        read: |path| told(fmi_check::validate(path, pack::program::guest().as_deref())),
     },
     Parser {
         name: "ssp",
@@ -215,7 +215,8 @@ pub const LIMIT: Duration = Duration::from_secs(20);
 /// Sound files of a parser, to be damaged.
 pub fn sound(parser: &Parser) -> Vec<Sound> {
     let (project, sound) = (project(), corpus().join("sound"));
-    let systems = project.join("orchestrator/systems");
+    let systems = project.join("orchestrator/laboratory/systems");
+    let hybrid = project.join("hybrid/systems");
     let texts = |texts: Vec<Vec<u8>>| texts.into_iter().map(Sound::File).collect();
     match parser.name {
         "fmu" | "validate" => {
@@ -247,7 +248,7 @@ pub fn sound(parser: &Parser) -> Vec<Sound> {
         }
         "ssd" => texts(files(&sound.join("ssp"), "ssd")),
         "system" => texts(
-            [&systems, &systems.join("plant"), &systems.join("hybrid")]
+            [&systems, &systems.join("plant"), &hybrid]
                 .into_iter()
                 .flat_map(|folder| files(folder, "toml"))
                 .collect(),

@@ -2,10 +2,10 @@
 
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableInput};
 use controllers::{Controller, Motion as Sample};
+use motion::Motion;
 use nalgebra::{DVector, dvector};
 use plant::identified::coupled::Rig;
 use plant::specimens::linear::LinearSpecimen;
-use shakebench::motion::Motion;
 
 /// Acceleration of the table (m/s²) at the samples of `motion` under three-variable control, from
 /// the exact solution of table and specimen as one system with the valve command held.

@@ -3,10 +3,10 @@
 use controllers::interlock::{Interlock, InterlockInput};
 use controllers::three_variable::{ThreeVariableControl, ThreeVariableGains, ThreeVariableInput};
 use controllers::{Controller, Motion as Sample};
+use motion::Motion;
 use plant::sensors::instrumentation::{Instrumentation, InstrumentationState, TrueMotion};
 use plant::servo_hydraulic::{ServoHydraulicInput, ServoHydraulicTable};
 use plant::specimens::{YieldingSpecimen, YieldingState};
-use shakebench::motion::Motion;
 
 /// Sampling period, s.
 pub const PERIOD: f64 = 0.002;

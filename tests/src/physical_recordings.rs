@@ -6,12 +6,12 @@ use controllers::{Controller, ModelError};
 use identification::closed_loop::Found;
 use identification::closed_loop::simulation::Simulation;
 use identification::data::{Channel, Recording};
+use laboratory::commission::motions::Sines;
 use plant::sensors::channel::Noise;
 use plant::sensors::instrumentation::{Instrumentation, InstrumentationState, TrueMotion};
 use plant::servo_hydraulic::{SealFriction, ServoHydraulicRig, ServoHydraulicTable};
 use plant::specimens::YieldingSpecimen;
 use plant::specimens::linear::LinearSpecimen;
-use shakebench::commission::motions::Sines;
 use units::constants::{G, SAMPLING_PERIOD};
 
 /// What stands on the table.

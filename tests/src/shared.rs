@@ -2,25 +2,27 @@
 
 use std::path::PathBuf;
 
-/// The shared folder, or none (with a word on standard error) where it is missing.
-pub fn folder() -> Option<PathBuf> {
+/// The shared folder; a test that uses it says so by `needs::shared`.
+///
+/// # Panics
+/// When it is missing.
+pub fn folder() -> PathBuf {
     let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared");
     let folder = std::env::var_os("SHAKEBENCH_SHARED").map_or_else(beside, PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!(
-        "SKIPPED: {} is missing (set SHAKEBENCH_SHARED)",
+    assert!(
+        folder.is_dir(),
+        "{} is missing (set SHAKEBENCH_SHARED)",
         folder.display()
     );
-    None
+    folder
 }
 
-/// The records of earthquakes, in alphabetical order; none where they are missing.
+/// The records of earthquakes, in alphabetical order.
+///
+/// # Panics
+/// When they are not all there.
 pub fn records() -> Vec<PathBuf> {
-    let Some(folder) = folder() else {
-        return Vec::new();
-    };
+    let folder = folder();
     let entries = std::fs::read_dir(folder.join("records"))
         .into_iter()
         .flatten();

@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use acceptance::{python, shared};
-use shakebench::fmu::{Datum, FmiVersion, Options};
-use shakebench::library::FmuLibrary;
-use shakebench::master::{Algorithm, Checkpoint, Ended, Outcome, Pace, Record, Simulation};
-use shakebench::motion::Motion;
-use shakebench::system::{SystemFile, assemble};
+use fmi_import::{Datum, FmiVersion, Options};
+use fmi_master::{Algorithm, Checkpoint, Ended, Outcome, Pace, Record, Simulation};
+use fmi_system::{SystemFile, assemble};
+use laboratory::run::experiment::samples as played;
+use motion::Motion;
+use pack::library::FmuLibrary;
 use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 /// A motion at rest.
@@ -32,13 +33,19 @@ fn run(system: &str, settings: &[&str], step: f64, samples: usize) -> Outcome {
     let file = SystemFile::parse("test", system).unwrap();
     let settings: Vec<String> = settings.iter().map(|text| text.to_string()).collect();
     let mut library = FmuLibrary::new(FmiVersion::V3, None);
-    let system = assemble(&file, &settings, &mut |name| library.find(name)).unwrap();
+    let system = assemble(&file, &settings, &mut library).unwrap();
     let motion = rest(step, samples);
     let plan = (step, samples as f64 * step);
     let options = Options::default();
-    Simulation::with(&system, &motion, Algorithm::GaussSeidel, plan, &options)
-        .unwrap()
-        .run(samples, Pace::Fastest, &mut |_| {})
+    Simulation::with(
+        &system,
+        &played(&motion),
+        Algorithm::GaussSeidel,
+        plan,
+        &options,
+    )
+    .unwrap()
+    .run(samples, Pace::Fastest, &mut |_| {})
 }
 
 fn alone(fmu: &Path) -> String {
@@ -72,8 +79,9 @@ fn fmpy(
     (names, rows.collect())
 }
 
+/// A Reference-FMU; not each of them is there in both versions.
 fn foreign(version: &str, name: &str) -> Option<PathBuf> {
-    let path = shared::folder()?.join(format!("foreign-fmus/{version}/{name}.fmu"));
+    let path = shared::folder().join(format!("foreign-fmus/{version}/{name}.fmu"));
     path.is_file().then_some(path)
 }
 
@@ -123,6 +131,7 @@ fn difference(fmu: &Path, step: f64, stop: f64, kind: &str) -> f64 {
     largest
 }
 
+#[needs::shared("foreign-fmus")]
 #[test]
 fn reference_fmus_give_the_bits_of_fmpy() {
     let mut tried = 0;
@@ -145,9 +154,7 @@ fn reference_fmus_give_the_bits_of_fmpy() {
             tried += 1;
         }
     }
-    if shared::folder().is_some() {
-        assert_eq!(tried, 13);
-    }
+    assert_eq!(tried, 13);
 }
 
 /// The FMU without its co-simulation, in a folder of the test.
@@ -179,6 +186,7 @@ fn exchange_only(fmu: &Path, folder: &Path) -> PathBuf {
     path
 }
 
+#[needs::shared("foreign-fmus")]
 #[test]
 fn model_exchange_agrees_with_cvode() {
     let folder = tempfile::tempdir().unwrap();
@@ -200,6 +208,7 @@ fn model_exchange_agrees_with_cvode() {
     }
 }
 
+#[needs::shared("foreign-fmus")]
 #[test]
 fn model_exchange_goes_on_from_a_checkpoint_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
@@ -215,12 +224,19 @@ fn model_exchange_goes_on_from_a_checkpoint_to_the_bit() {
             let fmu = exchange_only(&fmu, folder.path());
             let file = SystemFile::parse("test", &alone(&fmu)).unwrap();
             let mut library = FmuLibrary::new(FmiVersion::V3, None);
-            let system = assemble(&file, &[], &mut |name| library.find(name)).unwrap();
+            let system = assemble(&file, &[], &mut library).unwrap();
             let begin = || {
                 let motion = rest(step, samples);
                 let plan = (step, samples as f64 * step);
                 let algorithm = Algorithm::GaussSeidel;
-                Simulation::with(&system, &motion, algorithm, plan, &Options::default()).unwrap()
+                Simulation::with(
+                    &system,
+                    &played(&motion),
+                    algorithm,
+                    plan,
+                    &Options::default(),
+                )
+                .unwrap()
             };
             let kept: Arc<Mutex<Vec<(Checkpoint, Record)>>> = Arc::default();
             let keep = kept.clone();
@@ -252,11 +268,10 @@ fn model_exchange_goes_on_from_a_checkpoint_to_the_bit() {
     }
 }
 
+#[needs::shared("foreign-fmus")]
 #[test]
 fn every_type_goes_through_parameters_and_connections() {
-    let Some(fmu) = foreign("fmi3", "Feedthrough") else {
-        return;
-    };
+    let fmu = foreign("fmi3", "Feedthrough").unwrap();
     let types = [
         ("Float32_continuous", "0.1"),
         ("Float64_continuous", "-1.5"),
@@ -314,11 +329,10 @@ fn every_type_goes_through_parameters_and_connections() {
     }
 }
 
+#[needs::shared("foreign-fmus")]
 #[test]
 fn arrays_are_set_as_a_whole_and_connected_by_their_names() {
-    let Some(fmu) = foreign("fmi3", "StateSpace") else {
-        return;
-    };
+    let fmu = foreign("fmi3", "StateSpace").unwrap();
     // y = D u without states, once and once more.
     let system = format!(
         "connections = [\"a.y -> b.u\"]\n[components.a]\nfmu = \"{0}\"\n\
@@ -352,15 +366,14 @@ fn arrays_are_set_as_a_whole_and_connected_by_their_names() {
 
 /// The published StateSpace refuses every setting of its structural parameters, from fmpy as well:
 /// the sizes are checked before the run.
+#[needs::shared("foreign-fmus")]
 #[test]
 fn arrays_follow_structural_parameters() {
-    let Some(fmu) = foreign("fmi3", "StateSpace") else {
-        return;
-    };
+    let fmu = foreign("fmi3", "StateSpace").unwrap();
     let file = SystemFile::parse("test", &alone(&fmu)).unwrap();
     let mut library = FmuLibrary::new(FmiVersion::V3, None);
     let settings = ["it.m=2", "it.n=1", "it.r=3"].map(str::to_string);
-    let system = assemble(&file, &settings, &mut |name| library.find(name)).unwrap();
+    let system = assemble(&file, &settings, &mut library).unwrap();
     let description = &system.components[0].fmu.description;
     let size = |name: &str| description.array(name).map(|elements| elements.len());
     for (name, elements) in [("A", 1), ("B", 2), ("C", 3), ("D", 6), ("u", 2), ("y", 3)] {
@@ -370,15 +383,15 @@ fn arrays_follow_structural_parameters() {
     assert!(description.position("D[2,3]").is_none());
 }
 
+#[needs::shared("foreign-fmus")]
 #[test]
 fn foreign_fmus_run_among_each_other_and_with_ours() {
-    let (Some(ball), Some(oscillator), Some(through)) = (
+    let [ball, oscillator, through] = [
         foreign("fmi2", "BouncingBall"),
         foreign("fmi3", "VanDerPol"),
         foreign("fmi3", "Feedthrough"),
-    ) else {
-        return;
-    };
+    ]
+    .map(Option::unwrap);
     let system = format!(
         r#"
         connections = [
@@ -416,11 +429,10 @@ fn foreign_fmus_run_among_each_other_and_with_ours() {
 }
 
 /// Each with each, of both versions: what one does in the process does not change the other.
+#[needs::shared("foreign-fmus")]
 #[test]
 fn reference_fmus_in_pairs_are_as_they_are_alone() {
-    let Some(folder) = shared::folder() else {
-        return;
-    };
+    let folder = shared::folder();
     let mut fmus = Vec::new();
     for version in ["fmi2", "fmi3"] {
         let all = fs::read_dir(folder.join("foreign-fmus").join(version)).unwrap();
@@ -465,23 +477,22 @@ fn reference_fmus_in_pairs_are_as_they_are_alone() {
     }
 }
 
+#[needs::shared("foreign-fmus")]
 #[test]
 fn scheduled_execution_is_refused_in_words() {
-    let Some(fmu) = foreign("fmi3", "Clocks") else {
-        return;
-    };
+    let fmu = foreign("fmi3", "Clocks").unwrap();
     let file = SystemFile::parse("test", &alone(&fmu)).unwrap();
     let mut library = FmuLibrary::new(FmiVersion::V3, None);
-    let system = assemble(&file, &[], &mut |name| library.find(name)).unwrap();
+    let system = assemble(&file, &[], &mut library).unwrap();
     let plan = (0.1, 1.0);
     let options = Options::default();
     let made = Simulation::with(
         &system,
-        &rest(0.1, 3),
+        &played(&rest(0.1, 3)),
         Algorithm::GaussSeidel,
         plan,
         &options,
     );
     let said = made.err().unwrap().to_string();
-    assert!(said.contains("scheduled execution only"), "{said}");
+    assert!(said.contains("only scheduled execution"), "{said}");
 }

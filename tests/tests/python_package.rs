@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use acceptance::python::{dask, importers, python};
-use shakebench::pack::{self, FmiVersion};
+use pack::{self, FmiVersion};
 
 fn root() -> PathBuf {
     pack::workspace_root().unwrap()

@@ -7,7 +7,7 @@ use super::dimension::Dimension;
 /// What is wrong with a unit, or with a number that carries one.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum UnitError {
-    /// A name that is no unit.
+    /// An unknown unit.
     #[error("unknown unit \"{name}\" in \"{text}\"{hint}")]
     Unknown {
         /// The name that was not recognised.
@@ -24,7 +24,7 @@ pub enum UnitError {
         text: String,
         /// Where, counted in characters from 1.
         at: usize,
-        /// What should have stood there.
+        /// What was expected there.
         expected: &'static str,
     },
     /// Two units of different dimension.

@@ -78,7 +78,7 @@ impl<'a> Parser<'a> {
                 }
                 None | Some(')') => return Ok(unit),
                 Some(_) if blank && divided => {
-                    return self.error("brackets or `*`: a blank after `/` can be read two ways");
+                    return self.error("brackets or `*`: a blank after `/` is ambiguous");
                 }
                 Some(_) if blank => 2,
                 Some(_) => return self.error("`*`, `/`, `^` or a blank"),
@@ -113,7 +113,7 @@ impl<'a> Parser<'a> {
         };
         match atom.power(halves) {
             Some(unit) => Ok(unit),
-            None => self.error("a power that leaves whole or half exponents"),
+            None => self.error("a power that gives whole or half exponents"),
         }
     }
 
@@ -187,7 +187,7 @@ impl<'a> Parser<'a> {
                 if name == "sqrt" && self.peek() == Some('(') {
                     return match self.bracket()?.power(1) {
                         Some(unit) => Ok(unit),
-                        None => self.error("a root that leaves whole or half exponents"),
+                        None => self.error("a root that gives whole or half exponents"),
                     };
                 }
                 lookup(&name).ok_or_else(|| self.unknown(name))

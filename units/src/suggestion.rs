@@ -12,8 +12,10 @@ fn likeliest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option
 
 /// Likeness from which a name is worth suggesting.
 const LIKELY: f64 = 0.5;
+/// Likeness below which the nearest name has nothing to do with the one that was meant.
+const ALIKE: f64 = 0.35;
 /// Names that are listed when none is likely.
-const LISTED: usize = 12;
+const LISTED: usize = 40;
 
 /// The name nearest to `name`, when one is near enough to be worth suggesting.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -28,7 +30,8 @@ pub fn hint<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String 
     match likeliest(name, known.iter().copied()) {
         Some((likeness, near)) if likeness >= LIKELY => format!("; did you mean `{near}`?"),
         Some(_) if known.len() <= LISTED => format!("; there is `{}`", known.join("`, `")),
-        Some((_, near)) => format!("; the nearest name is `{near}`"),
+        Some((likeness, near)) if likeness >= ALIKE => format!("; the nearest name is `{near}`"),
+        Some(_) => String::new(),
         None => "; there is none".to_string(),
     }
 }
@@ -48,9 +51,10 @@ mod tests {
             hint("zorkmid", known),
             "; there is `mpc`, `three-variable`, `none`"
         );
-        let many: Vec<String> = (0..20).map(|k| format!("output_{k}")).collect();
-        let many = many.iter().map(String::as_str);
-        assert!(hint("zork", many).starts_with("; the nearest name is `output_"));
+        let many: Vec<String> = (0..50).map(|k| format!("output_{k}")).collect();
+        let many = || many.iter().map(String::as_str);
+        assert!(hint("outing", many()).starts_with("; the nearest name is `output_"));
+        assert_eq!(hint("zork", many()), "");
         assert_eq!(hint("zork", []), "; there is none");
     }
 }

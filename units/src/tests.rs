@@ -127,8 +127,8 @@ fn what_cannot_be_read_says_where_and_what_was_expected() {
     );
     assert_eq!(
         message("m/s s"),
-        "cannot read the unit \"m/s s\" at character 5: expected brackets or `*`: \
-         a blank after `/` can be read two ways"
+        "cannot read the unit \"m/s s\" at character 5: expected brackets or `*`: a blank after \
+         `/` is ambiguous"
     );
     assert_eq!(
         message("N/(m/s"),
@@ -214,5 +214,24 @@ proptest::proptest! {
         let there = convert(value, "in/s^2", "g").unwrap();
         let back = convert(there, "g", "in/s^2").unwrap();
         proptest::prop_assert!((back - value).abs() <= 1e-9 * value.abs());
+    }
+}
+
+#[test]
+fn a_value_is_converted_by_the_ratio_of_its_units() {
+    close(convert(3.0, "in", "mm").unwrap(), 76.2);
+    close(convert(500.0, "mm", "m").unwrap(), 0.5);
+    close(convert(180.0, "°", "rad").unwrap(), std::f64::consts::PI);
+    close(
+        convert(90.0, "°/s", "rad/s").unwrap(),
+        std::f64::consts::FRAC_PI_2,
+    );
+}
+
+#[test]
+fn units_that_touch_are_refused() {
+    for text in ["m(s)", "N%", "(m)(s)"] {
+        let said = Unit::parse(text).unwrap_err().to_string();
+        assert!(said.contains("`*`, `/`, `^` or a blank"), "{text}: {said}");
     }
 }

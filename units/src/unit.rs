@@ -50,7 +50,7 @@ impl Unit {
         })
     }
 
-    /// The unit as FMI describes it; none where an exponent is no whole number.
+    /// The unit as FMI describes it; none if an exponent is not an integer.
     pub fn base_unit(&self) -> Option<BaseUnit> {
         let [kg, m, s, a, rad] = self.counted.dimension.whole()?;
         (self.counted.cycles % 2 == 0).then_some(BaseUnit {

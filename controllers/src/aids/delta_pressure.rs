@@ -1,16 +1,23 @@
 //! Stabilisation by differential pressure (H. E. Merritt, Hydraulic Control Systems, 1967, section 6-6: dynamic pressure
 //! feedback).
 
+use units::Parameters;
+
 use crate::ModelError;
 
 /// `u = -k s/(s + w) F`: the actuator's force, which is the differential pressure times the piston's
 /// area less friction, makes the valve yield and so damps the oil column. The high pass keeps static
-/// loads out; without it (`w = 0`) the actuator is softer.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+/// loads out (gain `k`, corner `w`); without it (`w = 0`) the actuator is softer.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, Parameters,
+)]
+#[parameters(prefix = "pressure_")]
 pub struct DeltaPressure {
-    /// `k`, V/N.
+    /// Stabilisation: command per force, V/N.
+    #[parameter("V/N" => "V/lbf", min = 0.0, non_negative)]
     pub gain: f64,
-    /// `w`, rad/s.
+    /// Stabilisation: corner below which forces count for nothing, rad/s.
+    #[parameter("rad/s" => "Hz", min = 0.0, non_negative)]
     pub high_pass: f64,
     /// The slow part of the force, N.
     pub slow: f64,
@@ -22,8 +29,7 @@ impl DeltaPressure {
     /// # Errors
     /// Names the first that is negative.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_non_negative("pressure_gain", self.gain)?;
-        ModelError::require_non_negative("pressure_high_pass", self.high_pass)
+        Ok(self.check()?)
     }
 
     /// What is added to the valve command of this sample under the measured `force` (N), V.

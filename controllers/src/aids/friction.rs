@@ -2,6 +2,7 @@
 //! Dupont and C. Canudas de Wit, Automatica 30, 1994, section 5.3: feedforward by a friction model).
 
 use plant::identified::seal_shape::SealShape;
+use units::Parameters;
 
 use super::rig::KnownRig;
 use crate::{ModelError, Motion};
@@ -12,11 +13,13 @@ use crate::{ModelError, Motion};
 ///
 /// The wanted motion, not the measured one, moves the model: nothing is fed back, so no limit cycle can
 /// come of friction that is taken for too large.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct FrictionCompensation {
     /// Coulomb friction of the seals, N.
+    #[parameter("N" => "lbf", name = "seal_friction", min = 0.0, non_negative)]
     pub friction: f64,
     /// Its shape.
+    #[parameters]
     pub shape: SealShape,
     /// What the law remembers.
     pub memory: FrictionMemory,
@@ -50,8 +53,7 @@ impl FrictionCompensation {
     /// # Errors
     /// Names the first that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_non_negative("seal_friction", self.friction)?;
-        self.shape.validate()
+        Ok(self.check()?)
     }
 
     /// What is added to the valve command of this sample, V.

@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Complex;
+use units::Parameters;
 
 use super::rig::KnownRig;
 use crate::{ModelError, Motion};
@@ -25,17 +26,20 @@ type Phasor = [f64; 2];
 /// `w_k -= gain E_k/H_k`: `E_k` is the harmonic of the measured acceleration less the wanted one, `H_k` what
 /// the acceleration does of the valve command at that frequency, from the model at first and then from
 /// what the changes did, so that it is that of the loop which the controller closes.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct HarmonicControl {
     /// Whether the fundamental's amplitude and phase are controlled.
     pub fundamental: bool,
     /// Whether the harmonics above it are cancelled.
     pub cancellation: bool,
-    /// Part of an error that is taken off at once.
+    /// Sines: part of an error that is taken off at once.
+    #[parameter(name = "harmonic_gain", finite)]
     pub gain: f64,
-    /// Cycles at the beginning of an epoch that are not measured.
+    /// Sines: cycles of an epoch that are not measured.
+    #[parameter(min = 0.0)]
     pub settling_cycles: i32,
-    /// Cycles that are.
+    /// Sines: cycles that are.
+    #[parameter(min = 1.0)]
     pub measured_cycles: i32,
     /// What the law remembers.
     pub memory: HarmonicMemory,
@@ -132,7 +136,7 @@ impl HarmonicControl {
                 return Err(ModelError::Parameter {
                     name,
                     value: f64::from(value),
-                    expected: "no negative number, and one measured cycle at least",
+                    expected: "a number from 0 up, and at least one measured cycle",
                 });
             }
         }
@@ -140,7 +144,7 @@ impl HarmonicControl {
             return Err(ModelError::Parameter {
                 name: "harmonic_gain",
                 value: self.gain,
-                expected: "less than 2, from which on errors grow",
+                expected: "less than 2, above which the errors diverge",
             });
         }
         Ok(())

@@ -1,45 +1,55 @@
 //! What operators switch on between a controller and the valve, whatever the controller is.
 //!
 //! ```text
-//! u = notch(u_c) + friction + specimen + harmonics - observer - pressure,   |u| <= limit
+//! u = h⁻¹(u_c + friction + specimen + harmonics - pressure),   |u| <= limit
 //! ```
 //!
-//! Each is a law of its own on what is known of valve, oil and table ([`rig`]). The observer is told the
-//! command less what friction and specimen got, so that it finds only what those two leave.
+//! Each is a law of its own on what is known of valve, oil and table ([`rig`]).
 
 pub mod delta_pressure;
-pub mod disturbance_observer;
 pub mod friction;
 pub mod harmonics;
 pub mod lag;
-pub mod notch;
 pub mod rig;
 pub mod specimen_force;
+pub mod valve;
 
 use self::delta_pressure::DeltaPressure;
-use self::disturbance_observer::{DisturbanceObserver, ObserverMemory};
 use self::friction::{FrictionCompensation, FrictionMemory};
 use self::harmonics::{HarmonicControl, HarmonicMemory};
 use self::lag::Lag;
-use self::notch::Notch;
 use self::rig::KnownRig;
 use self::specimen_force::SpecimenForceCompensation;
+use self::valve::ValveCompensation;
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};
+use units::{Parameters, vocabulary};
 
 /// Which aids are on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize, Parameters,
+)]
 pub struct Switches {
-    /// [`FrictionCompensation`].
+    /// Whether dry friction along the wanted motion is compensated.
+    ///
+    /// See [`FrictionCompensation`].
+    #[parameter(name = "friction_compensation")]
     pub friction: bool,
-    /// [`SpecimenForceCompensation`].
+    /// Whether the specimen's measured force is compensated.
+    ///
+    /// See [`SpecimenForceCompensation`].
+    #[parameter(name = "specimen_compensation")]
     pub specimen: bool,
-    /// [`DisturbanceObserver`].
-    pub observer: bool,
-    /// [`DeltaPressure`].
+    /// Whether the actuator's force makes the valve yield.
+    ///
+    /// See [`DeltaPressure`].
+    #[parameter(name = "pressure_stabilisation")]
     pub pressure: bool,
-    /// [`Notch`].
-    pub notch: bool,
+    /// Whether the valve's curve is compensated.
+    ///
+    /// See [`ValveCompensation`].
+    #[parameter(name = "valve_compensation")]
+    pub valve: bool,
 }
 
 /// The aids.
@@ -53,12 +63,10 @@ pub struct OperatorAids {
     pub friction: FrictionCompensation,
     /// Compensation of the specimen's force.
     pub specimen: SpecimenForceCompensation,
-    /// Disturbance observer.
-    pub observer: DisturbanceObserver,
     /// Differential-pressure stabilisation.
     pub pressure: DeltaPressure,
-    /// Notch.
-    pub notch: Notch,
+    /// Compensation of the valve's curve.
+    pub valve: ValveCompensation,
     /// Amplitude and phase control, harmonic cancellation.
     pub harmonics: HarmonicControl,
     /// Largest magnitude of the valve command, V.
@@ -75,9 +83,8 @@ impl Default for OperatorAids {
             rig: KnownRig::default(),
             friction: FrictionCompensation::default(),
             specimen: SpecimenForceCompensation::default(),
-            observer: DisturbanceObserver::default(),
             pressure: DeltaPressure::default(),
-            notch: Notch::default(),
+            valve: ValveCompensation::default(),
             harmonics: HarmonicControl::default(),
             limit: VALVE_LIMIT,
             saturated: false,
@@ -107,20 +114,16 @@ impl Controller for OperatorAids {
         self.rig.validate()?;
         self.friction.validate()?;
         self.specimen.validate()?;
-        self.observer.validate()?;
         self.pressure.validate()?;
-        self.notch.validate()?;
+        self.valve.validate()?;
         self.harmonics.validate()?;
-        ModelError::require_positive("valve_limit", self.limit)
+        ModelError::require_positive(vocabulary::VALVE_LIMIT, self.limit)
     }
 
     fn step(&mut self, input: &AidsInput, period: f64) -> f64 {
         let (rig, on) = (&self.rig, &self.on);
         let (reference, measured) = (&input.reference, &input.measured);
         let mut command = input.command;
-        if on.notch {
-            command = self.notch.step(command, period);
-        }
         if self.harmonics.is_on() {
             let acceleration = measured.acceleration;
             let saturated = self.saturated;
@@ -128,34 +131,27 @@ impl Controller for OperatorAids {
                 .harmonics
                 .step(reference, acceleration, saturated, rig, period);
         }
-        let mut known = 0.0;
         if on.friction {
-            known += self.friction.step(reference, rig, period);
+            command += self.friction.step(reference, rig, period);
         }
         if on.specimen {
-            known += self.specimen.step(measured, input.force, rig, period);
-        }
-        command += known;
-        if on.observer {
-            command += self.observer.step(measured, rig, period);
+            command += self.specimen.step(measured, input.force, rig, period);
         }
         if on.pressure {
             command += self.pressure.step(input.force, period);
         }
+        if on.valve {
+            command = self.valve.command(command);
+        }
         let sent = command.clamp(-self.limit, self.limit);
         self.saturated = sent != command;
-        if on.observer {
-            self.observer.sent(sent - known, rig, period);
-        }
         sent
     }
 
     fn reset(&mut self) {
         self.friction.memory = FrictionMemory::default();
         self.specimen.memory = Lag::default();
-        self.observer.memory = ObserverMemory::default();
         self.pressure.slow = 0.0;
-        self.notch.memory = [0.0; 2];
         self.harmonics.memory = HarmonicMemory::default();
         self.saturated = false;
     }

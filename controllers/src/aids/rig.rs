@@ -7,17 +7,22 @@ use plant::identified::shake_table::ShakeTable;
 use plant::identified::table::Table;
 use plant::linear::{StateSpace, log_space};
 use plant::specimens::linear::LinearSpecimen;
+use units::{Parameters, vocabulary};
 
 use crate::ModelError;
 pub use crate::preview::feedback::MAXIMUM_DELAY;
 use crate::preview::model::{Hydraulics, RigModel, STATES};
 
 /// Valve, oil and table as recordings give them; by default the physical rig's, nothing late.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, Parameters,
+)]
 pub struct KnownRig {
     /// Valve and oil.
+    #[parameters]
     pub hydraulics: Hydraulics,
     /// The table.
+    #[parameters]
     pub table: Table,
     /// Samples by which measurements are late.
     pub delay: usize,
@@ -32,7 +37,7 @@ impl KnownRig {
         self.hydraulics.validate()?;
         if self.delay > MAXIMUM_DELAY {
             return Err(ModelError::Parameter {
-                name: "loop_delay_samples",
+                name: vocabulary::LOOP_DELAY_SAMPLES,
                 value: self.delay as f64,
                 expected: "at most 4",
             });
@@ -103,8 +108,8 @@ impl KnownRig {
         let near = |left: f64| (left / lines.len() as f64).sqrt() < 0.25;
         let Some((_, hydraulics)) = best.filter(|(left, _)| near(*left)) else {
             return Err(ModelError::NoSolution {
-                equation: "the parting of the actuator into valve and oil",
-                reason: "no valve and oil move the table as it does within a quarter".into(),
+                equation: "the separation of the actuator into valve and oil",
+                reason: "no valve and oil reproduce the table's motion within 25 %".into(),
             });
         };
         Ok(Self {

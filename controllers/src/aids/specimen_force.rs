@@ -2,15 +2,18 @@
 //! payload compensation of laboratory controllers; J. P. Conte and T. L. Trombetti, Earthquake Engineering and
 //! Structural Dynamics 29, 2000, give the interaction).
 
+use units::Parameters;
+
 use super::lag::Lag;
 use super::rig::KnownRig;
 use crate::{ModelError, Motion};
 
 /// `u = -(df/dt + p f)/g` with `f = m a + c v + k x - F`, what the table's motion takes beyond the
 /// actuator's force, through a lag of second order.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct SpecimenForceCompensation {
-    /// Corner of the lag, rad/s.
+    /// Specimen: corner of the lag on its force, rad/s.
+    #[parameter("rad/s" => "Hz", name = "specimen_corner", positive)]
     pub corner: f64,
     /// What the law remembers.
     pub memory: Lag,
@@ -34,7 +37,7 @@ impl SpecimenForceCompensation {
     /// # Errors
     /// A corner that is not positive.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("specimen_corner", self.corner)
+        Ok(self.check()?)
     }
 
     /// Force of the specimen on the table (N) from the measured motion and the actuator's force (N).

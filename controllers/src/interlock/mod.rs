@@ -8,6 +8,7 @@
 mod tests;
 mod trip;
 
+use units::Parameters;
 use units::constants::{G, INCH, LBF, STROKE};
 
 use crate::pid::VALVE_LIMIT;
@@ -20,65 +21,103 @@ pub use trip::Trip;
 /// [`ramp_time`](Self::ramp_time); cause and time are latched until a reset, after which the
 /// controller's command is faded in over the same time. A trip at sample k means a valve at null
 /// from sample k + ramp_time/h on.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct Interlock {
     /// Largest displacement, measured or predicted, m.
+    #[parameter("m" => "in", positive)]
     pub displacement_limit: f64,
     /// Largest velocity, m/s.
+    #[parameter("m/s" => "in/s", positive)]
     pub velocity_limit: f64,
-    /// Largest acceleration, m/s².
+    /// Largest acceleration, m/s2.
+    #[parameter("m/s2" => "g", positive)]
     pub acceleration_limit: f64,
-    /// Largest force of the actuator, N.
+    /// Largest force, N.
+    #[parameter("N" => "lbf", positive)]
     pub force_limit: f64,
     /// Largest distance of the measured displacement from what the reference lately was, m.
+    #[parameter("m" => "in", positive)]
     pub tracking_limit: f64,
-    /// How lately, s: both ends of the reference's range return to its present value with this time
-    /// constant, so that a table that follows late is not taken for one that does not follow.
+    /// How lately: time constant of the reference's range, s.
+    ///
+    /// Both ends of the range return to the present value with it, so that a table that follows late
+    /// is not taken for one that does not follow.
+    #[parameter("s", positive)]
     pub tracking_time: f64,
     /// Largest way that the controller's command, as a mean of four samples, goes per second, to and
     /// fro, V/s, as a mean over [`activity_time`](Self::activity_time): an oscillating loop. The
     /// mean of four samples takes three quarters of white noise out; the command itself may go four
     /// times as far: one that changes sign from sample to sample.
+    #[parameter(
+        "V/s",
+        about = "Largest way of the controller's command, as a mean of four samples, per second, to and fro; four times as much for the command itself",
+        positive
+    )]
     pub activity_limit: f64,
     /// Time constant of that mean, s.
+    #[parameter("s", positive)]
     pub activity_time: f64,
-    /// Commands from this magnitude on count as saturated, V.
+    /// Commands from here on count as saturated, V.
+    #[parameter("V", positive)]
     pub saturation_level: f64,
     /// Longest time in saturation, s.
+    #[parameter("s", positive)]
     pub saturation_time: f64,
     /// Time from a trip to the valve at null, s.
+    #[parameter("s", positive)]
     pub ramp_time: f64,
-    /// Time from the measurement to the valve's answer that the stopping distance allows for, s.
+    /// Time until the valve answers, allowed for in the stopping distance, s.
+    #[parameter("s", non_negative)]
     pub reaction_time: f64,
-    /// A channel is stale when it repeats itself to the bit for this many samples and ...
-    pub stale_samples: u32,
+    /// Repetitions that make a channel stale ....
+    ///
+    /// Repetitions to the bit.
+    #[parameter(min = 1.0)]
+    pub stale_samples: usize,
     /// ... while the reference travels this far, m.
+    #[parameter("m" => "in", positive)]
     pub stale_travel: f64,
-    /// Samples after which the heartbeat must have changed; 0 if there is none.
-    pub heartbeat_samples: u32,
-    /// A specimen's accelerometer that stays below this magnitude is silent, m/s²; 0 for no check.
+    /// Samples after which the heartbeat must have changed, 0 without one.
+    #[parameter(min = 0.0)]
+    pub heartbeat_samples: usize,
+    /// The specimen is silent below this acceleration, 0 for no check, m/s2.
+    #[parameter("m/s2" => "g", non_negative)]
     pub specimen_silence: f64,
-    /// The table moves when its acceleration exceeds this magnitude, m/s², and ...
+    /// The table moves above this acceleration ..., m/s2.
+    #[parameter("m/s2" => "g", positive)]
     pub specimen_table_motion: f64,
-    /// ... the mean of its speed over [`activity_time`](Self::activity_time) this one, m/s: a
-    /// chattering table accelerates without moving its specimen.
+    /// ... and its mean speed this one, m/s.
+    ///
+    /// A mean over [`activity_time`](Self::activity_time): a chattering table accelerates without
+    /// moving its specimen.
+    #[parameter("m/s" => "in/s", positive)]
     pub specimen_table_velocity: f64,
-    /// A specimen that answered before and is silent while the table moves for this long (counted
-    /// without interruption of the silence) is lost, s.
-    pub specimen_silence_time: f64,
-    /// Least pressure of the supply, Pa; 0 for no check.
+    /// Least pressure of the supply, 0 for no check, Pa.
+    #[parameter("Pa" => "psi", min = 0.0, non_negative)]
     pub pressure_limit: f64,
-    /// Largest flow out of the supply, m³/s, as a mean over [`flow_time`](Self::flow_time): what the
-    /// pump can give for long; 0 for no check. Short peaks come out of the accumulator.
+    /// Largest mean flow out of the supply, 0 for no check, m3/s.
+    ///
+    /// What the pump can give for long. Short peaks come out of the accumulator.
+    #[parameter("m3/s" => "in3/s", min = 0.0, non_negative)]
     pub flow_limit: f64,
     /// Time constant of that mean, s.
+    #[parameter("s", positive)]
     pub flow_time: f64,
+    /// Time of the moving table in which a specimen must not be silent, s.
+    ///
+    /// Counted without interruption, for a specimen that answered before.
+    #[parameter("s", positive)]
+    pub specimen_silence_time: f64,
     /// What the interlock remembers.
     pub memory: InterlockMemory,
 }
 
 /// Samples over which the command is smoothed before its way is measured.
 const SMOOTHED: usize = 4;
+
+/// A specimen has answered when its acceleration reached this many times the silence: noise that
+/// comes over the silence now and then is not an answer.
+const ANSWER: f64 = 3.0;
 
 /// Memory of [`Interlock`].
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
@@ -106,7 +145,7 @@ pub struct InterlockMemory {
     range: [f64; 2],
     last: [f64; 5],
     last_reference: f64,
-    repeats: [u32; 5],
+    repeats: [usize; 5],
     travel: [f64; 5],
     /// Mean speed of the table, m/s.
     speed: f64,
@@ -115,7 +154,7 @@ pub struct InterlockMemory {
     specimen_answered: bool,
     silent: f64,
     heartbeat: i32,
-    beats_missed: u32,
+    beats_missed: usize,
     reset_was_held: bool,
 }
 
@@ -226,7 +265,7 @@ impl Interlock {
         m.speed += period / (period + self.activity_time) * (speed - m.speed);
         let answer = input.specimen_acceleration.abs();
         if answer >= self.specimen_silence {
-            m.specimen_answered |= answer >= 3.0 * self.specimen_silence;
+            m.specimen_answered |= answer >= ANSWER * self.specimen_silence;
             m.silent = 0.0;
         } else if input.measured.acceleration.abs() >= self.specimen_table_motion
             && m.speed >= self.specimen_table_velocity
@@ -372,31 +411,8 @@ impl Controller for Interlock {
     type Output = f64;
 
     fn validate(&self) -> Result<(), ModelError> {
-        for (name, value) in [
-            ("displacement_limit", self.displacement_limit),
-            ("velocity_limit", self.velocity_limit),
-            ("acceleration_limit", self.acceleration_limit),
-            ("force_limit", self.force_limit),
-            ("tracking_limit", self.tracking_limit),
-            ("tracking_time", self.tracking_time),
-            ("activity_limit", self.activity_limit),
-            ("activity_time", self.activity_time),
-            ("saturation_level", self.saturation_level),
-            ("saturation_time", self.saturation_time),
-            ("ramp_time", self.ramp_time),
-            ("flow_time", self.flow_time),
-            ("stale_travel", self.stale_travel),
-            ("specimen_table_motion", self.specimen_table_motion),
-            ("specimen_table_velocity", self.specimen_table_velocity),
-            ("specimen_silence_time", self.specimen_silence_time),
-        ] {
-            ModelError::require_positive(name, value)?;
-        }
-        ModelError::require_non_negative("specimen_silence", self.specimen_silence)?;
-        ModelError::require_non_negative("pressure_limit", self.pressure_limit)?;
-        ModelError::require_non_negative("flow_limit", self.flow_limit)?;
-        ModelError::require_non_negative("reaction_time", self.reaction_time)?;
-        ModelError::require_positive("stale_samples", f64::from(self.stale_samples))
+        self.check()?;
+        ModelError::require_positive(Self::STALE_SAMPLES, self.stale_samples as f64)
     }
 
     fn step(&mut self, input: &InterlockInput, period: f64) -> f64 {

@@ -302,3 +302,28 @@ fn causes_have_numbers_and_words_of_their_own() {
         assert_eq!(same.count(), 1);
     }
 }
+
+#[test]
+fn noise_above_the_silence_is_not_yet_an_answer_of_the_specimen() {
+    let silence = 0.012 * G;
+    let interlock = Interlock {
+        specimen_silence: silence,
+        ..Interlock::laboratory()
+    };
+    // A channel that shows something until 1 s and nothing afterwards, while the table moves.
+    let until_one_second = |height: f64| {
+        run(interlock, 1500, move |k, input| {
+            let wave = (1.7 * f64::from(k)).sin();
+            input.measured.acceleration = 0.5 * G * (0.1 * f64::from(k)).cos();
+            let shown = if k < 500 { height } else { 0.3 };
+            input.specimen_acceleration = shown * silence * wave;
+        })
+        .0
+        .memory
+        .trip
+    };
+    // An accelerometer without a specimen: its noise comes over the threshold now and then.
+    assert_eq!(until_one_second(2.5), Trip::None);
+    // A specimen that answers well above the noise is missed when it falls silent.
+    assert_eq!(until_one_second(6.0), Trip::SpecimenLost);
+}

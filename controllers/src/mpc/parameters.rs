@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, Vector3};
 use plant::identified::coupled::Rig;
 use plant::linear::StateSpace;
 use units::constants::{INCH, SAMPLING_PERIOD, STROKE};
+use units::vocabulary;
 
 use super::disturbance::OutputDisturbance;
 use super::prediction::CHANNELS;
@@ -226,11 +227,6 @@ const MINIMA: [&str; CHANNELS] = [
     "minimum_velocity",
     "minimum_acceleration",
 ];
-const MEASUREMENT_NOISE: [&str; CHANNELS] = [
-    "displacement_measurement_noise",
-    "velocity_measurement_noise",
-    "acceleration_measurement_noise",
-];
 
 fn count_within(
     name: &'static str,
@@ -266,8 +262,11 @@ impl Parameters {
             "1 to 20 samples",
         )?;
         for (name, value) in [
-            ("loop_delay_samples", self.loop_delay_samples),
-            ("command_delay_samples", self.command_delay_samples),
+            (vocabulary::LOOP_DELAY_SAMPLES, self.loop_delay_samples),
+            (
+                vocabulary::COMMAND_DELAY_SAMPLES,
+                self.command_delay_samples,
+            ),
         ] {
             count_within(name, value, 0, MAXIMUM_DELAY, "0 to 4 samples")?;
         }
@@ -287,7 +286,7 @@ impl Parameters {
         ModelError::require_non_negative("force_noise", self.noise.force)?;
         for channel in 0..CHANNELS {
             ModelError::require_positive(
-                MEASUREMENT_NOISE[channel],
+                vocabulary::MEASUREMENT_NOISE[channel],
                 self.noise.measurement[channel],
             )?;
         }
@@ -300,9 +299,9 @@ impl Parameters {
         }
         if self.law == LowLevelLaw::Continuous && self.loop_delay_samples > 0 {
             return Err(ModelError::Parameter {
-                name: "loop_delay_samples",
+                name: vocabulary::LOOP_DELAY_SAMPLES,
                 value: self.loop_delay_samples as f64,
-                expected: "0 with `continuous_law`: Eq 5-5 has no delay",
+                expected: "0 with `continuous_law`, because Eq 5-5 has no delay",
             });
         }
         Ok(())

@@ -15,19 +15,31 @@ use std::f64::consts::LN_2;
 
 use plant::identified::table::Table;
 use plant::specimens::{YieldingSpecimen, YieldingState};
+use units::Parameters;
 
 use crate::{ModelError, Motion};
 
 /// What the estimates take for granted.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
+#[parameters(prefix = "adaptation_")]
 pub struct Adaptation {
-    /// How far the known mass, stiffness and strength may be off, one standard deviation, relative.
+    /// Standard deviation of what is known of them, relative.
+    ///
+    /// Of mass, stiffness and strength.
+    #[parameter(positive)]
     pub spread: f64,
-    /// What they change by in a second, one standard deviation, relative: forgetting.
+    /// Standard deviation of what they change by in a second, relative.
+    ///
+    /// This is what the estimates forget by.
+    #[parameter(non_negative)]
     pub drift: f64,
-    /// What the specimen's measured acceleration and its model differ by beside that, m/s².
+    /// What specimen and model differ by, m/s2.
+    ///
+    /// In the measured acceleration, beside the changes.
+    #[parameter("m/s2" => "g", positive)]
     pub acceleration_noise: f64,
-    /// What the balance of forces on the table is off by, N.
+    /// What the balance of forces is off by, N.
+    #[parameter("N" => "lbf", positive)]
     pub force_noise: f64,
 }
 
@@ -49,10 +61,7 @@ impl Adaptation {
     /// # Errors
     /// Names the first that is no deviation.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("adaptation_spread", self.spread)?;
-        ModelError::require_non_negative("adaptation_drift", self.drift)?;
-        ModelError::require_positive("adaptation_acceleration_noise", self.acceleration_noise)?;
-        ModelError::require_positive("adaptation_force_noise", self.force_noise)
+        Ok(self.check()?)
     }
 }
 

@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, RowSVector, SMatrix, SVector};
 use plant::linear::{DiscreteStateSpace, discrete_riccati};
+use units::{Parameters, vocabulary};
 
 use super::model::{OUTPUTS, STATES, SampledRig};
 use crate::ModelError;
@@ -20,18 +21,28 @@ const FORCE_LEFT: f64 = 0.999;
 /// Largest command of the valve where margins are found, as a factor: a gain margin of 6 dB.
 const MARGIN: f64 = 2.0;
 
+/// What the noise of a sensor is.
+const NOISE: &str = "Standard deviation of the sensor";
+
 /// What the filter takes to be uncertain: one standard deviation each.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct Uncertainty {
     /// Displacement (m), velocity (m/s) and acceleration (m/s²) as measured.
+    #[parameter(0, name = vocabulary::MEASUREMENT_NOISE[0], about = NOISE, "m" => "in", positive)]
+    #[parameter(1, name = vocabulary::MEASUREMENT_NOISE[1], about = NOISE, "m/s" => "in/s", positive)]
+    #[parameter(2, name = vocabulary::MEASUREMENT_NOISE[2], about = NOISE, "m/s2" => "g", positive)]
     pub measurement: [f64; OUTPUTS],
-    /// White noise on the valve command, V.
+    /// Standard deviation of white noise on the valve command, V.
+    #[parameter("V", name = "valve_noise", non_negative)]
     pub valve: f64,
-    /// White noise of the force on the table, N.
+    /// Standard deviation of white noise of the force on the table, N.
+    #[parameter("N" => "lbf", name = "force_noise", non_negative)]
     pub force: f64,
-    /// Step of the unknown force a sample, N.
+    /// Standard deviation of the unknown force's step a sample, N.
+    #[parameter("N" => "lbf", positive)]
     pub force_step: f64,
-    /// Step of the valve's offset a sample, V.
+    /// Standard deviation of the step of the valve's offset a sample, V.
+    #[parameter("V", positive)]
     pub offset_step: f64,
 }
 
@@ -41,18 +52,7 @@ impl Uncertainty {
     /// # Errors
     /// Names the first that no filter is built from.
     pub fn validate(&self) -> Result<(), ModelError> {
-        let [displacement, velocity, acceleration] = self.measurement;
-        for (name, value) in [
-            ("displacement_measurement_noise", displacement),
-            ("velocity_measurement_noise", velocity),
-            ("acceleration_measurement_noise", acceleration),
-            ("force_step", self.force_step),
-            ("offset_step", self.offset_step),
-        ] {
-            ModelError::require_positive(name, value)?;
-        }
-        ModelError::require_non_negative("valve_noise", self.valve)?;
-        ModelError::require_non_negative("force_noise", self.force)
+        Ok(self.check()?)
     }
 }
 

@@ -4,14 +4,19 @@
 use plant::identified::seal_shape::SealShape;
 use plant::specimens::{YieldingSpecimen, YieldingState};
 
+use units::Parameters;
+
+use crate::aids::friction::FrictionCompensation;
 use crate::{ModelError, Motion};
 
 /// What acts on the table beside the actuator's oil, as far as it is known.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct KnownLoad {
-    /// Coulomb friction of the seals, N; 0 for none.
+    /// Coulomb friction of the seals; 0: no compensation, N.
+    #[parameter("N" => "lbf", name = FrictionCompensation::SEAL_FRICTION, min = 0.0, non_negative)]
     pub friction: f64,
     /// Its shape.
+    #[parameters]
     pub shape: SealShape,
     /// The specimen, if one stands on the table.
     pub specimen: Option<YieldingSpecimen>,
@@ -31,7 +36,7 @@ impl KnownLoad {
     /// # Errors
     /// Names the first that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_non_negative("seal_friction", self.friction)?;
+        ModelError::require_non_negative(FrictionCompensation::SEAL_FRICTION, self.friction)?;
         if self.friction > 0.0 {
             self.shape.validate()?;
         }

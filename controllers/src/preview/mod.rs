@@ -31,6 +31,7 @@ pub mod model;
 
 use nalgebra::SVector;
 use units::constants::{INCH, LBF, SAMPLING_PERIOD};
+use units::{Parameters as _, vocabulary};
 
 use self::adaptation::{Adaptation, AdaptationState, Measured};
 use self::feedback::{Feedback, FeedbackState, MAXIMUM_DELAY, Uncertainty};
@@ -59,7 +60,9 @@ pub enum Role {
 }
 
 /// What preview control is built from.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct Parameters {
     /// What it does.
     pub role: Role,
@@ -69,26 +72,81 @@ pub struct Parameters {
     pub load: KnownLoad,
     /// How the specimen is learnt while the motion goes on, if it is. Not for [`Role::MultiMetric`].
     pub adaptation: Option<Adaptation>,
-    /// Whether the motion ahead is known; else it is extrapolated.
+    /// Whether the reference ahead is connected; else it is extrapolated.
+    #[parameter]
     pub preview: bool,
     /// Samples by which measurements are late.
+    #[parameter(name = vocabulary::LOOP_DELAY_SAMPLES, min = 0.0, max = 4.0)]
     pub delay: usize,
+    /// Largest magnitude of the valve command, V.
+    #[parameter("V", name = vocabulary::VALVE_LIMIT, positive)]
+    pub limit: f64,
     /// The rig's inverse for [`Role::MultiMetric`]: V/m, V s/m, V s²/m, V s³/m.
+    #[parameter(0, name = SHAPES[0], about = "Multi-metric: command per displacement of the motion ahead", "V/m" => "V/in", finite)]
+    #[parameter(1, name = SHAPES[1], about = "Multi-metric: command per velocity", "V.s/m" => "V.s/in", finite)]
+    #[parameter(2, name = SHAPES[2], about = "Multi-metric: command per acceleration", "V.s2/m" => "V.s2/in", finite)]
+    #[parameter(3, name = SHAPES[3], about = "Multi-metric: command per jerk, a difference of two samples", "V.s3/m" => "V.s3/in", finite)]
     pub shaping: [f64; SHAPING],
-    /// Samples by which the motion is ahead that it shapes, at most [`PREVIEW`].
+    /// Multi-metric: samples by which the motion shaped is ahead.
+    ///
+    /// At most [`PREVIEW`].
+    #[parameter(name = "shaping_lead_samples", min = 0.0, max = 20.0)]
     pub shaping_lead: usize,
     /// Weights of the feedforward: displacement (1/m), velocity (s/m), acceleration (s²/m).
+    #[parameter(
+        0,
+        name = "tracking_displacement_weight",
+        about = "Feedforward: weight of the displacement's error",
+        "1/m",
+        positive
+    )]
+    #[parameter(
+        1,
+        name = "tracking_velocity_weight",
+        about = "Feedforward: weight of the velocity's error",
+        "s/m",
+        positive
+    )]
+    #[parameter(
+        2,
+        name = "tracking_acceleration_weight",
+        about = "Feedforward: weight of the acceleration's error",
+        "s2/m",
+        positive
+    )]
     pub tracking_weights: [f64; OUTPUTS],
-    /// Weight of the feedforward's change of command a sample, 1/V.
+    /// Feedforward: weight of the command's change a sample, 1/V.
+    #[parameter("1/V", positive)]
     pub move_weight: f64,
     /// Weights of the feedback: displacement (1/m), velocity (s/m), acceleration (s²/m).
+    #[parameter(
+        0,
+        name = "feedback_displacement_weight",
+        about = "Feedback: weight of the displacement's error",
+        "1/m",
+        positive
+    )]
+    #[parameter(
+        1,
+        name = "feedback_velocity_weight",
+        about = "Feedback: weight of the velocity's error",
+        "s/m",
+        positive
+    )]
+    #[parameter(
+        2,
+        name = "feedback_acceleration_weight",
+        about = "Feedback: weight of the acceleration's error",
+        "s2/m",
+        positive
+    )]
     pub feedback_weights: [f64; OUTPUTS],
-    /// Weight of the feedback's command, 1/V.
+    /// Feedback: weight of the command, 1/V.
+    #[parameter("1/V", positive)]
     pub command_weight: f64,
     /// What the estimates take to be uncertain.
+    #[parameters]
     pub uncertainty: Uncertainty,
-    /// Largest magnitude of the valve command, V.
-    pub limit: f64,
     /// Sampling period, s.
     pub period: f64,
 }
@@ -144,39 +202,19 @@ impl Parameters {
             .map_or(Ok(()), Adaptation::validate)?;
         if self.delay > MAXIMUM_DELAY {
             return Err(ModelError::Parameter {
-                name: "loop_delay_samples",
+                name: vocabulary::LOOP_DELAY_SAMPLES,
                 value: self.delay as f64,
                 expected: "at most 4",
             });
         }
         if self.shaping_lead > PREVIEW {
             return Err(ModelError::Parameter {
-                name: "shaping_lead_samples",
+                name: Self::SHAPING_LEAD_SAMPLES,
                 value: self.shaping_lead as f64,
                 expected: "at most 20",
             });
         }
-        for (name, value) in SHAPES.into_iter().zip(self.shaping) {
-            ModelError::require_finite(name, value)?;
-        }
-        const TRACKING: [&str; OUTPUTS] = [
-            "tracking_displacement_weight",
-            "tracking_velocity_weight",
-            "tracking_acceleration_weight",
-        ];
-        const FEEDBACK: [&str; OUTPUTS] = [
-            "feedback_displacement_weight",
-            "feedback_velocity_weight",
-            "feedback_acceleration_weight",
-        ];
-        for i in 0..OUTPUTS {
-            ModelError::require_positive(TRACKING[i], self.tracking_weights[i])?;
-            ModelError::require_positive(FEEDBACK[i], self.feedback_weights[i])?;
-        }
-        self.uncertainty.validate()?;
-        ModelError::require_positive("move_weight", self.move_weight)?;
-        ModelError::require_positive("command_weight", self.command_weight)?;
-        ModelError::require_positive("valve_limit", self.limit)?;
+        self.check()?;
         ModelError::require_positive("period", self.period)
     }
 }

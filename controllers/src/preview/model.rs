@@ -1,9 +1,13 @@
 //! The rig as preview control knows it, sampled.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{DMatrix, SMatrix, SVector};
 use plant::identified::shake_table::ShakeTable;
 use plant::linear::{DiscreteStateSpace, StateSpace};
+use plant::servo_hydraulic::ServoHydraulicTable;
 use plant::specimens::linear::LinearSpecimen;
+use units::Parameters;
 
 use crate::ModelError;
 
@@ -13,53 +17,70 @@ pub const STATES: usize = 5;
 pub const OUTPUTS: usize = 3;
 
 /// Valve and oil of an actuator, as recordings give them: `y + l dy/dt + j d²y/dt² = u`,
-/// `dP/dt = g y - K v - p P`, `F = P - c v` less dry friction.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+/// `dP/dt = g y - K v - p P`, `F = P - c v` less dry friction, with `l`, `j`, `g`, `K`, `p` and `c`
+/// in this order.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct Hydraulics {
-    /// `l`, s.
+    /// 2 D/w of the spool, s.
+    #[parameter("s", positive)]
     pub spool_lag: f64,
-    /// `j`, s².
+    /// 1/w^2 of the spool, s2.
+    #[parameter("s2", positive)]
     pub spool_inertia: f64,
-    /// `g`, N/(V s).
+    /// Rate of the force under a valve open by one volt, N/(V.s).
+    #[parameter("N/(V.s)" => "lbf/(V.s)", positive)]
     pub force_rate: f64,
-    /// `K`, N/m.
+    /// Stiffness of the oil column, N/m.
+    #[parameter("N/m" => "lbf/in", positive)]
     pub oil_stiffness: f64,
-    /// `p`, 1/s.
+    /// Rate at which leakage empties it, 1/s.
+    #[parameter("1/s", non_negative)]
     pub leakage_rate: f64,
-    /// `c`, viscous damping of the seals, N s/m.
+    /// Viscous damping of the seals, N.s/m.
+    #[parameter("N.s/m" => "lbf.s/in", non_negative)]
     pub seal_damping: f64,
 }
 
 impl Default for Hydraulics {
-    /// The physical rig's (`ServoHydraulicTable`), linearised.
+    /// The physical rig's, each number to the three digits to which recordings tell it.
     fn default() -> Self {
+        let digits = |value: f64| format!("{value:.2e}").parse().unwrap_or(value);
+        let exact = Self::linearised(&ServoHydraulicTable::default());
         Self {
-            spool_lag: 0.00477,
-            spool_inertia: 7.04e-6,
-            force_rate: 1.92e4,
-            oil_stiffness: 1.87e5,
-            leakage_rate: 2.67,
-            seal_damping: 876.0,
+            spool_lag: digits(exact.spool_lag),
+            spool_inertia: digits(exact.spool_inertia),
+            force_rate: digits(exact.force_rate),
+            oil_stiffness: digits(exact.oil_stiffness),
+            leakage_rate: digits(exact.leakage_rate),
+            seal_damping: digits(exact.seal_damping),
         }
     }
 }
 
 impl Hydraulics {
+    /// Those of the physical rig near the middle position at rest (Merritt, Hydraulic Control Systems, 1967,
+    /// chapter 6): `V_t/(4 β) dP_L/dt = k_q y - A v - C P_L`, `k_q = k_v sqrt(P_s/2)`, for the force `A P_L`.
+    pub fn linearised(rig: &ServoHydraulicTable) -> Self {
+        let (valve, cylinder) = (&rig.valve, &rig.cylinder);
+        let spool = TAU * valve.frequency;
+        let flow_gain = valve.flow_coefficient * (0.5 * rig.rest().supply_pressure).sqrt();
+        let compliance = cylinder.volume / (4.0 * cylinder.bulk_modulus);
+        Self {
+            spool_lag: 2.0 * valve.damping_ratio / spool,
+            spool_inertia: 1.0 / (spool * spool),
+            force_rate: cylinder.area * flow_gain / compliance,
+            oil_stiffness: cylinder.area * cylinder.area / compliance,
+            leakage_rate: (cylinder.leakage + valve.null_leakage) / compliance,
+            seal_damping: rig.friction.viscous,
+        }
+    }
+
     /// Checks the parameters.
     ///
     /// # Errors
     /// Names the first that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
-        for (name, value) in [
-            ("spool_lag", self.spool_lag),
-            ("spool_inertia", self.spool_inertia),
-            ("force_rate", self.force_rate),
-            ("oil_stiffness", self.oil_stiffness),
-        ] {
-            ModelError::require_positive(name, value)?;
-        }
-        ModelError::require_non_negative("leakage_rate", self.leakage_rate)?;
-        ModelError::require_non_negative("seal_damping", self.seal_damping)
+        Ok(self.check()?)
     }
 }
 
@@ -242,5 +263,57 @@ mod tests {
                 "{got} {expected}"
             );
         }
+    }
+
+    /// Beside the rig differentiated by numbers; without the supply's own dynamics, which the valve at null
+    /// does not draw on.
+    #[test]
+    fn the_linearised_hydraulics_move_the_table_as_the_physical_rig_does() {
+        use nalgebra::{Complex, DMatrix};
+        let physical = ServoHydraulicTable::default();
+        let rig = RigModel {
+            shake_table: ShakeTable {
+                table: physical.table,
+                ..ShakeTable::default()
+            },
+            hydraulics: Some(Hydraulics::linearised(&physical)),
+        };
+        let (a, b) = rig.dynamics();
+        let rig = StateSpace {
+            a: DMatrix::from_fn(STATES, STATES, |i, k| a[(i, k)]),
+            b: DMatrix::from_fn(STATES, 2, |i, k| b[(i, k)]),
+            c: DMatrix::from_fn(1, STATES, |_, k| if k == 3 { 1.0 } else { 0.0 }),
+            d: DMatrix::zeros(1, 2),
+        };
+        let physical = physical.linearised();
+        for frequency in [0.1, 1.0, 5.0, 20.0, 80.0] {
+            let s = Complex::new(0.0, TAU * frequency);
+            let [own, other] = [&rig, &physical].map(|rig| rig.evaluate(s).unwrap());
+            for input in 0..2 {
+                let (own, other) = (own[(0, input)], other[(0, input)]);
+                assert!(
+                    (own - other).norm() < 1e-4 * other.norm(),
+                    "{frequency} Hz, input {input}: {own} {other}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_default_hydraulics_are_the_linearised_ones_to_three_digits() {
+        let own = Hydraulics::default();
+        let exact = Hydraulics::linearised(&ServoHydraulicTable::default());
+        for (own, exact) in [
+            (own.spool_lag, exact.spool_lag),
+            (own.spool_inertia, exact.spool_inertia),
+            (own.force_rate, exact.force_rate),
+            (own.oil_stiffness, exact.oil_stiffness),
+            (own.leakage_rate, exact.leakage_rate),
+            (own.seal_damping, exact.seal_damping),
+        ] {
+            assert!((own / exact - 1.0).abs() <= 0.005, "{own} {exact}");
+        }
+        // The start values of four components.
+        assert_eq!((own.spool_lag, own.oil_stiffness), (0.00477, 1.87e5));
     }
 }

@@ -26,6 +26,7 @@ mod surfaces;
 
 use nalgebra::SVector;
 use units::constants::SAMPLING_PERIOD;
+use units::{Parameters as _, vocabulary};
 
 pub use self::surfaces::SurfaceMemory;
 use crate::aids::rig::KnownRig;
@@ -49,27 +50,73 @@ pub enum Variant {
 }
 
 /// What the law is built from.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct Parameters {
     /// Which law.
     pub variant: Variant,
-    /// The rig.
-    pub rig: KnownRig,
-    /// `lambda`, 1/s.
+    /// Largest magnitude of the valve command, V.
+    #[parameter("V", name = vocabulary::VALVE_LIMIT, positive)]
+    pub limit: f64,
+    /// lambda, 1/s.
+    #[parameter("1/s", positive)]
     pub surface_rate: f64,
     /// `K1`, `K2`, `K3`, 1/s.
+    #[parameter(
+        0,
+        name = "motion_reaching_rate",
+        about = "K1, of the motion's surface",
+        "1/s",
+        positive
+    )]
+    #[parameter(
+        1,
+        name = "oil_reaching_rate",
+        about = "K2, of the oil's",
+        "1/s",
+        positive
+    )]
+    #[parameter(
+        2,
+        name = "spool_reaching_rate",
+        about = "K3, of the spool's",
+        "1/s",
+        positive
+    )]
     pub reaching_rates: [f64; 3],
     /// Time constants of the lags on `P_d` and `y_d`, s.
+    #[parameter(
+        0,
+        name = "oil_filter_time",
+        about = "Dynamic surface: lag of the wanted force",
+        "s",
+        positive
+    )]
+    #[parameter(
+        1,
+        name = "spool_filter_time",
+        about = "Dynamic surface: lag of the wanted opening",
+        "s",
+        positive
+    )]
     pub filter_times: [f64; 2],
-    /// Samples by which the motion is ahead that the surfaces follow, at most [`PREVIEW`]: what sampling,
-    /// differences or lags make the table late by.
+    /// Surfaces: samples by which the motion that they follow is ahead.
+    ///
+    /// At most [`PREVIEW`]: what sampling, differences or lags make the table late by.
+    #[parameter(name = "reference_lead_samples", min = 0.0, max = 20.0)]
     pub lead: usize,
-    /// Weight of the command's change a sample beside `S`, m/s per V.
+    /// Receding horizon: weight of the command's change a sample, m/(V.s).
+    ///
+    /// Beside `S`.
+    #[parameter("m/(V.s)", positive)]
     pub move_weight: f64,
     /// What the estimates take to be uncertain.
+    #[parameters]
     pub uncertainty: Uncertainty,
-    /// Largest magnitude of the valve command, V.
-    pub limit: f64,
+    /// The rig.
+    #[parameters]
+    pub rig: KnownRig,
     /// Sampling period, s.
     pub period: f64,
 }
@@ -98,27 +145,14 @@ impl Parameters {
     /// Names the first with which the law cannot run.
     pub fn validate(&self) -> Result<(), ModelError> {
         self.rig.validate()?;
-        const REACHING: [&str; 3] = [
-            "motion_reaching_rate",
-            "oil_reaching_rate",
-            "spool_reaching_rate",
-        ];
-        self.uncertainty.validate()?;
-        ModelError::require_positive("surface_rate", self.surface_rate)?;
-        for (name, rate) in REACHING.into_iter().zip(self.reaching_rates) {
-            ModelError::require_positive(name, rate)?;
-        }
-        ModelError::require_positive("oil_filter_time", self.filter_times[0])?;
-        ModelError::require_positive("spool_filter_time", self.filter_times[1])?;
         if self.lead > PREVIEW {
             return Err(ModelError::Parameter {
-                name: "reference_lead_samples",
+                name: Self::REFERENCE_LEAD_SAMPLES,
                 value: self.lead as f64,
                 expected: "at most 20",
             });
         }
-        ModelError::require_positive("move_weight", self.move_weight)?;
-        ModelError::require_positive("valve_limit", self.limit)?;
+        self.check()?;
         ModelError::require_positive("period", self.period)
     }
 }

@@ -46,13 +46,13 @@ pub fn residualise(
     order: usize,
 ) -> Result<(StateSpace, Vec<f64>), ModelError> {
     if !system.is_stable() {
-        return Err(no_solution("what is to be reduced is not stable".into()));
+        return Err(no_solution("the system to reduce is not stable".into()));
     }
     if order == 0 || order > system.order() {
         return Err(ModelError::Parameter {
             name: "order",
             value: order as f64,
-            expected: "at least one and no more than the system's",
+            expected: "at least one and at most the system's",
         });
     }
     let (p, q) = gramians(system)?;
@@ -66,7 +66,7 @@ pub fn residualise(
     let hankel: Vec<f64> = places.iter().map(|&i| svd.singular_values[i]).collect();
     if hankel[order - 1] <= 0.0 {
         return Err(no_solution(
-            "the system has fewer states that matter".into(),
+            "the system has fewer significant states".into(),
         ));
     }
     let kept = &places[..order];
@@ -82,7 +82,7 @@ pub fn residualise(
 
     // Residualising is truncating the reciprocal system G(1/s) = (A^-1, A^-1 B, -C A^-1,
     // D - C A^-1 B), which has the same Gramians, and taking the reciprocal of the result.
-    let singular = || no_solution("what is to be reduced integrates".into());
+    let singular = || no_solution("the system to reduce integrates".into());
     let inverse = system.a.clone().try_inverse().ok_or_else(singular)?;
     let into = &inverse * &system.b;
     let a = (&onto * &inverse * &from)

@@ -94,7 +94,9 @@ pub fn loop_shaping(
     if poles.len() < 3 || zeros.is_empty() || zeros.len() + 2 > poles.len() {
         return Err(ModelError::Shape {
             what: "plant of the loop-shaping synthesis",
-            expected: "three poles or more, at least one zero, two poles more than zeros".into(),
+            expected: "three poles or more, at least one zero, at least two more poles than \
+                zeros"
+                .into(),
             got: format!("{} poles and {} zeros", poles.len(), zeros.len()),
         });
     }

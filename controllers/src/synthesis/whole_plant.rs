@@ -133,7 +133,7 @@ impl Shaped<'_> {
             asked *= (crossover / reached).clamp(0.5, 2.0);
         }
         let most = best.map_or(String::new(), |best| {
-            format!("; the nearest that was reached is {best:.3}")
+            format!("; the nearest crossover reached is {best:.3}")
         });
         Err(no_solution(format!(
             "no controller crosses at {crossover:.4} rad/s{most}{reason}"
@@ -173,8 +173,8 @@ impl Shaped<'_> {
         }
         let reason = last.map_or(String::new(), |error| format!(" ({error})"));
         Err(no_solution(format!(
-            "no crossover from {most:.3} to {:.3} rad/s leaves 6 dB, 45 degrees and a quiet \
-             valve{reason}",
+            "no crossover from {most:.3} to {:.3} rad/s keeps 6 dB, 45 degrees and low noise at \
+             the valve{reason}",
             most / 50.0
         )))
     }
@@ -198,7 +198,7 @@ impl Shaped<'_> {
         };
         if !Pushed::new(late_rig, &mut command, 6.0).is_stable() {
             return Err(no_solution(format!(
-                "at {target:.4} rad/s the reduced controller does not hold the sampled loop"
+                "at {target:.4} rad/s the reduced controller does not stabilise the sampled loop"
             )));
         }
         Ok(WholePlantDesign {
@@ -258,8 +258,8 @@ impl Shaped<'_> {
             }
             _ => {
                 return Err(no_solution(format!(
-                    "below {:.3} rad/s the plant has {slow} more poles than zeros; none or one \
-                     can be shaped",
+                    "below {:.3} rad/s the plant has {slow} more poles than zeros; the synthesis \
+                     needs none or one",
                     w / SLOW
                 )));
             }
@@ -374,7 +374,9 @@ fn law(small: &StateSpace, integral: f64, w: f64) -> Result<LoopShaping, ModelEr
     c.columns_mut(0, n).copy_from(&small.c);
     c[(0, n)] = integral;
     if direct.abs() < 1e-9 * integral.abs() {
-        return Err(no_solution("the controller has no direct part".into()));
+        return Err(no_solution(
+            "the controller has no direct feedthrough".into(),
+        ));
     }
     let zeros = (&a - &b * &c / direct).complex_eigenvalues();
     let zeros: Vec<Complex<f64>> = zeros.iter().map(|zero| zero * w).collect();
@@ -401,7 +403,9 @@ fn law(small: &StateSpace, integral: f64, w: f64) -> Result<LoopShaping, ModelEr
         .collect();
     let (mut above, below) = (quadratics(&zeros), quadratics(&others));
     if above.is_empty() || above.len() != below.len() + 1 {
-        return Err(no_solution("zeros and poles make no sections".into()));
+        return Err(no_solution(
+            "zeros and poles cannot be paired to sections".into(),
+        ));
     }
     let [rate, constant] = above.remove(0);
     let mut sections = [Section::default(); SECTIONS];

@@ -99,7 +99,7 @@ impl Shaping {
         fits.min_by(|a, b| a.left.total_cmp(&b.left))
             .ok_or(ModelError::NoSolution {
                 equation: "command shaping",
-                reason: "the rig does not answer in the band of the motions".into(),
+                reason: "the rig does not respond in the band of the motions".into(),
             })
     }
 
@@ -206,7 +206,7 @@ impl AccelerationTracking {
         });
         let unheld = || ModelError::NoSolution {
             equation: "the tuning of acceleration trajectory tracking",
-            reason: "no displacement gain from 0.1 V/in upwards holds the table".into(),
+            reason: "no displacement gain from 0.1 V/in upwards stabilises the table".into(),
         };
         let gain = 0.5 * gain.ok_or_else(unheld)?;
         let prompt = LateRig::new(&rig.state_space(), 0.0, period)?;
@@ -290,7 +290,7 @@ impl AccelerationTracking {
         }
         let unheld = || ModelError::NoSolution {
             equation: "the tuning of the dual loop",
-            reason: "no gains of its grid hold the table".into(),
+            reason: "no gains of its grid stabilise the table".into(),
         };
         let (_, acceleration) = best.ok_or_else(unheld)?;
         let law = Self {
@@ -310,29 +310,6 @@ impl AccelerationTracking {
         }
         Ok(AccelerationTuning { law, lead: 0 })
     }
-
-    /// The parameters with the names of their component, SI.
-    pub fn named(&self) -> [(&'static str, f64); 16] {
-        let (own, force) = (&self.acceleration, &self.force);
-        [
-            ("displacement_shaping", self.shaping[0]),
-            ("velocity_shaping", self.shaping[1]),
-            ("acceleration_shaping", self.shaping[2]),
-            ("jerk_shaping", self.shaping[3]),
-            ("displacement_gain", self.displacement_gain),
-            ("displacement_noise", self.filter.displacement_noise),
-            ("acceleration_noise", self.filter.acceleration_noise),
-            ("acceleration_gain", own.proportional),
-            ("acceleration_integral_gain", own.integral),
-            ("acceleration_double_integral_gain", own.double_integral),
-            ("acceleration_leak", own.leak),
-            ("force_gain", force.gain),
-            ("force_corner", force.corner),
-            ("table_mass", force.mass),
-            ("table_damping", force.damping),
-            ("table_stiffness", force.stiffness),
-        ]
-    }
 }
 
 #[cfg(test)]
@@ -342,6 +319,7 @@ mod tests {
     use crate::Motion;
     use crate::acceleration_tracking::AccelerationTrackingInput;
     use plant::servo_hydraulic::ServoHydraulicTable;
+    use units::Parameters as _;
 
     fn measurements(late: f64) -> Measurements {
         Measurements {

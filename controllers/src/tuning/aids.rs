@@ -9,7 +9,7 @@ use plant::linear::margins::nyquist;
 use plant::specimens::linear::LinearSpecimen;
 
 use crate::aids::rig::KnownRig;
-use crate::aids::specimen_force::LAG_DAMPING;
+use crate::aids::specimen_force::{LAG_DAMPING, SpecimenForceCompensation};
 use crate::aids::{AidsInput, OperatorAids};
 use crate::robustness::{self, LateRig, Pushed};
 use crate::{Controller, ModelError};
@@ -22,8 +22,6 @@ const LOOP_SENSITIVITY: f64 = 1.6;
 const CORNERS: (f64, f64) = (0.5, 30.0);
 /// Stiffness that a specimen may have, over that which is known: a fifth either way.
 const STIFFNESSES: [f64; 3] = [0.8, 1.0, 1.25];
-/// What the valve may do, over what it is known to do.
-const GAINS: [f64; 3] = [0.8, 1.0, 1.25];
 
 /// How long a push is followed, s.
 const PUSHED: f64 = 10.0;
@@ -46,11 +44,8 @@ impl AidsDesign<'_> {
     ///
     /// 1. Stabilisation: of a grid, the gain with which a proportional displacement loop can be
     ///    stiffest at a sensitivity of 1.6; no high pass.
-    /// 2. Specimen and observer: the largest corner from 0.5 to 30 Hz with which the aid's own loop is stable and
-    ///    keeps its sensitivity below 2, bare and under the specimen, its stiffness a fifth off either way; the
-    ///    observer's also with measurements one sample later and a valve that does 0.8 to 1.25 of what it is
-    ///    known to do.
-    /// 3. Notch: on the oil column, in whose place it puts a damping ratio of 0.7.
+    /// 2. Specimen: the largest corner from 0.5 to 30 Hz with which the aid's own loop is stable and keeps its
+    ///    sensitivity below 2, bare and under the specimen, its stiffness a fifth off either way.
     ///
     /// Friction is what was identified.
     ///
@@ -63,8 +58,6 @@ impl AidsDesign<'_> {
         };
         aids.pressure.gain = self.pressure_gain()?;
         aids.specimen.corner = self.specimen_corner()?;
-        aids.observer.corner = self.observer_corner()?;
-        (aids.notch.frequency, aids.notch.depth) = self.rig.oil_column(0.0);
         Ok(aids)
     }
 
@@ -142,35 +135,14 @@ impl AidsDesign<'_> {
                 loops.push((omega, found * (s + own.leakage_rate) / own.force_rate));
             }
         }
-        self.largest_corner("specimen_corner", &loops, |aids, corner| {
-            aids.on.specimen = true;
-            aids.specimen.corner = corner;
-        })
-    }
-
-    fn observer_corner(&self) -> Result<f64, ModelError> {
-        let (table, own) = (&self.rig.table, &self.rig.hydraulics);
-        let mut loops = Vec::new();
-        for late in [self.late, self.late + self.period] {
-            for load in self.loads() {
-                for (omega, [x, v, a, _]) in self.responses(load.as_ref(), late)? {
-                    let s = Complex::new(0.0, omega);
-                    let force = a * table.mass
-                        + v * (table.damping + own.seal_damping)
-                        + x * table.stiffness;
-                    let needed =
-                        (force * (s + own.leakage_rate) + v * own.oil_stiffness) / own.force_rate;
-                    let spool = 1.0 / ((s * own.spool_inertia + own.spool_lag) * s + 1.0);
-                    let samples = 0.5 + self.rig.delay as f64;
-                    let given = spool * (-s * self.period * samples).exp();
-                    loops.extend(GAINS.map(|gain| (omega, needed * gain - given)));
-                }
-            }
-        }
-        self.largest_corner("observer_corner", &loops, |aids, corner| {
-            aids.on.observer = true;
-            aids.observer.corner = corner;
-        })
+        self.largest_corner(
+            SpecimenForceCompensation::SPECIMEN_CORNER,
+            &loops,
+            |aids, corner| {
+                aids.on.specimen = true;
+                aids.specimen.corner = corner;
+            },
+        )
     }
 
     /// The largest corner (rad/s) of a lag with which `1/(1 + Q L)` stays below 2 at all frequencies of all
@@ -197,7 +169,7 @@ impl AidsDesign<'_> {
         }
         Err(ModelError::NoSolution {
             equation: "the rule for the aids",
-            reason: format!("no {name} from {} Hz upwards holds the rig", CORNERS.0),
+            reason: format!("no {name} from {} Hz upwards stabilises the rig", CORNERS.0),
         })
     }
 
@@ -316,24 +288,18 @@ mod tests {
             specimen: Some(&own),
         };
         let aids = design.tuned().unwrap();
-        let hertz = [aids.specimen.corner, aids.observer.corner].map(|own| own / TAU);
-        println!("{hertz:?} Hz, {} V/N, {:?}", aids.pressure.gain, aids.notch);
+        let hertz = aids.specimen.corner / TAU;
+        println!("{hertz} Hz, {} V/N", aids.pressure.gain);
         for load in [None, Some(&own)] {
-            for which in 0..4 {
+            for which in 0..2 {
                 let mut aids = aids;
-                aids.on.specimen = which == 0 || which == 3;
-                aids.on.observer = which == 1 || which == 3;
-                aids.on.pressure = which == 2;
+                aids.on.specimen = which == 0;
+                aids.on.pressure = which == 1;
                 let got = peak(aids, load, 0.002);
                 println!("{} {which}: {got}", load.is_some());
                 assert!(got < 2.6, "{which}: {got}");
             }
         }
-        // Over a rig whose measurements are later by far the observer is none that holds.
-        let mut beyond = aids;
-        beyond.on.observer = true;
-        let late = peak(beyond, Some(&own), 0.02);
-        assert!(late > 2.0, "{late}");
     }
 
     /// The form of Eq 2-4, fitted to a hydraulic rig, gives its valve and oil back.

@@ -65,7 +65,7 @@ impl Parameters {
         }
         Err(ModelError::NoSolution {
             equation: "the rule for preview control's feedback",
-            reason: "no weight of its command leaves a margin of 6 dB, bare and under the specimen"
+            reason: "no weight of its command keeps a margin of 6 dB, bare and with the specimen"
                 .into(),
         })
     }

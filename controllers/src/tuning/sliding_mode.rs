@@ -73,7 +73,7 @@ impl Hierarchy<'_> {
         }
         Err(ModelError::NoSolution {
             equation: "the rule for the force loop under sliding mode",
-            reason: "no gain of it leaves the hierarchy a margin of 6 dB".into(),
+            reason: "none of its gains gives the hierarchy a margin of 6 dB".into(),
         })
     }
 

@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
+use units::Parameters as _;
 use units::constants::{G, STROKE};
 
 use super::sliding_mode::{Hierarchy, SlidingModeTuning};

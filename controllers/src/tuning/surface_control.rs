@@ -148,7 +148,7 @@ impl Parameters {
                     return Ok(own);
                 }
             }
-            return Err(none("no weight of a move leaves a sensitivity below 2"));
+            return Err(none("no move weight keeps the sensitivity below 2"));
         }
         let mut best: Option<(f64, Self)> = None;
         for rate in log_space(RATES.0, RATES.1, TRIED) {
@@ -159,7 +159,7 @@ impl Parameters {
             }
         }
         let Some((_, mut tuned)) = best else {
-            return Err(none("surfaces of no rate from 15 to 90 1/s hold the rig"));
+            return Err(none("no surface rate from 15 to 90 1/s stabilises the rig"));
         };
         let samples = (tuned.lateness()? / tuned.period).round();
         tuned.lead = samples.clamp(0.0, PREVIEW as f64) as usize;

@@ -112,7 +112,9 @@ impl ThreeVariableGains {
         }
         let [proportional, acceleration] = best.ok_or(ModelError::NoSolution {
             equation: "the tuning of three-variable control",
-            reason: "no displacement gain of 0.001 to 1000 V/in holds the table with a sensitivity of 1.6".into(),
+            reason: "no displacement gain from 0.001 to 1000 V/in stabilises the table with a \
+                sensitivity of 1.6"
+                .into(),
         })?;
         let printed = Self::TABLE_3_2_IN_THESIS_UNITS;
         let integral = proportional * printed.integral / printed.proportional;
@@ -163,7 +165,7 @@ fn reference_gains(
             .solve(&scale.component_mul(&right))
             .ok_or(ModelError::NoSolution {
                 equation: "the feedforward of three-variable control",
-                reason: "the rig does not answer in the band of the motions".into(),
+                reason: "the rig does not respond in the band of the motions".into(),
             })?;
     Ok(solution.component_mul(&scale).into())
 }
@@ -204,7 +206,7 @@ fn ultimate_gain(rig: &ShakeTable, delay: usize, period: f64) -> Result<f64, Mod
         .find(|&gain| is_stable(gain))
         .ok_or(ModelError::NoSolution {
             equation: "the tuning of three-variable control",
-            reason: "no displacement gain of 0.001 to 1000 V/in holds the table".into(),
+            reason: "no displacement gain from 0.001 to 1000 V/in stabilises the table".into(),
         })?;
     let mut high = low;
     while is_stable(high) {

@@ -16,18 +16,6 @@ pub struct AccelerationTracking {
     valve_command: f64,
 }
 
-const INPUTS: [&str; 9] = [
-    "ahead_displacement",
-    "ahead_velocity",
-    "ahead_acceleration",
-    "reference_displacement",
-    "reference_velocity",
-    "reference_acceleration",
-    "measured_displacement",
-    "measured_acceleration",
-    "measured_force",
-];
-
 impl Component for AccelerationTracking {
     const NAME: &'static str = "AccelerationTracking";
     const DESCRIPTION: &'static str =
@@ -59,23 +47,8 @@ impl Component for AccelerationTracking {
             input("measured_acceleration", s.input.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
             input("measured_force", s.input.force, "Force of the actuator", "N" => "lbf").nominal(200.0);
             output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
-                .discrete().nominal(10.0).depends_on(&INPUTS, Dependent);
-            parameter("displacement_shaping", s.law.shaping[0], "F0 of command shaping", "V/m" => "V/in");
-            parameter("velocity_shaping", s.law.shaping[1], "F1 of command shaping", "V.s/m" => "V.s/in");
-            parameter("acceleration_shaping", s.law.shaping[2], "F2 of command shaping", "V.s2/m" => "V.s2/in");
-            parameter("jerk_shaping", s.law.shaping[3], "F3 of command shaping", "V.s3/m" => "V.s3/in");
-            parameter("displacement_gain", s.law.displacement_gain, "K of the displacement feedback", "V/m" => "V/in");
-            parameter("displacement_noise", s.law.filter.displacement_noise, "Standard deviation of the measured displacement", "m" => "in");
-            parameter("acceleration_noise", s.law.filter.acceleration_noise, "Standard deviation of the measured acceleration", "m/s2" => "g");
-            parameter("acceleration_gain", s.law.acceleration.proportional, "Kp of the acceleration loop", "V.s2/m" => "V.s2/in");
-            parameter("acceleration_integral_gain", s.law.acceleration.integral, "Ki of the acceleration loop", "V.s/m" => "V.s/in");
-            parameter("acceleration_double_integral_gain", s.law.acceleration.double_integral, "Kii of the acceleration loop", "V/m" => "V/in");
-            parameter("acceleration_leak", s.law.acceleration.leak, "Rate at which its integrals leak away", "1/s");
-            parameter("force_gain", s.law.force.gain, "Kf of the force loop", "V/N" => "V/lbf");
-            parameter("force_corner", s.law.force.corner, "Corner of its lag", "rad/s");
-            parameter("table_mass", s.law.force.mass, "Mass of the table, for the wanted force", "kg" => "lbf.s2/in");
-            parameter("table_damping", s.law.force.damping, "Viscous damping of the table", "N.s/m" => "lbf.s/in");
-            parameter("table_stiffness", s.law.force.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
+                .discrete().nominal(10.0).depends_on_inputs(Dependent);
+            group(s.law);
             parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }
@@ -94,37 +67,3 @@ impl Component for AccelerationTracking {
 }
 
 fmu_kit::export!(AccelerationTracking);
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use controllers::Motion;
-    use fmu_kit::conformance::number;
-
-    #[test]
-    fn parameters_and_inputs_arrive_where_they_belong() {
-        let mut component = AccelerationTracking::default();
-        let named = component.law.named().map(|(name, _)| name);
-        number(&mut component, &named);
-        let arrived = component.law.named().map(|(_, value)| value);
-        assert_eq!(arrived, std::array::from_fn(|i| 1.0 + i as f64));
-        number(&mut component, &INPUTS);
-        let motion = |first: f64| Motion {
-            displacement: first,
-            velocity: first + 1.0,
-            acceleration: first + 2.0,
-        };
-        let measured = Motion {
-            displacement: 7.0,
-            velocity: 0.0,
-            acceleration: 8.0,
-        };
-        let expected = Input {
-            ahead: motion(1.0),
-            reference: motion(4.0),
-            measured,
-            force: 9.0,
-        };
-        assert_eq!(component.input, expected);
-    }
-}

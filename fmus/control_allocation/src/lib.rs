@@ -39,10 +39,8 @@ impl Component for ControlAllocation {
                 .nominal(10.0);
             output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0)
-                .depends_on(&["displacement_loop_command", "force_loop_command"], Dependent);
-            parameter("displacement_share", s.law.displacement_share, "Share alpha of the displacement loop", "1");
-            parameter("force_share", s.law.force_share, "Share beta of the force loop", "1");
-            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
+                .depends_on_inputs(Dependent);
+            group(s.law);
         }
     }
 

@@ -54,12 +54,12 @@ impl Component for DisplacementPid {
                 .nominal(0.0381);
             output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0)
-                .depends_on(&["reference_displacement", "measured_displacement"], Dependent);
-            parameter("proportional_gain", s.law.proportional, "Proportional gain", "V/m" => "V/in");
-            parameter("integral_gain", s.law.integral, "Integral gain", "V/(m.s)" => "V/(in.s)");
-            parameter("integral_leak", s.law.integral_leak, "Rate at which the integral leaks away", "1/s");
-            parameter("derivative_gain", s.law.derivative, "Derivative gain", "V.s/m" => "V.s/in");
-            parameter("derivative_lag", s.law.derivative_lag, "Time constant of the derivative's lag", "s");
+                .depends_on_inputs(Dependent);
+            parameter(Pid::PROPORTIONAL_GAIN, s.law.proportional, "Proportional gain", "V/m" => "V/in");
+            parameter(Pid::INTEGRAL_GAIN, s.law.integral, "Integral gain", "V/(m.s)" => "V/(in.s)");
+            parameter(Pid::INTEGRAL_LEAK, s.law.integral_leak, "Rate at which the integral leaks away", "1/s");
+            parameter(Pid::DERIVATIVE_GAIN, s.law.derivative, "Derivative gain", "V.s/m" => "V.s/in");
+            parameter(Pid::DERIVATIVE_LAG, s.law.derivative_lag, "Time constant of the derivative's lag", "s");
             parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }
@@ -82,36 +82,3 @@ impl Component for DisplacementPid {
 }
 
 fmu_kit::export!(DisplacementPid);
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use fmu_kit::conformance::number;
-
-    #[test]
-    fn parameters_and_inputs_arrive_where_they_belong() {
-        let mut component = DisplacementPid::default();
-        let names = [
-            "proportional_gain",
-            "integral_gain",
-            "derivative_gain",
-            "derivative_lag",
-            "valve_limit",
-            "reference_displacement",
-            "measured_displacement",
-        ];
-        number(&mut component, &names);
-        let law = Pid {
-            proportional: 1.0,
-            integral: 2.0,
-            derivative: 3.0,
-            derivative_lag: 4.0,
-            limit: 5.0,
-            ..Pid::equation_3_6()
-        };
-        assert_eq!(component.law, law);
-        component.step(0.0, 0.5).unwrap();
-        // Error -1: -1 - 2 * 0.5, and no rate at the first sample.
-        assert_eq!(component.valve_command, -2.0);
-    }
-}

@@ -46,12 +46,12 @@ impl Component for ForcePid {
                 .nominal(200.0);
             output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0)
-                .depends_on(&["reference_force", "measured_force"], Dependent);
-            parameter("proportional_gain", s.law.proportional, "Proportional gain", "V/N" => "V/lbf");
-            parameter("integral_gain", s.law.integral, "Integral gain", "V/(N.s)" => "V/(lbf.s)");
-            parameter("integral_leak", s.law.integral_leak, "Rate at which the integral leaks away", "1/s");
-            parameter("derivative_gain", s.law.derivative, "Derivative gain", "V.s/N" => "V.s/lbf");
-            parameter("derivative_lag", s.law.derivative_lag, "Time constant of the derivative's lag", "s");
+                .depends_on_inputs(Dependent);
+            parameter(Pid::PROPORTIONAL_GAIN, s.law.proportional, "Proportional gain", "V/N" => "V/lbf");
+            parameter(Pid::INTEGRAL_GAIN, s.law.integral, "Integral gain", "V/(N.s)" => "V/(lbf.s)");
+            parameter(Pid::INTEGRAL_LEAK, s.law.integral_leak, "Rate at which the integral leaks away", "1/s");
+            parameter(Pid::DERIVATIVE_GAIN, s.law.derivative, "Derivative gain", "V.s/N" => "V.s/lbf");
+            parameter(Pid::DERIVATIVE_LAG, s.law.derivative_lag, "Time constant of the derivative's lag", "s");
             parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }

@@ -35,8 +35,6 @@ const CAUSES: Enumeration = Enumeration {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Interlock {
     law: Law,
-    stale_samples: i32,
-    heartbeat_samples: i32,
     controller_command: f64,
     reference_displacement: f64,
     measured: controllers::Motion,
@@ -54,11 +52,8 @@ pub struct Interlock {
 
 impl Default for Interlock {
     fn default() -> Self {
-        let law = Law::default();
         Self {
-            law,
-            stale_samples: law.stale_samples as i32,
-            heartbeat_samples: law.heartbeat_samples as i32,
+            law: Law::default(),
             controller_command: 0.0,
             reference_displacement: 0.0,
             measured: controllers::Motion::default(),
@@ -108,17 +103,6 @@ impl Component for Interlock {
     ];
 
     fn variables() -> Vec<Variable<Self>> {
-        const INPUTS: [&str; 9] = [
-            "controller_command",
-            "reference_displacement",
-            "measured_displacement",
-            "measured_velocity",
-            "measured_acceleration",
-            "measured_force",
-            "specimen_acceleration",
-            "supply_pressure",
-            "supply_flow",
-        ];
         fmu_kit::table! { Self, s:
             input("controller_command", s.controller_command, "Command of the controller", "V").nominal(10.0);
             input("reference_displacement", s.reference_displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
@@ -134,39 +118,15 @@ impl Component for Interlock {
             input("stop", s.stop, "The operator's stop");
             input("reset", s.reset, "A rising edge ends a trip whose cause is gone");
             output("valve_command", s.law.memory.command, "Voltage to the servo valve", "V")
-                .discrete().nominal(10.0).depends_on(&INPUTS, Dependent)
-                .depends_on(&["measurement_valid", "heartbeat", "stop", "reset"], Dependent);
+                .discrete().nominal(10.0).depends_on_inputs(Dependent);
             output("tripped", s.tripped, "Whether the interlock has tripped");
             output("trip_cause", s.trip_cause, "Why it tripped").choices(CAUSES);
             output("trip_time", s.law.memory.trip_time, "When it tripped, 0 if it did not", "s").discrete();
-            parameter("displacement_limit", s.law.displacement_limit, "Largest displacement, measured or predicted", "m" => "in");
-            parameter("velocity_limit", s.law.velocity_limit, "Largest velocity", "m/s" => "in/s");
-            parameter("acceleration_limit", s.law.acceleration_limit, "Largest acceleration", "m/s2" => "g");
-            parameter("force_limit", s.law.force_limit, "Largest force", "N" => "lbf");
-            parameter("tracking_limit", s.law.tracking_limit, "Largest distance of the measured displacement from what the reference lately was", "m" => "in");
-            parameter("tracking_time", s.law.tracking_time, "How lately: time constant of the reference's range", "s");
-            parameter("activity_limit", s.law.activity_limit, "Largest way of the controller's command, as a mean of four samples, per second, to and fro; four times as much for the command itself", "V/s");
-            parameter("activity_time", s.law.activity_time, "Time constant of that mean", "s");
-            parameter("saturation_level", s.law.saturation_level, "Commands from here on count as saturated", "V");
-            parameter("saturation_time", s.law.saturation_time, "Longest time in saturation", "s");
-            parameter("ramp_time", s.law.ramp_time, "Time from a trip to the valve at null", "s");
-            parameter("reaction_time", s.law.reaction_time, "Time until the valve answers, allowed for in the stopping distance", "s");
-            parameter("stale_samples", s.stale_samples, "Repetitions that make a channel stale ...").min(1.0);
-            parameter("stale_travel", s.law.stale_travel, "... while the reference travels this far", "m" => "in");
-            parameter("heartbeat_samples", s.heartbeat_samples, "Samples after which the heartbeat must have changed, 0 without one").min(0.0);
-            parameter("specimen_silence", s.law.specimen_silence, "The specimen is silent below this acceleration, 0 for no check", "m/s2" => "g");
-            parameter("specimen_table_motion", s.law.specimen_table_motion, "The table moves above this acceleration ...", "m/s2" => "g");
-            parameter("specimen_table_velocity", s.law.specimen_table_velocity, "... and its mean speed this one", "m/s" => "in/s");
-            parameter("pressure_limit", s.law.pressure_limit, "Least pressure of the supply, 0 for no check", "Pa" => "psi").min(0.0);
-            parameter("flow_limit", s.law.flow_limit, "Largest mean flow out of the supply, 0 for no check", "m3/s" => "in3/s").min(0.0);
-            parameter("flow_time", s.law.flow_time, "Time constant of that mean", "s");
-            parameter("specimen_silence_time", s.law.specimen_silence_time, "Time of the moving table in which a specimen must not be silent", "s");
+            group(s.law);
         }
     }
 
     fn initialize(&mut self) -> ComponentResult {
-        self.law.stale_samples = self.stale_samples.unsigned_abs();
-        self.law.heartbeat_samples = self.heartbeat_samples.unsigned_abs();
         self.law.validate()?;
         self.law.reset();
         (self.tripped, self.trip_cause) = (false, 0);

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-/// What follows from the settings alone, kept from step to step: gains, factored matrices, a solver. It is
-/// no state: a copy builds its own when it is first asked, and a saved state leaves it out
-/// (`#[serde(skip)]`).
+/// What follows from the settings alone, kept from step to step: gains, factored matrices, a
+/// solver. It is not a state: a copy builds its own when it is first asked, and a saved state
+/// leaves it out (`#[serde(skip)]`).
 pub struct Built<S, T>(Option<Box<(S, T)>>);
 
 impl<S: PartialEq + Copy, T> Built<S, T> {

@@ -33,6 +33,10 @@ pub trait Component: Clone + Default + Serialize + DeserializeOwned + Send + 'st
     const ANY_STEP_SIZE: bool = true;
     /// Whether [`partial_derivative`](Self::partial_derivative) is implemented.
     const PARTIAL_DERIVATIVES: bool = false;
+    /// Whether a copy of it is its whole state; `false` for one with a process of its own.
+    const SAVES_STATE: bool = true;
+    /// Whether it needs another program to be installed.
+    const NEEDS_EXECUTION_TOOL: bool = false;
     /// Number of values that [`event_indicators`](Self::event_indicators) fills.
     const EVENT_INDICATORS: usize = 0;
     /// Ports that are connected as a whole.

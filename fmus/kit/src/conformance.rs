@@ -7,11 +7,10 @@ use std::{
     cell::Cell,
 };
 
-use crate::{
-    component::Component,
-    model::Model,
-    variable::{Access, Causality, Variable},
-};
+use crate::{component::Component, model::Model, variable::Causality};
+
+#[cfg(test)]
+mod tests;
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -92,7 +91,10 @@ pub fn number<C: Component>(component: &mut C, names: &[&str]) {
     let model = Model::<C>::get().expect("the table is sound");
     for (i, name) in names.iter().enumerate() {
         let (_, variable) = model.find(name).expect("the variable is in the table");
-        *real(component, variable).expect("the variable is a Float64") = (i + 1) as f64;
+        *variable
+            .access
+            .real(component)
+            .expect("the variable is a Float64") = (i + 1) as f64;
     }
 }
 
@@ -105,9 +107,14 @@ pub fn refuses<C: Component>(values: &[(&str, f64)]) {
     for &(name, value) in values {
         let mut component = C::default();
         let (_, variable) = model.find(name).expect("the variable is in the table");
-        match &variable.access {
-            Access::Integer(field) => *field(&mut component) = value as i32,
-            _ => *real(&mut component, variable).expect("the variable is a number") = value,
+        let access = &variable.access;
+        match access.real(&mut component) {
+            Some(place) => *place = value,
+            // What is below zero is not even set.
+            None if access.counts() && value < 0.0 => continue,
+            None => access
+                .set_integer(&mut component, value as i32)
+                .expect("the variable is a number"),
         }
         let refused = component.initialize().expect_err("it is refused");
         let error = refused.to_string();
@@ -132,15 +139,6 @@ impl Numbers {
     }
 }
 
-fn real<'a, C>(component: &'a mut C, variable: &Variable<C>) -> Option<&'a mut f64> {
-    match &variable.access {
-        Access::Real(field) => Some(field(component)),
-        Access::Within(place) => Some(place(component)),
-        Access::Element(field, index) => field(component).get_mut(*index),
-        _ => None,
-    }
-}
-
 /// Sets the inputs to about a hundredth of their nominal value.
 fn set_inputs<C: Component>(model: &Model<C>, component: &mut C, numbers: &mut Numbers) {
     for variable in model
@@ -150,7 +148,7 @@ fn set_inputs<C: Component>(model: &Model<C>, component: &mut C, numbers: &mut N
     {
         let size = 0.01 * variable.nominal.unwrap_or(1.0);
         let (min, max) = (variable.min.unwrap_or(-size), variable.max.unwrap_or(size));
-        if let Some(value) = real(component, variable) {
+        if let Some(value) = variable.access.real(component) {
             *value = (size * numbers.next()).clamp(min, max);
         }
     }
@@ -185,10 +183,10 @@ fn check_dependencies<C: Component>(model: &Model<C>, component: &C) {
             let mut values = [Vec::new(), Vec::new()];
             for (sign, values) in [-1.0, 1.0].into_iter().zip(&mut values) {
                 let mut changed = component.clone();
-                *real(&mut changed, variable)? += sign * amount;
+                *variable.access.real(&mut changed)? += sign * amount;
                 changed.update_outputs(0.0);
                 for unknown in &unknowns {
-                    values.push(*real(&mut changed, &model.variables[*unknown])?);
+                    values.push(*model.variables[*unknown].access.real(&mut changed)?);
                 }
             }
             let [low, high] = values;
@@ -238,12 +236,12 @@ fn check_initial_dependencies<C: Component>(model: &Model<C>) {
             .iter()
             .filter(|v| v.causality == Causality::Input)
         {
-            if let Some(value) = real(&mut component, variable) {
+            if let Some(value) = variable.access.real(&mut component) {
                 *value = 0.01 * variable.nominal.unwrap_or(1.0);
             }
         }
         if let Some(index) = change {
-            let value = real(&mut component, &model.variables[index])?;
+            let value = model.variables[index].access.real(&mut component)?;
             *value = if *value == 0.0 { 1e-3 } else { *value * 1.001 };
         }
         component.initialize().ok()?;
@@ -259,11 +257,12 @@ fn check_initial_dependencies<C: Component>(model: &Model<C>) {
             continue;
         };
         for (unknown, output) in model.variables.iter().enumerate() {
-            let (Some(before), true) = (real(&mut base, output).copied(), output.is_computed())
+            let (Some(before), true) =
+                (output.access.real(&mut base).copied(), output.is_computed())
             else {
                 continue;
             };
-            let after = real(&mut changed, output).copied();
+            let after = output.access.real(&mut changed).copied();
             let declared = model.initial_dependencies[unknown].contains(&known);
             assert!(
                 declared || after == Some(before),
@@ -287,8 +286,8 @@ fn check_replay<C: Component>(model: &Model<C>, component: &C, numbers: &mut Num
             .iter()
             .filter(|v| v.causality == Causality::Input)
         {
-            if let Some(value) = real(&mut original, variable).copied()
-                && let Some(copy) = real(&mut restored, variable)
+            if let Some(value) = variable.access.real(&mut original).copied()
+                && let Some(copy) = variable.access.real(&mut restored)
             {
                 *copy = value;
             }

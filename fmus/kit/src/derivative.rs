@@ -63,7 +63,7 @@ impl<C: Component> Instance<C> {
             let variable = &self.model.variables[self.model.position(*unknown)?];
             if !variable.is_computed() || !variable.access.is_real() {
                 return Err(Fault::error(format!(
-                    "`{}` is no unknown: expected an output or the derivative of a state",
+                    "`{}` is not an unknown: expected an output or the derivative of a state",
                     variable.name
                 )));
             }
@@ -74,7 +74,7 @@ impl<C: Component> Instance<C> {
             let is_state = self.model.states.iter().any(|s| s.state == index);
             if (variable.causality != Causality::Input && !is_state) || !variable.access.is_real() {
                 return Err(Fault::error(format!(
-                    "`{}` is no known: expected an input or a continuous state",
+                    "`{}` is not a known: expected an input or a continuous state",
                     variable.name
                 )));
             }
@@ -136,8 +136,8 @@ mod tests {
         let mut one = |unknown, known| {
             refusal(instance.directional_derivative(&[unknown], &[known], &[1.0], &mut [0.0]))
         };
-        assert!(one(FORCE, FORCE).contains("`force` is no unknown"));
-        assert!(one(ACCELERATION, MASS).contains("`mass` is no known"));
+        assert!(one(FORCE, FORCE).contains("`force` is not an unknown"));
+        assert!(one(ACCELERATION, MASS).contains("`mass` is not a known"));
         assert!(one(ACCELERATION, 99).contains("value reference 99"));
     }
 }

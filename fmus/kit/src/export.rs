@@ -6,32 +6,61 @@ mod fmi3;
 /// Writes a component's table of variables, one line a variable: kind, name, field, meaning, SI
 /// unit and the unit in which a laboratory wants to see it; then what [`Variable`]'s methods add.
 ///
+/// `group(field)` takes in a part of the component that derives [`units::Parameters`], changed by
+/// the methods of [`Rows`]; `include(rows)` takes in rows made elsewhere.
+///
 /// ```
 /// # use fmu_kit::{Variable, Dependency};
-/// # #[derive(Default)] struct Spring { force: f64, drift: f64, stiffness: f64 }
+/// #[derive(Default, units::Parameters)]
+/// struct Columns {
+///     /// Stiffness of the storey.
+///     #[parameter("N/m", min = 0.0)]
+///     stiffness: f64,
+/// }
+/// # #[derive(Default)] struct Spring { force: f64, drift: f64, columns: Columns }
 /// let table: Vec<Variable<Spring>> = fmu_kit::table! { Spring, s:
 ///     input("drift", s.drift, "Drift of the storey", "m" => "in").nominal(0.02);
 ///     output("force", s.force, "Force on the table", "N" => "lbf")
-///         .depends_on(&["drift"], Dependency::Fixed);
-///     parameter("stiffness", s.stiffness, "Stiffness of the storey", "N/m").min(0.0);
+///         .depends_on_inputs(Dependency::Fixed);
+///     group(s.columns).prefixed("first_");
 /// };
 /// assert_eq!(table[0].display_unit, Some("in"));
+/// assert_eq!(table[1].dependencies, [("drift".into(), Dependency::Fixed)]);
+/// assert_eq!(table[2].name, "first_stiffness");
 /// ```
 ///
 /// [`Variable`]: crate::Variable
+/// [`Rows`]: crate::variable::Rows
 #[macro_export]
 macro_rules! table {
     ($component:ty, $s:ident: $(
-        $kind:ident($name:literal, $field:expr, $about:literal
-            $(, $unit:literal $(=> $shown:literal)?)?)
-        $(.$method:ident($($argument:expr),*))*;
-    )*) => {
-        vec![$(
-            $crate::Variable::<$component>::$kind($name, |$s: &mut $component| &mut $field)
-                .about($about)
-                $(.unit($unit)$(.shown_in($shown))?)?
-                $(.$method($($argument),*))*,
-        )*]
+        $kind:ident($($argument:tt)*)$(.$method:ident($($value:expr),*))*;
+    )*) => {{
+        #[allow(unused_imports, reason = "not every table has groups")]
+        use $crate::variable::Rows as _;
+        let mut table: Vec<$crate::Variable<$component>> = Vec::new();
+        $(table.extend($crate::row!($component, $s, $kind($($argument)*))$(.$method($($value),*))*);)*
+        $crate::Variable::resolve_inputs(&mut table);
+        table
+    }};
+}
+
+/// One row of [`table!`], or several.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! row {
+    ($component:ty, $s:ident, group($field:expr)) => {
+        $crate::Variable::<$component>::group(|$s: &mut $component| &mut $field)
+    };
+    ($component:ty, $s:ident, include($rows:expr)) => {
+        $rows
+    };
+    ($component:ty, $s:ident, $kind:ident(
+        $name:expr, $field:expr, $about:literal $(, $unit:literal $(=> $shown:literal)?)?
+    )) => {
+        $crate::Variable::<$component>::$kind($name, |$s: &mut $component| &mut $field)
+            .about($about)
+            $(.unit($unit)$(.shown_in($shown))?)?
     };
 }
 

@@ -18,7 +18,7 @@ use crate::{
 pub struct Snapshot<C: Component> {
     /// The component's fields.
     pub component: C,
-    /// Where it stands in the order of calls.
+    /// Its phase in the order of calls.
     pub phase: Phase,
     /// How it is driven.
     pub kind: Kind,
@@ -157,24 +157,39 @@ impl<C: Component> Instance<C> {
             .now
             .stop_time
             .is_none_or(|stop| time + step_size <= stop + slack);
-        let fits = C::ANY_STEP_SIZE || (step_size - C::STEP_SIZE).abs() <= slack;
+        // A law for one step size takes whole multiples of it, with its inputs held.
+        let parts = (step_size / C::STEP_SIZE).round().max(1.0);
+        // Some masters count whole nanoseconds.
+        let rounding = slack + 1e-9;
+        let fits = C::ANY_STEP_SIZE || (step_size - parts * C::STEP_SIZE).abs() <= rounding;
         if !(in_place && in_range && in_time && fits) {
             return Err(self.refuse_step(time, step_size, in_place, in_range, in_time));
         }
         // A master that computes the step as a difference of times errs by rounding; components
         // prepared for their own step size need not prepare again.
         let nominal = (step_size - C::STEP_SIZE).abs() <= 1e-9 * C::STEP_SIZE;
-        let length = if nominal { C::STEP_SIZE } else { step_size };
-        if let Err(problem) = self.now.component.step(time, length) {
-            self.now.phase = Phase::Failed;
-            return Err(Fault::error(format!(
-                "the step from t = {time} s to {} s failed: {problem}",
-                time + step_size
-            )));
+        if nominal || C::ANY_STEP_SIZE {
+            let length = if nominal { C::STEP_SIZE } else { step_size };
+            self.step_once(time, length)?;
+        } else {
+            for part in 0..parts as u64 {
+                self.step_once(time + part as f64 * C::STEP_SIZE, C::STEP_SIZE)?;
+            }
         }
         self.now.time = time + step_size;
         self.now.stale = true;
         Ok(())
+    }
+
+    #[inline]
+    fn step_once(&mut self, time: f64, length: f64) -> Outcome {
+        self.now.component.step(time, length).map_err(|problem| {
+            self.now.phase = Phase::Failed;
+            Fault::error(format!(
+                "the step from t = {time} s to {} s failed: {problem}",
+                time + length
+            ))
+        })
     }
 
     #[cold]
@@ -183,7 +198,7 @@ impl<C: Component> Instance<C> {
             format!("step size {h} s at t = {t} s, expected a positive finite number")
         } else if !place {
             format!(
-                "communication point {t} s, but the instance stands at {} s",
+                "communication point {t} s, but the instance is at {} s",
                 self.now.time
             )
         } else if !in_time {
@@ -191,7 +206,7 @@ impl<C: Component> Instance<C> {
             format!("the step from {t} s by {h} s goes past the stop time {stop} s")
         } else {
             format!(
-                "step size {h} s, but {} steps by {} s only",
+                "step size {h} s, but {} takes whole multiples of {} s",
                 C::NAME,
                 C::STEP_SIZE
             )
@@ -306,7 +321,7 @@ mod tests {
             time += 0.002;
         }
         assert_eq!(instance.do_step(50_000.0 * 0.002, 0.002), Ok(()));
-        assert!(refusal(instance.do_step(100.0, 0.002)).contains("stands at 100.002 s"));
+        assert!(refusal(instance.do_step(100.0, 0.002)).contains("is at 100.002 s"));
         assert!(refusal(instance.do_step(100.002 + 1e-6, 0.002)).contains("communication point"));
         assert!(refusal(instance.do_step(100.002, -0.0)).contains("step size -0 s"));
         assert!(refusal(instance.do_step(100.002, f64::NAN)).contains("step size NaN s"));
@@ -322,5 +337,100 @@ mod tests {
         instance.reset();
         assert_eq!(instance.now.phase, Phase::Instantiated);
         assert_eq!(instance.get_real(FORCE), Ok(0.0));
+    }
+
+    #[test]
+    fn an_experiment_ends_after_it_starts() {
+        let mut instance = instance(Kind::CoSimulation);
+        for (start, stop) in [(1.0, 0.5), (0.0, -1.0), (0.0, f64::NAN)] {
+            let message = refusal(instance.set_up(start, Some(stop)));
+            assert!(
+                message.contains(&format!("stop time {stop} s")),
+                "{message}"
+            );
+            assert!(!instance.now.set_up);
+        }
+        for start in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(refusal(instance.set_up(start, None)).contains("not finite"));
+        }
+        assert_eq!(instance.set_up(1.0, Some(1.5)), Ok(()));
+        assert_eq!(
+            (instance.now.time, instance.now.stop_time),
+            (1.0, Some(1.5))
+        );
+        // An experiment without length and one without end.
+        assert_eq!(instance.set_up(1.0, Some(1.0)), Ok(()));
+        assert_eq!(instance.set_up(-1.0, Some(f64::INFINITY)), Ok(()));
+    }
+
+    #[test]
+    fn steps_go_to_the_stop_time_and_no_further() {
+        let mut instance = instance(Kind::CoSimulation);
+        instance.set_up(0.5, Some(0.504)).unwrap();
+        instance.enter_initialization().unwrap();
+        instance.exit_initialization().unwrap();
+        instance.do_step(0.5, 0.002).unwrap();
+        instance.do_step(0.502, 0.002).unwrap();
+        let message = refusal(instance.do_step(0.504, 0.002));
+        assert!(message.contains("past the stop time 0.504 s"), "{message}");
+        assert_eq!(instance.now.time, 0.504);
+    }
+
+    /// Counts its steps and adds up their times.
+    #[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
+    struct Sampled {
+        count: i32,
+        sum: f64,
+    }
+
+    impl Component for Sampled {
+        const NAME: &'static str = "Sampled";
+        const DESCRIPTION: &'static str = "Steps by 1/4096 s only";
+        const STEP_SIZE: f64 = 1.0 / 4096.0;
+        const ANY_STEP_SIZE: bool = false;
+
+        fn variables() -> Vec<crate::variable::Variable<Self>> {
+            crate::table! { Self, s:
+                output("count", s.count, "Steps");
+                output("sum", s.sum, "Sum of the times of the steps", "s");
+            }
+        }
+
+        fn initialize(&mut self) -> crate::component::ComponentResult {
+            Ok(())
+        }
+
+        fn step(&mut self, time: f64, step_size: f64) -> crate::component::ComponentResult {
+            assert_eq!(step_size, Self::STEP_SIZE);
+            self.count += 1;
+            self.sum += time;
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_law_for_one_step_size_takes_whole_multiples_of_it() {
+        let model = crate::model::Model::get().unwrap();
+        let log = crate::log::Log::new(crate::log::Sink::None, c"it", false);
+        let mut instance = Instance::new(model, Sampled::default(), Kind::CoSimulation, log);
+        instance.set_up(0.0, None).unwrap();
+        instance.enter_initialization().unwrap();
+        instance.exit_initialization().unwrap();
+        let own = Sampled::STEP_SIZE;
+        instance.do_step(0.0, 4.0 * own).unwrap();
+        let component = &instance.now.component;
+        assert_eq!((component.count, component.sum), (4, 6.0 * own));
+        instance.do_step(4.0 * own, own).unwrap();
+        // In whole nanoseconds.
+        instance.do_step(5.0 * own, 244_141e-9).unwrap();
+        assert_eq!(instance.now.component.count, 6);
+        let message = refusal(instance.do_step(instance.now.time, 1.5 * own));
+        assert!(
+            message.contains("whole multiples of 0.000244140625 s"),
+            "{message}"
+        );
+        assert!(
+            refusal(instance.do_step(instance.now.time, 0.5 * own)).contains("whole multiples")
+        );
     }
 }

@@ -50,6 +50,8 @@ mod instance;
 mod log;
 #[cfg(test)]
 mod oscillator;
+#[cfg(test)]
+mod panel;
 mod phase;
 mod pointers;
 mod shared;

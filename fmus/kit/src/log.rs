@@ -73,7 +73,7 @@ impl Log {
         for category in categories {
             if *category != c"logAll" && !CATEGORIES.iter().any(|(name, _)| name == category) {
                 return Err(format!(
-                    "`{}` is no log category",
+                    "`{}` is not a log category",
                     category.to_string_lossy()
                 ));
             }
@@ -132,4 +132,80 @@ impl Log {
 /// A C string of the text; bytes that it cannot hold are left out.
 pub fn c_text(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+
+    type Lines = Mutex<Vec<(i32, String, String)>>;
+
+    unsafe extern "C" fn note(
+        environment: *mut c_void,
+        status: i32,
+        category: *const c_char,
+        message: *const c_char,
+    ) {
+        // SAFETY: the environment of `log` and two C strings.
+        let (lines, category, message) = unsafe {
+            (
+                &*environment.cast::<Lines>(),
+                CStr::from_ptr(category),
+                CStr::from_ptr(message),
+            )
+        };
+        let line = |text: &CStr| text.to_str().unwrap().to_string();
+        lines
+            .lock()
+            .unwrap()
+            .push((status, line(category), line(message)));
+    }
+
+    fn log(lines: &Lines, debug: bool) -> Log {
+        let environment = std::ptr::from_ref(lines).cast_mut().cast();
+        Log::new(Sink::Fmi3(note, environment), c"it", debug)
+    }
+
+    #[test]
+    fn faults_are_always_logged_and_events_when_asked_for() {
+        let lines = Lines::default();
+        let mut log = log(&lines, false);
+        log.event("unheard");
+        log.fault(Status::Warning, "a 100 % word");
+        log.fault(Status::Error, "refused");
+        log.set_debug(true, &[]).unwrap();
+        log.event("one");
+        log.set_debug(false, &[c"logEvents"]).unwrap();
+        log.event("unheard");
+        log.set_debug(true, &[c"logAll"]).unwrap();
+        log.event("two");
+        // Another category leaves the events as they are.
+        log.set_debug(false, &[c"logStatusError"]).unwrap();
+        log.event("three");
+        let line = |status: Status, category: &str, message: &str| {
+            (status as i32, category.to_string(), message.to_string())
+        };
+        assert_eq!(
+            *lines.lock().unwrap(),
+            [
+                line(Status::Warning, "logStatusWarning", "a 100 % word"),
+                line(Status::Error, "logStatusError", "refused"),
+                line(Status::Ok, "logEvents", "one"),
+                line(Status::Ok, "logEvents", "two"),
+                line(Status::Ok, "logEvents", "three"),
+            ]
+        );
+    }
+
+    #[test]
+    fn an_unknown_category_is_refused_by_name_and_changes_nothing() {
+        let lines = Lines::default();
+        let mut log = log(&lines, true);
+        let error = log.set_debug(false, &[c"logEvents", c"logNothing"]);
+        assert!(error.unwrap_err().contains("`logNothing`"));
+        log.event("still");
+        assert_eq!(lines.lock().unwrap().len(), 1);
+    }
 }

@@ -111,6 +111,7 @@ impl<C: Component> Model<C> {
 mod tests {
     use super::*;
     use crate::component::ComponentResult;
+    use crate::variable::{Enumeration, Item, Variability};
     use serde::{Deserialize, Serialize};
 
     /// Components that differ in the mistake in their table.
@@ -119,7 +120,17 @@ mod tests {
         input: f64,
         output: f64,
         flag: bool,
+        number: i32,
     }
+
+    const MODES: Enumeration = Enumeration {
+        name: "Mode",
+        items: &[Item {
+            name: "only",
+            value: 1,
+            description: "The only one",
+        }],
+    };
 
     impl<const MISTAKE: usize> Component for Wrong<MISTAKE> {
         const NAME: &'static str = "Wrong";
@@ -140,6 +151,26 @@ mod tests {
                 6 => vec![input.tunable(), output],
                 7 => vec![input.derivative_of("output"), output],
                 8 => vec![input, output.initially_depends_on(&["output"])],
+                10 => vec![input.max(-1.0), output],
+                11 => vec![Variable::<Self>::parameter("input", |s| &mut s.input).discrete()],
+                12 => vec![flag.derivative_of("input"), input],
+                13 => vec![
+                    input,
+                    output.depends_on(&["flag"], fixed),
+                    Variable::local("flag", |s: &mut Self| &mut s.flag),
+                ],
+                14 => vec![Variable::choice("mode", MODES, |s: &mut Self| {
+                    &mut s.number
+                })],
+                15 => vec![
+                    input.shown_in("in"),
+                    Variable::output("output", |s: &mut Self| &mut s.output).shown_in("in"),
+                ],
+                16 => {
+                    let mut flag = flag;
+                    flag.declaration.variability = Variability::Continuous;
+                    vec![flag]
+                }
                 _ => vec![input, output.depends_on(&["input"], fixed), flag],
             }
         }
@@ -167,7 +198,7 @@ mod tests {
             (problem::<1>(), "`input`: cannot be shown in `s`"),
             (problem::<2>(), "unknown unit \"cubit\""),
             (problem::<3>(), "`input`: start 0 is outside 1 to inf"),
-            (problem::<4>(), "`output`: `inptu` is no variable"),
+            (problem::<4>(), "`output`: `inptu` is not a variable"),
             (problem::<5>(), "`flag`: only a Float64 has a unit"),
             (problem::<6>(), "`input`: cannot be Input and Tunable"),
             (
@@ -178,6 +209,19 @@ mod tests {
                 problem::<8>(),
                 "`output`: `output` is neither input nor parameter",
             ),
+            (problem::<10>(), "`input`: start 0 is outside -inf to -1"),
+            (problem::<11>(), "`input`: cannot be Parameter and Discrete"),
+            (
+                problem::<12>(),
+                "`input`: states and derivatives are continuous outputs or locals",
+            ),
+            (
+                problem::<13>(),
+                "`output`: `flag` is neither input nor state",
+            ),
+            (problem::<14>(), "`mode`: start 0 is not a choice"),
+            (problem::<15>(), "`output`: has a display unit but no unit"),
+            (problem::<16>(), "`flag`: only a Float64 is continuous"),
         ] {
             assert!(problem.contains(expected), "`{problem}` lacks `{expected}`");
         }

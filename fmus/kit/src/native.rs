@@ -10,7 +10,6 @@ use crate::{
     guard::catch,
     log::c_text,
     model::{Model, ValueReference},
-    variable::Access,
 };
 
 /// Argument of `shakebench_describe`: `modelDescription.xml` of FMI 2.0.
@@ -86,12 +85,9 @@ pub unsafe fn run<C: Component>(job: *const Job) -> *mut c_char {
 fn simulate<C: Component>(job: &Job) -> Result<(), Box<dyn std::error::Error>> {
     let variables = C::variables();
     let field = |component: &mut C, reference: ValueReference| -> *mut f64 {
-        match &variables[reference as usize - 1].access {
-            Access::Real(field) => field(component),
-            Access::Within(place) => place(component),
-            Access::Element(field, index) => &mut field(component)[*index],
-            _ => panic!("value reference {reference} is no Float64"),
-        }
+        let access = &variables[reference as usize - 1].access;
+        let place = access.real(component);
+        place.unwrap_or_else(|| panic!("value reference {reference} is not a Float64"))
     };
     let mut component = C::default();
     // SAFETY: arrays as promised to `run`; fields belong to `component`, which outlives them.

@@ -44,6 +44,8 @@ pub(crate) const POSITION: u32 = 2;
 pub(crate) const VELOCITY: u32 = 3;
 pub(crate) const ACCELERATION: u32 = 4;
 pub(crate) const MASS: u32 = 5;
+pub(crate) const STEPS: u32 = 7;
+pub(crate) const NOTE: u32 = 8;
 
 impl Component for Oscillator {
     const NAME: &'static str = "Oscillator";

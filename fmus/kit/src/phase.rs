@@ -13,7 +13,7 @@ pub enum Kind {
     ModelExchange,
 }
 
-/// Where an instance stands in the order of calls.
+/// Phase of an instance in the order of calls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Phase {
     /// Made or reset.

@@ -112,20 +112,22 @@ pub fn apply<C: Component>(
         let (_, variable) = model
             .find(name)
             .filter(|(_, v)| v.causality == Causality::Parameter)
-            .ok_or_else(|| fail(format!("`{name}` is no parameter of {}", C::NAME)))?;
+            .ok_or_else(|| fail(format!("`{name}` is not a parameter of {}", C::NAME)))?;
         let number: f64 = value
             .parse()
             .ok()
             .filter(|number: &f64| number.is_finite())
-            .ok_or_else(|| fail(format!("`{value}` is no number")))?;
+            .ok_or_else(|| fail(format!("`{value}` is not a number")))?;
         let (min, max) = (variable.min, variable.max);
         if min.is_some_and(|min| number < min) || max.is_some_and(|max| number > max) {
             return Err(fail(format!("`{name}` = {number} is out of its range")));
         }
         match &variable.access {
-            Access::Real(field) => *field(component) = number,
-            Access::Within(place) => *place(component) = number,
-            Access::Element(field, index) => field(component)[*index] = number,
+            access if access.is_real() => {
+                if let Some(place) = access.real(component) {
+                    *place = number;
+                }
+            }
             Access::Choice(field, choices) => {
                 let mut known = choices.items.iter().map(|item| item.value);
                 let chosen = known.find(|value| f64::from(*value) == number);
@@ -180,10 +182,10 @@ mod tests {
             ("mass", "start_values.csv:2: `mass`, expected `name,value`"),
             (
                 "force,1",
-                "start_values.csv:2: `force` is no parameter of Oscillator",
+                "start_values.csv:2: `force` is not a parameter of Oscillator",
             ),
-            ("mass,two", "start_values.csv:2: `two` is no number"),
-            ("mass,NaN", "start_values.csv:2: `NaN` is no number"),
+            ("mass,two", "start_values.csv:2: `two` is not a number"),
+            ("mass,NaN", "start_values.csv:2: `NaN` is not a number"),
             (
                 "mass,0.01",
                 "start_values.csv:2: `mass` = 0.01 is out of its range",
@@ -199,5 +201,37 @@ mod tests {
                 Err(expected.to_string())
             );
         }
+    }
+
+    #[test]
+    fn a_file_of_start_values_is_read_where_it_is() {
+        let folder = std::env::temp_dir().join(format!("fmu-kit-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let location = Location::Path(folder.to_str().unwrap());
+        assert_eq!(start_values(location), Ok(None));
+        assert_eq!(start_values(Location::Unknown), Ok(None));
+        let file = folder.join(START_VALUES);
+        fs::write(&file, "mass,3").unwrap();
+        let found = start_values(location).unwrap().unwrap();
+        assert_eq!(found, (file.clone(), "mass,3".to_string()));
+        // A file instead of the folder is none; one that is not text is a fault.
+        assert_eq!(optional_text(&file.join("below")), Ok(None));
+        fs::write(&file, [0xff, 0xfe]).unwrap();
+        let error = start_values(location).unwrap_err();
+        assert!(error.contains(START_VALUES), "{error}");
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_variant_has_a_token_of_its_own() {
+        let [one, same, other, foreign] = [
+            ("t", "mass,1"),
+            ("t", "mass,1"),
+            ("t", "mass,2"),
+            ("u", "mass,1"),
+        ]
+        .map(|(token, values)| variant_token(token, values));
+        assert_eq!(one, same);
+        assert!(one != other && one != foreign && one != "t");
     }
 }

@@ -55,6 +55,12 @@ fn look_up<'a, C: Component>(state: *mut c_void) -> Outcome<&'a mut Snapshot<C>>
 impl<C: Component> Instance<C> {
     /// Saves the state into `*slot`: into the state that it holds, or a new one if it is NULL.
     pub(crate) fn get_state(&self, slot: &mut *mut c_void) -> Outcome {
+        if !C::SAVES_STATE {
+            return Err(Fault::error(format!(
+                "{} cannot save its state, part of which is in another program",
+                C::NAME
+            )));
+        }
         if slot.is_null() {
             *slot = hand_out(self.now.clone());
         } else {

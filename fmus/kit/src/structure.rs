@@ -66,7 +66,7 @@ impl Structure {
                 names
                     .get(name)
                     .copied()
-                    .ok_or_else(|| wrong(format!("`{name}` is no variable")))
+                    .ok_or_else(|| wrong(format!("`{name}` is not a variable")))
             };
             let mut on = variable
                 .dependencies
@@ -193,9 +193,7 @@ fn modelica_unit(text: &str) -> Result<Unit, String> {
     }
     let below = text.split_once('/').map_or("", |(_, below)| below);
     if below.contains('/') || (below.contains('.') && !below.starts_with('(')) {
-        return Err(wrong(
-            "a product below the line stands in parentheses".into(),
-        ));
+        return Err(wrong("a product below the line is in parentheses".into()));
     }
     let unit = Unit::parse(text).map_err(|error| wrong(error.to_string()))?;
     match unit.base_unit() {
@@ -218,10 +216,10 @@ fn check_kind(row: &Row) -> Result<(), String> {
         return Err("only a Float64 is continuous".into());
     }
     let value = match (row.kind, &row.start) {
-        (_, Value::Missing) => return Err("is no element of its array".into()),
+        (_, Value::Missing) => return Err("is not an element of its array".into()),
         (Type::Choice(choices), Value::Integer(value)) => {
             if !choices.items.iter().any(|item| item.value == *value) {
-                return Err(format!("start {value} is no choice"));
+                return Err(format!("start {value} is not a choice"));
             }
             return Ok(());
         }

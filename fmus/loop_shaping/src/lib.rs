@@ -40,19 +40,10 @@ impl Component for LoopShaping {
                 .nominal(0.0381);
             output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0)
-                .depends_on(&["reference_displacement", "measured_displacement"], Dependent);
-            parameter("gain", s.law.coefficients.gain, "g of Eq 3-10", "V/m" => "V/in");
-            parameter("numerator_rate", s.law.coefficients.numerator_rate, "Coefficient of s in the numerator", "1/s");
-            parameter("numerator_constant", s.law.coefficients.numerator_constant, "Constant of the numerator", "1/s2");
-            parameter("pole", s.law.coefficients.pole, "Rate p of the slow pole", "1/s");
-            parameter("section_1_b2", s.law.sections[0].b2, "First further section, numerator, s^2", "s2");
-            parameter("section_1_b1", s.law.sections[0].b1, "First further section, numerator, s", "s");
-            parameter("section_1_a2", s.law.sections[0].a2, "First further section, denominator, s^2", "s2");
-            parameter("section_1_a1", s.law.sections[0].a1, "First further section, denominator, s", "s");
-            parameter("section_2_b2", s.law.sections[1].b2, "Second further section, numerator, s^2", "s2");
-            parameter("section_2_b1", s.law.sections[1].b1, "Second further section, numerator, s", "s");
-            parameter("section_2_a2", s.law.sections[1].a2, "Second further section, denominator, s^2", "s2");
-            parameter("section_2_a1", s.law.sections[1].a1, "Second further section, denominator, s", "s");
+                .depends_on_inputs(Dependent);
+            group(s.law.coefficients);
+            group(s.law.sections[0]).prefixed("section_1_").introduced("First further section, ");
+            group(s.law.sections[1]).prefixed("section_2_").introduced("Second further section, ");
             parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }

@@ -62,40 +62,27 @@ impl Component for ModelPredictive {
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        let mut inputs = fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured);
-        inputs.extend(fmu_kit::reference_ahead::<Self>(
-            MAXIMUM_HORIZON,
-            [
+        fmu_kit::table! { Self, s:
+            include(fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured));
+            include(fmu_kit::reference_ahead::<Self>(MAXIMUM_HORIZON, [
                 |s| &mut s.displacement_ahead,
                 |s| &mut s.velocity_ahead,
                 |s| &mut s.acceleration_ahead,
-            ],
-        ));
-        let outputs = fmu_kit::table! { Self, s:
-            output("command_displacement", s.command.displacement, "Displacement for three-variable control", "m" => "in").nominal(0.0381);
-            output("command_velocity", s.command.velocity, "Velocity for three-variable control", "m/s" => "in/s").nominal(0.5);
-            output("command_acceleration", s.command.acceleration, "Acceleration for three-variable control", "m/s2" => "g").nominal(10.0);
-        };
-        let outputs = outputs.into_iter().map(Variable::discrete);
-        let counts = fmu_kit::table! { Self, s:
-            output("solver_shortcut_count", s.counts.shortcuts, "Steps in which no limit was active");
-            output("solver_solved_count", s.counts.solved, "Steps that the solver solved");
-            output("solver_iterations", s.counts.iterations, "Iterations of the solver in this step");
-            output("fallback_count", s.counts.fallbacks, "Steps along the previous plan because the solver gave up");
-            output("low_level_alone_count", s.counts.low_level_alone, "Steps left to three-variable control alone");
-        };
-        let outputs: Vec<Variable<Self>> = outputs
-            .chain(counts)
-            .map(|output| output.depends_on_all(&inputs, Dependent))
-            .collect();
-        let mut variables = inputs;
-        variables.extend(outputs);
-        variables.extend(settings::variables());
-        variables.push(
-            Variable::choice("solver", SOLVERS, |s: &mut Self| &mut s.settings.solver)
-                .about("Solver of the steps in which a limit is active"),
-        );
-        variables
+            ]));
+            output("command_displacement", s.command.displacement, "Displacement for three-variable control", "m" => "in")
+                .discrete().nominal(0.0381).depends_on_inputs(Dependent);
+            output("command_velocity", s.command.velocity, "Velocity for three-variable control", "m/s" => "in/s")
+                .discrete().nominal(0.5).depends_on_inputs(Dependent);
+            output("command_acceleration", s.command.acceleration, "Acceleration for three-variable control", "m/s2" => "g")
+                .discrete().nominal(10.0).depends_on_inputs(Dependent);
+            output("solver_shortcut_count", s.counts.shortcuts, "Steps in which no limit was active").depends_on_inputs(Dependent);
+            output("solver_solved_count", s.counts.solved, "Steps that the solver solved").depends_on_inputs(Dependent);
+            output("solver_iterations", s.counts.iterations, "Iterations of the solver in this step").depends_on_inputs(Dependent);
+            output("fallback_count", s.counts.fallbacks, "Steps along the previous plan because the solver gave up").depends_on_inputs(Dependent);
+            output("low_level_alone_count", s.counts.low_level_alone, "Steps left to three-variable control alone").depends_on_inputs(Dependent);
+            include(settings::variables());
+            parameter("solver", s.settings.solver, "Solver of the steps in which a limit is active").choices(SOLVERS);
+        }
     }
 
     fn initialize(&mut self) -> ComponentResult {

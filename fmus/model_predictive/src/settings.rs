@@ -11,6 +11,10 @@ use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
 use serde::{Deserialize, Serialize};
+use units::vocabulary::{
+    COMMAND_DELAY_SAMPLES, LOOP_DELAY_SAMPLES, MEASUREMENT_NOISE, SPECIMEN_DAMPING, SPECIMEN_MASS,
+    SPECIMEN_STIFFNESS,
+};
 
 use crate::ModelPredictive;
 
@@ -140,9 +144,9 @@ impl Settings {
                 (false, true) => Outlook::Extrapolate,
                 (false, false) => Outlook::Hold,
             },
-            loop_delay_samples: ModelError::count("loop_delay_samples", self.loop_delay_samples)?,
+            loop_delay_samples: ModelError::count(LOOP_DELAY_SAMPLES, self.loop_delay_samples)?,
             command_delay_samples: ModelError::count(
-                "command_delay_samples",
+                COMMAND_DELAY_SAMPLES,
                 self.command_delay_samples,
             )?,
             disturbance: self.disturbance,
@@ -172,8 +176,8 @@ pub fn variables() -> Vec<Variable<ModelPredictive>> {
         parameter("preview", s.settings.preview, "Whether the reference ahead is connected");
         parameter("extrapolate", s.settings.extrapolate, "Without preview: extrapolate the reference instead of holding it");
         parameter("prediction_horizon", s.settings.prediction_horizon, "Samples looked ahead, Table 5-1").min(1.0).max(20.0);
-        parameter("loop_delay_samples", s.settings.loop_delay_samples, "Samples from three-variable control to the valve").min(0.0).max(4.0);
-        parameter("command_delay_samples", s.settings.command_delay_samples, "Samples from here to three-variable control").min(0.0).max(4.0);
+        parameter(LOOP_DELAY_SAMPLES, s.settings.loop_delay_samples, "Samples from three-variable control to the valve").min(0.0).max(4.0);
+        parameter(COMMAND_DELAY_SAMPLES, s.settings.command_delay_samples, "Samples from here to three-variable control").min(0.0).max(4.0);
         parameter("continuous_law", s.settings.continuous_law, "Predict with three-variable control running continuously, Eq 5-5");
         parameter("displacement_weight", s.settings.output_weights[0], "w_disp of Eq 5-16, Table 5-1");
         parameter("velocity_weight", s.settings.output_weights[1], "w_vel of Eq 5-16, Table 5-1");
@@ -195,38 +199,21 @@ pub fn variables() -> Vec<Variable<ModelPredictive>> {
         parameter("time_limit", s.settings.time_limit, "Time after which the solver gives up; 0: none", "s");
         parameter("valve_noise", s.settings.valve_noise, "Standard deviation of the noise on the valve command", "V");
         parameter("force_noise", s.settings.force_noise, "Standard deviation of the force on the table", "N" => "lbf");
-        parameter("displacement_measurement_noise", s.settings.measurement_noise[0], "Standard deviation of the sensor", "m" => "in");
-        parameter("velocity_measurement_noise", s.settings.measurement_noise[1], "Standard deviation of the sensor", "m/s" => "in/s");
-        parameter("acceleration_measurement_noise", s.settings.measurement_noise[2], "Standard deviation of the sensor", "m/s2" => "g");
+        parameter(MEASUREMENT_NOISE[0], s.settings.measurement_noise[0], "Standard deviation of the sensor", "m" => "in");
+        parameter(MEASUREMENT_NOISE[1], s.settings.measurement_noise[1], "Standard deviation of the sensor", "m/s" => "in/s");
+        parameter(MEASUREMENT_NOISE[2], s.settings.measurement_noise[2], "Standard deviation of the sensor", "m/s2" => "g");
         parameter("disturbance_input_gain[1]", s.settings.disturbance.input[0], "B_d of Eq 5-6, displacement");
         parameter("disturbance_input_gain[2]", s.settings.disturbance.input[1], "B_d of Eq 5-6, velocity");
         parameter("disturbance_input_gain[3]", s.settings.disturbance.input[2], "B_d of Eq 5-6, acceleration");
         parameter("disturbance_output_gain[1]", s.settings.disturbance.output[0], "C_d of Eq 5-6, displacement", "m" => "in");
         parameter("disturbance_output_gain[2]", s.settings.disturbance.output[1], "C_d of Eq 5-6, velocity", "m/s" => "in/s");
         parameter("disturbance_output_gain[3]", s.settings.disturbance.output[2], "C_d of Eq 5-6, acceleration", "m/s2" => "g");
-        parameter("proportional_gain", s.settings.low_level.gains.proportional, "P of Table 3-2", "V/m" => "V/in");
-        parameter("integral_gain", s.settings.low_level.gains.integral, "I of Table 3-2", "V/(m.s)" => "V/(in.s)");
-        parameter("velocity_feedback_gain", s.settings.low_level.gains.velocity_feedback, "Kbv of Table 3-2", "V.s/m" => "V.s/in");
-        parameter("acceleration_feedback_gain", s.settings.low_level.gains.acceleration_feedback, "Kba of Table 3-2", "V.s2/m" => "V.s2/in");
-        parameter("displacement_feedforward_gain", s.settings.low_level.gains.displacement_feedforward, "Kfd of Table 3-2", "V/m" => "V/in");
-        parameter("velocity_feedforward_gain", s.settings.low_level.gains.velocity_feedforward, "Kfv of Table 3-2", "V.s/m" => "V.s/in");
-        parameter("acceleration_feedforward_gain", s.settings.low_level.gains.acceleration_feedforward, "Kfa of Table 3-2", "V.s2/m" => "V.s2/in");
-        parameter("valve_limit", s.settings.low_level.limit, "Largest magnitude of the valve command", "V");
+        group(s.settings.low_level);
         parameter("specimen_in_model", s.settings.specimen_in_model, "Whether the prediction knows the specimen");
-        parameter("specimen_mass", s.settings.specimen.mass, "Mass of the specimen", "kg" => "lbf.s2/in");
-        parameter("specimen_damping", s.settings.specimen.damping, "Viscous damping of the specimen", "N.s/m" => "lbf.s/in");
-        parameter("specimen_stiffness", s.settings.specimen.stiffness, "Stiffness of the specimen", "N/m" => "lbf/in");
-        parameter("table_mass", s.settings.shake_table.table.mass, "Mass of the table", "kg" => "lbf.s2/in");
-        parameter("table_damping", s.settings.shake_table.table.damping, "Viscous damping of the table", "N.s/m" => "lbf.s/in");
-        parameter("table_stiffness", s.settings.shake_table.table.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
-        parameter("actuator_a2", s.settings.shake_table.actuator.denominator[0], "Actuator, denominator, s^2", "1/s");
-        parameter("actuator_a1", s.settings.shake_table.actuator.denominator[1], "Actuator, denominator, s", "1/s2");
-        parameter("actuator_a0", s.settings.shake_table.actuator.denominator[2], "Actuator, denominator, constant", "1/s3");
-        parameter("actuator_b2", s.settings.shake_table.actuator.voltage_to_force[0], "Valve command to force, s^2", "N/(V.s)" => "lbf/(V.s)");
-        parameter("actuator_b1", s.settings.shake_table.actuator.voltage_to_force[1], "Valve command to force, s", "N/(V.s2)" => "lbf/(V.s2)");
-        parameter("actuator_b0", s.settings.shake_table.actuator.voltage_to_force[2], "Valve command to force, constant", "N/(V.s3)" => "lbf/(V.s3)");
-        parameter("actuator_e2", s.settings.shake_table.actuator.velocity_to_force[0], "Velocity to force, s^2", "N/m" => "lbf/in");
-        parameter("actuator_e1", s.settings.shake_table.actuator.velocity_to_force[1], "Velocity to force, s", "N/(m.s)" => "lbf/(in.s)");
-        parameter("actuator_e0", s.settings.shake_table.actuator.velocity_to_force[2], "Velocity to force, constant", "N/(m.s2)" => "lbf/(in.s2)");
+        parameter(SPECIMEN_MASS, s.settings.specimen.mass, "Mass of the specimen", "kg" => "lbf.s2/in");
+        parameter(SPECIMEN_DAMPING, s.settings.specimen.damping, "Viscous damping of the specimen", "N.s/m" => "lbf.s/in");
+        parameter(SPECIMEN_STIFFNESS, s.settings.specimen.stiffness, "Stiffness of the specimen", "N/m" => "lbf/in");
+        group(s.settings.shake_table.table);
+        group(s.settings.shake_table.actuator);
     }
 }

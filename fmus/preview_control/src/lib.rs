@@ -8,6 +8,7 @@ use controllers::preview::{Memory, PreviewControl as Law, PreviewInput};
 use controllers::{Controller, Motion};
 use fmu_kit::{Built, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary::{CONTROLLER_COMMAND, MEASURED_FORCE, SPECIMEN_ACCELERATION, VALVE_COMMAND};
 
 use settings::{ROLES, Settings};
 
@@ -33,7 +34,7 @@ pub struct PreviewControl {
 }
 
 fn build(settings: &Settings) -> Result<Law, plant::ModelError> {
-    Law::new(settings.parameters(PreviewControl::STEP_SIZE)?)
+    Law::new(settings.parameters(PreviewControl::STEP_SIZE))
 }
 
 impl Component for PreviewControl {
@@ -50,37 +51,24 @@ impl Component for PreviewControl {
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        let mut inputs = fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured);
-        inputs.extend(fmu_kit::table! { Self, s:
-            input("controller_command", s.command, "Another controller's command, where this compensates", "V").nominal(10.0);
-            input("specimen_acceleration", s.specimen_acceleration, "Absolute acceleration of the specimen, where it is estimated", "m/s2" => "g").nominal(10.0);
-            input("measured_force", s.actuator_force, "Force of the actuator on the table, where the specimen is estimated", "N" => "lbf").nominal(400.0);
-        });
-        inputs.extend(fmu_kit::reference_ahead::<Self>(
-            PREVIEW,
-            [
+        fmu_kit::table! { Self, s:
+            include(fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured));
+            input(CONTROLLER_COMMAND, s.command, "Another controller's command, where this compensates", "V").nominal(10.0);
+            input(SPECIMEN_ACCELERATION, s.specimen_acceleration, "Absolute acceleration of the specimen, where it is estimated", "m/s2" => "g").nominal(10.0);
+            input(MEASURED_FORCE, s.actuator_force, "Force of the actuator on the table, where the specimen is estimated", "N" => "lbf").nominal(400.0);
+            include(fmu_kit::reference_ahead::<Self>(PREVIEW, [
                 |s| &mut s.displacement_ahead,
                 |s| &mut s.velocity_ahead,
                 |s| &mut s.acceleration_ahead,
-            ],
-        ));
-        let outputs = fmu_kit::table! { Self, s:
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
-                .discrete().nominal(10.0).depends_on_all(&inputs, Dependent);
-        };
-        let mut variables = inputs;
-        variables.extend(outputs);
-        variables.extend(settings::variables());
-        variables.extend(fmu_kit::table! { Self, s:
+            ]));
+            output(VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0).depends_on_inputs(Dependent);
+            include(settings::variables());
             local("estimated_specimen_mass", s.specimen_mass, "Mass of the specimen as it is known now", "kg" => "lbf.s2/in").discrete();
             local("estimated_specimen_stiffness", s.specimen_stiffness, "Its stiffness before it yields", "N/m" => "lbf/in").discrete();
             local("estimated_specimen_yield_force", s.specimen_yield_force, "Its yield force", "N" => "lbf").discrete();
-        });
-        variables.push(
-            Variable::choice("role", ROLES, |s: &mut Self| &mut s.settings.role)
-                .about("What the law does"),
-        );
-        variables
+            parameter("role", s.settings.role, "What the law does").choices(ROLES);
+        }
     }
 
     fn initialize(&mut self) -> ComponentResult {
@@ -120,16 +108,20 @@ fmu_kit::export!(PreviewControl);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use controllers::preview::Parameters;
+    use controllers::preview::feedback::Uncertainty;
+    use plant::identified::table::Table;
+    use units::vocabulary::{LOOP_DELAY_SAMPLES, VALVE_LIMIT};
 
     #[test]
     fn what_no_controller_is_built_from_is_refused_by_name() {
         fmu_kit::conformance::refuses::<PreviewControl>(&[
-            ("move_weight", 0.0),
-            ("command_weight", -1.0),
-            ("force_step", 0.0),
-            ("valve_limit", 0.0),
-            ("table_mass", 0.0),
-            ("loop_delay_samples", 9.0),
+            (Parameters::MOVE_WEIGHT, 0.0),
+            (Parameters::COMMAND_WEIGHT, -1.0),
+            (Uncertainty::FORCE_STEP, 0.0),
+            (VALVE_LIMIT, 0.0),
+            (Table::TABLE_MASS, 0.0),
+            (LOOP_DELAY_SAMPLES, 9.0),
         ]);
     }
 }

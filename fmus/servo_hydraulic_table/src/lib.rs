@@ -8,7 +8,7 @@ use fmu_kit::{
 };
 use plant::servo_hydraulic::{
     ExtendedServoHydraulicState, ExtendedServoHydraulicTable as Rig, ServoHydraulicInput,
-    ServoHydraulicState,
+    ServoHydraulicState, Supply,
 };
 use serde::{Deserialize, Serialize};
 
@@ -130,46 +130,19 @@ impl Component for ServoHydraulicTable {
                 .nominal(2e-4).depends_on(&["pressure_a", "pressure_b", "supply_pressure", "spool"], Dependent)
                 .initially_depends_on(&VALVE);
             parameter("estimate_error", s.estimate_error, "Estimate the error of every step");
-            parameter("pump_pressure", s.rig.table.supply.pressure, "Pressure at which the pump stops delivering", "Pa" => "psi");
-            parameter("pump_gain", s.rig.table.supply.pump_gain, "Pump flow per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
-            parameter("pump_limit", s.rig.table.supply.pump_limit, "Largest flow of the pump", "m3/s" => "in3/s");
-            parameter("accumulator_gas_volume", s.rig.table.supply.gas_volume, "Gas volume of the accumulator at the pump's pressure", "m3" => "in3");
-            parameter("polytropic_exponent", s.rig.table.supply.polytropic_exponent, "Polytropic exponent of the gas");
+            group(s.rig.table.supply);
             parameter("command_delay.delay", s.rig.command_delay, "Pure delay of the command, at most 30 steps; 0 is off", "s" => "ms").min(0.0);
             parameter("valve_hysteresis.half_width", s.rig.hysteresis, "Half width of the play between command and spool; 0 is off", "V").min(0.0);
             parameter("foundation_compliance.frequency", s.rig.foundation.frequency, "Natural frequency of the reaction mass, relative to which the piston moves; 0 is rigid", "Hz").min(0.0);
             parameter("foundation_compliance.mass_ratio", s.rig.foundation.mass_ratio, "Reaction mass in masses of the table", "1").min(1e-3);
             parameter("foundation_compliance.damping_ratio", s.rig.foundation.damping_ratio, "Damping ratio of the reaction mass", "1").min(0.0);
             parameter("supply_loss_time", s.supply_loss_time, "Fault: the supply is lost from this time on", "s");
-            parameter("supply_drain_time", s.rig.table.supply.drain_time, "Time constant at which a lost supply drains", "s");
-            parameter("valve_frequency", s.rig.table.valve.frequency, "Natural frequency of the spool", "Hz");
-            parameter("valve_damping_ratio", s.rig.table.valve.damping_ratio, "Damping ratio of the spool");
-            parameter("spool_slew_limit", s.rig.table.valve.slew_limit, "Largest velocity of the spool", "V/s");
-            parameter("spool_travel_limit", s.rig.table.valve.travel_limit, "Travel limit of the spool", "V");
-            parameter("valve_overlap", s.rig.table.valve.overlap, "Overlap of the edges (dead band, half width)", "V");
-            parameter("valve_null_bias", s.rig.table.valve.null_bias, "Position of the spool at zero command", "V");
-            parameter("flow_coefficient", s.rig.table.valve.flow_coefficient, "Flow through an edge per volt and root of pressure, m3/(s V sqrt(Pa))");
-            parameter("valve_asymmetry", s.rig.table.valve.asymmetry, "q of the flow gains 1 + q and 1 - q");
-            parameter("null_leakage", s.rig.table.valve.null_leakage, "Laminar flow past a closed edge", "m3/(s.Pa)" => "in3/(s.psi)");
-            parameter("piston_area", s.rig.table.cylinder.area, "Area of the piston", "m2" => "in2");
-            parameter("oil_volume", s.rig.table.cylinder.volume, "Volume of both chambers with hoses", "m3" => "in3");
-            parameter("bulk_modulus", s.rig.table.cylinder.bulk_modulus, "Effective bulk modulus", "Pa" => "psi");
-            parameter("piston_leakage", s.rig.table.cylinder.leakage, "Leakage past the piston", "m3/(s.Pa)" => "in3/(s.psi)");
-            parameter("make_up_flow", s.rig.table.cylinder.make_up, "Flow of the anti-cavitation valves per missing pressure", "m3/(s.Pa)" => "in3/(s.psi)");
-            parameter("coulomb_friction", s.rig.table.friction.coulomb, "Coulomb friction of the seals", "N" => "lbf");
-            parameter("static_friction", s.rig.table.friction.static_force, "Static friction of the seals", "N" => "lbf");
-            parameter("stribeck_velocity", s.rig.table.friction.stribeck_velocity, "Stribeck velocity", "m/s" => "in/s");
-            parameter("seal_viscous_friction", s.rig.table.friction.viscous, "Viscous friction of the seals", "N.s/m" => "lbf.s/in");
-            parameter("seal_stiffness", s.rig.table.friction.stiffness, "Stiffness of the seals before they slide", "N/m" => "lbf/in");
-            parameter("presliding_damping", s.rig.table.friction.presliding_damping, "Damping of the seals at rest", "N.s/m" => "lbf.s/in");
-            parameter("stroke", s.rig.table.stops.stroke, "Distance of the hard stops from the middle", "m" => "in");
-            parameter("cushion_length", s.rig.table.stops.cushion_length, "Length of the cushions", "m" => "in");
-            parameter("cushion_damping", s.rig.table.stops.cushion_damping, "Damping of a cushion at its end", "N.s/m" => "lbf.s/in");
-            parameter("stop_stiffness", s.rig.table.stops.stiffness, "Stiffness of the hard stops", "N/m" => "lbf/in");
-            parameter("stop_loss", s.rig.table.stops.loss, "Loss of the hard stops", "s/m" => "s/in");
-            parameter("table_mass", s.rig.table.table.mass, "Mass of the table", "kg" => "lbf.s2/in");
-            parameter("table_damping", s.rig.table.table.damping, "Viscous damping of the table", "N.s/m" => "lbf.s/in");
-            parameter("table_stiffness", s.rig.table.table.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
+            parameter(Supply::SUPPLY_DRAIN_TIME, s.rig.table.supply.drain_time, "Time constant at which a lost supply drains", "s");
+            group(s.rig.table.valve);
+            group(s.rig.table.cylinder);
+            group(s.rig.table.friction);
+            group(s.rig.table.stops);
+            group(s.rig.table.table);
             parameter("added_payload", s.rig.table.added_payload, "Mass on the table that a model does not know of", "kg" => "lbf.s2/in");
             parameter("cubic_stiffness", s.rig.table.cubic_stiffness, "Factor of an additional force with the cube of the displacement", "N/m3" => "lbf/in3");
             local("stop_hit", s.stop_hit, "Whether a hard stop is touched");

@@ -127,18 +127,8 @@ impl Component for ShakeTable {
                 .initially_depends_on(&effects::acting_at_start(Part::ShakeTable, AtStart::Acceleration));
             output("actuator_force", s.state.table.actuator[0], "Force of the actuator on the table", "N" => "lbf")
                 .nominal(400.0);
-            parameter("table_mass", s.rig.table.mass, "Mass of the table", "kg" => "lbf.s2/in");
-            parameter("table_damping", s.rig.table.damping, "Viscous damping of the table", "N.s/m" => "lbf.s/in");
-            parameter("table_stiffness", s.rig.table.stiffness, "Stiffness from table to ground", "N/m" => "lbf/in");
-            parameter("actuator_a2", s.rig.actuator.denominator[0], "Actuator, denominator, s^2", "1/s");
-            parameter("actuator_a1", s.rig.actuator.denominator[1], "Actuator, denominator, s", "1/s2");
-            parameter("actuator_a0", s.rig.actuator.denominator[2], "Actuator, denominator, constant", "1/s3");
-            parameter("actuator_b2", s.rig.actuator.voltage_to_force[0], "Valve command to force, s^2", "N/(V.s)" => "lbf/(V.s)");
-            parameter("actuator_b1", s.rig.actuator.voltage_to_force[1], "Valve command to force, s", "N/(V.s2)" => "lbf/(V.s2)");
-            parameter("actuator_b0", s.rig.actuator.voltage_to_force[2], "Valve command to force, constant", "N/(V.s3)" => "lbf/(V.s3)");
-            parameter("actuator_e2", s.rig.actuator.velocity_to_force[0], "Velocity to force, s^2", "N/m" => "lbf/in");
-            parameter("actuator_e1", s.rig.actuator.velocity_to_force[1], "Velocity to force, s", "N/(m.s)" => "lbf/(in.s)");
-            parameter("actuator_e0", s.rig.actuator.velocity_to_force[2], "Velocity to force, constant", "N/(m.s2)" => "lbf/(in.s2)");
+            group(s.rig.table);
+            group(s.rig.actuator);
         };
         variables.extend(effect_parameters());
         let actuator = effects::acting_at_start(Part::ShakeTable, AtStart::ActuatorRates);

@@ -11,7 +11,7 @@ use controllers::{
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::ModelError;
-use plant::identified::{actuator::IdentifiedActuator, shake_table::ShakeTable};
+use plant::identified::{actuator::IdentifiedActuator, shake_table::ShakeTable, table::Table};
 use serde::{Deserialize, Serialize};
 use units::constants::SAMPLING_PERIOD;
 
@@ -59,16 +59,6 @@ const MOTION: [&str; 5] = [
     "measured_displacement",
     "measured_velocity",
 ];
-const ALL: [&str; 7] = [
-    "reference_displacement",
-    "reference_velocity",
-    "reference_acceleration",
-    "measured_displacement",
-    "measured_velocity",
-    "measured_force",
-    "specimen_acceleration",
-];
-
 impl Component for SlidingMode {
     const NAME: &'static str = "SlidingMode";
     const DESCRIPTION: &'static str = "Sliding mode over a displacement and a force loop";
@@ -109,32 +99,20 @@ impl Component for SlidingMode {
             input("measured_force", s.input.measured_force, "Force of the actuator, for the prediction over a delay", "N" => "lbf").nominal(200.0);
             input("specimen_acceleration", s.input.specimen_acceleration, "Absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
             output("displacement_command", s.references.displacement, "Reference of the displacement loop", "m" => "in")
-                .discrete().nominal(0.0381).depends_on(&ALL, Dependent);
+                .discrete().nominal(0.0381).depends_on_inputs(Dependent);
             output("force_command", s.references.force, "Reference of the force loop", "N" => "lbf")
-                .discrete().nominal(200.0).depends_on(&ALL, Dependent);
+                .discrete().nominal(200.0).depends_on_inputs(Dependent);
             output("sliding_surface", s.surface, "S of Eq 4-7 as measured", "m/s" => "in/s")
                 .discrete().nominal(0.5).depends_on(&MOTION, Dependent);
-            parameter("table_mass", s.law.table.mass, "Mass of the table", "kg");
-            parameter("table_damping", s.law.table.damping, "Damping of the table", "N.s/m" => "lbf.s/in");
-            parameter("table_stiffness", s.law.table.stiffness, "Stiffness of the table's springs", "N/m" => "lbf/in");
-            parameter("specimen_mass", s.law.specimen_mass, "Mass of the specimen whose acceleration is measured", "kg");
-            parameter("surface_rate", s.law.surface_rate, "lambda of Eq 4-7", "1/s");
-            parameter("reaching_rate", s.law.reaching_rate, "K of Eq 4-12", "1/s");
-            parameter("switching_gain", s.law.switching_gain, "K_s of the switching term, 0 for none", "m/s2" => "g");
-            parameter("boundary_layer", s.law.boundary_layer, "phi of the switching term", "m/s" => "in/s");
+            parameter(Table::TABLE_MASS, s.law.table.mass, "Mass of the table", "kg");
+            parameter(Table::TABLE_DAMPING, s.law.table.damping, "Damping of the table", "N.s/m" => "lbf.s/in");
+            parameter(Table::TABLE_STIFFNESS, s.law.table.stiffness, "Stiffness of the table's springs", "N/m" => "lbf/in");
+            group(s.law);
             parameter("loop_delay_samples", s.loop_delay_samples, "Samples from measurement to valve");
             parameter("command_delay_samples", s.command_delay_samples, "Samples from this law to the low-level loops");
             parameter("reference_ahead", s.reference_ahead, "The references are those of loop_delay_samples later");
             parameter("sampling_period", s.sampling_period, "Period of the prediction", "s" => "ms");
-            parameter("actuator_a2", s.actuator.denominator[0], "Prediction: actuator, denominator, s^2", "1/s");
-            parameter("actuator_a1", s.actuator.denominator[1], "Prediction: actuator, denominator, s", "1/s2");
-            parameter("actuator_a0", s.actuator.denominator[2], "Prediction: actuator, denominator, constant", "1/s3");
-            parameter("actuator_b2", s.actuator.voltage_to_force[0], "Prediction: valve command to force, s^2", "N/(V.s)" => "lbf/(V.s)");
-            parameter("actuator_b1", s.actuator.voltage_to_force[1], "Prediction: valve command to force, s", "N/(V.s2)" => "lbf/(V.s2)");
-            parameter("actuator_b0", s.actuator.voltage_to_force[2], "Prediction: valve command to force, constant", "N/(V.s3)" => "lbf/(V.s3)");
-            parameter("actuator_e2", s.actuator.velocity_to_force[0], "Prediction: velocity to force, s^2", "N/m" => "lbf/in");
-            parameter("actuator_e1", s.actuator.velocity_to_force[1], "Prediction: velocity to force, s", "N/(m.s)" => "lbf/(in.s)");
-            parameter("actuator_e0", s.actuator.velocity_to_force[2], "Prediction: velocity to force, constant", "N/(m.s2)" => "lbf/(in.s2)");
+            group(s.actuator).introduced("Prediction: ");
             parameter("displacement_loop_proportional_gain", s.displacement_loop.proportional, "Of the displacement loop", "V/m" => "V/in");
             parameter("displacement_loop_integral_gain", s.displacement_loop.integral, "Of the displacement loop", "V/(m.s)" => "V/(in.s)");
             parameter("displacement_loop_integral_leak", s.displacement_loop.integral_leak, "Of the displacement loop", "1/s");
@@ -143,8 +121,8 @@ impl Component for SlidingMode {
             parameter("force_loop_integral_gain", s.force_loop.integral, "Of the force loop", "V/(N.s)" => "V/(lbf.s)");
             parameter("force_loop_integral_leak", s.force_loop.integral_leak, "Of the force loop", "1/s");
             parameter("force_loop_limit", s.force_loop.limit, "Of the force loop", "V");
-            parameter("displacement_share", s.allocation.displacement_share, "alpha of the allocation", "1");
-            parameter("force_share", s.allocation.force_share, "beta of the allocation", "1");
+            parameter(ControlAllocation::DISPLACEMENT_SHARE, s.allocation.displacement_share, "alpha of the allocation", "1");
+            parameter(ControlAllocation::FORCE_SHARE, s.allocation.force_share, "beta of the allocation", "1");
             parameter("valve_limit", s.allocation.limit, "Largest magnitude of the valve command", "V");
         }
     }

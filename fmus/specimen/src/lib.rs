@@ -105,9 +105,7 @@ impl Component for Specimen {
             output("drift", s.state.specimen.drift, "Displacement relative to the table", "m" => "in").nominal(0.05);
             output("drift_velocity", s.state.specimen.drift_velocity, "Velocity relative to the table", "m/s" => "in/s")
                 .nominal(0.3).derivative_of("drift");
-            parameter("mass", s.specimen.mass, "Mass of the storey", "kg" => "lbf.s2/in");
-            parameter("damping", s.specimen.damping, "Viscous damping of the storey", "N.s/m" => "lbf.s/in");
-            parameter("stiffness", s.specimen.stiffness, "Stiffness of the storey", "N/m" => "lbf/in");
+            group(s.specimen);
         };
         variables.extend(effect_parameters());
         variables.extend(fmu_kit::table! { Self, s:

@@ -161,20 +161,7 @@ impl Component for StoreysSpecimen {
         };
         variables.extend(fmu_kit::table! { Self, s:
             parameter("damper_storey", s.damper_storey, "Storey with a magnetorheological damper, the lowest 1; 0 is none").min(0.0).max(10.0);
-            parameter("damper_size", s.damper.size, "Factor on the damper's force").min(0.0);
-            parameter("damper_damping", s.damper.damping, "c0 without voltage", "N.s/m").min(0.0);
-            parameter("damper_damping_rise", s.damper.damping_rise, "Rise of c0 with voltage", "N.s/(m.V)").min(0.0);
-            parameter("damper_roll_off_damping", s.damper.roll_off_damping, "c1 without voltage", "N.s/m").min(0.0);
-            parameter("damper_roll_off_damping_rise", s.damper.roll_off_damping_rise, "Rise of c1 with voltage", "N.s/(m.V)").min(0.0);
-            parameter("damper_stiffness", s.damper.stiffness, "k0", "N/m").min(0.0);
-            parameter("damper_accumulator_stiffness", s.damper.accumulator_stiffness, "k1, stiffness of the accumulator", "N/m").min(0.0);
-            parameter("damper_hysteresis", s.damper.hysteresis, "alpha without voltage", "N/m").min(0.0);
-            parameter("damper_hysteresis_rise", s.damper.hysteresis_rise, "Rise of alpha with voltage", "N/(m.V)").min(0.0);
-            parameter("damper_gamma", s.damper.gamma, "gamma", "1/m2").min(0.0);
-            parameter("damper_beta", s.damper.beta, "beta", "1/m2").min(0.0);
-            parameter("damper_sharpness", s.damper.sharpness, "A").min(0.0);
-            parameter("damper_driver_rate", s.damper.driver_rate, "eta, rate of the current's driver", "1/s").min(0.0);
-            parameter("damper_largest_voltage", s.damper.largest_voltage, "Largest voltage that counts", "V").min(0.0);
+            group(s.damper);
             parameter("tuned_mass_floor", s.tuned_mass_floor, "Floor with a tuned mass damper, the lowest 1; 0 is none").min(0.0).max(10.0);
             parameter("tuned_mass", s.tuned_mass.mass, "Its mass", "kg" => "lbf.s2/in").min(0.0);
             parameter("tuned_mass_frequency", s.tuned_mass.frequency, "Its own frequency", "rad/s").min(0.0);

@@ -8,6 +8,7 @@ use controllers::surface_control::{Memory, SurfaceControl as Law, SurfaceInput};
 use controllers::{Controller, Motion};
 use fmu_kit::{Built, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary::{LOOP_DELAY_SAMPLES, VALVE_COMMAND};
 
 use settings::{Settings, VARIANTS};
 
@@ -27,7 +28,7 @@ pub struct SurfaceControl {
 }
 
 fn build(settings: &Settings) -> Result<Law, plant::ModelError> {
-    Law::new(settings.parameters(SurfaceControl::STEP_SIZE)?)
+    Law::new(settings.parameters(SurfaceControl::STEP_SIZE))
 }
 
 impl Component for SurfaceControl {
@@ -40,27 +41,19 @@ impl Component for SurfaceControl {
     const ANY_STEP_SIZE: bool = false;
 
     fn variables() -> Vec<Variable<Self>> {
-        let mut inputs = fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured);
-        inputs.extend(fmu_kit::reference_ahead::<Self>(
-            PREVIEW,
-            [
+        fmu_kit::table! { Self, s:
+            include(fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured));
+            include(fmu_kit::reference_ahead::<Self>(PREVIEW, [
                 |s| &mut s.displacement_ahead,
                 |s| &mut s.velocity_ahead,
                 |s| &mut s.acceleration_ahead,
-            ],
-        ));
-        let outputs = fmu_kit::table! { Self, s:
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
-                .discrete().nominal(10.0).depends_on_all(&inputs, Dependent);
-        };
-        let mut variables = inputs;
-        variables.extend(outputs);
-        variables.extend(settings::variables());
-        variables.push(
-            Variable::choice("variant", VARIANTS, |s: &mut Self| &mut s.settings.variant)
-                .about("Which law"),
-        );
-        variables
+            ]));
+            output(VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0).depends_on_inputs(Dependent);
+            parameter(LOOP_DELAY_SAMPLES, s.settings.law.rig.delay, "Samples by which measurements are late").min(0.0).max(4.0);
+            group(s.settings.law);
+            parameter("variant", s.settings.variant, "Which law").choices(VARIANTS);
+        }
     }
 
     fn initialize(&mut self) -> ComponentResult {
@@ -92,16 +85,20 @@ fmu_kit::export!(SurfaceControl);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use controllers::preview::feedback::Uncertainty;
+    use controllers::surface_control::Parameters;
+    use plant::identified::table::Table;
+    use units::vocabulary::VALVE_LIMIT;
 
     #[test]
     fn what_no_controller_is_built_from_is_refused_by_name() {
         fmu_kit::conformance::refuses::<SurfaceControl>(&[
-            ("surface_rate", 0.0),
-            ("oil_reaching_rate", -1.0),
-            ("force_step", 0.0),
-            ("valve_limit", 0.0),
-            ("table_mass", 0.0),
-            ("loop_delay_samples", 9.0),
+            (Parameters::SURFACE_RATE, 0.0),
+            (Parameters::OIL_REACHING_RATE, -1.0),
+            (Uncertainty::FORCE_STEP, 0.0),
+            (VALVE_LIMIT, 0.0),
+            (Table::TABLE_MASS, 0.0),
+            (LOOP_DELAY_SAMPLES, 9.0),
         ]);
     }
 }

@@ -7,6 +7,7 @@ use controllers::{
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary::VALVE_COMMAND;
 
 /// Three-variable control from motion to valve command.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -25,22 +26,12 @@ impl Component for ThreeVariableControl {
         &[Terminal::REFERENCE, Terminal::MEASURED, Terminal::VALVE];
 
     fn variables() -> Vec<Variable<Self>> {
-        let inputs = fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured);
-        let others = fmu_kit::table! { Self, s:
-                        output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
-                .discrete().nominal(10.0).depends_on_all(&inputs, Dependent);
-            parameter("proportional_gain", s.law.gains.proportional, "P of Table 3-2", "V/m" => "V/in");
-            parameter("integral_gain", s.law.gains.integral, "I of Table 3-2", "V/(m.s)" => "V/(in.s)");
-            parameter("velocity_feedback_gain", s.law.gains.velocity_feedback, "Kbv of Table 3-2", "V.s/m" => "V.s/in");
-            parameter("acceleration_feedback_gain", s.law.gains.acceleration_feedback, "Kba of Table 3-2", "V.s2/m" => "V.s2/in");
-            parameter("displacement_feedforward_gain", s.law.gains.displacement_feedforward, "Kfd of Table 3-2", "V/m" => "V/in");
-            parameter("velocity_feedforward_gain", s.law.gains.velocity_feedforward, "Kfv of Table 3-2", "V.s/m" => "V.s/in");
-            parameter("acceleration_feedforward_gain", s.law.gains.acceleration_feedforward, "Kfa of Table 3-2", "V.s2/m" => "V.s2/in");
-            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
-        };
-        let mut variables = inputs;
-        variables.extend(others);
-        variables
+        fmu_kit::table! { Self, s:
+            include(fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured));
+            output(VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
+                .discrete().nominal(10.0).depends_on_inputs(Dependent);
+            group(s.law);
+        }
     }
 
     fn initialize(&mut self) -> ComponentResult {
@@ -61,66 +52,3 @@ impl Component for ThreeVariableControl {
 }
 
 fmu_kit::export!(ThreeVariableControl);
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use controllers::three_variable::ThreeVariableGains;
-    use fmu_kit::conformance::number;
-
-    #[test]
-    fn parameters_and_inputs_arrive_where_they_belong() {
-        let mut component = ThreeVariableControl::default();
-        let parameters = [
-            "proportional_gain",
-            "integral_gain",
-            "velocity_feedback_gain",
-            "acceleration_feedback_gain",
-            "displacement_feedforward_gain",
-            "velocity_feedforward_gain",
-            "acceleration_feedforward_gain",
-            "valve_limit",
-        ];
-        number(&mut component, &parameters);
-        let gains = ThreeVariableGains {
-            proportional: 1.0,
-            integral: 2.0,
-            velocity_feedback: 3.0,
-            acceleration_feedback: 4.0,
-            displacement_feedforward: 5.0,
-            velocity_feedforward: 6.0,
-            acceleration_feedforward: 7.0,
-        };
-        assert_eq!(
-            component.law,
-            Law {
-                gains,
-                limit: 8.0,
-                integral: 0.0
-            }
-        );
-        let inputs = [
-            "reference_displacement",
-            "reference_velocity",
-            "reference_acceleration",
-            "measured_displacement",
-            "measured_velocity",
-            "measured_acceleration",
-        ];
-        number(&mut component, &inputs);
-        let reference = Motion {
-            displacement: 1.0,
-            velocity: 2.0,
-            acceleration: 3.0,
-        };
-        let measured = Motion {
-            displacement: 4.0,
-            velocity: 5.0,
-            acceleration: 6.0,
-        };
-        assert_eq!(
-            (component.reference, component.measured),
-            (reference, measured)
-        );
-    }
-}

@@ -78,20 +78,7 @@ impl Component for YieldingSpecimen {
             output("drift", s.state.drift, "Displacement relative to the table", "m" => "in").nominal(0.05);
             output("drift_velocity", s.state.drift_velocity, "Velocity relative to the table", "m/s" => "in/s")
                 .nominal(0.3).derivative_of("drift");
-            parameter("mass", s.storey.mass, "Mass of the storey", "kg" => "lbf.s2/in");
-            parameter("damping", s.storey.damping, "Viscous damping of the storey", "N.s/m" => "lbf.s/in");
-            parameter("yield_force", s.storey.columns.yield_force, "Yield force", "N" => "lbf");
-            parameter("yield_displacement", s.storey.columns.yield_displacement, "Yield displacement", "m" => "in");
-            parameter("post_yield_ratio", s.storey.columns.post_yield_ratio, "Stiffness after yielding over that before");
-            parameter("sharpness", s.storey.columns.sharpness, "n of the Bouc-Wen model");
-            parameter("beta", s.storey.columns.beta, "beta of the Bouc-Wen model");
-            parameter("gamma", s.storey.columns.gamma, "gamma of the Bouc-Wen model");
-            parameter("hardening", s.storey.columns.hardening, "Cubic hardening: force at the yield displacement over the yield force");
-            parameter("strength_degradation", s.storey.columns.strength_degradation, "Loss of strength with hysteretic work");
-            parameter("stiffness_degradation", s.storey.columns.stiffness_degradation, "Loss of stiffness with hysteretic work");
-            parameter("pinching", s.storey.columns.pinching, "Loss of slope in the pinched range");
-            parameter("pinching_level", s.storey.columns.pinching_level, "Middle of the pinched range over the yield force");
-            parameter("pinching_width", s.storey.columns.pinching_width, "Width of the pinched range over the yield force");
+            group(s.storey);
             parameter("break_off_time", s.break_off_time, "Fault: the specimen is off the table from this time on", "s");
             local("hysteretic_force_ratio", s.state.hysteresis.z, "Hysteretic force over its yield force").nominal(1.0);
             local("hysteretic_work", s.state.hysteresis.work, "Work on the hysteretic part over yield force and displacement").nominal(10.0);

@@ -1,352 +1,57 @@
-//! `shakebench benchmark`
+//! `shakebench benchmark`: starts the program that holds the benchmarks.
 
-use std::path::PathBuf;
-use std::process::ExitCode;
+use std::ffi::OsString;
+use std::process::{Command, ExitCode};
 
-use clap::{Args, Subcommand, ValueEnum};
-use identification::diagnosis::engine::Observer;
-use indicatif::{ProgressBar, ProgressStyle};
-use plant::hybrid::{BenchmarkCase, InteractionForm};
+use clap::{Args, ValueEnum};
+use laboratory::error::Error;
+use pages::report::UnitSystem;
 
-use crate::benchmark::vrths::hidden::{HiddenError, HiddenStudy, read_hidden};
-use crate::benchmark::vrths::motions::{self, INTENSITY, RECORDS};
-use crate::benchmark::vrths::outcome::Outcome;
-use crate::benchmark::vrths::study::{Plants, Study};
-use crate::benchmark::vrths::{page, published, roster};
-use crate::diagnosis::EXTENDED_MODEL;
-use crate::error::Error;
-use crate::report;
-use crate::results::Results;
-use crate::units::nearest;
+/// The program that holds the benchmarks, and the package it is built from.
+const PROGRAM: &str = "shakebench-hybrid";
+const PACKAGE: &str = "hybrid-benchmark";
 
 /// Options of `shakebench benchmark`.
 #[derive(Debug, Args)]
+#[command(
+    disable_help_flag = true,
+    after_help = "Example:\n  shakebench benchmark vrths --case 1 --motion el-centro --perturbed 0"
+)]
 pub struct Arguments {
-    #[command(subcommand)]
-    benchmark: Benchmark,
+    /// The benchmark and its options; `--help` lists them
+    #[arg(
+        trailing_var_arg = true,
+        allow_hyphen_values = true,
+        value_name = "NAME"
+    )]
+    arguments: Vec<OsString>,
 }
 
-#[derive(Debug, Subcommand)]
-enum Benchmark {
-    /// Virtual real-time hybrid simulation: an actuator between a computed frame and a specimen
-    Vrths(Vrths),
-}
-
-/// Options of `shakebench benchmark vrths`.
-#[derive(Debug, Args)]
-#[command(after_help = "Controllers: phase-lead-pi (the benchmark's own), \
-    inverse-without-specimen, inverse, inverse-pi, robust, linear-quadratic, sliding-mode, \
-    gradient-inverse, adaptive-inverse.\n\nExamples:\n  \
-    shakebench benchmark vrths --case 1 --motion el-centro --perturbed 0\n  \
-    shakebench benchmark vrths --controller adaptive-inverse --plant derivative-blocks --corners 3\n  \
-    shakebench benchmark vrths --hidden delay=1ms --case 1 --out play\n  \
-    shakebench benchmark vrths --json > scores.json")]
-pub struct Vrths {
-    /// Cases, 1 to 4 [default: all]
-    #[arg(long = "case", value_name = "N", value_delimiter = ',')]
-    cases: Vec<u8>,
-    /// Ground motions: el-centro, kobe, morgan-hill, built-in or files [default: the three]
-    #[arg(long = "motion", value_name = "NAME|FILE", value_delimiter = ',')]
-    motions: Vec<String>,
-    /// Controllers [default: all]
-    #[arg(long = "controller", value_name = "NAME", value_delimiter = ',')]
-    controllers: Vec<String>,
-    /// Perturbed plants a case, besides the nominal one [default: 20]
-    #[arg(long, value_name = "N", conflicts_with_all = ["corners", "stiffness_within"])]
-    perturbed: Option<u32>,
-    /// Instead, the sixteen corners of so many standard deviations
-    #[arg(long, value_name = "DEVIATIONS", conflicts_with = "stiffness_within")]
-    corners: Option<f64>,
-    /// Instead, ten plants a case whose specimen's stiffness is spread up to this factor
-    #[arg(long, value_name = "FACTOR")]
-    stiffness_within: Option<f64>,
-    /// Seed of plants and noise
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// How the plant forms its derivatives
-    #[arg(long, value_enum, default_value_t)]
-    plant: Form,
-    /// Hide this in the nominal plant, record it, diagnose the record and design the laws again on
-    /// what was found: EFFECT=VALUE, such as "delay=1 ms"
-    #[arg(long = "hidden", value_name = "EFFECT=VALUE",
-          conflicts_with_all = ["perturbed", "corners", "stiffness_within", "plant"])]
-    hidden: Vec<String>,
-    /// Factor on the ground motions
-    #[arg(long, value_name = "FACTOR", default_value_t = INTENSITY)]
-    intensity: f64,
-    /// Folder of the benchmark's records and table [default: vrths in SHAKEBENCH_SHARED, or
-    /// ../shared/vrths]
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
-    /// Folder for report.html, scores.json and runs.csv [default: none are written]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
-}
-
-#[derive(Debug, Clone, Copy, Default, ValueEnum)]
-enum Form {
-    /// By its equations
-    #[default]
-    TransferFunction,
-    /// As the published program does
-    DerivativeBlocks,
-}
-
-impl From<Form> for InteractionForm {
-    fn from(form: Form) -> Self {
-        match form {
-            Form::TransferFunction => Self::TransferFunction,
-            Form::DerivativeBlocks => Self::DerivativeBlocks,
-        }
-    }
-}
-
-/// Plants a case of `--stiffness-within`.
-const STIFFNESSES: u32 = 10;
-
-/// Runs a benchmark.
+/// Runs a benchmark with the options before its name.
 ///
 /// # Errors
-/// Unknown names and numbers out of range: nothing is run then; a folder that cannot be written.
-pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
-    let Benchmark::Vrths(arguments) = &arguments.benchmark;
-    let folder = motions::data_folder(arguments.data.as_deref());
-    if let (Some(given), None) = (&arguments.data, &folder) {
-        return Err(Error::File {
-            path: given.clone(),
-            reason: "no such folder; expected el-centro.csv, kobe.csv and morgan-hill.csv in it"
-                .into(),
-        });
+/// The program is neither beside this one nor can be built.
+pub fn execute(
+    arguments: &Arguments,
+    units: Option<UnitSystem>,
+    force: bool,
+) -> Result<ExitCode, Error> {
+    let program = pack::companion(PROGRAM, PACKAGE)?;
+    let mut command = Command::new(&program);
+    if let Some(units) = units.and_then(|units| units.to_possible_value()) {
+        command.args(["--units", units.get_name()]);
     }
-    let study = study(arguments, folder.as_deref())?;
-    if let Some(out) = &arguments.out {
-        Results::check(out)?;
+    if force {
+        command.arg("--force");
     }
-    if !arguments.hidden.is_empty() {
-        return hidden(arguments, study);
-    }
-    let published = folder
-        .as_deref()
-        .map(published::read)
-        .transpose()?
-        .flatten();
-    let el_centro = match &folder {
-        Some(folder) => motions::motions(&[RECORDS[0].into()], Some(folder), INTENSITY)?.pop(),
-        None => None,
-    };
-
-    let bar = ProgressBar::new(study.runs() as u64);
-    // A template that cannot be read leaves the plain bar.
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos} of {len} plants, {eta} left") {
-        bar.set_style(style);
-    }
-    let simulation = |error: plant::ModelError| Error::Option {
-        option: "benchmark vrths",
-        reason: error.to_string(),
-    };
-    let mut outcome =
-        Outcome::of(&study, el_centro.as_ref(), published, || bar.inc(1)).map_err(simulation)?;
-    bar.finish_and_clear();
-    if folder.is_none() {
-        outcome.notes.push(
-            "the benchmark's records are not here (--data DIR): without them, the built-in motion \
-             stands in, and the published table is left out"
-                .into(),
-        );
-    }
-
-    let mut files = Vec::new();
-    if let Some(out) = &arguments.out {
-        let pictures = page::pictures(&study).map_err(simulation)?;
-        files = write(out, &outcome, &page::report(&outcome, &pictures))?;
-    }
-    print(
-        arguments.json,
-        &serde_json::json!(outcome),
-        &outcome.text(),
-        &files,
-    );
-    Ok(ExitCode::SUCCESS)
-}
-
-/// Hides effects in the plant and shows what comes of it.
-fn hidden(arguments: &Vrths, study: Study) -> Result<ExitCode, Error> {
-    let refused = |reason: String| Error::Option {
-        option: "--hidden",
-        reason,
-    };
-    let read = arguments.hidden.iter().map(|text| read_hidden(text));
-    let hidden = HiddenStudy {
-        hidden: read.collect::<Result<_, _>>().map_err(refused)?,
-        cases: study.cases,
-        motions: study.motions,
-        controllers: study.controllers,
-        seed: study.seed,
-    };
-    let fault = |error: HiddenError| refused(error.to_string());
-    let record = hidden.record().map_err(fault)?;
-    let results = match &arguments.out {
-        Some(out) => {
-            let mut results = Results::begin(out)?;
-            results.write("record.csv", |file| record.write(file))?;
-            // A diagnosis takes minutes.
-            results.check_existing()?;
-            Some(results)
-        }
-        None => None,
-    };
-    let outcome = hidden.run(&record, Observer::none()).map_err(fault)?;
-    let mut files = Vec::new();
-    if let (Some(out), Some(mut results)) = (&arguments.out, results) {
-        let model = outcome.extended_model().map_err(|error| Error::File {
-            path: out.join(EXTENDED_MODEL),
+    let status = command
+        .args(&arguments.arguments)
+        .status()
+        .map_err(|error| Error::File {
+            path: program,
             reason: error.to_string(),
         })?;
-        results.write_text(EXTENDED_MODEL, &model)?;
-        results.write("scores.json", |file| {
-            serde_json::to_writer_pretty(file, &outcome).map_err(std::io::Error::other)
-        })?;
-        files = results.finish()?;
-    }
-    print(
-        arguments.json,
-        &serde_json::json!(outcome),
-        &outcome.text(),
-        &files,
-    );
-    Ok(ExitCode::SUCCESS)
-}
-
-/// Prints the one object, or what people read.
-fn print(json: bool, object: &serde_json::Value, text: &str, files: &[PathBuf]) {
-    if json {
-        println!("{object}");
-        return;
-    }
-    print!("{text}");
-    if !files.is_empty() {
-        println!("\nwritten:");
-    }
-    for file in files {
-        println!("  {}", file.display());
-    }
-}
-
-fn study(arguments: &Vrths, folder: Option<&std::path::Path>) -> Result<Study, Error> {
-    let cases: Result<Vec<_>, _> = arguments
-        .cases
-        .iter()
-        .map(|number| BenchmarkCase::new(*number))
-        .collect();
-    let mut cases = cases.map_err(|error| Error::Option {
-        option: "--case",
-        reason: error.to_string(),
-    })?;
-    if cases.is_empty() {
-        cases = BenchmarkCase::ALL.to_vec();
-    }
-    let positive = |option: &'static str, value: f64, expected: &str| {
-        if value.is_finite() && value > 0.0 {
-            return Ok(value);
-        }
-        Err(Error::Option {
-            option,
-            reason: format!("{value}, expected {expected}"),
-        })
-    };
-    let intensity = positive("--intensity", arguments.intensity, "a positive factor")?;
-    let plants = match (arguments.corners, arguments.stiffness_within) {
-        (Some(by), _) => Plants::Corners(positive("--corners", by, "standard deviations")?),
-        (None, Some(factor)) => Plants::StiffnessWithin {
-            factor: positive("--stiffness-within", factor, "a positive factor")?,
-            count: STIFFNESSES,
-        },
-        (None, None) => Plants::Drawn(arguments.perturbed.unwrap_or(20)),
-    };
-    Ok(Study {
-        cases,
-        motions: motions::motions(&arguments.motions, folder, intensity)?,
-        controllers: controllers(&arguments.controllers)?,
-        plants,
-        form: arguments.plant.into(),
-        seed: arguments.seed,
-    })
-}
-
-fn controllers(names: &[String]) -> Result<Vec<roster::Entry>, Error> {
-    if names.is_empty() {
-        return Ok(roster::ALL.to_vec());
-    }
-    names
-        .iter()
-        .map(|name| {
-            roster::entry(name).ok_or_else(|| {
-                let known = || roster::ALL.iter().map(|entry| entry.name);
-                let hint = nearest(name, known())
-                    .map_or(String::new(), |near| format!(", did you mean `{near}`"));
-                let known: Vec<_> = known().collect();
-                Error::Option {
-                    option: "--controller",
-                    reason: format!(
-                        "`{name}` is no controller{hint}? Expected {}",
-                        known.join(", ")
-                    ),
-                }
-            })
-        })
-        .collect()
-}
-
-/// Writes report, scores and a row a run.
-fn write(
-    folder: &std::path::Path,
-    outcome: &Outcome,
-    page: &report::Report,
-) -> Result<Vec<PathBuf>, Error> {
-    let page = report::render(page, &folder.join(report::FILE))?;
-    let mut results = Results::begin(folder)?;
-    results.write_text(report::FILE, &page)?;
-    results.write("scores.json", |file| {
-        serde_json::to_writer_pretty(file, outcome).map_err(std::io::Error::other)
-    })?;
-    results.write("runs.csv", |file| {
-        let mut csv = csv::Writer::from_writer(file);
-        let heads = ["controller", "case", "motion", "plant", "stable", "J1 [ms]"];
-        let scores = (2..=9).map(|i| format!("J{i} [%]"));
-        let rest = [
-            "true tracking [%]",
-            "peak force [N]",
-            "peak displacement [m]",
-        ];
-        csv.write_record(
-            heads
-                .map(String::from)
-                .into_iter()
-                .chain(scores)
-                .chain(rest.map(String::from)),
-        )?;
-        for (name, score) in &outcome.controllers {
-            for run in &score.all {
-                let heads = [
-                    (*name).to_string(),
-                    run.case.to_string(),
-                    run.motion.clone(),
-                    run.plant.to_string(),
-                    run.stable.to_string(),
-                ];
-                let rest = [
-                    run.true_tracking_percent,
-                    run.peak_force_n,
-                    run.peak_displacement_m,
-                ];
-                let numbers = run.criteria.iter().chain(&rest).map(f64::to_string);
-                csv.write_record(heads.into_iter().chain(numbers))?;
-            }
-        }
-        csv.flush()
-    })?;
-    Ok(results.finish()?)
+    let code = status.code().and_then(|code| u8::try_from(code).ok());
+    // Without a code, a signal ended it.
+    Ok(ExitCode::from(code.unwrap_or(1)))
 }

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
-use crate::error::Error;
-use crate::pack::{self, FmiVersion, Platform};
+use laboratory::error::Error;
+use pack::{self, FmiVersion, Platform};
 
 /// Options of `shakebench build`.
 #[derive(Debug, Args)]
@@ -21,7 +21,7 @@ pub struct Arguments {
     /// Folder for fmi2/NAME.fmu and fmi3/NAME.fmu [default: target/fmus]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Join the FMUs of these folders instead of building: one archive with all their platforms
+    /// Merge the FMUs of these folders instead of building: one archive with all their platforms
     #[arg(
         long,
         value_name = "DIR",
@@ -30,17 +30,17 @@ pub struct Arguments {
         conflicts_with_all = ["fmi", "libraries", "revision", "notices"]
     )]
     merge: Vec<PathBuf>,
-    /// Pack libraries that were compiled before instead of building; one folder a platform, which is
-    /// written as in x86_64-windows; this platform's is needed
+    /// Pack compiled libraries instead of building: one folder per platform, such as
+    /// x86_64-windows=DIR; this platform is required
     #[arg(long, value_name = "PLATFORM=DIR", value_parser = libraries)]
     libraries: Vec<(Platform, PathBuf)>,
-    /// Which build of the sources the libraries are; goes into the descriptions
+    /// Revision of the sources, for the descriptions
     #[arg(long, value_name = "TEXT", requires = "libraries")]
     revision: Option<String>,
-    /// Compress the libraries as far as it goes: 4 % smaller, seconds for each
+    /// Use the strongest compression: 4 % smaller, some seconds per library
     #[arg(long, requires = "libraries")]
     smallest: bool,
-    /// Write the licences of everything that the program is linked with, and pack nothing
+    /// Write the licences of all linked code to this file, without packing
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fmi", "out", "libraries", "revision"])]
     notices: Option<PathBuf>,
 }

@@ -7,34 +7,34 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt;
-use crate::campaign::{self, Bench, Left, Plan, Progress, Runs, Shard, Study, carry_out};
-use crate::error::Error;
-use crate::report::columns::aligned;
-use crate::results::{Results, unused};
+use laboratory::error::Error;
+use laboratory::results::{Results, unused};
+use pages::report::columns::aligned;
+use study::campaign::{self, Bench, Left, Plan, Progress, Runs, Shard, Study, carry_out};
 
 /// Options of `shakebench campaign`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
     shakebench campaign STUDY.toml --out RUNS\n  \
     shakebench campaign rigs --shard 1/8 --out RIGS\n\n\
-    The same command goes on where it was stopped. A study that was extended runs what is new.")]
+    Repeating the command resumes an interrupted study. An extended study runs only the new runs.")]
 pub struct Arguments {
-    /// The study: what is fixed, what varies, and how (docs/campaigns.md); or `rigs`, the controllers on 200
-    /// rigs that are not the one they were designed for
+    /// Study file (docs/campaigns.md), or `rigs`: the controllers on 200 rigs that differ from the
+    /// one they were designed for
     study: PathBuf,
     /// Folder for runs.parquet, runs.csv and report.html [default: shakebench-results/STUDY]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Carry out the I-th of N parts of the study; without this, the parts in the folder are collected
+    /// Run the I-th of N parts of the study; without this, the parts in the folder are collected
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Runs at a time [default: one a core]
+    /// Number of parallel runs [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
-    /// Check the study, say how many runs it has, and carry none out
+    /// Check the study and print the number of runs, without running it
     #[arg(long, conflicts_with_all = ["shard", "rows"])]
     plan: bool,
-    /// Carry out the runs A to B - 1 and print them as a journal
+    /// Run the runs A to B - 1 and print them as journal entries
     #[arg(long, value_name = "A-B", value_parser = range, conflicts_with = "shard")]
     rows: Option<std::ops::Range<u64>>,
     /// Print one JSON object
@@ -53,7 +53,7 @@ fn range(text: &str) -> Result<std::ops::Range<u64>, String> {
     }
 }
 
-/// Carries out a study and writes its table.
+/// Runs a study and writes its table.
 ///
 /// # Errors
 /// Input at fault; nothing is written then.
@@ -126,15 +126,23 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         println!("{}", serde_json::json!(summary));
     } else {
         println!(
-            "{} runs: {} complete, {} stopped by the interlock, {} failed; {:.1} s",
-            summary.runs, summary.complete, summary.interlock, summary.failed, summary.wall_s
+            "{} runs: {} complete, {} stopped by the interlock, {} failed{}; {:.1} s",
+            summary.runs,
+            summary.complete,
+            summary.interlock,
+            summary.failed,
+            match summary.invalid {
+                0 => String::new(),
+                some => format!(", {some} with invalid input"),
+            },
+            summary.wall_s
         );
         if summary.from_before > 0 {
-            println!("{} of them were there already", summary.from_before);
+            println!("{} of them were finished before", summary.from_before);
         }
         if !is_whole {
             println!(
-                "{} runs are missing; results are written once all are in {}",
+                "{} runs are missing; the results are written when all are in {}",
                 summary.missing,
                 folder.display()
             );
@@ -151,7 +159,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     let is_done = is_whole || arguments.shard.is_some();
     if asked.load(std::sync::atomic::Ordering::Relaxed) && !is_done {
-        eprintln!("error: interrupted; the same command goes on");
+        eprintln!("error: interrupted; repeat the command to resume");
         return Ok(ExitCode::from(1));
     }
     Ok(ExitCode::SUCCESS)
@@ -182,7 +190,7 @@ fn plan(study: &Study, folder: Option<&Path>, json: bool) -> Result<ExitCode, Er
         );
         return Ok(ExitCode::SUCCESS);
     }
-    println!("{} runs; nothing is wrong with the study", study.runs());
+    println!("{} runs; the study has no errors", study.runs());
     for column in &columns {
         let unit = column
             .unit

@@ -7,12 +7,12 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::OneVersion;
-use crate::commission::{self, Request};
-use crate::error::Error;
-use crate::report::columns::aligned;
-use crate::results::Results;
-use crate::system::built_in;
-use crate::units::{self, STANDARD_GRAVITY};
+use laboratory::commission::{self, Request, Verdict};
+use laboratory::error::Error;
+use laboratory::results::Results;
+use laboratory::systems::built_in;
+use pages::report::columns::aligned;
+use units::{self, STANDARD_GRAVITY};
 
 /// Options of `shakebench commission`.
 #[derive(Debug, Args)]
@@ -25,28 +25,39 @@ use crate::units::{self, STANDARD_GRAVITY};
     shakebench design --model model.toml\n  \
     shakebench run mpc --control-model model.toml ...")]
 pub struct Arguments {
-    /// Plant: identified, servohydraulic, or a .toml file of one [default: servohydraulic]
+    /// Plant: identified, servohydraulic, or a .toml file [default: servohydraulic]
     #[arg(long)]
     plant: Option<String>,
     /// Specimen on the table: none, linear, yielding [default: none]
     #[arg(long)]
     specimen: Option<String>,
-    /// Parameter of the rig, such as table.added_payload="10 kg"; may be given several times
+    /// Parameter of the rig, such as table.added_payload="10 kg"; repeatable
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
-    /// Peak of the table's acceleration that the excitation grows to, such as "0.3 g" (a number
-    /// alone is in g)
+    /// Peak acceleration of the table for the excitation, such as "0.3 g" (a plain number is in g)
     #[arg(long, value_name = "G", default_value = "0.3 g")]
     level: String,
-    /// Half of the stroke; the excitation uses four tenths of it at most
+    /// Half of the stroke; the excitation uses at most 40 % of it
     #[arg(long, value_name = "L", default_value = "1.5 in")]
     stroke: String,
-    /// Length of the recording that is identified
+    /// Length of the recording for the identification
     #[arg(long, value_name = "T", default_value = "60 s")]
     duration: String,
     /// Seed of the motions
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Part of the loop's delay that is the sensors'; the valve's is the rest, and the motion leads by it
+    #[arg(long, value_name = "T", default_value = "2 ms")]
+    sensor_delay: String,
+    /// Record that will be played, on which the tracking error is predicted [default: the built-in motion]
+    #[arg(long, value_name = "FILE", conflicts_with = "reference")]
+    record: Option<PathBuf>,
+    /// Reference that will be played, used exactly as it is
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// Duration of the motion on which the tracking error is predicted
+    #[arg(long, value_name = "T", default_value = "20 s")]
+    played: String,
     /// Version of FMI of the components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
@@ -58,7 +69,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Commissions a rig and writes what came of it.
+/// Commissions a rig and writes the results.
 ///
 /// # Errors
 /// Input at fault, or a rig that gives no model; nothing is written then.
@@ -81,6 +92,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         stroke: quantity("--stroke", &arguments.stroke, "m", 1e-3, 2.0)?,
         duration: quantity("--duration", &arguments.duration, "s", 20.0, 600.0)?,
         seed: arguments.seed,
+        sensor_delay: quantity("--sensor-delay", &arguments.sensor_delay, "s", 0.0, 0.1)?,
+        record: arguments.record.clone(),
+        reference: arguments.reference.clone(),
+        played: quantity("--played", &arguments.played, "s", 1.0, 600.0)?,
         fmi: arguments.fmi.into(),
     };
     Results::check(&arguments.out)?;
@@ -91,6 +106,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     };
     let mut done = commission::commission(&request, &tell)?;
     done.write(&arguments.out)?;
+    let status = match done.verdict {
+        Verdict::Robust => ExitCode::from(1),
+        Verdict::Used | Verdict::Extended => ExitCode::SUCCESS,
+    };
     if arguments.json {
         let mut json = serde_json::json!(done);
         json["folder"] = arguments.out.display().to_string().into();
@@ -101,10 +120,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             .to_string()
             .into();
         println!("{json}");
-        return Ok(ExitCode::SUCCESS);
+        return Ok(status);
     }
     print!("{}", done.words());
-    println!("\n{}", aligned(&done.design.table()));
+    if !done.design.loops.is_empty() {
+        println!("\n{}", aligned(&done.design.table()));
+    }
     if done.warnings.len() > 1 {
         println!("warnings");
         for warning in &done.warnings[1..] {
@@ -116,5 +137,5 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     for file in &done.files {
         println!("  {}", arguments.out.join(file).display());
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(status)
 }

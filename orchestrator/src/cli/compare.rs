@@ -7,10 +7,10 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::rig::RigArguments;
-use crate::comparison::{self, Plan, Played, Progress};
-use crate::error::Error;
-use crate::results::unused;
-use crate::system::built_in;
+use laboratory::comparison::{self, Plan, Played, Progress};
+use laboratory::error::Error;
+use laboratory::results::unused;
+use laboratory::systems::built_in;
 
 /// Options of `shakebench compare`.
 #[derive(Debug, Args)]
@@ -37,7 +37,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Plays every motion under every controller, in parallel, and prints the errors beside those of
+/// Plays every motion under every controller, in parallel, and prints the errors next to those of
 /// the thesis.
 ///
 /// # Errors
@@ -103,11 +103,10 @@ fn controllers(asked: &[String]) -> Result<Vec<String>, Error> {
     if asked.is_empty() {
         return Ok(built_in::names().map(String::from).collect());
     }
-    let asked = asked.iter().map(|name| name.trim());
-    let asked = asked.filter(|name| !name.is_empty());
     asked
-        .map(|name| match built_in::check(name) {
-            Ok(()) => Ok(name.to_string()),
+        .iter()
+        .map(|name| match built_in::check(name.trim()) {
+            Ok(()) => Ok(name.trim().to_string()),
             Err(error) => Err(Error::Option {
                 option: "--controllers",
                 reason: error.to_string(),

@@ -5,10 +5,10 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::error::Error;
-use crate::report::columns::aligned;
-use crate::results::unused;
-use crate::run_comparison;
+use laboratory::error::Error;
+use laboratory::results::unused;
+use laboratory::run_comparison;
+use pages::report::columns::aligned;
 
 /// Options of `shakebench compare-runs`.
 #[derive(Debug, Args)]
@@ -17,7 +17,7 @@ use crate::run_comparison;
     shakebench run three-variable --set control.proportional_gain=\"5 V/in\" --out second\n  \
     shakebench compare-runs first second")]
 pub struct Arguments {
-    /// Folders of runs, or folders that hold such
+    /// Folders of runs, or folders that contain runs
     #[arg(value_name = "DIR", required = true)]
     folders: Vec<PathBuf>,
     /// Folder for report.html, runs.json and runs.csv [default: shakebench-results/runs]
@@ -28,7 +28,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Lays runs over each other and says what differs between them.
+/// Overlays runs and lists their differences.
 ///
 /// # Errors
 /// A folder that holds no run; nothing is written then.

@@ -5,12 +5,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::design::{self, LoopName, Options, Synthesis, model};
-use crate::error::Error;
-use crate::report::columns::aligned;
-use crate::report::number::significant;
-use crate::results::unused;
-use crate::units::INCH;
+use laboratory::design::{self, LoopName, Options, Synthesis, model};
+use laboratory::error::Error;
+use laboratory::results::unused;
+use pages::report::columns::aligned;
+use pages::report::number::significant;
+use units::INCH;
 
 /// Options of `shakebench design`.
 #[derive(Debug, Args)]
@@ -23,11 +23,11 @@ pub struct Arguments {
     /// three-variable or sliding-mode [default: all]
     #[arg(long = "loop", value_name = "NAME")]
     only: Option<String>,
-    /// Crossover that loop shaping is to reach, rad/s [default: the synthesis that comes nearest to
-    /// Eq 3-10; with --model the fastest with 6 dB and 45 degrees]
+    /// Crossover for loop shaping, rad/s [default: the synthesis closest to Eq 3-10; with --model
+    /// the fastest with 6 dB and 45 degrees]
     #[arg(long, value_name = "RAD_PER_S")]
     crossover: Option<f64>,
-    /// Design every controller on this model, as `shakebench identify` writes it: displacement-pid,
+    /// Design every controller on this model from `shakebench identify`: displacement-pid,
     /// three-variable, loop-shaping, sliding-mode, mpc
     #[arg(
         long,
@@ -36,13 +36,13 @@ pub struct Arguments {
         conflicts_with = "specimen"
     )]
     model: Option<PathBuf>,
-    /// With --model: rigs drawn from its uncertainty
+    /// With --model: number of rigs drawn from its uncertainty
     #[arg(long, value_name = "N", default_value_t = model::DRAWS, requires = "model")]
     draws: u64,
     /// With --model: seed of the draws
     #[arg(long, value_name = "N", default_value_t = 1, requires = "model")]
     seed: u64,
-    /// What stands on the table: none, linear [default: none]
+    /// Specimen on the table: none, linear [default: none]
     #[arg(long, value_name = "NAME")]
     specimen: Option<String>,
     /// Folder for report.html [default: shakebench-results/design]
@@ -128,7 +128,8 @@ fn on_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
         println!("{warning}");
     }
     println!(
-        "measurements {:.2} ms late; band: 5 to 95 % of {} rigs drawn from the model's errors (seed {})\n",
+        "measurement delay {:.2} ms; band: 5 to 95 % of {} rigs drawn from the model's errors \
+         (seed {})\n",
         design.late_ms, design.draws, design.seed
     );
     print!("{}", aligned(&design.table()));

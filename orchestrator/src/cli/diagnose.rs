@@ -3,20 +3,23 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Args;
 use identification::diagnosis::DiagnosisReport;
-use identification::diagnosis::engine::{Observer, Progress};
+use identification::diagnosis::engine::{Deadline, Observer, Progress};
 
 use super::progress;
-use crate::diagnosis::{diagnose, files, foreign, model, template, text};
-use crate::error::Error;
-use crate::fmu::Isolation;
-use crate::results::unused;
+use fmi_import::Isolation;
+use identification::diagnosis::rigs::guess::Guess;
+use laboratory::diagnosis::{diagnose, diagnose_files, files, foreign, model, template, text};
+use laboratory::error::Error;
+use laboratory::results::unused;
 
 /// What `diagnose` takes.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
+    shakebench diagnose motion_1.csv motion_2.csv --out results\n  \
     shakebench diagnose cases/dev-03 --out results/dev-03 --json\n  \
     shakebench diagnose identification/rigs/positioning_drive.toml --out results\n  \
     shakebench diagnose --template oscillator > rig.toml\n  \
@@ -26,36 +29,36 @@ use crate::results::unused;
     shakebench diagnose --fmu Theirs.fmu --map map.toml test.csv\n\n\
     A case is a folder with nominal.toml, identification.csv and validation.csv, and may have\n\
     small.csv and baseline.csv. Each header cell is `name [unit]`, in any order and unit; columns\n\
-    of other names are left alone.")]
+    of other names are ignored.")]
 pub struct Arguments {
-    /// Folder of a case (nominal.toml and records), description of a rig (.toml), or data files of an FMU
+    /// Data files (kind and columns are guessed and shown), description of a rig (.toml), folder of a case
+    /// (nominal.toml and records), or data files of an FMU
     #[arg(value_name = "CASE", required_unless_present_any = ["template", "model"])]
     cases: Vec<PathBuf>,
-    /// Data files in place of those that the description of a rig names
+    /// Data files to use instead of those in the description of a rig
     #[arg(long, value_name = "FILE")]
     data: Vec<PathBuf>,
-    /// What the columns of the files are called: `channel = "header"` or
-    /// `channel = { column = "header", unit = "mm" }` a line, in place of the usual names or of the
-    /// description's
+    /// Names of the columns, one per line: `channel = "header"` or `channel = { column = "header",
+    /// unit = "mm" }`; replaces the usual names or the description's
     #[arg(long, value_name = "MAP.toml")]
     columns: Option<PathBuf>,
     /// Print a commented description to fill in: table, actuator, drive, axis, hysteretic device, material,
     /// oscillator, damper or transfer system; with --fmu, `map`
     #[arg(long, value_name = "KIND", conflicts_with_all = ["cases", "model", "data"])]
     template: Option<String>,
-    /// Extended model that a diagnosis wrote, of a table, a rig or an FMU; nothing is fitted
+    /// Extended model from a diagnosis of a table, a rig or an FMU; nothing is fitted
     #[arg(long, value_name = "EXTENDED.toml", conflicts_with_all = ["cases", "data"])]
     model: Option<PathBuf>,
-    /// Diagnose a model that came as an FMU, by effects at its inputs and outputs and drifts of its
-    /// parameters, on data files in place of CASE
+    /// Diagnose an FMU by effects at its inputs and outputs and drifts of its parameters; give data
+    /// files instead of CASE
     #[arg(long, value_name = "MODEL.fmu", conflicts_with = "columns")]
     fmu: Option<PathBuf>,
-    /// Which column of the data is which input and output of the FMU; with --model, in place of the map
-    /// beside it
+    /// Map from columns of the data to inputs and outputs of the FMU; with --model, replaces the
+    /// map next to it
     #[arg(long, value_name = "MAP.toml")]
     map: Option<PathBuf>,
-    /// FMUs in a process of their own: without it foreign ones, but for the many simulations of a
-    /// diagnosis, which then run in this process once the nominal model came to its end
+    /// FMUs to run in a separate process [default: foreign ones; the many simulations of a
+    /// diagnosis run in this process after the nominal model has completed]
     #[arg(long, value_enum)]
     isolate: Option<Isolation>,
     /// Score the model on these files
@@ -69,7 +72,7 @@ pub struct Arguments {
         conflicts_with = "validate"
     )]
     predict: Option<PathBuf>,
-    /// The predicted file is a period of a motion that goes on: predict its steady state
+    /// The predicted file is one period of a periodic motion: predict its steady state
     #[arg(long, requires = "predict")]
     periodic: bool,
     /// Folder for report, JSON and extended model [default: shakebench-results/diagnosis-NAME], or file
@@ -79,7 +82,11 @@ pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
-    /// Tell on standard error what is tried
+    /// Time after which the search ends with the best that it has found; effects that it could not check are
+    /// candidates then
+    #[arg(long, value_name = "T", default_value = "10 min")]
+    time_limit: String,
+    /// Print each attempt to standard error
     #[arg(long)]
     verbose: bool,
 }
@@ -110,23 +117,42 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.map.is_some() && arguments.fmu.is_none() {
         return Err(Error::Option {
             option: "--map",
-            reason: "it says which column is which input and output of an FMU: expected --fmu MODEL.fmu or \
-                     --model with it"
+            reason: "it maps columns to inputs and outputs of an FMU: expected --fmu MODEL.fmu or \
+                --model with it"
                 .into(),
         });
     }
+    let is_data = |path: &PathBuf| {
+        path.is_file() && path.extension().is_none_or(|extension| extension != "toml")
+    };
+    let guesses = arguments.fmu.is_none() && arguments.cases.iter().all(is_data);
     let case = match (&arguments.fmu, arguments.cases.as_slice()) {
         (Some(fmu), _) => fmu,
+        (None, [case, ..]) if guesses => case,
         (None, [case]) => case,
         (None, _) => {
             return Err(Error::Option {
                 option: "CASE",
-                reason: "expected one case or description; data files in place of a description's \
-                         own go with --data"
-                    .into(),
+                reason:
+                    "expected data files, or one case or description; pass data files other than \
+                    the description's with --data"
+                        .into(),
             });
         }
     };
+    let limit = units::value_in(&arguments.time_limit, "s")
+        .map_err(|error| error.to_string())
+        .and_then(|limit| match Duration::try_from_secs_f64(limit) {
+            Ok(limit) if !limit.is_zero() => Ok(limit),
+            _ => Err(format!(
+                "`{}`: expected more than 0 s",
+                arguments.time_limit
+            )),
+        })
+        .map_err(|reason| Error::Option {
+            option: "--time-limit",
+            reason,
+        })?;
     let folder = arguments.out.clone().unwrap_or_else(|| {
         let place = std::path::absolute(case).unwrap_or_else(|_| case.clone());
         let name = if place.is_dir() {
@@ -151,9 +177,20 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         bar.finish_and_clear();
     }
     let columns = arguments.columns.as_deref();
-    let observer = Observer::new(&tell);
+    let deadline = Deadline::after(limit);
+    let observer = Observer::new(&tell).until(&deadline);
     let report = match &arguments.fmu {
         Some(fmu) => of_fmu(arguments, fmu, &folder, observer),
+        None if guesses => {
+            let files: Vec<PathBuf> = arguments
+                .cases
+                .iter()
+                .chain(&arguments.data)
+                .cloned()
+                .collect();
+            let tell = |guess: &Guess| bar.suspend(|| show(guess, arguments.json));
+            diagnose_files(&files, columns, &folder, &tell, observer)
+        }
         None => diagnose(case, &arguments.data, columns, &folder, observer),
     };
     bar.finish_and_clear();
@@ -168,6 +205,25 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Prints what was guessed; to standard error where standard output is for JSON.
+fn show(guess: &Guess, json: bool) {
+    let sentences: Vec<String> = guess
+        .sentences
+        .iter()
+        .map(|own| format!("  {own}\n"))
+        .collect();
+    let text = format!(
+        "guessed from the files\n{}as a description, to change where it is wrong:\n\n{}\n",
+        sentences.concat(),
+        guess.text
+    );
+    if json {
+        eprint!("{text}");
+    } else {
+        print!("{text}");
+    }
 }
 
 fn of_fmu(

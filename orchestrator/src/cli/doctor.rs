@@ -4,21 +4,21 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::doctor::{Examination, State, examine};
-use crate::error::Error;
-use crate::report::columns::last_left;
+use laboratory::error::Error;
+use pack::doctor::{Examination, State, examine};
+use pages::report::columns::last_left;
 
 /// Options of `shakebench doctor`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  shakebench doctor\n\n\
-    Exit status: 0 where the program can do its work, 1 where it cannot.")]
+    Exit status: 0 if the program can work, 1 if it cannot.")]
 pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
 }
 
-/// Prints what is here, what is missing, and the cure.
+/// Prints the parts of the installation, what is missing, and what to do.
 ///
 /// # Errors
 /// None.
@@ -72,8 +72,8 @@ fn text(found: &Examination) -> String {
         text += &format!("\nto have more\n{}", cures.concat());
     }
     text += match found.ready {
-        true => "\neverything that is needed is here\n",
-        false => "\nsomething that is needed is missing or at fault\n",
+        true => "\nall required parts are installed\n",
+        false => "\na required part is missing or faulty\n",
     };
     text
 }

@@ -7,11 +7,11 @@ use clap::Args;
 
 use super::motion::MotionArguments;
 use super::quantity::band;
-use crate::error::Error;
-use crate::iteration::circle::{self, Circle, Plan};
-use crate::iteration::on_model::Search;
-use crate::report::columns::aligned;
-use crate::results::{Results, unused};
+use laboratory::error::Error;
+use laboratory::iteration::circle::{self, Circle, Plan};
+use laboratory::iteration::on_model::Search;
+use laboratory::results::{Results, unused};
+use pages::report::columns::aligned;
 
 /// Options of `shakebench drive`.
 #[derive(Debug, Args)]
@@ -20,18 +20,18 @@ use crate::results::{Results, unused};
     shakebench drive my-case --model results/extended_model.toml --record NGA/RSN1633_MANJIL_ABBAR--L.AT2\n  \
     shakebench drive my-case --model results/extended_model.toml --pga 0.15 --out drives")]
 pub struct Arguments {
-    /// Case of a diagnosis: a folder with nominal.toml, whose law the drive is for
+    /// Case of a diagnosis: a folder with nominal.toml, which states the control law
     #[arg(value_name = "CASE")]
     case: PathBuf,
-    /// Extended model that `shakebench diagnose` made of the case
+    /// Extended model of the case from `shakebench diagnose`
     #[arg(long, value_name = "MODEL.toml")]
     model: PathBuf,
     #[command(flatten)]
     motion: MotionArguments,
-    /// Most corrections
+    /// Largest number of corrections
     #[arg(long, default_value_t = Search::default().corrections)]
     corrections: usize,
-    /// Lowest and highest frequency that is corrected, Hz
+    /// Lowest and highest corrected frequency, Hz
     #[arg(long, value_names = ["LOW", "HIGH"], num_args = 2, default_values_t = Search::default().band)]
     band: Vec<f64>,
     /// Folder for drive.csv and drive.json [default: shakebench-results/drive-CASE-MOTION]
@@ -42,7 +42,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Finds the drive and writes it.
+/// Computes the drive and writes it.
 ///
 /// # Errors
 /// Input at fault; nothing is written then.

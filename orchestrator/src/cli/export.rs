@@ -3,46 +3,51 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use bridges::opensees;
 use clap::{Args, ValueEnum};
 
 use super::motion::MotionArguments;
 use super::quantity::if_given;
 use super::rig::RigArguments;
 use super::run;
-use crate::error::Error;
-use crate::fmu::FmiVersion;
-use crate::master::Algorithm;
-use crate::results::Results;
-use crate::run::experiment::{Request, prepare};
-use crate::ssp::export::{Experiment, write};
+use fmi_import::FmiVersion;
+use fmi_master::Algorithm;
+use laboratory::error::Error;
+use laboratory::export::{Experiment, write, write_model};
+use laboratory::results::Results;
+use laboratory::run::experiment::{Request, prepare};
 
 /// Options of `shakebench export`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     shakebench export mpc --ssp mpc.ssp\n  \
-    shakebench export my-rig.toml --ssp rig.ssp --record NGA/RSN1633_MANJIL_ABBAR--L.AT2")]
+    shakebench export my-rig.toml --ssp rig.ssp --record NGA/RSN1633_MANJIL_ABBAR--L.AT2\n  \
+    shakebench export opensees:frame.py --fmu frame.fmu --fmi 3")]
 pub struct Arguments {
-    /// Built-in system, .toml file or .ssp archive
+    /// Built-in system, .toml file or .ssp archive; opensees:MODEL.py for --fmu
     #[arg(value_name = "SYSTEM")]
     system: String,
     /// Archive to write (System Structure and Parameterization)
-    #[arg(long, value_name = "FILE")]
-    ssp: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "fmu")]
+    ssp: Option<PathBuf>,
+    /// FMU to write, of a structure that OpenSees computes
+    #[arg(long, value_name = "FILE", conflicts_with = "ssp")]
+    fmu: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
     #[command(flatten)]
     rig: RigArguments,
-    /// Parameter, such as control.valve_limit="5 V"; may be given several times
+    /// Parameter, such as control.valve_limit="5 V"; repeatable
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
     /// Version of FMI of the components: 2 for an archive of SSP 1.0, 3 for one of SSP 2.0
     #[arg(long, value_enum, default_value_t = Version::Two)]
     fmi: Version,
-    /// Order of calls that the parameters are for; programs that read SSP mostly step all
-    /// components from the same values
+    /// Order of calls for which the parameters are computed; most SSP importers step all components
+    /// from the same values
     #[arg(long, value_enum, default_value_t = Algorithm::Jacobi)]
     algorithm: Algorithm,
-    /// How much of the motion goes into the archive, such as "10 s"
+    /// Length of the motion in the archive, such as "10 s"
     #[arg(long, value_name = "T")]
     duration: Option<String>,
 }
@@ -67,6 +72,22 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Version::Two => FmiVersion::V2,
         Version::Three => FmiVersion::V3,
     };
+    if let Some(out) = &arguments.fmu {
+        let Some(model) = opensees::model_of(&arguments.system) else {
+            return Err(Error::Option {
+                option: "--fmu",
+                reason: format!(
+                    "`{}` is not a model in OpenSees; expected opensees:MODEL.py (a system is \
+                     exported with --ssp)",
+                    arguments.system
+                ),
+            });
+        };
+        write_model(model, fmi, out)?;
+        eprintln!("note: files that the model reads are not included, and it needs openseespy");
+        println!("{}", out.display());
+        return Ok(ExitCode::SUCCESS);
+    }
     let request = Request {
         fmi,
         algorithm: Some(arguments.algorithm),
@@ -79,10 +100,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ))?
     };
     let prepared = prepare(&request)?;
-    let parent = arguments
-        .ssp
-        .parent()
-        .filter(|parent| !parent.as_os_str().is_empty());
+    let ssp = arguments.ssp.as_deref().unwrap_or(Path::new("system.ssp"));
+    let parent = ssp.parent().filter(|parent| !parent.as_os_str().is_empty());
     Results::check(parent.unwrap_or(Path::new(".")))?;
     if let Some(parent) = parent {
         std::fs::create_dir_all(parent).map_err(|error| Error::File {
@@ -98,13 +117,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         algorithm: prepared.algorithm.to_string(),
         fmi,
     };
-    let mut notes = write(&prepared.system, &experiment, &arguments.ssp)?;
+    let mut notes = write(&prepared.system, &experiment, ssp)?;
     if motion.is_none() {
-        notes.push("the system follows no motion, so none is in the archive".to_string());
+        notes.push("the system does not use a motion, so the archive has none".to_string());
     }
     for note in notes {
         eprintln!("note: {note}");
     }
-    println!("{}", arguments.ssp.display());
+    println!("{}", ssp.display());
     Ok(ExitCode::SUCCESS)
 }

@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::progress;
-use crate::error::Error;
-use crate::figures;
-use crate::results::unused;
+use laboratory::error::Error;
+use laboratory::figures;
+use laboratory::results::unused;
 
 /// Options of `shakebench figures`.
 #[derive(Debug, Args)]
@@ -16,10 +16,10 @@ use crate::results::unused;
     shakebench figures\n  \
     shakebench figures --figure 3-7,3-10 --out figures")]
 pub struct Arguments {
-    /// Numbers of figures, such as 3-7 [default: all]
+    /// Figure numbers, such as 3-7 [default: all]
     #[arg(long = "figure", value_name = "N-N", value_delimiter = ',')]
     only: Vec<String>,
-    /// Ground motion to play [default: the built-in one]
+    /// Ground motion to play [default: the built-in motion]
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Folder for report.html and the pictures [default: shakebench-results/figures]

@@ -8,14 +8,14 @@ use clap::Args;
 use identification::identify::identified::RigIdentification;
 
 use super::progress;
-use crate::error::Error;
-use crate::identify::{
+use laboratory::error::Error;
+use laboratory::identify::{
     CANDIDATE_COLUMNS, EQUATION_COLUMNS, Form, HydraulicIdentification, ONE_INPUT_COLUMNS,
     OneInputIdentification, Outcome, PARAMETER_COLUMNS, Parameter, Request, Summary, identify,
     parameters,
 };
-use crate::report::columns::aligned;
-use crate::report::number::significant;
+use pages::report::columns::aligned;
+use pages::report::number::significant;
 
 /// Options of `shakebench identify`.
 #[derive(Debug, Args)]
@@ -30,20 +30,20 @@ pub struct Arguments {
     /// Recordings of one rig
     #[arg(value_name = "DATA.csv", required = true)]
     data: Vec<PathBuf>,
-    /// Where the model goes; a report with plots goes beside it
+    /// Output file of the model; a report with plots is written next to it
     #[arg(long, value_name = "MODEL.toml")]
     out: PathBuf,
-    /// Part of each recording that is fitted before the rest validates it
+    /// Part of each recording that is fitted; the rest validates the model
     #[arg(long, value_name = "PART", default_value_t = 0.75)]
     fit_part: f64,
-    /// Known specimen, held: TOML with [specimen] mass, damping, stiffness and units. One recording
-    /// with it is enough; `specimen_acceleration` may then be missing
+    /// Known specimen, held fixed: TOML with `[specimen]` mass, damping, stiffness and units. One
+    /// recording with it is enough; `specimen_acceleration` is then optional
     #[arg(long, value_name = "FILE")]
     specimen: Option<PathBuf>,
-    /// What the columns are called: `channel = { column = "header", unit = "mm" }` a line
+    /// Names of the columns, one per line: `channel = { column = "header", unit = "mm" }`
     #[arg(long, value_name = "MAP.toml")]
     columns: Option<PathBuf>,
-    /// Look at command and displacement alone, as where nothing else is recorded
+    /// Use only command and displacement, as if nothing else were recorded
     #[arg(long, conflicts_with = "specimen")]
     one_input: bool,
     /// Print one JSON object
@@ -113,7 +113,7 @@ fn check_place(arguments: &Arguments) -> Result<(), Error> {
     };
     if !folder.is_dir() {
         return Err(fault(format!(
-            "{}: the folder does not exist; expected one that does",
+            "{}: the folder does not exist; expected an existing folder",
             folder.display()
         )));
     }
@@ -126,7 +126,7 @@ fn check_place(arguments: &Arguments) -> Result<(), Error> {
         .chain(&arguments.columns);
     if let Some(path) = read.into_iter().find(|path| same(path)) {
         return Err(fault(format!(
-            "{} is read from; expected another file",
+            "{} is an input; expected another file for the output",
             path.display()
         )));
     }
@@ -154,7 +154,7 @@ fn text(found: &RigIdentification, summary: &Summary) -> String {
         .collect();
     if !colours.is_empty() {
         text += &format!(
-            "not white: the one-step errors of {}: this model lacks something that the rig does, and \
+            "the one-step errors of {} are not white: the model lacks an effect of the rig, and \
              the standard errors are too small\n\n",
             colours.join(", ")
         );
@@ -180,7 +180,7 @@ fn text(found: &RigIdentification, summary: &Summary) -> String {
     text += &format!("\n{}", aligned(&rows));
     for (index, (payload, error)) in found.payload.iter().enumerate().skip(1) {
         text += &format!(
-            "payload of {} over the first: {} kg (standard error {})\n",
+            "payload of {} relative to the first: {} kg (standard error {})\n",
             found.model.experiments[index].name,
             significant(*payload, 5),
             significant(*error, 2)
@@ -232,7 +232,7 @@ fn beginning(summary: &Summary) -> (String, &[String]) {
     }
 }
 
-/// What stands below every identification: warnings, and where the model lies.
+/// The end of the text of every identification: warnings, and the file of the model.
 fn ending(warnings: &[String], summary: &Summary) -> String {
     let mut text = String::new();
     if !warnings.is_empty() {
@@ -248,7 +248,7 @@ fn ending(warnings: &[String], summary: &Summary) -> String {
     )
 }
 
-/// As [`text`], for command to displacement; what the reader must know stands first.
+/// As [`text`], for command to displacement; the most important result comes first.
 fn one_input_text(own: &OneInputIdentification, summary: &Summary) -> String {
     let (mut text, rest) = beginning(summary);
     text += &format!("{} to displacement\n\npoles\n", own.found.input.name());
@@ -261,7 +261,7 @@ fn one_input_text(own: &OneInputIdentification, summary: &Summary) -> String {
     text + &ending(rest, summary)
 }
 
-/// As [`text`], for a hydraulic rig; what the reader must know stands first.
+/// As [`text`], for a hydraulic rig; the most important result comes first.
 fn hydraulic_text(own: &HydraulicIdentification, summary: &Summary) -> String {
     let (mut text, rest) = beginning(summary);
     text += "hydraulic rig, with the reference as instrument\n\n";

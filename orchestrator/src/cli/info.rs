@@ -5,17 +5,16 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::error::Error;
-use crate::fmu::{Causality, FmiVersion, Fmu};
-use crate::library::{FmuLibrary, component};
-use crate::motion;
-use crate::pack;
-use crate::report::columns::last_left;
-use crate::report::number::significant;
-use crate::report::{Cell, UnitSystem, Units};
-use crate::ssp;
-use crate::system::tuning::Wanted;
-use crate::system::{self, Operation, SystemFile, built_in};
+use fmi_import::{Causality, FmiVersion, Fmu};
+use fmi_ssp as ssp;
+use fmi_system::{Operation, System, SystemFile, assemble};
+use laboratory::error::Error;
+use laboratory::systems::built_in;
+use laboratory::systems::tuning::Wanted;
+use pack::library::{FmuLibrary, component};
+use pages::report::columns::last_left;
+use pages::report::number::significant;
+use pages::report::{Cell, UnitSystem, Units};
 
 /// Options of `shakebench info`.
 #[derive(Debug, Args)]
@@ -135,7 +134,7 @@ fn fmu(fmu: &Fmu) -> String {
 
 fn system(file: &SystemFile) -> Result<String, Error> {
     let mut library = FmuLibrary::of(FmiVersion::V3, file);
-    let system = system::assemble(file, &[], &mut |name| library.find(name))?;
+    let system = assemble(file, &[], &mut library)?;
     let mut text = format!("{}: {}\n\ncomponents\n", system.name, system.description);
     let rows = system.components.iter().map(|component| {
         let sampled = match component.period {
@@ -159,7 +158,7 @@ fn system(file: &SystemFile) -> Result<String, Error> {
     Ok(text)
 }
 
-fn words(system: &system::System, operation: &Operation) -> String {
+fn words(system: &System, operation: &Operation) -> String {
     match operation {
         Operation::Call { component } => format!("call {}", system.components[*component].name),
         Operation::Read { component, outputs } => {

@@ -26,3 +26,12 @@ pub(super) fn heed() -> &'static AtomicBool {
     }
     &ASKED
 }
+
+/// A limit of the size of files is an error of the write that exceeds it and does not end the program.
+pub(super) fn survive_full_disks() {
+    #[cfg(unix)]
+    // SAFETY: the signal is ignored; no handler runs.
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+    }
+}

@@ -10,10 +10,10 @@ use super::motion::MotionArguments;
 use super::quantity::{band, if_given};
 use super::rig::RigArguments;
 use super::run;
-use crate::error::Error;
-use crate::iteration::{self, Iteration, Plan};
-use crate::report::columns::aligned;
-use crate::results::{Results, unused};
+use laboratory::error::Error;
+use laboratory::iteration::{self, Iteration, Plan};
+use laboratory::results::{Results, unused};
+use pages::report::columns::aligned;
 
 /// Options of `shakebench iterate`.
 #[derive(Debug, Args)]
@@ -29,31 +29,32 @@ pub struct Arguments {
     motion: MotionArguments,
     #[command(flatten)]
     rig: RigArguments,
-    /// Parameter, such as control.valve_limit="5 V"; may be given several times
+    /// Parameter, such as control.valve_limit="5 V"; repeatable
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
-    /// Most corrections
+    /// Largest number of corrections
     #[arg(long, default_value_t = 3)]
     iterations: usize,
-    /// Part of the inverse that a correction applies, above 0 to 1
+    /// Fraction of the inverse that a correction applies, above 0 and at most 1
     #[arg(long, default_value_t = 0.8)]
     gain: f64,
     /// Measured error at which to stop, %
     #[arg(long, value_name = "PERCENT", default_value_t = 0.3)]
     target: f64,
-    /// Lowest and highest frequency that is corrected, Hz
+    /// Lowest and highest corrected frequency, Hz
     #[arg(long, value_names = ["LOW", "HIGH"], num_args = 2, default_values_t = [0.3, 20.0])]
     band: Vec<f64>,
-    /// Most energy of motion on the specimen, over that of the motion played once [default: none]
+    /// Limit of the motion energy on the specimen, relative to one run [default: none]
     #[arg(long, value_name = "TIMES")]
     exposure: Option<f64>,
-    /// Lateness of the measurements, such as "2 ms" [default: that of the model for tuning]
+    /// Delay of the measurements, such as "2 ms" [default: from the model for tuning]
     #[arg(long, value_name = "T")]
     measurement_delay: Option<String>,
-    /// Rigid mass in place of the specimen while the transfer function is found, such as "25 lbm"
+    /// Rigid mass that replaces the specimen while the transfer function is measured, such as "25
+    /// lbm"
     #[arg(long, value_name = "MASS")]
     dummy_mass: Option<String>,
-    /// Drive to begin with: the drive.csv of an earlier iteration
+    /// Initial drive: the drive.csv of an earlier iteration
     #[arg(long, value_name = "FILE")]
     drive: Option<PathBuf>,
     /// Folder for drive.csv, iteration.json and report.html [default: shakebench-results/iteration-SYSTEM-MOTION]
@@ -114,7 +115,10 @@ fn plan(arguments: &Arguments) -> Result<Plan, Error> {
     }
     let band = band(&arguments.band)?;
     if !arguments.target.is_finite() || arguments.target < 0.0 {
-        return fault("--target", format!("{} is no error in %", arguments.target));
+        return fault(
+            "--target",
+            format!("{} is not an error in %", arguments.target),
+        );
     }
     if let Some(exposure) = arguments
         .exposure
@@ -122,7 +126,10 @@ fn plan(arguments: &Arguments) -> Result<Plan, Error> {
     {
         return fault(
             "--exposure",
-            format!("{exposure} is less than the one run that shows the error"),
+            format!(
+                "{exposure} is less than the exposure of the first run, which measures the \
+                error"
+            ),
         );
     }
     Ok(Plan {

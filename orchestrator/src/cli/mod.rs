@@ -31,11 +31,14 @@ mod interrupt;
 pub mod iterate;
 mod motion;
 mod progress;
+pub mod qualify;
 mod quantity;
 pub mod report;
 mod rig;
 pub mod run;
+pub mod serve;
 mod terminal;
+pub mod trs;
 pub mod tune;
 pub mod validate;
 
@@ -44,58 +47,74 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
-use crate::error;
-use crate::fmu::{FmiVersion, isolation};
-use crate::pack::supply;
-use crate::report::UnitSystem;
-use crate::results;
+use fmi_import::{FmiVersion, isolation};
+use laboratory::error;
+use laboratory::results;
+use pack::supply;
+use pages::report::UnitSystem;
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
-/// Without a command, the built-in system is run on the built-in motion.
+/// Without a command, the built-in system runs on the built-in motion.
 #[derive(Debug, Parser)]
 #[command(
     name = "shakebench",
     version,
-    after_help = "Exit status: 0 done; 1 the run ended early \
-    (what was computed is saved); 2 the input is at fault (nothing is written)."
+    after_help = "Exit status: 0 done; 1 the run ended early (the results so far are saved); 2 \
+        the input is wrong (nothing is written)."
 )]
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Units of what is printed and drawn: us (in, lbf) or si (mm, kN); accelerations in g. Files of
-    /// numbers are SI always [default: us, and the reader of a page chooses]
-    #[arg(
-        long,
-        value_enum,
-        global = true,
-        value_name = "SYSTEM",
-        hide_possible_values = true
-    )]
-    units: Option<UnitSystem>,
-    /// Replace files of results that are there already and differ
+    /// Units of printed output and pages: us (in, lbf) or si (mm, kN); accelerations in g. Data
+    /// files are always SI [default: us; pages have buttons to switch]. For `serve`: length and force
+    /// of the client, such as in,kip
+    #[arg(long, value_parser = GivenUnits::read, global = true, value_name = "SYSTEM")]
+    units: Option<GivenUnits>,
+    /// Replace existing result files that differ
     #[arg(long, global = true)]
     force: bool,
-    /// Folder of the components' FMUs [default: beside the program, or built from the workspace]
+    /// Folder of the components' FMUs [default: the program's folder, or built from the workspace]
     #[arg(long, global = true, value_name = "DIR")]
     fmus: Option<PathBuf>,
 }
 
+/// What `--units` says.
+#[derive(Debug, Clone, PartialEq)]
+enum GivenUnits {
+    /// Those of what is printed.
+    System(UnitSystem),
+    /// A client's length and force.
+    Client(String),
+}
+
+impl GivenUnits {
+    fn read(text: &str) -> Result<Self, String> {
+        if text.contains(',') {
+            return Ok(Self::Client(text.to_string()));
+        }
+        let known = UnitSystem::from_str(text, true);
+        known.map(Self::System).map_err(|_| {
+            "expected us or si; of `serve` a length and a force, such as in,kip".to_string()
+        })
+    }
+}
+
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run a benchmark of others and score controllers by its rules
+    /// Run a published benchmark and score controllers by its rules
     Benchmark(benchmark::Arguments),
-    /// Build the components and pack them as FMUs
+    /// Build all components and pack them as FMUs
     Build(build::Arguments),
-    /// Carry out a study of many runs and say what they show
+    /// Run a parameter study
     Campaign(campaign::Arguments),
-    /// Record, identify and validate a rig, and design all controllers on the result
+    /// Record, identify and validate a rig, and design its controllers
     Commission(commission::Arguments),
-    /// Run controllers on records and print the thesis's tables beside the results
+    /// Compare controllers on records, with the thesis's tables
     Compare(compare::Arguments),
-    /// Lay any runs over each other and say what differs between them
+    /// Compare finished runs
     CompareRuns(compare_runs::Arguments),
-    /// Print what makes a shell complete commands and options
+    /// Generate shell completions
     #[command(
         after_help = "Example:\n  shakebench completions bash > ~/.local/share/bash-completion/completions/shakebench"
     )]
@@ -103,46 +122,63 @@ enum Command {
         /// The shell
         shell: clap_complete::Shell,
     },
-    /// Print margins of the loops and draw their frequency responses
+    /// Print margins and plot frequency responses of the loops
     Design(design::Arguments),
-    /// Name what a model gets wrong, from records of the rig
+    /// Find what a model gets wrong, from records of the rig
     Diagnose(diagnose::Arguments),
-    /// Draw the thesis's figures with what this program computes
+    /// Reproduce the figures of the thesis
     Figures(figures::Arguments),
-    /// Say what is here, what is missing, and the cure
+    /// Check the installation
     Doctor(doctor::Arguments),
-    /// Find the drive with which a diagnosed rig follows a motion, on its extended model
+    /// Compute the drive of a diagnosed rig for a motion, on its extended model
     Drive(drive::Arguments),
-    /// Write a system with its components as an SSP archive
+    /// Export a system with its components as an SSP archive
     Export(export::Arguments),
-    /// Find a rig's parameters from measured data
+    /// Identify a rig's parameters from measured data
     Identify(identify::Arguments),
-    /// Show what an .fmu, system or motion file holds
+    /// Show the content of an FMU, a system or a motion file
     Info(info::Arguments),
-    /// Correct the drive from run to run until the table follows
+    /// Correct the drive from run to run until the table follows the motion
     Iterate(Box<iterate::Arguments>),
-    /// Write the HTML report of a run, a comparison or a diagnosis again
+    /// Make a motion for a required response spectrum, run it, and search resonances
+    Qualify(Box<qualify::Arguments>),
+    /// Recreate the HTML report of a run, a comparison or a diagnosis
     Report(report::Arguments),
-    /// Carry out calls of FMUs for another process of this program
+    /// Call FMUs for another process of this program
     #[command(name = isolation::COMMAND, hide = true)]
     FmuProcess {
-        /// File that the calls come through
+        /// File through which the calls arrive
         file: PathBuf,
     },
     /// Run a system on a motion
     Run(Box<run::Arguments>),
-    /// Search a controller's parameters over a study, within stability margins
+    /// Answer another program as an experimental element, over OpenFresco's protocol
+    Serve(Box<serve::Arguments>),
+    /// Compare a record's response spectrum with a required one
+    Trs(trs::Arguments),
+    /// Optimise a controller's parameters over a study, within stability margins
     Tune(tune::Arguments),
-    /// Say what is wrong with an FMU or an SSP archive
+    /// Check an FMU or an SSP archive
     Validate(validate::Arguments),
 }
 
 /// Reads the command line, does what it says and gives the exit status.
 pub fn main() -> ExitCode {
+    interrupt::survive_full_disks();
     let cli = Cli::parse();
-    if let Some(units) = cli.units {
-        units.choose();
-    }
+    let is_service = matches!(cli.command, Some(Command::Serve(_)));
+    let (units, client_units) = match cli.units {
+        Some(GivenUnits::Client(units)) if is_service => (None, Some(units)),
+        Some(GivenUnits::Client(units)) => {
+            eprintln!("error: --units: `{units}` is for `serve` only; expected us or si");
+            return ExitCode::from(2);
+        }
+        Some(GivenUnits::System(units)) => {
+            units.choose();
+            (Some(units), None)
+        }
+        None => (None, None),
+    };
     if cli.force {
         results::allow_overwriting();
     }
@@ -151,7 +187,7 @@ pub fn main() -> ExitCode {
     }
     let done = match cli.command {
         None => run::execute(&run::Arguments::default()),
-        Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments),
+        Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments, units, cli.force),
         Some(Command::Build(arguments)) => build::execute(&arguments),
         Some(Command::Drive(arguments)) => drive::execute(&arguments),
         Some(Command::Campaign(arguments)) => campaign::execute(&arguments),
@@ -160,7 +196,9 @@ pub fn main() -> ExitCode {
         Some(Command::CompareRuns(arguments)) => compare_runs::execute(&arguments),
         Some(Command::Completions { shell }) => {
             let mut words = Cli::command();
-            clap_complete::generate(shell, &mut words, "shakebench", &mut std::io::stdout());
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut words, "shakebench", &mut script);
+            print!("{}", String::from_utf8_lossy(&script));
             Ok(ExitCode::SUCCESS)
         }
         Some(Command::Design(arguments)) => design::execute(&arguments),
@@ -171,15 +209,18 @@ pub fn main() -> ExitCode {
         Some(Command::Identify(arguments)) => identify::execute(&arguments),
         Some(Command::Info(arguments)) => info::execute(&arguments),
         Some(Command::Iterate(arguments)) => iterate::execute(&arguments),
+        Some(Command::Qualify(arguments)) => qualify::execute(&arguments),
         Some(Command::Report(arguments)) => report::execute(&arguments),
         Some(Command::FmuProcess { file }) => Ok(isolation::guest(&file)),
         Some(Command::Run(arguments)) => run::execute(&arguments),
+        Some(Command::Serve(arguments)) => serve::execute(&arguments, client_units.as_deref()),
+        Some(Command::Trs(arguments)) => trs::execute(&arguments),
         Some(Command::Tune(arguments)) => tune::execute(&arguments),
         Some(Command::Validate(arguments)) => validate::execute(&arguments),
     };
     let status = done.unwrap_or_else(|error| {
         eprintln!("error: {}", error::clipped(&error.to_string()));
-        ExitCode::from(2)
+        ExitCode::from(if error.is_early_end() { 1 } else { 2 })
     });
     terminal::flush();
     match terminal::has_failed() {

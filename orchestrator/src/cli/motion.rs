@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::quantity::positive;
-use crate::error::Error;
-use crate::motion::{self, Scaling};
-use crate::units::STANDARD_GRAVITY;
+use laboratory::error::Error;
+use motion::{self, Scaling};
+use units::STANDARD_GRAVITY;
 
 /// Options that choose a motion and how large it is played.
 #[derive(Debug, Clone, Default, Args)]
 pub struct MotionArguments {
-    /// Ground motion: acceleration only, as PEER .AT2 or .csv; it is made playable
+    /// Ground motion: acceleration only, as PEER .AT2 or .csv; filtered and scaled for the table
     #[arg(
         long,
         alias = "motion",
@@ -29,7 +29,7 @@ pub struct MotionArguments {
     /// Scale of the motion: peak acceleration in g
     #[arg(long, value_name = "G", group = "scaling")]
     pub pga: Option<String>,
-    /// Scale of the motion: peak displacement, such as "1.2 in" (a number alone is in m)
+    /// Scale of the motion: peak displacement, such as "1.2 in" (a plain number is in m)
     #[arg(long, value_name = "L", group = "scaling")]
     pub peak: Option<String>,
     /// Seed of the built-in motion [default: 1]
@@ -38,7 +38,7 @@ pub struct MotionArguments {
 }
 
 impl MotionArguments {
-    /// How large the motion is played, where that is said.
+    /// Size of the motion, if given.
     ///
     /// # Errors
     /// No positive quantity.

@@ -1,8 +1,6 @@
 //! Numbers with units, as options.
 
-use crate::error::Error;
-use crate::system;
-use crate::units;
+use laboratory::error::Error;
 
 /// A positive quantity; a number alone is in `unit`.
 ///
@@ -36,7 +34,7 @@ pub fn if_given(
 /// # Errors
 /// Another thing.
 pub fn percent(option: &'static str, text: &str) -> Result<f64, Error> {
-    system::percent(text).map_err(|reason| Error::Option { option, reason })
+    fmi_system::percent(text).map_err(|reason| Error::Option { option, reason })
 }
 
 /// Lowest and highest frequency of `--band`, Hz.

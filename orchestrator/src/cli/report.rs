@@ -5,12 +5,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::comparison;
-use crate::diagnosis;
-use crate::error::Error;
-use crate::iteration;
-use crate::report;
-use crate::run::page;
+use laboratory::comparison;
+use laboratory::diagnosis;
+use laboratory::error::Error;
+use laboratory::iteration;
+use laboratory::results::write_report;
+use laboratory::run::page;
 
 /// Options of `shakebench report`.
 #[derive(Debug, Args)]
@@ -37,7 +37,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     };
     if !folder.is_dir() {
         return Err(fault(
-            "is no folder; expected that of a run, a comparison or a diagnosis",
+            "is not a folder; expected the folder of a run, a comparison or a diagnosis",
         ));
     }
     let has = |name: &str| folder.join(name).is_file();
@@ -49,16 +49,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ("diagnosis", diagnosis::page_again(folder)?)
     } else if let Some(command) = made_by(folder) {
         return Err(fault(&format!(
-            "its page holds more than its other files; expected that of a run, a comparison or a \
-             diagnosis; `{command}` writes it again"
+            "its page contains more than its other files; expected the folder of a run, a \
+             comparison or a diagnosis; `{command}` writes it again"
         )));
     } else {
         return Err(fault(
-            "holds no results; expected results.csv, summary.json and manifest.json of a run, \
+            "contains no results; expected results.csv, summary.json and manifest.json of a run, \
              comparison.json of a comparison, or diagnosis.json of a diagnosis",
         ));
     };
-    let report = report::write(&page, folder)?;
+    let report = write_report(&page, folder)?;
     if arguments.json {
         println!("{}", serde_json::json!({"of": kind, "report": report}));
     } else {

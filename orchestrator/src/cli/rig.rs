@@ -4,23 +4,24 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::system::built_in;
-use crate::system::tuning::Tuning;
+use laboratory::systems::built_in;
+use laboratory::systems::tuning::Tuning;
 
 /// Options that choose a rig.
 #[derive(Debug, Clone, Default, Args)]
 pub struct RigArguments {
-    /// Plant of a built-in system: identified, servohydraulic, or a .toml file of one [default: identified]
+    /// Plant of a built-in system: identified, servohydraulic, or a .toml file [default:
+    /// identified]
     #[arg(long)]
     pub plant: Option<String>,
     /// Specimen of a built-in system: none, linear, yielding, storeys,
-    /// storeys-tuned-mass, storeys-damped [default: linear]
+    /// storeys-tuned-mass, storeys-damped, or opensees:MODEL.py [default: linear]
     #[arg(long)]
     pub specimen: Option<String>,
     /// Parameters of the controllers [default: tuned on servohydraulic, otherwise printed]
     #[arg(long, value_enum)]
     pub tuning: Option<Tuning>,
-    /// Model that the controllers are tuned on, as `shakebench identify` writes it
+    /// Model from `shakebench identify` for which the controllers are tuned
     #[arg(long, value_name = "MODEL.toml")]
     pub control_model: Option<PathBuf>,
 }
@@ -35,6 +36,6 @@ impl RigArguments {
     /// The specimen, chosen or not.
     pub fn specimen(&self) -> String {
         let specimen = self.specimen.as_deref();
-        specimen.unwrap_or(built_in::DEFAULT_SPECIMEN).to_string()
+        built_in::specimen_path(specimen.unwrap_or(built_in::DEFAULT_SPECIMEN))
     }
 }

@@ -13,19 +13,20 @@ use super::interrupt;
 use super::motion::MotionArguments;
 use super::quantity::{at_least_one, if_given, percent, positive};
 use super::rig::RigArguments;
-use crate::error::Error;
-use crate::fmu::{Isolation, Options, Trace};
-use crate::live::{Scene, Server, Tap};
-use crate::master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Simulation};
-use crate::results::{Results, allow_overwriting, unused};
-use crate::run::checkpoint::{self, Checkpoints, Unfinished};
-use crate::run::experiment::{Prepared, Request, is_file, prepare};
-use crate::run::manifest::Manifest;
-use crate::run::page;
-use crate::run::refinement::refine;
-use crate::run::summary::Summary;
-use crate::run::text::text;
-use crate::system::built_in;
+use fmi_import::{Isolation, Options, Trace};
+use fmi_master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Simulation};
+use laboratory::error::Error;
+use laboratory::results::{Results, allow_overwriting, unused};
+use laboratory::run::checkpoint::{self, Checkpoints, Unfinished};
+use laboratory::run::experiment::{Prepared, Request, is_file, prepare};
+use laboratory::run::manifest::Manifest;
+use laboratory::run::page;
+use laboratory::run::refinement::refine;
+use laboratory::run::summary::Summary;
+use laboratory::run::text::text;
+use laboratory::systems::built_in;
+use pack::program;
+use pages::live::{Scene, Server, Tap};
 
 /// Options of `shakebench run`.
 #[derive(Debug, Default, Args)]
@@ -47,51 +48,51 @@ pub struct Arguments {
     motion: MotionArguments,
     #[command(flatten)]
     rig: RigArguments,
-    /// Hybrid simulation: a computed structure between the ground, which the motion then is, and the
-    /// specimen of a built-in system: none, two-storeys [default: none]
+    /// Hybrid simulation: a computed structure between the ground motion and the specimen of a
+    /// built-in system: none, two-storeys [default: none]
     #[arg(long, value_name = "NAME")]
     structure: Option<String>,
-    /// Parameter, such as control.valve_limit="5 V"; may be given several times
+    /// Parameter, such as control.valve_limit="5 V"; repeatable
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
     /// Version of FMI of the components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
-    /// Order of calls [default: what the system says, otherwise gauss-seidel]
+    /// Order of calls [default: from the system, otherwise gauss-seidel]
     #[arg(long, value_enum)]
     algorithm: Option<Algorithm>,
     /// Input table: .csv with a column `time`, then columns named as inputs (component.input), with
-    /// units; may be given several times
+    /// units; repeatable
     #[arg(long, value_name = "FILE")]
     input: Vec<PathBuf>,
     /// Coupling step, such as "0.5 ms"; controllers keep their own period [default: 2 ms]
     #[arg(long, value_name = "T")]
     step: Option<String>,
-    /// Choose each coupling step so that what components give each other errs over it by an estimated
-    /// share of its largest size so far, such as "0.1 %"; --step is then the greatest
+    /// Choose each coupling step by the estimated error of coupled values, relative to their
+    /// largest magnitude so far, such as "0.1 %"; --step is then the longest step
     #[arg(long, value_name = "PERCENT")]
     variable_step: Option<String>,
-    /// Least step where it varies [default: a 1024th of the greatest]
+    /// Shortest step with --variable-step [default: 1/1024 of the longest]
     #[arg(long, value_name = "T")]
     least_step: Option<String>,
-    /// Halve the coupling step until the error of the coupling is estimated to be at most so much of
-    /// the peak of each signal, such as "0.05 %"
+    /// Halve the coupling step until the estimated coupling error of each signal is at most this
+    /// share of its peak, such as "0.05 %"
     #[arg(long, value_name = "PERCENT", conflicts_with_all = ["manifest", "resume", "variable_step"])]
     coupling_error: Option<String>,
     /// Play only the beginning of the motion, such as "10 s"
     #[arg(long, value_name = "T")]
     duration: Option<String>,
-    /// Keep pace with real time, and say how well that went
+    /// Keep pace with real time and report missed deadlines
     #[arg(long)]
     real_time: bool,
-    /// Keep one sample of so many in the results
+    /// Keep every Nth sample in the results
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     record_every: usize,
-    /// Write the signals as results.parquet too
+    /// Also write the signals to results.parquet
     #[arg(long)]
     parquet: bool,
-    /// Show the run while it goes on, on a page of this machine at this port (any free one where none
-    /// is given); it keeps pace with real time
+    /// Show the run live on a local page at this port (default: any free port); the run keeps pace
+    /// with real time
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
     watch: Option<u16>,
     /// Folder for the results [default: shakebench-results/SYSTEM-MOTION]
@@ -100,23 +101,23 @@ pub struct Arguments {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
-    /// FMUs in a process of their own; foreign ones are those that are given as files
+    /// FMUs to run in a separate process; foreign FMUs are those given as files
     #[arg(long, value_enum, default_value_t = Isolation::Foreign)]
     isolate: Isolation,
-    /// How long a call of an FMU in a process of its own may take [default: 120 s]
+    /// Longest time of a call to an FMU in a separate process [default: 120 s]
     #[arg(long, value_name = "T")]
     call_limit: Option<String>,
     /// Write every call of every FMU, with its values, to this file
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Ask the FMUs for debug messages: all, or those of these categories
+    /// Request debug messages from the FMUs: all, or those of these categories
     #[arg(long, value_name = "CATEGORY", num_args = 0.., value_delimiter = ',')]
     log: Option<Vec<String>>,
-    /// Keep a checkpoint every so much simulated time, from which a run that was interrupted or killed
-    /// goes on to the bit; the FMUs must be able to write their states
+    /// Save a checkpoint at this interval of simulated time, from which an interrupted or killed
+    /// run continues with identical results; the FMUs must be able to save their states
     #[arg(long, value_name = "T")]
     checkpoint_every: Option<String>,
-    /// Go on with the run in this folder from its last checkpoint
+    /// Continue the run in this folder from its last checkpoint
     #[arg(long, value_name = "DIR", conflicts_with_all = [
         "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
         "variable_step", "least_step", "duration", "scaling", "seed", "manifest", "out", "record_every", "checkpoint_every",
@@ -239,8 +240,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let mut summary = Summary::new(&prepared, &outcome, &manifest);
     if let Some(error) = coupling_error.as_ref().filter(|error| !error.is_reached()) {
         summary.warnings.push(format!(
-            "the error of the coupling is estimated at {:.3} % of the peak of `{}` at the smallest step \
-             that was tried, {} ms; {} % was asked for",
+            "the estimated coupling error is {:.3} % of the peak of `{}` at the smallest step \
+             tried, {} ms; the target is {} %",
             error.percent,
             error.signal,
             1e3 * prepared.step,
@@ -294,20 +295,20 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return Ok(ExitCode::SUCCESS);
     }
     eprintln!("error: the run ended early: {}", outcome.ended.message());
-    eprintln!("what was computed until then is saved");
+    eprintln!("the results so far are saved");
     if can_go_on {
         eprintln!(
-            "it goes on from its last checkpoint with: shakebench run --resume {}",
+            "to continue from its last checkpoint: shakebench run --resume {}",
             folder.display()
         );
     }
     Ok(ExitCode::from(1))
 }
 
-/// Goes on where a run was left.
+/// Continues an interrupted run.
 ///
 /// # Errors
-/// A checkpoint of what is not the same any more, or that cannot be gone on with.
+/// A checkpoint of a run that has changed, or that cannot be continued.
 fn go_on(
     simulation: &mut Simulation,
     folder: &Path,
@@ -319,7 +320,7 @@ fn go_on(
         return Err(Error::File {
             path: folder.to_path_buf(),
             reason: format!(
-                "the run cannot go on to the bit, for it is not the same any more: {}",
+                "the run cannot be continued, because it has changed: {}",
                 differences.join("; ")
             ),
         });
@@ -337,7 +338,7 @@ fn go_on(
     Ok(())
 }
 
-/// Lets checkpoints be kept while the run goes on.
+/// Saves checkpoints during the run.
 ///
 /// # Errors
 /// A component that cannot write its state.
@@ -359,13 +360,13 @@ fn watch(
     simulation: &mut Simulation,
     port: u16,
 ) -> Result<(Server, Arc<Tap>), Error> {
-    let (scene, places) = Scene::new(prepared, simulation.names());
+    let (scene, places) = Scene::new(prepared.shown(), simulation.names());
     let tap = Arc::new(Tap::new(places, prepared.samples));
     let server = Server::start(&scene, Arc::clone(&tap), port).map_err(|error| Error::Option {
         option: "--watch",
-        reason: format!("port {port} of 127.0.0.1 cannot be listened at: {error}"),
+        reason: format!("cannot listen on port {port} of 127.0.0.1: {error}"),
     })?;
-    simulation.watch(Arc::clone(&tap));
+    simulation.watch(tap.clone());
     eprintln!("watch it at {}", server.url());
     Ok((server, tap))
 }
@@ -392,6 +393,7 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
     });
     Ok(Options {
         isolation: arguments.isolate,
+        guest: program::guest(),
         call_limit: limit.transpose()?.unwrap_or(Options::CALL_LIMIT),
         trace: trace.transpose()?,
         log_categories: arguments.log.clone(),
@@ -414,7 +416,10 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
         ("--structure", &arguments.structure),
     ] {
         if let (true, Some(_)) = (is_file, given) {
-            let reason = format!("{system} is a file and has its own; edit it instead");
+            let reason = format!(
+                "{system} is a file with its own plant and specimen; edit it \
+                instead"
+            );
             return Err(Error::Option { option, reason });
         }
     }

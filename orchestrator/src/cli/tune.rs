@@ -7,17 +7,17 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 
 use super::{interrupt, progress};
-use crate::campaign::Study;
-use crate::error::Error;
-use crate::report::columns::aligned;
-use crate::results::{Results, unused};
-use crate::tune::tune;
+use laboratory::error::Error;
+use laboratory::results::{Results, unused};
+use pages::report::columns::aligned;
+use study::campaign::Study;
+use study::tune::tune;
 
 /// Options of `shakebench tune`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
     shakebench tune STUDY.toml --out TUNED\n\n\
-    The study says in [tune] which parameters are searched and which margins are kept (docs/campaigns.md).")]
+    The table [tune] of the study defines the parameters and the margins (docs/campaigns.md).")]
 pub struct Arguments {
     /// The study, with a table [tune]
     study: PathBuf,
@@ -29,7 +29,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Searches parameters and writes what was found.
+/// Optimises parameters and writes the result.
 ///
 /// # Errors
 /// Input at fault; nothing is written then.
@@ -71,7 +71,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
     }
     if asked.load(Ordering::Relaxed) {
-        eprintln!("error: interrupted; the best set until then is written");
+        eprintln!("error: interrupted; the best set so far is written");
         return Ok(ExitCode::from(1));
     }
     Ok(ExitCode::SUCCESS)

@@ -5,15 +5,16 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::error::Error;
-use crate::validate::{Severity, validate};
+use fmi_check::{Severity, validate};
+use laboratory::error::Error;
+use pack::program;
 
 /// Options of `shakebench validate`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     shakebench validate Theirs.fmu\n  \
     shakebench validate system.ssp --json\n\n\
-    Exit status: 0 no errors were found; 2 errors were found.")]
+    Exit status: 0 no errors; 2 errors.")]
 pub struct Arguments {
     /// An .fmu or .ssp file
     #[arg(value_name = "FMU|SSP")]
@@ -23,12 +24,12 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Says what is wrong with an FMU or an SSP archive.
+/// Prints the faults of an FMU or an SSP archive.
 ///
 /// # Errors
 /// A file that cannot be read, or is neither.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
-    let found = validate(&arguments.file)?;
+    let found = validate(&arguments.file, program::guest().as_deref())?;
     let (errors, warnings, notes) = (
         found.count(Severity::Error),
         found.count(Severity::Warning),

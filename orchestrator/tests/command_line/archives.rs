@@ -4,8 +4,7 @@ use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::path::Path;
 
-use shakebench::fmu::{Fmu, Instance, Options};
-use shakebench::pack;
+use fmi_import::{Fmu, Instance, Options};
 use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 use crate::{refused, shakebench, stderr};
@@ -136,7 +135,7 @@ fn model_descriptions_that_cannot_be_used() {
         (
             "modelIdentifier=\"",
             "modelIdentifier=\"../",
-            vec!["`../ShakeTable`", "no C identifier"],
+            vec!["`../ShakeTable`", "not a C identifier"],
         ),
         (
             "name=\"velocity\"",

@@ -132,6 +132,17 @@ fn stands_in(expected: &str, printed: &str) -> Result<(), String> {
 }
 
 fn run_page(name: &str) {
+    run_page_with(name, None);
+}
+
+/// The pages on OpenSees need it, and are skipped with a word on it without.
+fn run_page_on_opensees(name: &str) {
+    if let Some(python) = super::opensees::python() {
+        run_page_with(name, Some(python));
+    }
+}
+
+fn run_page_with(name: &str, python: Option<&Path>) {
     let page = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../docs")
         .join(name);
@@ -165,6 +176,7 @@ fn run_page(name: &str) {
                     .arg(&body)
                     .current_dir(&work)
                     .env("PATH", &paths)
+                    .envs(python.map(|python| ("SHAKEBENCH_PYTHON", python)))
                     .output()
                     .unwrap();
                 printed = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -182,6 +194,11 @@ fn run_page(name: &str) {
 #[test]
 fn start_in_five_minutes() {
     run_page("start.md");
+}
+
+#[test]
+fn seismic_qualification() {
+    run_page("qualification.md");
 }
 
 #[test]
@@ -222,6 +239,16 @@ fn iterative_control() {
 #[test]
 fn ssp_archives() {
     run_page("ssp.md");
+}
+
+#[test]
+fn opensees_on_a_table() {
+    run_page_on_opensees("opensees-on-a-table.md");
+}
+
+#[test]
+fn our_rig_behind_opensees() {
+    run_page_on_opensees("our-rig-behind-opensees.md");
 }
 
 #[test]

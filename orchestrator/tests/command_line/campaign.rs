@@ -1,4 +1,4 @@
-//! Studies: a row a run, whoever carried it out and however often it was stopped.
+//! Studies: one row per run, whoever carried it out and however often it was stopped.
 
 use std::fs;
 use std::path::Path;
@@ -217,7 +217,7 @@ fn a_study_is_extended_without_repeating() {
 }
 
 #[test]
-fn a_run_that_fails_is_a_row_with_its_reason() {
+fn a_run_that_cannot_begin_is_a_row_that_no_figure_counts() {
     let folder = tempfile::tempdir().unwrap();
     let study = r#"
         [study]
@@ -248,26 +248,37 @@ fn a_run_that_fails_is_a_row_with_its_reason() {
     write(folder.path(), "study.toml", study);
     let said = carried(folder.path(), "study.toml", "out", &[]);
     assert_eq!(
-        (&said["runs"], &said["failed"]),
-        (&4.into(), &1.into()),
+        (&said["runs"], &said["failed"], &said["invalid"]),
+        (&4.into(), &0.into(), &1.into()),
         "{said}"
     );
     let (head, rows) = cells(folder.path(), "out");
     let place = |name: &str| head.iter().position(|own| own == name).unwrap();
-    let failed: Vec<_> = rows
+    let invalid: Vec<_> = rows
         .iter()
-        .filter(|row| row[place("ended")] == "failed")
+        .filter(|row| row[place("ended")] == "invalid")
         .collect();
-    assert_eq!(failed.len(), 1);
+    assert_eq!(invalid.len(), 1);
     assert_eq!(
         (
-            failed[0][place("pga [g]")].as_str(),
-            failed[0][place("seed")].as_str()
+            invalid[0][place("pga [g]")].as_str(),
+            invalid[0][place("seed")].as_str()
         ),
         ("0.22", "3")
     );
-    assert!(failed[0][place("reason")].contains("exceeds the stroke"));
-    assert_eq!(failed[0][place("time_domain_percent")], "");
+    assert!(invalid[0][place("reason")].contains("exceeds the stroke"));
+    assert_eq!(invalid[0][place("time_domain_percent")], "");
+    let found = fs::read_to_string(folder.path().join("out/findings.json")).unwrap();
+    let found: serde_json::Value = serde_json::from_str(&found).unwrap();
+    assert_eq!(found["groups"][0]["endings"]["runs"], 3);
+    assert_eq!(found["invalid"][0]["runs"], 1);
+    let worst = found["worst"].as_array().unwrap();
+    assert!(
+        worst.iter().all(|run| run["ended"] == "complete"),
+        "{found}"
+    );
+    let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("1 more could not begin and are not counted"));
 }
 
 #[test]

@@ -167,7 +167,7 @@ fn a_run_that_is_interrupted_goes_on_to_the_bit_in_whatever_process() {
 
     let output = shakebench(folder, &["run", "--resume", "out", "--isolate", "none"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    assert!(stderr(&output).contains("goes on from its checkpoint at 0."));
+    assert!(stderr(&output).contains("continues from its checkpoint at 0."));
     assert!(fs::read(folder.join("out/results.csv")).unwrap() == whole);
     assert!(!folder.join("out/checkpoint").exists());
     let sums = ["out", "whole"].map(|run| {

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use fmi_import::FmiVersion;
 use identification::data::Channel;
-use shakebench::commission::{Request, record_excitation};
-use shakebench::fmu::FmiVersion;
-use shakebench::run::experiment::{self, prepare};
-use shakebench::system::built_in;
+use laboratory::commission::{Request, record_excitation};
+use laboratory::run::experiment::{self, prepare};
+use laboratory::systems::built_in;
 
 use super::{refused, shakebench, stderr, stdout};
 
@@ -105,6 +105,10 @@ fn a_rig_changed_behind_the_controllers_backs_changes_recordings_only() {
             stroke: 0.0381,
             duration: 20.0,
             seed: 4,
+            sensor_delay: 0.002,
+            record: None,
+            reference: None,
+            played: 10.0,
             fmi: FmiVersion::V3,
         })
         .unwrap();
@@ -132,7 +136,7 @@ fn what_cannot_be_commissioned_or_designed_is_refused() {
         &["commission", "--level", "9 g"],
         &["--level", "expected 0.02 to 2 g"],
     );
-    let model = include_str!("../../systems/plant/servohydraulic-model.toml");
+    let model = include_str!("../../laboratory/systems/plant/servohydraulic-model.toml");
     std::fs::write(folder.path().join("m.toml"), model).unwrap();
     refused(
         folder.path(),

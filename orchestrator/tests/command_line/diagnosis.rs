@@ -8,18 +8,10 @@ use serde_json::Value;
 use crate::{refused, shakebench, stderr, stdout};
 
 /// A practice case beside the repository.
-fn practice(name: &str) -> Option<PathBuf> {
+fn practice(name: &str) -> PathBuf {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
     let shared = std::env::var_os("SHAKEBENCH_SHARED").map_or_else(beside, PathBuf::from);
-    let case = shared.join("hidden-effects/cases").join(name);
-    if case.is_dir() {
-        return Some(case);
-    }
-    println!(
-        "SKIPPED: {} is missing (set SHAKEBENCH_SHARED)",
-        case.display()
-    );
-    None
+    shared.join("hidden-effects/cases").join(name)
 }
 
 fn diagnosed(folder: &Path, case: &Path) -> Value {
@@ -81,11 +73,10 @@ fn rewritten(text: &str) -> String {
     out
 }
 
+#[needs::shared("hidden-effects/cases")]
 #[test]
 fn a_diagnosis_has_the_fields_of_the_contract_and_its_files() {
-    let Some(case) = practice("dev-03") else {
-        return;
-    };
+    let case = practice("dev-03");
     let folder = tempfile::tempdir().unwrap();
     let found = diagnosed(folder.path(), &case);
     assert_eq!(found["verdict"], "named");
@@ -142,7 +133,7 @@ fn a_diagnosis_has_the_fields_of_the_contract_and_its_files() {
     // The page again: refused over the one with pictures, and without them from the JSON.
     let output = shakebench(folder.path(), &["report", "out"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("pictures"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("plots"), "{}", stderr(&output));
     let page = folder.path().join("out/report.html");
     fs::remove_file(&page).unwrap();
     let output = shakebench(folder.path(), &["report", "out"]);
@@ -247,11 +238,10 @@ fn an_extended_model_of_a_table_says_what_it_lacks() {
     );
 }
 
+#[needs::shared("hidden-effects/cases")]
 #[test]
 fn names_order_and_units_of_columns_change_no_verdict() {
-    let Some(case) = practice("dev-03") else {
-        return;
-    };
+    let case = practice("dev-03");
     let folder = tempfile::tempdir().unwrap();
     let changed = folder.path().join("changed");
     copied(&case, &changed, rewritten);
@@ -276,13 +266,48 @@ fn names_order_and_units_of_columns_change_no_verdict() {
     }
 }
 
+#[needs::shared("hidden-effects/cases")]
+#[test]
+fn a_search_that_runs_out_of_time_names_nothing_and_says_so() {
+    let case = practice("dev-03");
+    let folder = tempfile::tempdir().unwrap();
+    let diagnose = |limit: &str| {
+        let case = case.to_str().unwrap();
+        let arguments = ["diagnose", case, "--out", "out", "--json"];
+        shakebench(
+            folder.path(),
+            &[&arguments[..], &["--time-limit", limit]].concat(),
+        )
+    };
+    for (limit, words) in [("0 s", "more than 0 s"), ("3 mm", "does not fit \"s\"")] {
+        let output = diagnose(limit);
+        assert_eq!(output.status.code(), Some(2));
+        let said = stderr(&output);
+        assert!(
+            said.contains("--time-limit") && said.contains(words),
+            "{said}"
+        );
+    }
+    let found: Value = serde_json::from_str(&stdout(&diagnose("1 ms"))).unwrap();
+    assert_eq!(found["time_limit_reached"], true);
+    assert_eq!(found["effects"], Value::Array(Vec::new()), "{found}");
+    assert_ne!(found["verdict"], "named");
+    let notes = found["notes"].as_array().unwrap();
+    let is_said = |note: &Value| note.as_str().unwrap().contains("--time-limit");
+    assert!(notes.iter().any(is_said), "{found}");
+}
+
+#[test]
+fn a_case_that_is_not_there_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    refused(folder.path(), &["diagnose", "nowhere"], &["nowhere"]);
+}
+
+#[needs::shared("hidden-effects/cases")]
 #[test]
 fn a_case_that_cannot_be_read_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
-    refused(folder.path(), &["diagnose", "nowhere"], &["nowhere"]);
-    let Some(case) = practice("dev-03") else {
-        return;
-    };
+    let case = practice("dev-03");
     let broken = folder.path().join("broken");
     copied(&case, &broken, |text| {
         text.replacen("displacement [in]", "displacement", 1)
@@ -408,11 +433,7 @@ fn a_rig_is_reported_as_a_case_is() {
     fs::remove_file(out.join("curves.csv")).unwrap();
     let refusal = again();
     assert_eq!(refusal.status.code(), Some(2));
-    assert!(
-        stderr(&refusal).contains("pictures"),
-        "{}",
-        stderr(&refusal)
-    );
+    assert!(stderr(&refusal).contains("plots"), "{}", stderr(&refusal));
     fs::remove_file(out.join("report.html")).unwrap();
     assert_eq!(again().status.code(), Some(0));
     assert!(page().contains("loop_gain") && !page().contains("nominal model is worst"));
@@ -467,7 +488,7 @@ fn a_rig_that_cannot_be_diagnosed_is_refused_by_place() {
     refused(
         folder,
         &["diagnose", "press.toml"],
-        &["press.toml", "second_half", "leaves nothing out"],
+        &["press.toml", "second_half", "holds out no data"],
     );
     press(folder, 6, "third_half = true");
     refused(

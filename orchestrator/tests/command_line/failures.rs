@@ -4,8 +4,6 @@
 use std::fs;
 use std::path::Path;
 
-use shakebench::pack;
-
 use crate::{shakebench, stderr, stdout};
 
 /// A table under displacement control beside a component that fails on demand.
@@ -74,7 +72,7 @@ fn a_failing_component_ends_the_run_and_what_was_computed_is_saved() {
                 "`watch`",
                 "Faulty.fmu",
                 prefix,
-                "is saved",
+                "saved",
             ] {
                 assert!(said.contains(word), "{fault}: `{word}` is not in: {said}");
             }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Instant;
 
-use shakebench::pack::{self, FmiVersion};
+use pack::{self, FmiVersion};
 use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 use super::{stderr, stdout};
@@ -122,6 +122,33 @@ fn moved_program_runs_like_the_one_in_the_checkout() {
     assert!(!installed.place("work/new").exists());
 }
 
+/// The benchmarks are another program, beside this one.
+#[cfg(unix)]
+#[test]
+fn a_benchmark_is_started_beside_the_program_with_what_was_said() {
+    use std::os::unix::fs::PermissionsExt;
+    let installed = Installation::new(&[]);
+    installed.refuses(
+        &["benchmark", "vrths"],
+        &["shakebench-hybrid", "is missing", "install"],
+    );
+    let beside = installed.place("shakebench-hybrid");
+    fs::write(&beside, "#!/bin/sh\necho \"$@\"\nexit 2\n").unwrap();
+    fs::set_permissions(&beside, fs::Permissions::from_mode(0o755)).unwrap();
+    let said = [
+        "--force",
+        "--units",
+        "si",
+        "benchmark",
+        "vrths",
+        "--help",
+        "--json",
+    ];
+    let output = installed.call(&said);
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(stdout(&output), "--units si --force vrths --help --json\n");
+}
+
 #[test]
 fn doctor_says_what_is_here_and_what_is_not() {
     let installed = Installation::new(&FmiVersion::ALL);
@@ -154,7 +181,12 @@ fn folder_of_fmus_is_named_by_option_or_environment() {
     let run = ["run", "--duration", "1 s"];
     installed.refuses(
         &run,
-        &["no FMUs", "beside the program", "--fmus", "SHAKEBENCH_FMUS"],
+        &[
+            "no FMUs",
+            "next to the program",
+            "--fmus",
+            "SHAKEBENCH_FMUS",
+        ],
     );
     let by_option = [&run[..], &["--fmus", elsewhere.to_str().unwrap()]].concat();
     assert!(installed.call(&by_option).status.success());
@@ -167,7 +199,7 @@ fn folder_of_fmus_is_named_by_option_or_environment() {
     let other = [&by_option[..], &["--fmi", "2"]].concat();
     installed.refuses(
         &other,
-        &["`ThreeVariableControl`", "no component in", "fmi2"],
+        &["`ThreeVariableControl`", "nor a component in", "fmi2"],
     );
     let nowhere = [&run[..], &["--fmus", "nowhere"]].concat();
     installed.refuses(&nowhere, &["nowhere: no FMUs", "named by --fmus", "fmi3"]);
@@ -202,7 +234,7 @@ fn fmus_that_do_not_fit_the_program_are_refused_with_the_cure() {
         "modelDescription.xml",
         replace("fmu-kit", "Other tool"),
     );
-    installed.refuses(&run, &["no component of this program", "Other tool"]);
+    installed.refuses(&run, &["not a component of this program", "Other tool"]);
 
     fs::write(&path, &whole).unwrap();
     rewrite(&path, &library, |_| None);
@@ -230,7 +262,11 @@ fn fmus_that_do_not_fit_the_program_are_refused_with_the_cure() {
     fs::remove_file(&path).unwrap();
     installed.refuses(
         &run,
-        &["`ShakeTable` is no path", "no component in", "fmi3"],
+        &[
+            "`ShakeTable` is neither a path",
+            "nor a component in",
+            "fmi3",
+        ],
     );
 }
 

@@ -290,7 +290,7 @@ fn a_loop_without_a_solution_is_explained() {
         }
     };
     // a = b + 1, b = a.
-    explained(["offset = 1", "gain = 1"], &["gain round the loop is 1"]);
+    explained(["offset = 1", "gain = 1"], &["loop gain is 1"]);
     // a = b^2 + 1, b = a: both come closest at 1/2.
     explained(
         ["gain = 0, bend = 1, offset = 1", "gain = 1"],

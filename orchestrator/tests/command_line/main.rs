@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod archives;
-mod benchmark;
 mod book;
 mod browser;
 mod campaign;
 mod checkpoints;
+mod clocks;
 mod commissioning;
 mod contract;
 mod diagnosis;
@@ -17,7 +17,9 @@ mod installation;
 mod iteration;
 mod loops;
 mod motions;
+mod opensees;
 mod physical_rig;
+mod qualification;
 mod reports;
 mod rigs;
 mod systems;

@@ -90,10 +90,10 @@ fn folders_and_files_at_fault_are_named() {
         }
         assert!(!folder.join("out/report.html").exists());
     };
-    complaint(&["error: out: is no folder"]);
+    complaint(&["error: out: is not a folder"]);
     fs::create_dir(folder.join("out")).unwrap();
     complaint(&[
-        "out: holds no results",
+        "out: contains no results",
         "results.csv",
         "comparison.json",
         "diagnosis.json",
@@ -124,7 +124,7 @@ fn folders_and_files_at_fault_are_named() {
     complaint(&["results.csv", "line: 3"]);
     let broken = lines[2].replacen("0.002", "soon", 1);
     fs::write(&results, [lines[0], lines[1], &broken].join("\n")).unwrap();
-    complaint(&["results.csv: line 3: `soon` is no number"]);
+    complaint(&["results.csv: line 3: `soon` is not a number"]);
     fs::write(&results, text.replacen("reference.velocity", "other", 1)).unwrap();
     complaint(&["results.csv", "no column `reference.velocity`"]);
     fs::remove_file(folder.join("out/summary.json")).unwrap();

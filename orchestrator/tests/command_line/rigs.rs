@@ -173,8 +173,7 @@ fn templates_and_what_is_wrong_with_a_model_are_told() {
     diagnose(&["--model", "rig.toml"], &["--validate", "--predict"]);
     fs::write(here.join("rig.toml"), DESCRIPTION).unwrap();
     diagnose(&["rig.toml"], &["record.csv"]);
-    // A description is no extended model.
-    let words = ["rig.toml", "no extended model"];
+    let words = ["a.csv", "no such file"];
     diagnose(&["--model", "rig.toml", "--validate", "a.csv"], &words);
     fs::write(here.join("record.csv"), record(200, 8.0, 1.0, 0.0, 200).0).unwrap();
     for (from, to, holds) in [

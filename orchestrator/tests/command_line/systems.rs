@@ -59,7 +59,7 @@ fn a_table_that_runs_away_is_a_failed_run_whatever_it_is_called() {
         fs::write(folder.path().join("rig.toml"), wrong_way).unwrap();
         let output = shakebench(folder.path(), &["run", "rig.toml", "--duration", "4 s"]);
         assert_eq!(output.status.code(), Some(1), "{name}: {}", stderr(&output));
-        assert!(stderr(&output).contains("the run ran away"), "{name}");
+        assert!(stderr(&output).contains("the run diverged"), "{name}");
     }
 }
 
@@ -142,7 +142,7 @@ fn a_value_of_another_type() {
     changed(
         "\"3 V/in\"",
         "true",
-        &["proportional_gain", "`true` is no value for a Float64"],
+        &["proportional_gain", "`true` is not a value for a Float64"],
     );
     changed("\"3 V/in\"", "\"much\"", &["proportional_gain", "much"]);
     changed(
@@ -174,7 +174,7 @@ fn an_input_driven_twice() {
         twice,
         &[
             "line 4",
-            "`control.reference_displacement` is driven by `reference.displacement` already",
+            "`control.reference_displacement` is already driven by `reference.displacement`",
         ],
     );
 }

@@ -364,7 +364,7 @@ fn steps_of_different_lengths_are_refused_where_they_cannot_be() {
     );
     refused(folder, &with(&["--least-step", "1 s"]), &["divide"]);
     refused(folder, &of(&["--least-step", "1 ms"]), &["--variable-step"]);
-    refused(folder, &of(&["--variable-step=-1"]), &["no share"]);
+    refused(folder, &of(&["--variable-step=-1"]), &["not a share"]);
     let system = fs::read_to_string(folder.join("masses.toml")).unwrap();
     let wrong = system + "variable_step = \"often\"\n";
     fs::write(folder.join("masses.toml"), wrong).unwrap();

@@ -6,17 +6,34 @@ use nalgebra::{DMatrix, Matrix3, SMatrix, dmatrix};
 use crate::ModelError;
 use crate::linear::{StateSpace, TransferFunction};
 use crate::linear::{characteristic_polynomial, numerator_polynomial};
+use units::Parameters;
 use units::constants::{INCH, LBF};
 
 /// Both transfer paths of the actuator over their common denominator
 /// `s³ + a2 s² + a1 s + a0`, in SI units.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
+#[parameters(prefix = "actuator_")]
 pub struct IdentifiedActuator {
     /// `[a2, a1, a0]` in 1/s, 1/s², 1/s³.
+    #[parameter(0, name = "a2", about = "Actuator, denominator, s^2", "1/s", finite)]
+    #[parameter(1, name = "a1", about = "Actuator, denominator, s", "1/s2", finite)]
+    #[parameter(
+        2,
+        name = "a0",
+        about = "Actuator, denominator, constant",
+        "1/s3",
+        finite
+    )]
     pub denominator: [f64; 3],
     /// Numerator of G1 `[b2, b1, b0]`, from valve command to force: N/(V s), N/(V s²), N/(V s³).
+    #[parameter(0, name = "b2", about = "Valve command to force, s^2", "N/(V.s)" => "lbf/(V.s)", finite)]
+    #[parameter(1, name = "b1", about = "Valve command to force, s", "N/(V.s2)" => "lbf/(V.s2)", finite)]
+    #[parameter(2, name = "b0", about = "Valve command to force, constant", "N/(V.s3)" => "lbf/(V.s3)", finite)]
     pub voltage_to_force: [f64; 3],
     /// Numerator of G2 `[e2, e1, e0]`, from velocity to force: N/m, N/(m s), N/(m s²).
+    #[parameter(0, name = "e2", about = "Velocity to force, s^2", "N/m" => "lbf/in", finite)]
+    #[parameter(1, name = "e1", about = "Velocity to force, s", "N/(m.s)" => "lbf/(in.s)", finite)]
+    #[parameter(2, name = "e0", about = "Velocity to force, constant", "N/(m.s2)" => "lbf/(in.s2)", finite)]
     pub velocity_to_force: [f64; 3],
 }
 
@@ -40,10 +57,7 @@ impl IdentifiedActuator {
     /// A coefficient that is not finite, or a zero of G1 in the right half plane: a valve that
     /// answers in the wrong direction at first or for good.
     pub fn validate(&self) -> Result<(), ModelError> {
-        let all = self.denominator.iter().chain(&self.voltage_to_force);
-        for &value in all.chain(&self.velocity_to_force) {
-            ModelError::require_finite("actuator coefficient", value)?;
-        }
+        self.check()?;
         let zeros = TransferFunction::new(&self.voltage_to_force, &[1.0])?.zeros();
         if let Some(zero) = zeros.iter().find(|zero| zero.re > 0.0) {
             return Err(ModelError::NotForSimulation {

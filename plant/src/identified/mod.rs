@@ -9,3 +9,4 @@ pub mod rig;
 pub mod seal_shape;
 pub mod shake_table;
 pub mod table;
+pub mod valve_curve;

@@ -3,6 +3,7 @@
 use crate::identified::effects::Component;
 use crate::identified::shake_table::ShakeTable;
 use crate::specimens::linear::LinearSpecimen;
+use units::Parameters;
 
 /// Actuator, table and specimen of the thesis, SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +38,31 @@ macro_rules! parameters {
 }
 
 impl NominalParameter {
+    /// Its SI unit in the notation of FMI.
+    pub fn unit(&self) -> Option<&'static str> {
+        let mut unit = None;
+        let mut look = |parameter: &'static units::Parameter, _: units::Slot<'_>| {
+            if parameter.name == self.variable {
+                unit = parameter.unit;
+            }
+        };
+        match self.field {
+            Field::Table(_) => {
+                let mut table = ShakeTable::default();
+                table
+                    .actuator
+                    .visit(&mut |parameter, slot| look(parameter, slot));
+                table
+                    .table
+                    .visit(&mut |parameter, slot| look(parameter, slot));
+            }
+            Field::Specimen(_) => {
+                LinearSpecimen::default().visit(&mut |parameter, slot| look(parameter, slot));
+            }
+        }
+        unit
+    }
+
     /// The component whose FMU has it.
     pub fn component(&self) -> Component {
         match self.field {
@@ -103,5 +129,43 @@ impl NominalRig {
             Field::Table(field) => Some(field(&mut self.shake_table)),
             Field::Specimen(field) => self.specimen.as_mut().map(field),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_read_where_it_is_set() {
+        let mut rig = NominalRig {
+            shake_table: ShakeTable::default(),
+            specimen: Some(LinearSpecimen::appendix_a()),
+        };
+        assert_eq!(rig.parameters().count(), PARAMETERS.len());
+        for (i, parameter) in PARAMETERS.iter().enumerate() {
+            *rig.place(parameter).unwrap() = 1.5 + i as f64;
+        }
+        for (i, parameter) in PARAMETERS.iter().enumerate() {
+            assert_eq!(
+                rig.value(parameter),
+                Some(1.5 + i as f64),
+                "{}",
+                parameter.name
+            );
+        }
+        assert_eq!(rig.shake_table.table.mass, 10.5);
+        assert_eq!(rig.specimen.unwrap().stiffness, 15.5);
+    }
+
+    #[test]
+    fn a_rig_without_a_specimen_has_none_of_its_parameters() {
+        let rig = NominalRig {
+            shake_table: ShakeTable::default(),
+            specimen: None,
+        };
+        let own: Vec<_> = rig.parameters().map(|(p, _)| p.component()).collect();
+        assert_eq!(own.len(), 12);
+        assert!(own.iter().all(|c| matches!(c, Component::ShakeTable)));
     }
 }

@@ -154,6 +154,104 @@ pub struct SampledRig {
     table: ExtendedTable,
     specimen: ExtendedSpecimen,
     lag_rate: f64,
+    linear: Option<LinearStep>,
+}
+
+/// A sampling period of a rig whose states follow the flow linearly, as one matrix product.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct LinearStep {
+    /// Places of the states that move, the first `count` of them.
+    places: [usize; STATES],
+    count: usize,
+    /// Row `j` holds the next states for a unit of the state at `places[j]`.
+    from_state: [[f64; STATES]; STATES],
+    /// And for a unit of input in the first and the second piece of the period.
+    from_input: [[f64; STATES]; 2],
+    /// The input is what drives the spool; elsewhere it is the flow.
+    has_spool: bool,
+}
+
+impl LinearStep {
+    /// From unit perturbations of `sampled`, so that it takes the same steps; none for a rig that is not
+    /// linear behind the valve's openings.
+    fn of(sampled: &SampledRig) -> Option<Self> {
+        let mut rig = sampled.rig;
+        let linear = rig.linear_part();
+        let valve = &mut rig.effects.valve;
+        let has_spool = valve.spool_frequency > 0.0;
+        let openings = [
+            valve.null_bias,
+            valve.dead_band,
+            valve.asymmetry,
+            valve.spool_limit,
+        ];
+        if has_spool && openings.iter().any(|size| *size != 0.0) {
+            return None;
+        }
+        valve.hysteresis = 0.0;
+        valve.null_bias = 0.0;
+        valve.dead_band = 0.0;
+        valve.asymmetry = 0.0;
+        valve.spool_limit = 0.0;
+        if rig.effects != linear.effects {
+            return None;
+        }
+        if !has_spool {
+            rig.effects.valve.flow_gain = 0.0;
+        }
+        let unit = SampledRig::stepwise(rig, sampled.period, sampled.substeps);
+        let pieces = CommandPath::default().advance(&rig.effects.valve, 0.0, sampled.period);
+        let after = |mut state: IdentifiedRigState, inputs: [f64; 2]| {
+            for ((_, duration), input) in pieces.into_iter().zip(inputs) {
+                unit.piece(&mut state, input, duration);
+            }
+            state.continuous
+        };
+        let active = rig.active_states();
+        let mut places = [0; STATES];
+        places[..active.len()].copy_from_slice(&active);
+        let packed = |next: [f64; STATES]| {
+            let mut row = [0.0; STATES];
+            for (own, &place) in row.iter_mut().zip(&active) {
+                *own = next[place];
+            }
+            row
+        };
+        let mut from_state = [[0.0; STATES]; STATES];
+        for (row, &place) in from_state.iter_mut().zip(&active) {
+            let mut state = IdentifiedRigState::default();
+            state.continuous[place] = 1.0;
+            *row = packed(after(state, [0.0; 2]));
+        }
+        let at_rest = IdentifiedRigState::default();
+        Some(Self {
+            places,
+            count: active.len(),
+            from_state,
+            from_input: [[1.0, 0.0], [0.0, 1.0]].map(|inputs| packed(after(at_rest, inputs))),
+            has_spool,
+        })
+    }
+
+    /// The next of the states that move, under the inputs of both pieces.
+    #[inline]
+    fn advance<const N: usize>(&self, s: &mut [f64; STATES], inputs: [f64; 2]) {
+        let mut next = [0.0; N];
+        for (row, input) in self.from_input.iter().zip(inputs) {
+            for i in 0..N {
+                next[i] += row[i] * input;
+            }
+        }
+        for (row, place) in self.from_state.iter().zip(&self.places[..self.count]) {
+            let own = s[place % STATES];
+            for i in 0..N {
+                next[i] += row[i] * own;
+            }
+        }
+        for (own, place) in next.iter().zip(&self.places[..self.count]) {
+            s[place % STATES] = *own;
+        }
+    }
 }
 
 /// The states of the table in those of the rig.
@@ -176,6 +274,13 @@ fn of_specimen(s: &[f64; STATES]) -> [f64; extended_specimen::STATES] {
 
 impl SampledRig {
     fn new(rig: IdentifiedRig, period: f64, substeps: usize) -> Self {
+        let mut sampled = Self::stepwise(rig, period, substeps);
+        sampled.linear = LinearStep::of(&sampled);
+        sampled
+    }
+
+    /// A rig that is integrated throughout.
+    fn stepwise(rig: IdentifiedRig, period: f64, substeps: usize) -> Self {
         Self {
             rig,
             period,
@@ -183,6 +288,7 @@ impl SampledRig {
             table: ExtendedTable::new(&rig.shake_table, &rig.effects),
             specimen: ExtendedSpecimen::new(rig.specimen, &rig.effects.specimen),
             lag_rate: TAU * rig.sensors.displacement.corner,
+            linear: None,
         }
     }
 
@@ -224,11 +330,32 @@ impl SampledRig {
     pub fn step(&self, state: &mut IdentifiedRigState, command: f64) {
         let valve = &self.rig.effects.valve;
         let w = state.disturbance;
-        for (drive, duration) in state.path.advance(valve, command, self.period) {
-            if duration > 0.0 {
-                for _ in 0..self.substeps {
-                    self.runge_kutta(state, drive + w, duration / self.substeps as f64);
-                }
+        let pieces = state.path.advance(valve, command, self.period);
+        if let Some(linear) = &self.linear {
+            let input = |(drive, _): (f64, f64)| match linear.has_spool {
+                true => drive + w,
+                false => valve.flow(drive + w),
+            };
+            let inputs = pieces.map(input);
+            if linear.count <= 8 {
+                linear.advance::<8>(&mut state.continuous, inputs);
+            } else {
+                linear.advance::<STATES>(&mut state.continuous, inputs);
+            }
+            state.peak_drift = state.peak_drift.max(state.continuous[5].abs());
+            return;
+        }
+        for (drive, duration) in pieces {
+            self.piece(state, drive + w, duration);
+        }
+    }
+
+    /// A piece of a period, `duration` s, with `drive` (V) at the spool.
+    #[inline]
+    fn piece(&self, state: &mut IdentifiedRigState, drive: f64, duration: f64) {
+        if duration > 0.0 {
+            for _ in 0..self.substeps {
+                self.runge_kutta(state, drive, duration / self.substeps as f64);
             }
         }
     }
@@ -289,5 +416,155 @@ impl SampledRig {
             sensors.actuator_force.scaled(motion.actuator_force),
             motion.specimen_acceleration,
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use units::constants::SAMPLING_PERIOD as PERIOD;
+
+    fn command(k: u32) -> f64 {
+        (0.05 * f64::from(k)).sin()
+    }
+
+    fn disturbance(k: u32) -> f64 {
+        0.3 * (0.31 * f64::from(k)).cos()
+    }
+
+    #[test]
+    fn a_disturbance_is_a_voltage_that_adds_to_the_command() {
+        let rig = IdentifiedRig::default().sample(PERIOD, 4).unwrap();
+        let (mut disturbed, mut commanded) =
+            (IdentifiedRigState::default(), IdentifiedRigState::default());
+        for k in 0..200 {
+            rig.step_disturbed(&mut disturbed, command(k), disturbance(k));
+            rig.step(&mut commanded, command(k) + disturbance(k));
+            let [a, b] = [&disturbed, &commanded].map(|state| rig.motion(state));
+            assert!((a.displacement - b.displacement).abs() < 1e-15);
+            assert!((a.actuator_force - b.actuator_force).abs() < 1e-9);
+        }
+        assert!(disturbed.continuous[3].abs() > 1e-4, "the table moved");
+    }
+
+    #[test]
+    fn a_disturbance_passes_by_the_delay_and_the_play_of_the_command() {
+        let mut rig = IdentifiedRig::default();
+        rig.effects.valve.command_delay = 3.0 * PERIOD;
+        rig.effects.valve.hysteresis = 10.0;
+        let sampled = rig.sample(PERIOD, 4).unwrap();
+        let plain = IdentifiedRig::default().sample(PERIOD, 4).unwrap();
+        let (mut disturbed, mut bare) =
+            (IdentifiedRigState::default(), IdentifiedRigState::default());
+        for k in 0..200 {
+            // The command is lost in the play.
+            sampled.step_disturbed(&mut disturbed, command(k), disturbance(k));
+            plain.step(&mut bare, disturbance(k));
+            assert!((disturbed.continuous[3] - bare.continuous[3]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn one_product_a_sample_is_the_integration_where_the_rig_is_linear_behind_the_valve() {
+        type Turn = fn(&mut IdentifiedRig);
+        let linear: [Turn; 6] = [
+            |_| (),
+            |rig| rig.effects.valve.dead_band = 0.05,
+            |rig| {
+                rig.effects.valve.command_delay = 3.4 * PERIOD;
+                rig.effects.valve.asymmetry = 0.2;
+                rig.effects.valve.hysteresis = 0.1;
+                rig.effects.valve.flow_gain = -0.1;
+            },
+            |rig| {
+                rig.effects.valve.spool_frequency = 30.0;
+                rig.effects.valve.flow_gain = 0.2;
+                rig.effects.foundation.frequency = 12.0;
+                rig.sensors.displacement.corner = 20.0;
+            },
+            |rig| rig.effects.hydraulics.compliance = 1e-5,
+            |rig| {
+                rig.effects.valve.null_bias = 0.1;
+                rig.effects.valve.spool_limit = 0.8;
+                rig.effects.hydraulics.leakage = 1e-3;
+            },
+        ];
+        for turn in linear {
+            let mut rig = IdentifiedRig {
+                specimen: Some(LinearSpecimen::appendix_a()),
+                ..Default::default()
+            };
+            turn(&mut rig);
+            let product = rig.sample(PERIOD, 2).unwrap();
+            assert!(product.linear.is_some());
+            let stepwise = SampledRig::stepwise(rig, PERIOD, 2);
+            let (mut one, mut other) =
+                (IdentifiedRigState::default(), IdentifiedRigState::default());
+            let mut largest = [0.0f64; STATES];
+            for k in 0..500 {
+                product.step_disturbed(&mut one, command(k), disturbance(k));
+                stepwise.step_disturbed(&mut other, command(k), disturbance(k));
+                for (most, state) in largest.iter_mut().zip(&other.continuous) {
+                    *most = most.max(state.abs());
+                }
+            }
+            for i in 0..STATES {
+                let off = (one.continuous[i] - other.continuous[i]).abs();
+                assert!(off <= 1e-9 * largest[i], "{i}: {off}");
+            }
+        }
+        let nonlinear: [Turn; 3] = [
+            |rig| rig.effects.friction.coulomb_force = 5.0,
+            |rig| rig.effects.hydraulics.stall_force = 300.0,
+            |rig| {
+                rig.effects.valve.spool_frequency = 30.0;
+                rig.effects.valve.dead_band = 0.05;
+            },
+        ];
+        for turn in nonlinear {
+            let mut rig = IdentifiedRig::default();
+            turn(&mut rig);
+            assert!(rig.sample(PERIOD, 2).unwrap().linear.is_none());
+        }
+    }
+
+    #[test]
+    fn the_active_states_are_those_that_move() {
+        type Turn = fn(&mut IdentifiedRig);
+        let turns: [Turn; 6] = [
+            |_| (),
+            |rig| rig.specimen = Some(LinearSpecimen::appendix_a()),
+            |rig| rig.effects.valve.spool_frequency = 40.0,
+            |rig| rig.effects.foundation.frequency = 12.0,
+            |rig| rig.sensors.displacement.corner = 30.0,
+            |rig| {
+                rig.specimen = Some(LinearSpecimen::appendix_a());
+                rig.effects.specimen.second_mode_frequency = 5.0;
+                rig.effects.specimen.second_mode_mass_share = 0.2;
+            },
+        ];
+        let all: Turn = |rig| {
+            rig.specimen = Some(LinearSpecimen::appendix_a());
+            rig.effects.valve.spool_frequency = 40.0;
+            rig.effects.foundation.frequency = 12.0;
+            rig.sensors.displacement.corner = 30.0;
+        };
+        for turn in turns.into_iter().chain([all]) {
+            let mut rig = IdentifiedRig::default();
+            turn(&mut rig);
+            let sampled = rig.sample(PERIOD, 8).unwrap();
+            let mut state = IdentifiedRigState::default();
+            for k in 0..50 {
+                sampled.step(&mut state, 0.1 + command(k));
+            }
+            let moved: Vec<usize> = (0..STATES)
+                .filter(|&i| i != HYSTERETIC && state.continuous[i] != 0.0)
+                .collect();
+            let mut active = rig.active_states();
+            active.sort_unstable();
+            assert_eq!(moved, active);
+            let is_fast = rig.effects.valve.spool_frequency > 0.0;
+            assert!(!is_fast || rig.is_fast());
+        }
     }
 }

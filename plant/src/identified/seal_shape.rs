@@ -1,23 +1,32 @@
 //! Dry friction of seals as recordings show it: a force over its Coulomb force with a deflection
 //! before they slide.
 
+use units::Parameters;
+
 use crate::ModelError;
 
-/// Shape of the friction over its Coulomb force: `z' = v (1 - |z/z_s|^n)` while it is loaded
+/// Shape of the friction over its Coulomb force, with presliding `z_c`, excess `e`, Stribeck
+/// velocity `v_s`, sharpness `n` and relaxation `τ`: `z' = v (1 - |z/z_s|^n)` while it is loaded
 /// further and `z' = v` while it is unloaded, `z_s = z_c (1 + e exp(-(v/v_s)²))`, force
 /// `(z + τ exp(-(v/v_s)²) z')/z_c`. Dahl's law for `n = 1` and `e = 0` (Dahl, Aerospace Report TOR-158, 1968), with the bump of
 /// Stribeck that the LuGre model has; a larger `n` slides more abruptly.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
+#[parameters(prefix = "seal_")]
 pub struct SealShape {
-    /// `z_c`, m.
+    /// Their deflection before they slide, m.
+    #[parameter("m" => "in", positive)]
     pub presliding: f64,
-    /// `e`.
+    /// Breakaway force over the Coulomb force, less one.
+    #[parameter(non_negative)]
     pub excess: f64,
-    /// `v_s`, m/s.
+    /// Stribeck velocity, m/s.
+    #[parameter("m/s" => "in/s", positive)]
     pub stribeck_velocity: f64,
-    /// `n`.
+    /// Exponent with which they begin to slide.
+    #[parameter(positive)]
     pub sharpness: f64,
-    /// `τ`, damping of the deflection over its stiffness, s.
+    /// Damping of their deflection over its stiffness, s.
+    #[parameter("s", non_negative)]
     pub relaxation: f64,
 }
 
@@ -27,11 +36,7 @@ impl SealShape {
     /// # Errors
     /// Names the first that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("seal_presliding", self.presliding)?;
-        ModelError::require_non_negative("seal_excess", self.excess)?;
-        ModelError::require_positive("seal_stribeck_velocity", self.stribeck_velocity)?;
-        ModelError::require_positive("seal_sharpness", self.sharpness)?;
-        ModelError::require_non_negative("seal_relaxation", self.relaxation)
+        Ok(self.check()?)
     }
 
     fn bump(&self, velocity: f64) -> f64 {
@@ -105,5 +110,53 @@ impl SealShape {
                 self.force(z, v)
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DAHL: SealShape = SealShape {
+        presliding: 1e-4,
+        excess: 0.0,
+        stribeck_velocity: 0.01,
+        sharpness: 1.0,
+        relaxation: 0.0,
+    };
+
+    #[test]
+    fn an_even_slide_builds_up_by_dahls_closed_form() {
+        // dz/dx = 1 - z: z = 1 - exp(-x).
+        let (velocity, period) = (0.01, 2e-4);
+        for (k, force) in DAHL.history(&[velocity; 400], period).iter().enumerate() {
+            let way = (k + 1) as f64 * period * velocity / DAHL.presliding;
+            assert!((force - (1.0 - (-way).exp())).abs() < 2e-3, "{k}: {force}");
+        }
+    }
+
+    #[test]
+    fn a_reversal_unloads_along_the_elastic_slope_and_slides_the_other_way() {
+        let loaded = 0.8;
+        // A tenth of the presliding back takes a tenth off.
+        let back = DAHL.advance(loaded, -0.01, 0.1 * DAHL.presliding / 0.01);
+        assert!((back - 0.7).abs() < 1e-12);
+        // Past zero it is loaded the other way, from zero: 1 - exp(-0.5).
+        let past = DAHL.advance(loaded, -0.01, 1.3 * DAHL.presliding / 0.01);
+        assert!((past + 1.0 - (-0.5_f64).exp()).abs() < 0.03, "{past}");
+    }
+
+    #[test]
+    fn the_breakaway_force_exceeds_the_coulomb_force_by_the_bump_of_stribeck() {
+        let shape = SealShape {
+            excess: 0.4,
+            sharpness: 3.0,
+            ..DAHL
+        };
+        for velocity in [0.002, 0.01, 0.05] {
+            let forces = shape.history(&[velocity; 3000], 2e-4);
+            let expected = 1.0 + 0.4 * (-(velocity / 0.01_f64).powi(2)).exp();
+            assert!((forces[2999] / expected - 1.0).abs() < 1e-3, "{velocity}");
+        }
     }
 }

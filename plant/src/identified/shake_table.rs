@@ -11,11 +11,15 @@ use crate::linear::{StateSpace, TransferFunction, zero_order_hold};
 ///
 /// Inputs are the valve command (V) and the specimen's force on the table (N); states are the
 /// actuator's three, displacement and velocity.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct ShakeTable {
     /// The actuator.
+    #[parameters]
     pub actuator: IdentifiedActuator,
     /// The table.
+    #[parameters]
     pub table: Table,
 }
 

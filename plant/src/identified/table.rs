@@ -2,16 +2,21 @@
 
 use crate::ModelError;
 use crate::linear::TransferFunction;
+use units::Parameters;
 use units::constants::{LBF_PER_INCH, LBF_S_PER_INCH, LBF_S2_PER_INCH};
 
 /// Mass, damping and stiffness of the table, SI.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
+#[parameters(prefix = "table_")]
 pub struct Table {
-    /// Mass in kg.
+    /// Mass of the table, kg.
+    #[parameter("kg" => "lbf.s2/in", positive)]
     pub mass: f64,
-    /// Viscous damping in N s/m.
+    /// Viscous damping of the table, N.s/m.
+    #[parameter("N.s/m" => "lbf.s/in", non_negative)]
     pub damping: f64,
-    /// Stiffness of the springs to the reaction wall in N/m.
+    /// Stiffness from table to ground, N/m.
+    #[parameter("N/m" => "lbf/in", positive)]
     pub stiffness: f64,
 }
 
@@ -49,9 +54,7 @@ impl Table {
     /// # Errors
     /// A mass or stiffness that is not positive, a negative damping.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("table_mass", self.mass)?;
-        ModelError::require_non_negative("table_damping", self.damping)?;
-        ModelError::require_positive("table_stiffness", self.stiffness)
+        Ok(self.check()?)
     }
 
     /// `G_table(s)`, force (N) to displacement (m).

@@ -190,4 +190,75 @@ mod tests {
         let expected = -20.0 * (gain * period / 2.0).log10();
         assert!((found.gain_margin_db.unwrap() - expected).abs() < 1e-9);
     }
+
+    #[test]
+    fn of_several_crossovers_the_one_with_the_least_phase_margin_counts() {
+        // g w0² / (s (s² + 2 zeta w0 s + w0²)) has a gain of one where W = w² solves
+        // W³ - (2 - 4 zeta²) w0² W² + w0⁴ W - g² w0⁴ = 0: made to cross at 2, 3 and sqrt(12) rad/s.
+        let [a, b, c] = [4.0, 9.0, 12.0_f64];
+        let (sum, pairs, product) = (a + b + c, a * b + b * c + c * a, a * b * c);
+        let square = pairs.sqrt();
+        let zeta = ((2.0 - sum / square) / 4.0).sqrt();
+        let gain = (product / pairs).sqrt();
+        let response = |omega: f64| {
+            let s = Complex::new(0.0, omega);
+            gain * square / (s * (s * s + s * (2.0 * zeta * square.sqrt()) + square))
+        };
+        let all = crossovers(response, 1e-2, 1e2);
+        assert_eq!(all.len(), 3);
+        for (got, expected) in all.iter().zip([a, b, c].map(f64::sqrt)) {
+            assert!((got - expected).abs() < 1e-9, "{got} {expected}");
+        }
+        let margin = |w: f64| {
+            let lag = (2.0 * zeta * square.sqrt() * w).atan2(square - w * w);
+            90.0 - lag.to_degrees()
+        };
+        let found = margins(response, 1e-2, 1e2);
+        assert!((found.crossover.unwrap() - c.sqrt()).abs() < 1e-9);
+        assert!((found.phase_margin_deg.unwrap() - margin(c.sqrt())).abs() < 1e-9);
+        // With a lead that makes up for the resonance, the first crossover has the least margin.
+        let with_lead = |omega: f64| {
+            let turn = Complex::from_polar(1.0, 1.1 * (omega - 2.0) - 0.9);
+            response(omega) * turn
+        };
+        let found = margins(with_lead, 1e-2, 3.9);
+        assert!((found.crossover.unwrap() - 2.0).abs() < 1e-9);
+        let expected = margin(2.0) - 0.9_f64.to_degrees();
+        assert!((found.phase_margin_deg.unwrap() - expected).abs() < 1e-9);
+    }
+
+    #[test]
+    fn of_two_phase_crossovers_the_nearer_gain_margin_counts() {
+        // k (s + 1)² / (s³ (s/p + 1)²) is at -180 degrees where w² - (p - 1) w + p = 0: its gain may
+        // neither fall below the one nor rise above the other.
+        let p: f64 = 20.0;
+        let root = ((p - 1.0) * (p - 1.0) - 4.0 * p).sqrt();
+        let [low, high] = [(p - 1.0 - root) / 2.0, (p - 1.0 + root) / 2.0];
+        let magnitude = |w: f64| (1.0 + w * w) / (w.powi(3) * (1.0 + (w / p).powi(2)));
+        for (k, nearer) in [(1.5 / magnitude(low), low), (0.5 / magnitude(high), high)] {
+            let response = |omega: f64| {
+                let s = Complex::new(0.0, omega);
+                k * (s + 1.0).powi(2) / (s.powi(3) * (s / p + 1.0).powi(2))
+            };
+            let found = margins(response, 1e-2, 1e3);
+            assert!((found.phase_crossover.unwrap() - nearer).abs() < 1e-6 * nearer);
+            let expected = -20.0 * (k * magnitude(nearer)).log10();
+            assert!((found.gain_margin_db.unwrap() - expected).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_bandwidth_ends_at_the_first_fall() {
+        // A notch falls by 3 dB before its frequency and comes back behind it.
+        let (w0, zeta) = (10.0, 0.4);
+        let response = |omega: f64| {
+            let x = w0 * w0 - omega * omega;
+            Complex::new(x, 0.0) / Complex::new(x, 2.0 * zeta * w0 * omega)
+        };
+        // |x| = y / sqrt(10^0.3 - 1).
+        let own = zeta / (10f64.powf(0.3) - 1.0).sqrt();
+        let expected = w0 * ((1.0 + own * own).sqrt() - own);
+        let got = bandwidth(response, 1e-6, 1e-2, 1e3).unwrap();
+        assert!((got - expected).abs() < 1e-9, "{got} {expected}");
+    }
 }

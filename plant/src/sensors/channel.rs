@@ -11,7 +11,7 @@ use crate::delay_line::{DelayLine, require_delay};
 pub struct Channel {
     /// Corner of the sensor's first-order lag, Hz.
     pub corner: f64,
-    /// Lateness, s.
+    /// Delay, s.
     pub delay: f64,
     /// Relative error of the scale.
     pub scale_error: f64,

@@ -191,7 +191,7 @@ impl Instrumentation {
             return Err(ModelError::Parameter {
                 name: "fault_channel",
                 value: self.fault_channel as f64,
-                expected: "the number of a channel",
+                expected: "the index of a channel",
             });
         }
         ModelError::require_non_negative("velocity_lag", self.velocity_lag)

@@ -1,23 +1,30 @@
 //! The double-ended cylinder: two chambers of compressible oil with a leak between them.
 
 use crate::ModelError;
+use units::Parameters as _;
 use units::constants::{INCH, PSI};
 
 /// A symmetrical cylinder. Each chamber obeys `V dp/dt = β (q - dV/dt)` with its own volume; at
 /// the middle position and with matched flows this is `V_t/(4 β) dP_L/dt = q_L - A v - C_l P_L`
 /// for the load pressure `P_L = p_a - p_b` (Merritt 1967, chapter 6).
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct Cylinder {
-    /// Area of the piston, m².
+    /// Area of the piston, m2.
+    #[parameter("m2" => "in2", name = "piston_area", positive)]
     pub area: f64,
-    /// Volume of both chambers with hoses, m³.
+    /// Volume of both chambers with hoses, m3.
+    #[parameter("m3" => "in3", name = "oil_volume")]
     pub volume: f64,
-    /// Effective bulk modulus of oil and hoses, Pa.
+    /// Effective bulk modulus, Pa.
+    #[parameter("Pa" => "psi", positive)]
     pub bulk_modulus: f64,
-    /// Leakage past the piston per load pressure, m³/(s Pa).
+    /// Leakage past the piston, m3/(s.Pa).
+    #[parameter("m3/(s.Pa)" => "in3/(s.psi)", name = "piston_leakage", non_negative)]
     pub leakage: f64,
-    /// Flow through the check valves from the tank per pressure missing in a chamber, m³/(s Pa):
-    /// they keep the chambers from cavitating.
+    /// Flow of the anti-cavitation valves per missing pressure, m3/(s.Pa).
+    #[parameter("m3/(s.Pa)" => "in3/(s.psi)", name = "make_up_flow", non_negative)]
     pub make_up: f64,
 }
 
@@ -42,15 +49,12 @@ impl Cylinder {
     /// # Errors
     /// Names the first that cannot be simulated.
     pub fn validate(&self, reach: f64) -> Result<(), ModelError> {
-        ModelError::require_positive("piston_area", self.area)?;
-        ModelError::require_positive("bulk_modulus", self.bulk_modulus)?;
-        ModelError::require_non_negative("piston_leakage", self.leakage)?;
-        ModelError::require_non_negative("make_up_flow", self.make_up)?;
+        self.check()?;
         if self.volume.is_finite() && self.volume > 2.2 * self.area * reach {
             return Ok(());
         }
         Err(ModelError::Parameter {
-            name: "oil_volume",
+            name: Self::OIL_VOLUME,
             value: self.volume,
             expected: "more than the piston sweeps over its stroke",
         })

@@ -1,6 +1,7 @@
 //! Friction of the piston's seals, with stiction that holds.
 
 use crate::ModelError;
+use units::Parameters as _;
 use units::constants::{INCH, LBF, LBF_PER_INCH, LBF_S_PER_INCH};
 
 /// The elasto-plastic bristle model (Dupont, Hayward, Armstrong and Altpeter, IEEE Transactions on
@@ -10,19 +11,27 @@ use units::constants::{INCH, LBF, LBF_PER_INCH, LBF_S_PER_INCH};
 /// `g(v) = Fc + (Fs - Fc) exp(-(v/vs)²)`.
 /// Below the break-away deflection α is zero: the seal is a spring and does not creep under a
 /// load that alternates, as it would in the LuGre model.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct SealFriction {
-    /// `Fc`, N.
+    /// Coulomb friction of the seals, N.
+    #[parameter("N" => "lbf", name = "coulomb_friction", non_negative)]
     pub coulomb: f64,
-    /// `Fs`, N.
+    /// Static friction of the seals, N.
+    #[parameter("N" => "lbf", name = "static_friction")]
     pub static_force: f64,
-    /// `vs`, m/s.
+    /// Stribeck velocity, m/s.
+    #[parameter("m/s" => "in/s", positive)]
     pub stribeck_velocity: f64,
-    /// `s2`, N s/m.
+    /// Viscous friction of the seals, N.s/m.
+    #[parameter("N.s/m" => "lbf.s/in", name = "seal_viscous_friction", non_negative)]
     pub viscous: f64,
-    /// `s0`, stiffness of the seals before they slide, N/m.
+    /// Stiffness of the seals before they slide, N/m.
+    #[parameter("N/m" => "lbf/in", name = "seal_stiffness", positive)]
     pub stiffness: f64,
-    /// `s1` at rest, N s/m. It fades with `exp(-(v/vs)²)`, which keeps sliding free of it.
+    /// Damping of the seals at rest, N.s/m.
+    #[parameter("N.s/m" => "lbf.s/in", non_negative)]
     pub presliding_damping: f64,
 }
 
@@ -62,17 +71,13 @@ impl SealFriction {
     /// Names the first that cannot be simulated, such as a static friction below the Coulomb
     /// friction.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_non_negative("coulomb_friction", self.coulomb)?;
-        ModelError::require_non_negative("seal_viscous_friction", self.viscous)?;
-        ModelError::require_positive("stribeck_velocity", self.stribeck_velocity)?;
-        ModelError::require_positive("seal_stiffness", self.stiffness)?;
-        ModelError::require_non_negative("presliding_damping", self.presliding_damping)?;
+        self.check()?;
         let dry = self.coulomb > 0.0 && self.static_force >= self.coulomb;
         if self.static_force.is_finite() && (dry || self.static_force == self.coulomb) {
             return Ok(());
         }
         Err(ModelError::Parameter {
-            name: "static_friction",
+            name: Self::STATIC_FRICTION,
             value: self.static_force,
             expected: "at least the Coulomb friction, and zero if that is zero",
         })

@@ -1,22 +1,29 @@
 //! The ends of the stroke: cushions and hard stops.
 
 use crate::ModelError;
+use units::Parameters as _;
 use units::constants::{INCH, LBF_PER_INCH, LBF_S_PER_INCH, STROKE};
 
 /// A cushion that brakes an outward motion near the end of the stroke (a check valve frees the way
 /// back) and a stop that the piston meets there. Assumed values.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct Stops {
-    /// Distance of both hard stops from the middle position, m.
+    /// Distance of the hard stops from the middle, m.
+    #[parameter("m" => "in", positive)]
     pub stroke: f64,
-    /// Length of the cushion before each stop, m.
+    /// Length of the cushions, m.
+    #[parameter("m" => "in")]
     pub cushion_length: f64,
-    /// Damping of a cushion where it ends at the stop, N s/m; it grows with the square of the way
-    /// into the cushion.
+    /// Damping of a cushion at its end, N.s/m.
+    #[parameter("N.s/m" => "lbf.s/in", non_negative)]
     pub cushion_damping: f64,
-    /// Stiffness of a stop, N/m.
+    /// Stiffness of the hard stops, N/m.
+    #[parameter("N/m" => "lbf/in", name = "stop_stiffness", positive)]
     pub stiffness: f64,
-    /// Loss of a stop per velocity (Hunt and Crossley, 1975), s/m.
+    /// Loss of the hard stops, s/m.
+    #[parameter("s/m" => "s/in", name = "stop_loss", non_negative)]
     pub loss: f64,
 }
 
@@ -38,15 +45,12 @@ impl Stops {
     /// # Errors
     /// Names the first that cannot be simulated; the cushion is shorter than the stroke.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("stroke", self.stroke)?;
-        ModelError::require_positive("stop_stiffness", self.stiffness)?;
-        ModelError::require_non_negative("cushion_damping", self.cushion_damping)?;
-        ModelError::require_non_negative("stop_loss", self.loss)?;
+        self.check()?;
         if self.cushion_length > 0.0 && self.cushion_length < self.stroke {
             return Ok(());
         }
         Err(ModelError::Parameter {
-            name: "cushion_length",
+            name: Self::CUSHION_LENGTH,
             value: self.cushion_length,
             expected: "a positive number below the stroke",
         })

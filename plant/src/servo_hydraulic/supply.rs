@@ -1,22 +1,30 @@
 //! Hydraulic supply: a pressure-compensated pump and an accumulator.
 
 use crate::ModelError;
+use units::Parameters as _;
 use units::constants::{INCH, PSI};
 
 /// A pump that delivers in proportion to the missing pressure, up to its largest flow, into a
 /// gas-charged accumulator from which the valve draws. Assumed values: at a mean demand of
 /// 4 in³/s the pressure sinks by 80 psi with a time constant of about half a second.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct Supply {
     /// Pressure at which the pump stops delivering, Pa.
+    #[parameter("Pa" => "psi", name = "pump_pressure", positive)]
     pub pressure: f64,
-    /// Pump flow per missing pressure, m³/(s Pa).
+    /// Pump flow per missing pressure, m3/(s.Pa).
+    #[parameter("m3/(s.Pa)" => "in3/(s.psi)", positive)]
     pub pump_gain: f64,
-    /// Largest flow of the pump, m³/s.
+    /// Largest flow of the pump, m3/s.
+    #[parameter("m3/s" => "in3/s", positive)]
     pub pump_limit: f64,
-    /// Volume of the accumulator's gas at `pressure`, m³.
+    /// Gas volume of the accumulator at the pump's pressure, m3.
+    #[parameter("m3" => "in3", name = "accumulator_gas_volume", positive)]
     pub gas_volume: f64,
     /// Polytropic exponent of the gas.
+    #[parameter(positive)]
     pub polytropic_exponent: f64,
     /// Time constant at which a lost supply drains to the tank, s.
     pub drain_time: f64,
@@ -37,22 +45,16 @@ impl Default for Supply {
 }
 
 impl Supply {
+    /// Name of the parameter `supply_drain_time`.
+    pub const SUPPLY_DRAIN_TIME: &'static str = "supply_drain_time";
+
     /// Checks the parameters.
     ///
     /// # Errors
     /// Names the first that is not positive.
     pub fn validate(&self) -> Result<(), ModelError> {
-        for (name, value) in [
-            ("supply_pressure", self.pressure),
-            ("pump_gain", self.pump_gain),
-            ("pump_limit", self.pump_limit),
-            ("accumulator_gas_volume", self.gas_volume),
-            ("polytropic_exponent", self.polytropic_exponent),
-            ("supply_drain_time", self.drain_time),
-        ] {
-            ModelError::require_positive(name, value)?;
-        }
-        Ok(())
+        self.check()?;
+        ModelError::require_positive(Self::SUPPLY_DRAIN_TIME, self.drain_time)
     }
 
     /// Flow of the pump at `pressure` (Pa), m³/s.

@@ -314,3 +314,72 @@ fn faint_friction_moves_the_table_as_none_does_or_is_refused_by_name() {
         "{refused}"
     );
 }
+
+#[test]
+fn cushion_and_stop_take_energy_and_the_load_cell_reads_what_moves_the_table() {
+    let table = ServoHydraulicTable::default();
+    let Stops {
+        stroke,
+        cushion_length,
+        ..
+    } = table.stops;
+    let input = ServoHydraulicInput::default();
+    let h = 1e-5;
+    // Into the cushion, and out of its last part into the stop.
+    for (way, hits) in [(cushion_length, false), (0.05 * cushion_length, true)] {
+        let mut s = ServoHydraulicState {
+            displacement: stroke - way,
+            velocity: 0.8,
+            ..table.rest()
+        };
+        let start = table.stored_energy(&s);
+        let (mut put_in, mut largest, mut deepest) = (0.0, 0.0_f64, 0.0_f64);
+        let mut last = None;
+        for _ in 0..2000 {
+            let p = table.powers(&s, &input);
+            assert!(p.rubbed >= 0.0);
+            let net = p.piston - p.rubbed - p.damped;
+            if let Some(before) = last {
+                put_in += 0.5 * h * (net + before);
+            }
+            last = Some(net);
+            // Newton: the reading of the load cell, spring and damper are all that acts.
+            let expected = (table.actuator_force(&s)
+                - table.table.damping * s.velocity
+                - table.table.stiffness * s.displacement)
+                / table.mass();
+            let got = table.derivatives(&s, &input).velocity;
+            assert!((got - expected).abs() < 1e-9 * expected.abs().max(1.0));
+            let now = table.stored_energy(&s);
+            let change = now.kinetic + now.springs - start.kinetic - start.springs;
+            largest = largest.max((put_in - change).abs());
+            deepest = deepest.max(s.displacement);
+            s = table.advance_with_error(&s, &input, h, h).0;
+        }
+        assert_eq!(deepest > stroke, hits);
+        assert!(
+            largest < 1e-3 * start.kinetic,
+            "{largest} J of {} J",
+            start.kinetic
+        );
+    }
+}
+
+#[test]
+fn a_payload_and_a_cubic_spring_act_as_mass_and_force() {
+    let plain = ServoHydraulicTable::default();
+    let table = ServoHydraulicTable {
+        added_payload: 15.0,
+        cubic_stiffness: 3e7,
+        ..plain
+    };
+    assert!((table.mass() - plain.table.mass - 15.0).abs() < 1e-12);
+    let s = ServoHydraulicState {
+        displacement: 0.02,
+        ..table.rest()
+    };
+    let without = plain.acceleration(&s, 0.0) * plain.mass();
+    let with = table.acceleration(&s, 0.0) * table.mass();
+    // k3 x³ = 3e7 * 8e-6 N against the motion.
+    assert!((with - without + 240.0).abs() < 1e-9, "{with} {without}");
+}

@@ -3,30 +3,47 @@
 use std::f64::consts::TAU;
 
 use crate::ModelError;
+use units::Parameters as _;
 use units::constants::{INCH, PSI};
 
 /// A four-edge servo valve with matched, symmetrical edges (Merritt, Hydraulic Control Systems,
 /// 1967, chapter 5). Spool positions are measured in volts of command.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct ServoValve {
     /// Natural frequency of the spool, Hz.
+    #[parameter("Hz", name = "valve_frequency", positive)]
     pub frequency: f64,
     /// Damping ratio of the spool.
+    #[parameter(name = "valve_damping_ratio", positive)]
     pub damping_ratio: f64,
     /// Largest velocity of the spool, V/s.
+    #[parameter("V/s", name = "spool_slew_limit", positive)]
     pub slew_limit: f64,
     /// Travel limit of the spool, V.
+    #[parameter("V", name = "spool_travel_limit", positive)]
     pub travel_limit: f64,
-    /// Overlap of the edges: the flow is zero within ± this opening, V.
+    /// Overlap of the edges (dead band, half width), V.
+    #[parameter("V", name = "valve_overlap", non_negative)]
     pub overlap: f64,
-    /// Spool position at zero command, V.
+    /// Share of the flow gain that is lost at null.
+    #[parameter(name = "valve_null_loss", non_negative)]
+    pub null_loss: f64,
+    /// Opening over which the lost gain comes back, V.
+    #[parameter("V", name = "valve_null_width", positive)]
+    pub null_width: f64,
+    /// Position of the spool at zero command, V.
+    #[parameter("V", name = "valve_null_bias", finite)]
     pub null_bias: f64,
-    /// Flow through one edge per volt and square root of its pressure drop, m³/(s V √Pa).
+    /// Flow through an edge per volt and root of pressure, m3/(s V sqrt(Pa)).
+    #[parameter(positive)]
     pub flow_coefficient: f64,
-    /// `q` of the flow gains `1 + q` for positive and `1 - q` for negative openings.
+    /// q of the flow gains 1 + q and 1 - q.
+    #[parameter(name = "valve_asymmetry")]
     pub asymmetry: f64,
-    /// Laminar flow past each closed edge per pressure drop, m³/(s Pa). It centres the chamber
-    /// pressures at half the supply.
+    /// Laminar flow past a closed edge, m3/(s.Pa).
+    #[parameter("m3/(s.Pa)" => "in3/(s.psi)", non_negative)]
     pub null_leakage: f64,
 }
 
@@ -40,6 +57,8 @@ impl Default for ServoValve {
             slew_limit: 1e4,
             travel_limit: 10.0,
             overlap: 0.0,
+            null_loss: 0.0,
+            null_width: 0.15,
             null_bias: 0.0,
             flow_coefficient: 0.0418 * INCH.powi(3) / PSI.sqrt(),
             asymmetry: 0.0,
@@ -74,19 +93,12 @@ impl ServoValve {
     /// # Errors
     /// Names the first that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("valve_frequency", self.frequency)?;
-        ModelError::require_positive("valve_damping_ratio", self.damping_ratio)?;
-        ModelError::require_positive("spool_slew_limit", self.slew_limit)?;
-        ModelError::require_positive("spool_travel_limit", self.travel_limit)?;
-        ModelError::require_non_negative("valve_overlap", self.overlap)?;
-        ModelError::require_finite("valve_null_bias", self.null_bias)?;
-        ModelError::require_positive("flow_coefficient", self.flow_coefficient)?;
-        ModelError::require_non_negative("null_leakage", self.null_leakage)?;
+        self.check()?;
         if self.asymmetry.abs() < 1.0 {
             return Ok(());
         }
         Err(ModelError::Parameter {
-            name: "valve_asymmetry",
+            name: Self::VALVE_ASYMMETRY,
             value: self.asymmetry,
             expected: "a number between -1 and 1",
         })
@@ -109,10 +121,15 @@ impl ServoValve {
         self.flow_coefficient * open / TRANSITION.sqrt() + self.null_leakage
     }
 
-    /// Opening of the edges, V: the spool's position within its travel, less the overlap.
+    /// Opening of the edges, V: the spool's position within its travel, less the overlap and less what is
+    /// lost near null, `1 - l exp(-(o/w)²)`.
     pub fn opening(&self, spool: f64) -> f64 {
         let spool = spool.clamp(-self.travel_limit, self.travel_limit);
-        spool - spool.clamp(-self.overlap, self.overlap)
+        let past = spool - spool.clamp(-self.overlap, self.overlap);
+        if self.null_loss == 0.0 {
+            return past;
+        }
+        past * (1.0 - self.null_loss * (-(past / self.null_width).powi(2)).exp())
     }
 
     /// Flows at pressures `a` and `b` of the chambers and `supply`, all Pa above the tank's. With
@@ -207,6 +224,64 @@ mod tests {
         };
         for (spool, opening) in [(0.1, 0.0), (-0.2, 0.0), (1.0, 0.8), (-7.0, -4.8)] {
             assert!((valve.opening(spool) - opening).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn an_asymmetric_valve_passes_more_for_positive_openings_and_less_for_negative_ones() {
+        let (asymmetry, supply) = (0.2, 3000.0 * PSI);
+        let even = ServoValve::default();
+        let valve = ServoValve { asymmetry, ..even };
+        let load_flow = |valve: &ServoValve, spool: f64| {
+            let without_leak = ServoValve {
+                null_leakage: 0.0,
+                ..*valve
+            };
+            let flows = without_leak.flows(spool, [0.5 * supply; 2], supply);
+            (flows.into_a - flows.into_b) / 2.0
+        };
+        for (spool, gain) in [(3.0, 1.0 + asymmetry), (-3.0, 1.0 - asymmetry)] {
+            let ratio = load_flow(&valve, spool) / load_flow(&even, spool);
+            assert!((ratio - gain).abs() < 1e-12, "{spool} V: {ratio}");
+        }
+    }
+
+    #[test]
+    fn oil_comes_from_the_supply_and_leaves_for_the_tank() {
+        let valve = ServoValve::default();
+        let supply = 3000.0 * PSI;
+        for spool in [-4.0, -0.5, 0.0, 0.5, 4.0] {
+            let chambers = [2000.0 * PSI, 700.0 * PSI];
+            let flows = valve.flows(spool, chambers, supply);
+            // The open edges: supply to A and B to the tank, or the reverse.
+            let k = valve.flow_coefficient * spool.abs();
+            let edge = |drop: f64| k * drop.sqrt() + valve.null_leakage * drop;
+            let leak = |drop: f64| valve.null_leakage * drop;
+            let [a, b] = chambers;
+            let (into_a, into_b, drawn) = if spool >= 0.0 {
+                (
+                    edge(supply - a) - leak(a),
+                    leak(supply - b) - edge(b),
+                    edge(supply - a) + leak(supply - b),
+                )
+            } else {
+                (
+                    leak(supply - a) - edge(a),
+                    edge(supply - b) - leak(b),
+                    edge(supply - b) + leak(supply - a),
+                )
+            };
+            let scale = valve.flow_coefficient * supply.sqrt();
+            for (got, expected) in [
+                (flows.into_a, into_a),
+                (flows.into_b, into_b),
+                (flows.from_supply, drawn),
+            ] {
+                assert!(
+                    (got - expected).abs() < 1e-5 * scale,
+                    "{spool} V: {got} {expected}"
+                );
+            }
         }
     }
 }

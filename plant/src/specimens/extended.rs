@@ -168,3 +168,50 @@ impl ExtendedSpecimen {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_masses_of_a_specimen_with_a_second_mode_obey_newton() {
+        let whole = LinearSpecimen::appendix_a();
+        let (share, frequency, ratio) = (0.3, 4.0, 0.06);
+        let effects = SpecimenEffects {
+            second_mode_mass_share: share,
+            second_mode_frequency: frequency,
+            second_mode_damping_ratio: ratio,
+            ..SpecimenEffects::default()
+        };
+        let specimen = ExtendedSpecimen::new(Some(whole), &effects);
+        let s = [0.01, -0.2, 0.004, 0.3, 0.0];
+        let (force, shaken) = (specimen.force(&s, 0.0), 1.7);
+        let pull = whole.stiffness * s[0] + whole.damping * s[1];
+        assert!((force - pull).abs() < 1e-9 * pull.abs());
+        let lower = specimen.acceleration(&s, force, shaken);
+        let rates = specimen.rates(&s, force, shaken);
+        let upper = lower + rates[SECOND_MODE + 1];
+        assert_eq!([rates[0], rates[SECOND_MODE]], [s[1], s[SECOND_MODE + 1]]);
+        assert!((rates[1] - (lower - shaken)).abs() < 1e-12);
+        // What acts on the whole is the table; what acts on the upper mass its own spring and damper.
+        let momentum = whole.mass * ((1.0 - share) * lower + share * upper);
+        assert!((momentum + force).abs() < 1e-9 * force.abs());
+        let w = TAU * frequency;
+        let own = -w * w * s[SECOND_MODE] - 2.0 * ratio * w * s[SECOND_MODE + 1];
+        assert!((upper / own - 1.0).abs() < 1e-12, "{upper} {own}");
+    }
+
+    #[test]
+    fn an_absent_specimen_pulls_at_nothing_and_shows_its_sensors_share() {
+        let effects = SpecimenEffects {
+            absent_sensor_share: 0.25,
+            ..SpecimenEffects::default()
+        };
+        let specimen = ExtendedSpecimen::new(None, &effects);
+        let s = [0.01, -0.2, 0.004, 0.3, 0.0];
+        assert!(!specimen.is_present());
+        assert_eq!(specimen.force(&s, 0.0), 0.0);
+        assert_eq!(specimen.rates(&s, 0.0, 2.0), [0.0; STATES]);
+        assert_eq!(specimen.acceleration(&s, 0.0, 2.0), 0.5);
+    }
+}

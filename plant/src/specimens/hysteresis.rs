@@ -1,6 +1,7 @@
 //! Hysteresis of the Bouc-Wen family: yielding with hardening, degradation and pinching.
 
 use crate::ModelError;
+use units::Parameters;
 use units::constants::{INCH, LBF};
 
 /// Restoring force of a yielding spring (Bouc 1967, Wen 1976; degradation after Baber and Wen
@@ -9,33 +10,53 @@ use units::constants::{INCH, LBF};
 /// `dz/dt = d'/d_y · p(z) [1 - ν |z|^n (γ + β sign(d' z))] / η`,
 /// `ν = 1 + δ_ν ε`, `η = 1 + δ_η ε`,
 /// `p(z) = 1 - ζ (1 - e^(-2 ε)) exp(-((z sign(d') - q)/ψ)²)`, where `ε` is the work done on the
-/// hysteretic part in units of `F_y d_y`. Off by default: h, δ_ν, δ_η, ζ.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+/// hysteretic part in units of `F_y d_y`. The fields are `F_y`, `d_y`, `r`, `n`, `β`, `γ`, `h`, `δ_ν`,
+/// `δ_η`, `ζ`, `q` and `ψ` in this order. Off by default: h, δ_ν, δ_η, ζ.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct BoucWen {
-    /// `F_y`, N.
+    /// Yield force, N.
+    #[parameter("N" => "lbf", positive)]
     pub yield_force: f64,
-    /// `d_y`, m.
+    /// Yield displacement, m.
+    #[parameter("m" => "in", positive)]
     pub yield_displacement: f64,
-    /// `r`, stiffness after yielding over that before (kinematic hardening).
+    /// Stiffness after yielding over that before.
+    ///
+    /// Kinematic hardening.
+    #[parameter(finite)]
     pub post_yield_ratio: f64,
-    /// `n`, sharpness of the yield point, at least 1.
+    /// n of the Bouc-Wen model.
+    ///
+    /// Sharpness of the yield point, at least 1.
+    #[parameter]
     pub sharpness: f64,
-    /// `β`.
+    /// beta of the Bouc-Wen model.
+    #[parameter]
     pub beta: f64,
-    /// `γ`.
+    /// gamma of the Bouc-Wen model.
+    #[parameter]
     pub gamma: f64,
-    /// `h`, force of the cubic hardening at the yield displacement over the yield force (plates
-    /// that begin to pull as membranes).
+    /// Cubic hardening: force at the yield displacement over the yield force.
+    ///
+    /// Plates that begin to pull as membranes.
+    #[parameter(non_negative)]
     pub hardening: f64,
-    /// `δ_ν`, loss of strength.
+    /// Loss of strength with hysteretic work.
+    #[parameter(non_negative)]
     pub strength_degradation: f64,
-    /// `δ_η`, loss of stiffness.
+    /// Loss of stiffness with hysteretic work.
+    #[parameter(non_negative)]
     pub stiffness_degradation: f64,
-    /// `ζ`, loss of slope in the pinched range after much work, below 1.
+    /// Loss of slope in the pinched range.
+    ///
+    /// After much work, below 1.
+    #[parameter]
     pub pinching: f64,
-    /// `q`, middle of the pinched range in units of the yield force.
+    /// Middle of the pinched range over the yield force.
+    #[parameter(finite)]
     pub pinching_level: f64,
-    /// `ψ`, width of the pinched range.
+    /// Width of the pinched range over the yield force.
+    #[parameter(positive)]
     pub pinching_width: f64,
 }
 
@@ -93,41 +114,34 @@ impl BoucWen {
     /// # Errors
     /// Names the first that cannot be simulated or that would make energy.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("yield_force", self.yield_force)?;
-        ModelError::require_positive("yield_displacement", self.yield_displacement)?;
-        ModelError::require_finite("post_yield_ratio", self.post_yield_ratio)?;
-        ModelError::require_non_negative("hardening", self.hardening)?;
-        ModelError::require_non_negative("strength_degradation", self.strength_degradation)?;
-        ModelError::require_non_negative("stiffness_degradation", self.stiffness_degradation)?;
-        ModelError::require_finite("pinching_level", self.pinching_level)?;
-        ModelError::require_positive("pinching_width", self.pinching_width)?;
+        self.check()?;
         let checks = [
             (
-                "post_yield_ratio",
+                Self::POST_YIELD_RATIO,
                 self.post_yield_ratio,
                 self.post_yield_ratio <= 1.0,
                 "a number not above 1",
             ),
             (
-                "sharpness",
+                Self::SHARPNESS,
                 self.sharpness,
                 self.sharpness.is_finite() && self.sharpness >= 1.0,
                 "a number of at least 1",
             ),
             (
-                "beta",
+                Self::BETA,
                 self.beta,
                 self.beta.is_finite() && self.beta > -self.gamma,
                 "a number with beta + gamma above 0",
             ),
             (
-                "gamma",
+                Self::GAMMA,
                 self.gamma,
                 self.gamma.is_finite() && self.gamma <= self.beta,
                 "a number not above beta (the loop would turn backwards)",
             ),
             (
-                "pinching",
+                Self::PINCHING,
                 self.pinching,
                 (0.0..1.0).contains(&self.pinching),
                 "a number from 0 to below 1",
@@ -296,5 +310,104 @@ mod tests {
         assert!((area(&hard) / area(&plain) - 1.0).abs() < 1e-3);
         // Pinched: soft near zero force, as strong at the ends.
         assert!((pinched[end].1 / plain[end].1 - 1.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn the_spring_is_pinched_on_the_way_in_and_stiff_on_the_way_out() {
+        let (pinching, level, work) = (0.8, 0.3, 2.0_f64);
+        let spring = BoucWen {
+            pinching,
+            pinching_level: level,
+            pinching_width: 0.1,
+            ..BoucWen::default()
+        };
+        let plain = BoucWen {
+            pinching: 0.0,
+            ..spring
+        };
+        let share = |velocity: f64, z: f64| {
+            let state = Hysteresis { z, work };
+            spring.rates(velocity, &state).z / plain.rates(velocity, &state).z
+        };
+        // Baber and Noori 1985: the slope is least where the force has the sign of the velocity and
+        // reaches the level, 1 - zeta (1 - exp(-2 work)); unloading passes there undisturbed.
+        let least = 1.0 - pinching * (1.0 - (-2.0 * work).exp());
+        for side in [1.0, -1.0] {
+            assert!((share(side, side * level) - least).abs() < 1e-12);
+            assert!((share(side, -side * level) - 1.0).abs() < 1e-12);
+            // One width beside the level, the bell has fallen to 1/e.
+            let beside = share(side, side * (level + 0.1));
+            let expected = 1.0 - (1.0 - least) * (-1.0_f64).exp();
+            assert!((beside - expected).abs() < 1e-12, "{beside} {expected}");
+        }
+    }
+
+    #[test]
+    fn what_the_loop_encloses_is_the_work_that_degradation_counts() {
+        let spring = BoucWen {
+            post_yield_ratio: 0.1,
+            ..BoucWen::default()
+        };
+        let mut x = [0.0; 3];
+        let mut area = 0.0;
+        for target in [4.0, -4.0, 4.0_f64] {
+            let velocity = (target * spring.yield_displacement - x[0]) / 400.0;
+            let pulled = Pulled { spring, velocity };
+            for _ in 0..400 {
+                let before = x;
+                x = advance(&pulled, &x, 1.0, 0.1);
+                area += 0.5 * (before[1] + x[1]) * (x[0] - before[0]);
+            }
+        }
+        let counted = x[2] * spring.yield_displacement;
+        assert!(
+            (counted / (0.9 * area) - 1.0).abs() < 1e-3,
+            "{counted} {area}"
+        );
+    }
+
+    #[test]
+    fn stored_energy_is_the_work_of_a_spring_that_stays_elastic() {
+        // With beta = gamma = 0 nothing yields: z = d/d_y, and the force is that of a hardening spring.
+        let spring = BoucWen {
+            beta: 0.0,
+            gamma: 0.0,
+            hardening: 0.05,
+            ..BoucWen::default()
+        };
+        let (mut work, n) = (0.0, 2000);
+        let most = 2.0 * spring.yield_displacement;
+        let at = |part: f64| Hysteresis {
+            z: 2.0 * part,
+            work: 0.0,
+        };
+        for i in 0..n {
+            let part = (f64::from(i) + 0.5) / f64::from(n);
+            work += spring.force(most * part, &at(part)) * most / f64::from(n);
+        }
+        let stored = spring.stored_energy(most, &at(1.0));
+        assert!((stored / work - 1.0).abs() < 1e-6, "{stored} {work}");
+    }
+
+    #[test]
+    fn worn_columns_follow_the_equation_of_baber_and_wen() {
+        let spring = BoucWen {
+            sharpness: 2.0,
+            beta: 0.7,
+            gamma: 0.2,
+            strength_degradation: 0.3,
+            stiffness_degradation: 0.5,
+            ..BoucWen::default()
+        };
+        let (z, work, velocity) = (0.4, 3.0, 0.01);
+        let speed = velocity / spring.yield_displacement;
+        // nu = 1 + 0.3 * 3, eta = 1 + 0.5 * 3; gamma + beta while loading, gamma - beta while unloading.
+        for (direction, weight) in [(1.0, 0.9), (-1.0, -0.5)] {
+            let rates = spring.rates(direction * velocity, &Hysteresis { z, work });
+            let expected = direction * speed * (1.0 - 1.9 * z * z * weight) / 2.5;
+            assert!((rates.z / expected - 1.0).abs() < 1e-12, "{}", rates.z);
+            let work = 0.95 * z * direction * speed;
+            assert!((rates.work / work - 1.0).abs() < 1e-12, "{}", rates.work);
+        }
     }
 }

@@ -6,17 +6,21 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::ModelError;
 use crate::linear::zero_order_hold;
+use units::Parameters;
 use units::constants::{INCH, LBF};
 
 /// A mass on a linear spring and damper that stand on the table (Eq A-1):
 /// `ms (at + d'') + cs d' + ks d = 0`.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct LinearSpecimen {
-    /// Mass in kg.
+    /// Mass of the storey, kg.
+    #[parameter("kg" => "lbf.s2/in", positive)]
     pub mass: f64,
-    /// Viscous damping in N s/m.
+    /// Viscous damping of the storey, N.s/m.
+    #[parameter("N.s/m" => "lbf.s/in", non_negative)]
     pub damping: f64,
-    /// Stiffness in N/m.
+    /// Stiffness of the storey, N/m.
+    #[parameter("N/m" => "lbf/in", non_negative)]
     pub stiffness: f64,
 }
 
@@ -41,9 +45,7 @@ impl LinearSpecimen {
     /// # Errors
     /// A mass that is not positive, negative damping or stiffness.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("mass", self.mass)?;
-        ModelError::require_non_negative("damping", self.damping)?;
-        ModelError::require_non_negative("stiffness", self.stiffness)
+        Ok(self.check()?)
     }
 
     /// Force on the table in N, positive along the drift.
@@ -133,5 +135,21 @@ mod tests {
             let expected = 0.01 * decay * ((damped * t).cos() + ratio * (damped * t).sin());
             assert!((state.drift - expected).abs() < 1e-14, "at {t} s");
         }
+    }
+
+    #[test]
+    fn the_storey_of_appendix_a_weighs_100_lbf() {
+        let specimen = LinearSpecimen::appendix_a();
+        // 386.4 in/s² are 9.81456 m/s²; 100 lbf are 444.822 N.
+        assert!((specimen.mass * 9.814_56 - 444.822_161_526_05).abs() < 1e-9);
+        let omega = (specimen.stiffness / specimen.mass).sqrt();
+        assert!((omega - TAU).abs() < 1e-12);
+        let ratio = specimen.damping / (2.0 * specimen.mass * omega);
+        assert!((ratio - 0.05).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_sampled_specimen_knows_its_step() {
+        assert_eq!(LinearSpecimen::appendix_a().sample(0.005).step(), 0.005);
     }
 }

@@ -1,42 +1,59 @@
 //! A magnetorheological damper (B. F. Spencer, S. J. Dyke, M. K. Sain and J. D. Carlson, Journal of
 //! Engineering Mechanics 123, 1997).
 
+use units::Parameters;
+
 use crate::ModelError;
 
 /// Parameters of
 /// `f = c1 y' + k1 x`, `(c0 + c1) y' = alpha z + c0 x' + k0 (x - y)`,
 /// `z' = A (x' - y') - |x' - y'| z |z| gamma - (x' - y') z² beta`, `u' = -eta (u - v)`,
 /// with `c0`, `c1` and `alpha` that rise with the driver's voltage `u`, SI; the exponent n is 2.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
+#[parameters(prefix = "damper_")]
 pub struct MagnetorheologicalDamper {
-    /// `c0` without voltage, N s/m.
-    pub damping: f64,
-    /// Its rise with voltage, N s/(m V).
-    pub damping_rise: f64,
-    /// `c1` without voltage, N s/m.
-    pub roll_off_damping: f64,
-    /// Its rise with voltage, N s/(m V).
-    pub roll_off_damping_rise: f64,
-    /// `k0`, N/m.
-    pub stiffness: f64,
-    /// `k1`, the accumulator, N/m; its preload is taken off.
-    pub accumulator_stiffness: f64,
-    /// `alpha` without voltage, N/m.
-    pub hysteresis: f64,
-    /// Its rise with voltage, N/(m V).
-    pub hysteresis_rise: f64,
-    /// `gamma`, 1/m².
-    pub gamma: f64,
-    /// `beta`, 1/m².
-    pub beta: f64,
-    /// `A`.
-    pub sharpness: f64,
-    /// `eta`, lag of the current's driver, 1/s.
-    pub driver_rate: f64,
-    /// Largest voltage, V.
-    pub largest_voltage: f64,
-    /// Factor on the force: a damper of another size.
+    /// Factor on the damper's force.
+    #[parameter(min = 0.0, non_negative)]
     pub size: f64,
+    /// c0 without voltage, N.s/m.
+    #[parameter("N.s/m", min = 0.0, non_negative)]
+    pub damping: f64,
+    /// Rise of c0 with voltage, N.s/(m.V).
+    #[parameter("N.s/(m.V)", min = 0.0, non_negative)]
+    pub damping_rise: f64,
+    /// c1 without voltage, N.s/m.
+    #[parameter("N.s/m", min = 0.0, positive)]
+    pub roll_off_damping: f64,
+    /// Rise of c1 with voltage, N.s/(m.V).
+    #[parameter("N.s/(m.V)", min = 0.0, non_negative)]
+    pub roll_off_damping_rise: f64,
+    /// k0, N/m.
+    #[parameter("N/m", min = 0.0, non_negative)]
+    pub stiffness: f64,
+    /// k1, stiffness of the accumulator, N/m.
+    #[parameter("N/m", min = 0.0, non_negative)]
+    pub accumulator_stiffness: f64,
+    /// alpha without voltage, N/m.
+    #[parameter("N/m", min = 0.0, non_negative)]
+    pub hysteresis: f64,
+    /// Rise of alpha with voltage, N/(m.V).
+    #[parameter("N/(m.V)", min = 0.0, non_negative)]
+    pub hysteresis_rise: f64,
+    /// gamma, 1/m2.
+    #[parameter("1/m2", min = 0.0, positive)]
+    pub gamma: f64,
+    /// beta, 1/m2.
+    #[parameter("1/m2", min = 0.0, non_negative)]
+    pub beta: f64,
+    /// A.
+    #[parameter(min = 0.0, non_negative)]
+    pub sharpness: f64,
+    /// eta, rate of the current's driver, 1/s.
+    #[parameter("1/s", min = 0.0, positive)]
+    pub driver_rate: f64,
+    /// Largest voltage that counts, V.
+    #[parameter("V", min = 0.0, positive)]
+    pub largest_voltage: f64,
 }
 
 /// State of [`MagnetorheologicalDamper`].
@@ -79,29 +96,7 @@ impl MagnetorheologicalDamper {
     /// # Errors
     /// Names the first that cannot be simulated.
     pub fn validate(&self) -> Result<(), ModelError> {
-        for (name, value) in [
-            ("damper_damping", self.damping),
-            ("damper_damping_rise", self.damping_rise),
-            ("damper_roll_off_damping_rise", self.roll_off_damping_rise),
-            ("damper_stiffness", self.stiffness),
-            ("damper_accumulator_stiffness", self.accumulator_stiffness),
-            ("damper_hysteresis", self.hysteresis),
-            ("damper_hysteresis_rise", self.hysteresis_rise),
-            ("damper_beta", self.beta),
-            ("damper_sharpness", self.sharpness),
-            ("damper_size", self.size),
-        ] {
-            ModelError::require_non_negative(name, value)?;
-        }
-        for (name, value) in [
-            ("damper_roll_off_damping", self.roll_off_damping),
-            ("damper_gamma", self.gamma),
-            ("damper_driver_rate", self.driver_rate),
-            ("damper_largest_voltage", self.largest_voltage),
-        ] {
-            ModelError::require_positive(name, value)?;
-        }
-        Ok(())
+        Ok(self.check()?)
     }
 
     /// `y'`, m/s, at a displacement (m) and its rate (m/s).
@@ -155,6 +150,102 @@ impl MagnetorheologicalDamper {
             inner: 0.0,
             hysteretic: -own.max(0.0),
             voltage: -self.driver_rate,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MOTION: [f64; 2] = [0.004, 0.07];
+
+    fn states() -> [DamperState; 2] {
+        [0.0, 1.6].map(|voltage| DamperState {
+            inner: 0.001,
+            hysteretic: 0.003,
+            voltage,
+        })
+    }
+
+    #[test]
+    fn both_sides_of_the_roll_off_damper_carry_the_same_force() {
+        let damper = MagnetorheologicalDamper::default();
+        for state in states() {
+            let u = state.voltage;
+            let [x, rate] = MOTION;
+            let inner = damper.rates(&state, MOTION, 0.0).inner;
+            // Eq 12 and 13 of Spencer et al.: alpha z + c0 (x' - y') + k0 (x - y) = c1 y'.
+            let outer = (14_000.0 + 69_500.0 * u) * state.hysteretic
+                + (2_100.0 + 350.0 * u) * (rate - inner)
+                + 4_690.0 * (x - state.inner);
+            let roll_off = (28_300.0 + 295.0 * u) * inner;
+            assert!((outer / roll_off - 1.0).abs() < 1e-12, "{outer} {roll_off}");
+            let force = roll_off + 500.0 * x;
+            assert!((damper.force(&state, MOTION) / force - 1.0).abs() < 1e-12);
+            let twice = MagnetorheologicalDamper {
+                size: 2.0,
+                ..damper
+            };
+            assert!((twice.force(&state, MOTION) / force - 2.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_voltage_lags_what_is_wanted_within_its_range() {
+        let damper = MagnetorheologicalDamper::default();
+        let state = states()[1];
+        for (wanted, held) in [(1.0, 1.0), (-3.0, 0.0), (9.0, 2.25)] {
+            let rate = damper.rates(&state, MOTION, wanted).voltage;
+            assert!((rate - 190.0 * (held - state.voltage)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_slide_saturates_the_hysteretic_displacement_in_the_time_that_steps_must_follow() {
+        let damper = MagnetorheologicalDamper::default();
+        let limit = (301.0_f64 / 7.26e6).sqrt();
+        for direction in [1.0, -1.0] {
+            let mut state = DamperState::default();
+            let rate: f64 = 0.05 * direction;
+            let step = damper.longest_step(rate.abs());
+            let (mut time, mut x) = (0.0, 0.0);
+            while time < 0.5 {
+                let rates = damper.rates(&state, [x, rate], 0.0);
+                state.hysteretic += step * rates.hysteretic;
+                state.inner += step * rates.inner;
+                x += step * rate;
+                time += step;
+            }
+            assert!((state.hysteretic / (direction * limit) - 1.0).abs() < 1e-6);
+        }
+        // A fifth of limit / (A v); no shorter than 10 us.
+        assert!((damper.longest_step(0.05) / (0.2 * limit / (301.0 * 0.05)) - 1.0).abs() < 1e-12);
+        assert_eq!(damper.longest_step(1e3), 1e-5);
+    }
+
+    #[test]
+    fn the_stiff_diagonal_is_the_slope_of_the_rates() {
+        // Without alpha the inner rate does not depend on z.
+        let damper = MagnetorheologicalDamper {
+            hysteresis: 0.0,
+            hysteresis_rise: 0.0,
+            beta: 1.2e6,
+            ..MagnetorheologicalDamper::default()
+        };
+        for hysteretic in [0.004, -0.004] {
+            let at = |change: f64| {
+                let state = DamperState {
+                    hysteretic: hysteretic + change,
+                    ..states()[1]
+                };
+                (state, damper.rates(&state, MOTION, 1.0).hysteretic)
+            };
+            let (state, _) = at(0.0);
+            let slope = (at(1e-7).1 - at(-1e-7).1) / 2e-7;
+            let own = damper.stiffness_of(&state, MOTION);
+            assert!((own.hysteretic / slope - 1.0).abs() < 1e-6, "{slope}");
+            assert_eq!((own.inner, own.voltage), (0.0, -190.0));
         }
     }
 }

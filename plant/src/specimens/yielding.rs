@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use units::Parameters as _;
+
 use crate::ModelError;
 use crate::integration::{self, Dynamics};
 use crate::specimens::hysteresis::{BoucWen, Hysteresis};
@@ -9,13 +11,18 @@ use crate::specimens::linear::LinearSpecimen;
 
 /// A storey that yields: `m (at + d'') + c d' + F(d, z) = 0`, with the force of a [`BoucWen`]
 /// spring.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, units::Parameters,
+)]
 pub struct YieldingSpecimen {
-    /// Mass, kg.
+    /// Mass of the storey, kg.
+    #[parameter("kg" => "lbf.s2/in", positive)]
     pub mass: f64,
-    /// Viscous damping, N s/m.
+    /// Viscous damping of the storey, N.s/m.
+    #[parameter("N.s/m" => "lbf.s/in", non_negative)]
     pub damping: f64,
     /// Restoring force of the columns.
+    #[parameters]
     pub columns: BoucWen,
 }
 
@@ -47,8 +54,7 @@ impl YieldingSpecimen {
     /// # Errors
     /// A mass that is not positive, negative damping, or what the columns refuse.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_positive("mass", self.mass)?;
-        ModelError::require_non_negative("damping", self.damping)?;
+        self.check()?;
         self.columns.validate()
     }
 
@@ -207,5 +213,15 @@ mod tests {
         let balance = work - viscous - hysteretic - elastic - kinetic;
         assert!(hysteretic > 20.0 * scale, "it yielded");
         assert!(balance.abs() < 1e-3 * work, "{balance} of {work} J");
+    }
+
+    #[test]
+    fn period_and_damping_before_yielding_are_those_asked_for() {
+        let columns = BoucWen::default();
+        let specimen = YieldingSpecimen::from_period(columns, 0.4, 0.03);
+        let omega = (columns.yield_force / columns.yield_displacement / specimen.mass).sqrt();
+        assert!((omega * 0.4 / TAU - 1.0).abs() < 1e-12);
+        let ratio = specimen.damping / (2.0 * specimen.mass * omega);
+        assert!((ratio - 0.03).abs() < 1e-12);
     }
 }

@@ -36,7 +36,7 @@ def campaign(
     run), ``start_s`` (the start of a task's process), ``gap_s`` (the scheduler, between two tasks of a
     thread), ``overhead`` (the share of start and gap in the threads' time).
 
-    ``frame()`` gives a row a run; ``result.folder`` holds ``runs.csv``, ``runs.parquet`` and the report.
+    ``frame()`` gives one row per run; ``result.folder`` holds ``runs.csv``, ``runs.parquet`` and the report.
 
     Raises :class:`shakebench.InputError` for a study at fault, and :class:`shakebench.Error` naming the
     worker that has another version, other FMUs or none.

@@ -103,7 +103,7 @@ def compare(
 ) -> Result:
     """Runs controllers (default: all) on records (files or folders; default: built-in motions).
 
-    ``result["rows"]`` has a row a run, ``result["medians"]`` one a controller; ``frame()`` gives the
+    ``result["rows"]`` has one row per run, ``result["medians"]`` one a controller; ``frame()`` gives the
     rows as a table.
 
     Raises :class:`shakebench.InputError` for unknown names or records at fault.
@@ -191,5 +191,5 @@ def tune(study: PathLike, *, out: Optional[PathLike] = None, **more: Any) -> Res
 
 
 def doctor() -> Dict[str, Any]:
-    """What is here, what is missing, and the cure: ``doctor()["ready"]`` and ``["findings"]``."""
+    """Checks the installation: ``doctor()["ready"]`` and ``["findings"]``."""
     return call(["doctor", "--json"])

@@ -35,7 +35,7 @@ def fmus(fmi: int = 3) -> Dict[str, Path]:
             return found
     places = " nor in ".join(map(str, looked))
     raise InputError(
-        f"no FMUs in {places}: install the package again, name their folder in SHAKEBENCH_FMUS, or, "
+        f"no FMUs in {places}: install the package again, give their folder in SHAKEBENCH_FMUS, or, "
         "in a checkout, run `cargo run --release -- build`"
     )
 

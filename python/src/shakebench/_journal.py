@@ -1,4 +1,4 @@
-"""The journal of a campaign: a head that says what made the rows behind it, then a line a run."""
+"""The journal of a campaign: a head that says what made the rows behind it, then one line per run."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Journal:
             self._file.flush()
         except OSError as error:
             raise Error(
-                f"{self.path}: cannot be written ({error}); what was computed until now is kept"
+                f"{self.path}: cannot be written ({error}); the results so far are kept"
             ) from error
 
     def _open(self, head: bytes) -> BinaryIO:
@@ -48,7 +48,7 @@ class Journal:
             except BlockingIOError:
                 file.close()
                 raise Error(
-                    f"{self.path}: another process is carrying this study out; expected it to end, or "
+                    f"{self.path}: another process is running this study; wait for it, or "
                     "another folder for out"
                 ) from None
         last, whole = b"", 0

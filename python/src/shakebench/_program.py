@@ -48,8 +48,10 @@ def program() -> Path:
         return Path(named)
     own = PACKAGE / "program" / NAME
     if own.is_file():
-        if not os.access(own, os.X_OK):
-            _make_executable(own)
+        # Others that it starts lie beside it.
+        for program in own.parent.glob("shakebench*"):
+            if not os.access(program, os.X_OK):
+                _make_executable(program)
         return own
     for folder in PACKAGE.parents:
         built = folder / "target" / "release" / NAME
@@ -75,7 +77,7 @@ def call(arguments: Sequence[str]) -> Dict[str, Any]:
     """Runs the program and gives the JSON object that it prints.
 
     Raises :class:`InputError` with the program's message for exit status 2, :class:`Error` where
-    there is no object (the program was stopped, or is of another version).
+    there is no object (the program was stopped, or is from another version).
     """
     path = program()
     try:

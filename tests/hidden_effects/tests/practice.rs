@@ -8,7 +8,7 @@ use hidden_effects::law::Law;
 use hidden_effects::plant::NOMINAL;
 use hidden_effects::rig::{RATE, Rig};
 
-fn record(case: &str, name: &str) -> Option<Vec<Vec<f64>>> {
+fn record(case: &str, name: &str) -> Vec<Vec<f64>> {
     let shared = env::var_os("SHAKEBENCH_SHARED").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
         PathBuf::from,
@@ -17,19 +17,14 @@ fn record(case: &str, name: &str) -> Option<Vec<Vec<f64>>> {
         .join("hidden-effects/cases")
         .join(case)
         .join(format!("{name}.csv"));
-    let Ok(text) = fs::read_to_string(&path) else {
-        eprintln!("skipped: {case}/{name}.csv is not at hand");
-        return None;
-    };
+    let text = fs::read_to_string(&path).expect("a file of the shared data");
     let rows = text.lines().skip(1);
-    Some(
-        rows.map(|row| {
-            row.split(',')
-                .map(|cell| cell.parse().expect("a number"))
-                .collect()
-        })
-        .collect(),
-    )
+    rows.map(|row| {
+        row.split(',')
+            .map(|cell| cell.parse().expect("a number"))
+            .collect()
+    })
+    .collect()
 }
 
 fn derivatives(reference: &[f64], k: usize) -> [f64; 3] {
@@ -39,12 +34,11 @@ fn derivatives(reference: &[f64], k: usize) -> [f64; 3] {
     [reference[k], (after - before) * RATE / 2.0, second]
 }
 
+#[needs::shared("hidden-effects/cases")]
 #[test]
 fn the_law_gives_the_recorded_voltage_to_its_noise() {
     for case in ["dev-01", "dev-04", "dev-11"] {
-        let Some(rows) = record(case, "identification") else {
-            return;
-        };
+        let rows = record(case, "identification");
         let reference: Vec<f64> = rows.iter().map(|row| row[6]).collect();
         let mut law = Law::default();
         let residuals: Vec<f64> = rows
@@ -59,12 +53,11 @@ fn the_law_gives_the_recorded_voltage_to_its_noise() {
     }
 }
 
+#[needs::shared("hidden-effects/cases")]
 #[test]
 fn the_nominal_rig_follows_the_records_within_the_mismatch() {
     for case in ["dev-01", "dev-02"] {
-        let Some(rows) = record(case, "identification") else {
-            return;
-        };
+        let rows = record(case, "identification");
         let reference: Vec<f64> = rows.iter().map(|row| row[6]).collect();
         let mut rig = Rig::new(NOMINAL, Hidden::default());
         let mut law = Law::default();

@@ -1,13 +1,17 @@
 /* FMI 2.0 co-simulation FMUs that do what FMUs must not do, or what few expect of them. Which one is
  * chosen by the macro BEHAVIOUR when it is compiled. An output `y` (0), an input `u` (1), a time to
  * misbehave `at` (2); `y` is the input of the step before where nothing else is said. */
+#include <fenv.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum {
     HONEST, KEEPS_CALLBACKS, UNKNOWN_STATUS, NULL_MESSAGE, SEGFAULT, ABORT, EXIT, LOOP, PRINTS, STRICT,
-    LATE, ENDS, ESCAPES, REPEATS, ONCE, DISCARDS, DIES_WHEN_LOADED, DIES_WHEN_FREED, DIVERGES, DIRECT
+    LATE, ENDS, ESCAPES, REPEATS, ONCE, DISCARDS, DIES_WHEN_LOADED, DIES_WHEN_FREED, DIVERGES, DIRECT,
+    FORKS, RETURNS_TWICE, DAEMON, STRANGE_ENVIRONMENT, TRUNCATES, FORGES, ROUNDS, THIRDS
 };
 
 typedef int Status;
@@ -105,11 +109,30 @@ Status fmi2SetReal(void *c, const unsigned vr[], size_t n, const double value[])
     return 0;
 }
 
+/* The memory that it shares with the program, overwritten again and again. */
+static void *forges(void *nothing) {
+    char line[512];
+    unsigned long from = 0, to = 0;
+    FILE *maps = fopen("/proc/self/maps", "r");
+    while (fgets(line, sizeof line, maps))
+        if (strstr(line, "shakebench-calls") && sscanf(line, "%lx-%lx", &from, &to) == 2) break;
+    fclose(maps);
+    /* Behind whose turn it is: lengths, messages, calls. */
+    for (int k = 0; k < 2000000 && from; k++)
+        memset((char *)from + 64 + k % 5000 * 256, k % 2 ? 0xff : 0x7f, 256);
+    return nothing;
+}
+
 Status fmi2DoStep(void *c, double time, double step, int no_state) {
     Instance *i = c;
     (void)no_state;
     i->is_set = 0;
     i->time = time + step;
+    if (BEHAVIOUR == THIRDS) {
+        volatile double u = 1 + i->u;
+        i->y = u / 3;
+        return 0;
+    }
     i->y = BEHAVIOUR == LATE || BEHAVIOUR == STRICT ? 2 * i->u : i->u;
     if (time < i->at - 1e-9) return 0;
     switch (BEHAVIOUR) {
@@ -124,6 +147,34 @@ Status fmi2DoStep(void *c, double time, double step, int no_state) {
     case ENDS: case DISCARDS: return 2;
     case ESCAPES: says(i, 1, "\033[2J\033]0;title\a at %g s", time); break;
     case REPEATS: says(i, 1, "the same again and again", 0); break;
+    case FORKS:
+        if (time < i->at + 1e-9 && fork() == 0) for (;;) pause();
+        break;
+    case RETURNS_TWICE:
+        if (time < i->at + 1e-9) fork();
+        break;
+    case DAEMON:
+        if (fork() == 0) {
+            setsid();
+            if (fork() == 0) for (;;) pause();
+            _exit(0);
+        }
+        sleep(1);
+        abort();
+    case STRANGE_ENVIRONMENT:
+        i->callbacks->logger((void *)1, i->name, 1, "logAll", "from %g s", time);
+        i->callbacks->logger(i, (const char *)8, 1, "logAll", "and %g s", time);
+        break;
+    case TRUNCATES:
+        for (int file = 3; file < 64; file++) if (ftruncate(file, 0)) continue;
+        break;
+    case FORGES:
+        if (time < i->at + 1e-9) {
+            pthread_t thread;
+            pthread_create(&thread, NULL, forges, NULL);
+        }
+        break;
+    case ROUNDS: fesetround(FE_UPWARD); break;
     case DIVERGES: i->y = 1e300 * (1 + 1e10 * (time - i->at)); break;
     }
     return 0;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use hidden_effects::Outcome;
 use hidden_effects::score::{names, wilson};
-use shakebench::report::{Abscissa, Axis, Panel, Series, Style, Units};
+use pages::report::{Abscissa, Axis, Panel, Series, Style, Units};
 
 use super::tables::{DEVIATE_95, held, quantile, sorted};
 use super::{Plan, Scored};

@@ -9,16 +9,16 @@ use std::sync::atomic::AtomicBool;
 use std::time::UNIX_EPOCH;
 
 pub use calibration::{beside_each_other, picture};
+use fmi_master::Ending;
 use hidden_effects::score::{Estimate, NamedEffect, ParameterError, outcome, parameter_errors};
 use hidden_effects::{Case, Kind, Outcome, Settings, Truth, Verdict, World};
 use identification::diagnosis::case::Case as Laboratory;
 use identification::diagnosis::engine::{self, Observer};
 use identification::diagnosis::rigs::shake_table::{Diagnosis, diagnose};
+use laboratory::error::Error;
 use serde::{Deserialize, Serialize};
-use shakebench::campaign::table::{Cell, Column, Kind as ColumnKind, Role};
-use shakebench::campaign::{self, Head, Progress, Row, Runs, Shard, carry_out};
-use shakebench::error::Error;
-use shakebench::master::Ending;
+use study::campaign::table::{Cell, Column, Kind as ColumnKind, Role};
+use study::campaign::{self, Head, Progress, Row, Runs, Shard, carry_out};
 pub use tables::{line, rates, table};
 
 /// How many cases of each kind, and from which seed.
@@ -101,7 +101,7 @@ pub fn run(seed: u64, kind: &'static str, settings: &Settings, verbose: bool) ->
         kind: kind.to_string(),
         outcome: outcome(&case.truth, &verdict),
         errors: parameter_errors(&case.truth, &verdict, |value, from, to| {
-            shakebench::units::convert(value, from, to).ok()
+            units::convert(value, from, to).ok()
         }),
         truth: case.truth,
         verdict,
@@ -225,7 +225,7 @@ impl Runs for Plan {
         };
         // What another program diagnosed is diagnosed again.
         let program = std::env::current_exe().and_then(std::fs::read);
-        let program = program.map(|bytes| shakebench::fmu::digest(&bytes));
+        let program = program.map(|bytes| fmi_import::digest(&bytes));
         Ok(Head::of(
             BTreeMap::from([("diagnosis".to_string(), program.unwrap_or_default())]),
             vec![

@@ -7,15 +7,14 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use fmi_import::{FmiVersion, Fmu};
+use fmi_ssp as ssp;
+use fmi_system::SystemFile;
+use laboratory::export::{Experiment, write};
+use laboratory::run::experiment::{Request, prepare};
+use pack::all_fmus;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use shakebench::fmu::{FmiVersion, Fmu};
-use shakebench::motion;
-use shakebench::pack::all_fmus;
-use shakebench::run::experiment::{Request, prepare};
-use shakebench::ssp;
-use shakebench::ssp::export::{Experiment, write};
-use shakebench::system::SystemFile;
 use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 const SEED: u64 = 20_261;
@@ -309,7 +308,7 @@ fn damaged_and_hostile_files_are_read_or_refused_by_name() {
         attempt(count, &place, &bytes, &read, &format!("ssp {number}"));
     }
 
-    let system = include_bytes!("../../../orchestrator/systems/mpc.toml");
+    let system = include_bytes!("../../../orchestrator/laboratory/systems/mpc.toml");
     let read = |path: &Path| {
         let read = SystemFile::read(path);
         read.map(|_| ()).map_err(|error| error.to_string())

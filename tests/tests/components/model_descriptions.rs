@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, fs, path::PathBuf};
 
-use shakebench::pack::{model_descriptions, workspace_root};
+use pack::{model_descriptions, workspace_root};
 
 /// Set to 1, the files are written instead of compared.
 const REGENERATE: &str = "SHAKEBENCH_REGENERATE";

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use shakebench::pack::{FmiVersion, Platform, build_fmus, build_of, pack_libraries};
+use pack::{FmiVersion, Platform, build_fmus, build_of, pack_libraries};
 
 fn names(path: &Path) -> zip::result::ZipResult<BTreeSet<String>> {
     let archive = zip::ZipArchive::new(File::open(path)?)?;
@@ -157,7 +157,7 @@ fn libraries_compiled_before_are_packed_for_their_platforms() {
 }
 
 fn folder() -> PathBuf {
-    shakebench::pack::default_folder().unwrap()
+    pack::default_folder().unwrap()
 }
 
 fn text(path: &Path, name: &str) -> String {

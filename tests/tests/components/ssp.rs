@@ -7,12 +7,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use acceptance::python::{run_script, run_script_in};
-use shakebench::fmu::FmiVersion;
-use shakebench::master::{Algorithm, Outcome};
-use shakebench::pack::all_fmus;
-use shakebench::run::experiment::{Request, prepare};
-use shakebench::run::signals::write_csv;
-use shakebench::ssp::export::{Experiment, write};
+use fmi_import::FmiVersion;
+use fmi_master::{Algorithm, Outcome};
+use laboratory::export::{Experiment, write};
+use laboratory::run::experiment::{Request, prepare};
+use laboratory::run::signals::write_csv;
+use pack::all_fmus;
 use zip::{ZipWriter, write::SimpleFileOptions};
 
 const HEAD: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -207,7 +207,7 @@ fn faults_of_an_archive_are_named_with_file_and_line() {
         (with(&link("a.scale", "b.scale"), ""), "both take values"),
         (
             with(&format!("{there}{there}"), ""),
-            "driven by `a.displacement` already",
+            "already driven by `a.displacement`",
         ),
         (
             with("", "<ssd:Component name=\"a\" source=\"x\"/>"),
@@ -215,7 +215,7 @@ fn faults_of_an_archive_are_named_with_file_and_line() {
         ),
         (
             with("", "<ssd:Component name=\"d\" source=\"../x.fmu\"/>"),
-            "leads out of the archive",
+            "points outside the archive",
         ),
         (
             with("", "<ssd:Component name=\"d\" source=\"file:///x.fmu\"/>"),
@@ -316,7 +316,7 @@ fn exported(
 fn built_in_systems_are_valid_archives_and_give_in_ecos_and_libcosim_what_jacobi_gives_here() {
     let folder = tempfile::tempdir().unwrap();
     let of = |specimen: &str| -> Vec<(PathBuf, PathBuf)> {
-        shakebench::system::built_in::names()
+        laboratory::systems::built_in::names()
             .map(|system| {
                 exported(
                     folder.path(),

@@ -5,9 +5,9 @@ use std::fs::File;
 use std::io::Read;
 
 use acceptance::python::run_script;
+use fmi_import::{Causality, Fmu};
+use pack::{FmiVersion, all_fmus};
 use roxmltree::Document;
-use shakebench::fmu::{Causality, Fmu};
-use shakebench::pack::{FmiVersion, all_fmus};
 
 /// A terminal of a component: members with causality and unit of their variables.
 struct Terminal {

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use hidden_effects::case::{Case, Kind, Settings};
 use identification::diagnosis::case::Nominal;
+use laboratory::iteration::circle::{Plan, close, write};
+use laboratory::iteration::on_model::{ModelledRig, Search};
+use motion::{self, Motion, Options};
 use plant::identified::rig::IdentifiedRig;
-use shakebench::iteration::circle::{Plan, close, write};
-use shakebench::iteration::on_model::{ModelledRig, Search};
-use shakebench::motion::{self, Motion, Options};
 use units::constants::{G, INCH};
 
 fn law_of(case: &Case) -> Nominal {
@@ -49,7 +49,7 @@ fn a_drive_that_knows_the_effect_is_better_on_an_independent_rig() {
         let reference: Vec<f64> = drive.displacement.iter().map(|x| x / INCH).collect();
         let table = case.follow(&reference, 5);
         let column = |i: usize| -> Vec<f64> { table.iter().map(|row| row[i] * INCH).collect() };
-        let tracking = shakebench::metrics::tracking(&wanted, &column(0), &column(1)).unwrap();
+        let tracking = motion::metrics::tracking(&wanted, &column(0), &column(1)).unwrap();
         tracking.time_domain_percent
     };
     let [itself, unaware, found] = [&wanted, &plain.drive, &aware.drive].map(on_rig);

@@ -5,20 +5,20 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use acceptance::python::run_script;
+use fmi_import::{FmiVersion, Fmu};
+use fmi_system::{SystemFile, Value, assemble};
 use hidden_effects::case::{Case as Generated, Kind, Settings};
 use identification::data::{OUTPUT_NAMES, mean_and_deviation};
 use identification::diagnosis::case::{ControlLaw, Nominal};
 use identification::diagnosis::engine::{NamedEffect, ParameterEstimate, Role};
 use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
 use identification::diagnosis::rigs::shake_table::catalogue::catalogue;
+use laboratory::diagnosis::co_simulation::{Channels, RigFmus, play};
+use pack::extended_model::ExtendedModel;
+use pack::library::FmuLibrary;
+use pack::{self, PackedFmu};
 use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
 use plant::specimens::linear::LinearSpecimen;
-use shakebench::diagnosis::co_simulation::{Channels, RigFmus, play};
-use shakebench::extended_model::ExtendedModel;
-use shakebench::fmu::{FmiVersion, Fmu};
-use shakebench::library::FmuLibrary;
-use shakebench::pack::{self, PackedFmu};
-use shakebench::system::{SystemFile, Value, assemble};
 
 const PERIOD: f64 = 0.002;
 
@@ -200,11 +200,11 @@ fn set_from_file(component: &str, inputs: &str, model: &Path) -> BTreeMap<String
     let file = SystemFile::parse("test", &text).unwrap();
     let mut library = FmuLibrary::new(FmiVersion::V3, None);
     let asked = [format!("part.model={}", model.display())];
-    let system = assemble(&file, &asked, &mut |name| library.find(name)).unwrap();
+    let system = assemble(&file, &asked, &mut library).unwrap();
     let part = &system.components[0];
     let values = part.parameters.iter().map(|(index, value)| {
         let Value::Number(value) = value else {
-            panic!("{value:?} is no number");
+            panic!("{value:?} is not a number");
         };
         (part.fmu.description.variables[*index].name.clone(), *value)
     });
@@ -256,7 +256,7 @@ fn a_model_file_sets_what_the_fmus_start_with() {
     .unwrap();
     let mut library = FmuLibrary::new(FmiVersion::V3, None);
     let asked = [format!("part.model={}", path.display())];
-    let error = assemble(&file, &asked, &mut |name| library.find(name)).unwrap_err();
+    let error = assemble(&file, &asked, &mut library).unwrap_err();
     let error = error.to_string();
     assert!(
         error.contains("[effects.specimen_yielding]")

@@ -6,17 +6,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use acceptance::shared;
+use fmi_import::{FmiVersion, Isolation};
+use fmi_master::Algorithm;
 use identification::diagnosis::DiagnosisReport;
 use identification::diagnosis::engine::{Observer, Verdict};
+use laboratory::diagnosis::foreign::{diagnose, template};
+use laboratory::diagnosis::model::{self, Asked};
+use laboratory::run::experiment::{Request, prepare};
+use pack::library;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use shakebench::diagnosis::foreign::{diagnose, template};
-use shakebench::diagnosis::model::{self, Asked};
-use shakebench::fmu::{FmiVersion, Isolation};
-use shakebench::library;
-use shakebench::master::Algorithm;
-use shakebench::run::experiment::{Request, prepare};
 
 /// Writes columns under `header`, with white noise of that share of its variation on the last `noisy`.
 fn write(path: &Path, header: &str, columns: &[Vec<f64>], noisy: usize, noise: f64) {
@@ -60,13 +60,8 @@ fn found(folder: &Path, fmu: &Path, map: &str) -> DiagnosisReport {
     .unwrap()
 }
 
-fn reference_fmu(version: &str, name: &str) -> Option<PathBuf> {
-    let path = shared::folder()?.join(format!("foreign-fmus/{version}/{name}.fmu"));
-    if path.is_file() {
-        return Some(path);
-    }
-    eprintln!("SKIPPED: {} is missing", path.display());
-    None
+fn reference_fmu(version: &str, name: &str) -> PathBuf {
+    shared::folder().join(format!("foreign-fmus/{version}/{name}.fmu"))
 }
 
 /// The equation of Van der Pol (Reference-FMUs' read-me) by Euler's method as that FMU takes it, a
@@ -85,12 +80,11 @@ fn van_der_pol(mu: f64, samples: usize, every: usize) -> [Vec<f64>; 2] {
 }
 
 /// A drift and a wrong calibration in a model without inputs, and the same model with nothing wrong.
+#[needs::shared("foreign-fmus")]
 #[test]
 fn van_der_pol_with_another_damping_and_a_wrong_gain() {
     for version in ["fmi2", "fmi3"] {
-        let Some(fmu) = reference_fmu(version, "VanDerPol") else {
-            return;
-        };
+        let fmu = reference_fmu(version, "VanDerPol");
         let map = "outputs = { x0 = 'position', x1 = 'speed' }\nparameters = { mu = {} }\n";
         for hides in [true, false] {
             let folder = tempfile::tempdir().unwrap();
@@ -119,11 +113,10 @@ fn van_der_pol_with_another_damping_and_a_wrong_gain() {
 }
 
 /// What only passes through: every place is as good as the other, and the report says so.
+#[needs::shared("foreign-fmus")]
 #[test]
 fn a_delay_through_an_fmu_that_does_nothing() {
-    let Some(fmu) = reference_fmu("fmi3", "Feedthrough") else {
-        return;
-    };
+    let fmu = reference_fmu("fmi3", "Feedthrough");
     let folder = tempfile::tempdir().unwrap();
     let at = |k: usize| {
         let t = 0.01 * k as f64;
@@ -171,7 +164,7 @@ fn our_own_specimen_and_the_system_around_it() {
         "{text}"
     );
     let start = |name: &str| -> f64 {
-        let fmu = shakebench::fmu::Fmu::open(fmu).unwrap();
+        let fmu = fmi_import::Fmu::open(fmu).unwrap();
         let variable = fmu.description.variable(name).unwrap();
         variable.start.as_deref().unwrap().parse().unwrap()
     };

@@ -7,5 +7,4 @@ mod hidden_effects;
 mod measured;
 mod next_measurement;
 mod spreadsheet_files;
-mod transfer_system;
 mod walkthrough;

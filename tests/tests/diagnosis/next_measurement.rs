@@ -1,5 +1,6 @@
 //! Where no effect explains the records, the diagnosis proposes the motion that shows more of what is left.
 
+use fmi_master::Algorithm;
 use hidden_effects::case::{Case, Kind, Settings};
 use hidden_effects::outside::Outside;
 use identification::diagnosis::case::ControlLaw;
@@ -9,14 +10,13 @@ use identification::diagnosis::rigs::shake_table::left_over::{Residual, left_ove
 use identification::diagnosis::rigs::shake_table::predictor::{
     Disturbance, Noise, Predictor, Samples,
 };
+use laboratory::diagnosis::diagnose;
+use laboratory::run::experiment::{Request, prepare};
 use plant::identified::rig::IdentifiedRig;
 use plant::specimens::linear::LinearSpecimen;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use shakebench::diagnosis::diagnose;
-use shakebench::master::Algorithm;
-use shakebench::run::experiment::{Request, prepare};
 use units::constants::INCH;
 
 const PERIOD: f64 = 2e-3;
@@ -126,10 +126,7 @@ fn an_unexplained_case_leaves_a_motion_that_run_plays() {
     let report = diagnose(&case, &[], None, &out, Observer::none()).unwrap();
     assert_eq!(report.verdict, Verdict::Unexplained, "{}", report.sentence);
     let told = report.separating_experiment.unwrap();
-    assert!(
-        told.contains("what is left over is largest at speeds"),
-        "{told}"
-    );
+    assert!(told.contains("the residual is largest at speeds"), "{told}");
     let motion = report.separating_motion.unwrap();
     assert_eq!(motion, out.join("separating_motion.csv"));
     let request = Request {

@@ -33,7 +33,7 @@ fn a_command_that_stands_still_is_no_excitation() {
         vec![0.1; recording.len()],
     ));
     assert!(
-        message.contains("no excitation: valve_command stands at 0.1000 V"),
+        message.contains("no excitation: valve_command is constant at 0.1000 V"),
         "{message}"
     );
     assert!(
@@ -50,7 +50,7 @@ fn sensors_that_see_only_noise_are_no_excitation() {
         .collect();
     let message = refused(with(&recording, Channel::Displacement, noise));
     assert!(
-        message.contains("no excitation: `displacement` is noise for the most part"),
+        message.contains("no excitation: `displacement` is mostly noise"),
         "{message}"
     );
 }

@@ -202,7 +202,7 @@ fn a_known_specimen_is_printed_as_given() {
     refused(
         folder,
         &[&arguments[..], &["known.toml"]].concat(),
-        &["--out: known.toml is read from"],
+        &["--out: known.toml is an input"],
     );
 }
 
@@ -279,7 +279,7 @@ fn bad_data_are_refused_by_name() {
     let command = 1;
     with(
         with_column(&good, command, |_, _| "0.1".into()),
-        &["no excitation", "valve_command stands at 0.1000 V"],
+        &["no excitation", "valve_command is constant at 0.1000 V"],
     );
     let short: Vec<&str> = good.lines().take(900).collect();
     with(short.join("\n"), &["too short to fit", "record at least"]);
@@ -404,6 +404,6 @@ fn command_and_displacement_alone_make_a_transfer_function() {
     refused(
         folder,
         &[&arguments[..], &["wrong.toml"]].concat(),
-        &["map.toml", "`displacemnt` is no channel", "displacement"],
+        &["map.toml", "`displacemnt` is not a channel", "displacement"],
     );
 }

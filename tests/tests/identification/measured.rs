@@ -6,27 +6,22 @@ use identification::data::{Sheet, Wanted, fit_percent};
 use identification::estimation::state_variable_filter::{Between, equal_lags, filter};
 use identification::estimation::transfer_function::{Structure, identify};
 
-/// Columns of a file under `measured`, or nothing and a word about it.
-fn measured(file: &str) -> Option<Vec<Vec<f64>>> {
-    let path = acceptance::shared::folder()?.join("measured").join(file);
-    if !path.is_file() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
+/// Columns of a file under `measured`.
+fn measured(file: &str) -> Vec<Vec<f64>> {
+    let path = acceptance::shared::folder().join("measured").join(file);
     let wanted = Wanted {
         is_column: &|cell| cell.parse::<f64>().is_err(),
         header: "names of columns",
     };
     let sheet = Sheet::read(&path, wanted).unwrap();
     let column = |(place, head): (usize, &String)| sheet.full_column(place, head).unwrap();
-    Some(sheet.heads().iter().enumerate().map(column).collect())
+    sheet.heads().iter().enumerate().map(column).collect()
 }
 
+#[needs::shared("measured")]
 #[test]
 fn the_press_is_one_pole_and_a_delay_of_four_milliseconds() {
-    let Some(columns) = measured("servohydraulic_press/chirp_0A.csv") else {
-        return;
-    };
+    let columns = measured("servohydraulic_press/chirp_0A.csv");
     let (command, position) = (&columns[1], &columns[2]);
     let structure = Structure {
         order: 1,
@@ -80,11 +75,10 @@ fn the_press_is_one_pole_and_a_delay_of_four_milliseconds() {
     );
 }
 
+#[needs::shared("measured")]
 #[test]
 fn the_drive_s_force_follows_from_its_motion() {
-    let Some(columns) = measured("positioning_drive/DATA_EMPS.csv") else {
-        return;
-    };
+    let columns = measured("positioning_drive/DATA_EMPS.csv");
     const NEWTON_PER_VOLT: f64 = 35.15065;
     let lag = equal_lags(200.0, 4);
     let position = filter(&columns[2], 0.001, &lag, Between::Straight);

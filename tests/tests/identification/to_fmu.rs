@@ -3,16 +3,15 @@
 
 use acceptance::python::run_script;
 use acceptance::recordings::{PERIOD, Test};
+use fmi_import::{Causality, FmiVersion};
+use fmi_system::{SystemFile, Value, assemble};
 use identification::data::{Channel, mean_and_deviation};
 use identification::identify::model_file::ModelFile;
 use identification::identify::rig::{Options, identify};
 use nalgebra::{DVector, dvector};
+use pack::library::FmuLibrary;
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
-use shakebench::fmu::{Causality, FmiVersion};
-use shakebench::library::FmuLibrary;
-use shakebench::pack;
-use shakebench::system::{SystemFile, Value, assemble};
 
 const OUTPUTS: [&str; 4] = ["displacement", "velocity", "acceleration", "actuator_force"];
 
@@ -75,7 +74,7 @@ fn an_fmu_with_the_identified_model_moves_like_the_identified_rig() {
         .unwrap();
         file.directory = Some(folder.path().to_path_buf());
         let mut library = FmuLibrary::new(FmiVersion::V3, None);
-        let system = assemble(&file, &[], &mut |name| library.find(name)).unwrap();
+        let system = assemble(&file, &[], &mut library).unwrap();
         let table = &system.components[0];
         let description = &table.fmu.description;
         let parameters: serde_json::Map<String, serde_json::Value> = table
@@ -83,7 +82,7 @@ fn an_fmu_with_the_identified_model_moves_like_the_identified_rig() {
             .iter()
             .map(|(index, value)| {
                 let Value::Number(value) = value else {
-                    panic!("{value:?} is no number");
+                    panic!("{value:?} is not a number");
                 };
                 (description.variables[*index].name.clone(), (*value).into())
             })
@@ -93,7 +92,7 @@ fn an_fmu_with_the_identified_model_moves_like_the_identified_rig() {
         // The command line sets the same.
         let asked = format!("table.model={}", folder.path().join("MODEL.toml").display());
         file.components.get_mut("table").unwrap().model = None;
-        let again = assemble(&file, &[asked], &mut |name| library.find(name)).unwrap();
+        let again = assemble(&file, &[asked], &mut library).unwrap();
         assert_eq!(
             format!("{:?}", again.components[0].parameters),
             format!("{:?}", table.parameters)

@@ -1,16 +1,11 @@
 //! `shakebench compare` over the eight records: the order of the controllers, and medians well below
 //! those of the thesis.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use acceptance::shared;
-use shakebench::metrics::tracking;
-use shakebench::run::experiment::{Request, prepare};
-
-fn records() -> Option<Vec<PathBuf>> {
-    let records = shared::records();
-    (!records.is_empty()).then_some(records)
-}
+use laboratory::run::experiment::{Request, prepare};
+use motion::metrics::tracking;
 
 fn request(system: &str, specimen: &str, record: &Path) -> Request {
     Request {
@@ -37,12 +32,10 @@ fn median(mut values: Vec<f64>) -> f64 {
     0.5 * (values[3] + values[4])
 }
 
+#[needs::shared("records")]
 #[test]
 fn sliding_mode_before_three_variable_before_loop_shaping_in_the_median() {
-    let Some(records) = records() else {
-        println!("skipped: the eight records are not here");
-        return;
-    };
+    let records = shared::records();
     for specimen in ["none", "linear"] {
         let [sliding, three, shaping] =
             ["sliding-mode", "three-variable", "loop-shaping"].map(|system| {
@@ -61,12 +54,10 @@ fn sliding_mode_before_three_variable_before_loop_shaping_in_the_median() {
     }
 }
 
+#[needs::shared("records")]
 #[test]
 fn with_the_jacobi_algorithm_sliding_mode_is_told_its_delays_and_keeps_its_advantage() {
-    let Some(records) = records() else {
-        println!("skipped: the eight records are not here");
-        return;
-    };
+    let records = shared::records();
     let jacobi = |system: &str, settings: &[&str]| {
         let mut request = request(system, "linear", &records[3]);
         request.algorithm = serde_json::from_str("\"jacobi\"").unwrap();

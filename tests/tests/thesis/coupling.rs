@@ -7,11 +7,11 @@ use std::path::Path;
 
 use acceptance::monolithic::{table_acceleration, table_acceleration_under, worst_error};
 use acceptance::shared;
+use fmi_master::{Algorithm, Ended};
+use laboratory::run::experiment::{Prepared, Request, prepare};
+use laboratory::run::refinement::refine;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
-use shakebench::master::{Algorithm, Ended};
-use shakebench::run::experiment::{Prepared, Request, prepare};
-use shakebench::run::refinement::refine;
 
 fn request(record: Option<&Path>, specimen: &str, step: f64) -> Prepared {
     let request = Request {
@@ -52,6 +52,7 @@ fn convergence(algorithm: Algorithm) -> (Vec<f64>, Vec<f64>) {
     (errors, orders)
 }
 
+#[needs::shared("records")]
 #[test]
 fn coupling_at_2_ms_errs_by_less_than_2_percent_of_the_peak_for_every_record() {
     let mut errors = Vec::new();

@@ -1,7 +1,7 @@
 //! `shakebench design` against the same figures computed with SciPy from the printed equations.
 
 use acceptance::python::python;
-use shakebench::design::{Design, LoopName, Options, Specimen, design};
+use laboratory::design::{Design, LoopName, Options, Specimen, design};
 
 fn scipy(script: &str, json: &serde_json::Value) -> (bool, String) {
     let file = tempfile::NamedTempFile::new().unwrap();
@@ -73,7 +73,7 @@ fn under_the_specimen_the_force_loop_alone_is_unstable() {
 #[test]
 fn what_cannot_be_designed_is_refused() {
     let refused = "pid".parse::<LoopName>().unwrap_err();
-    assert!(refused.contains("`pid` is no loop"), "{refused}");
+    assert!(refused.contains("`pid` is not a loop"), "{refused}");
     let refused = "yielding".parse::<Specimen>().unwrap_err();
     assert!(refused.contains("`yielding`"), "{refused}");
     for (crossover, words) in [

@@ -2,8 +2,8 @@
 
 use acceptance::native_rig::{Injected, NativeRig, NativeRun, PERIOD};
 use controllers::interlock::Trip;
+use motion::{self, Motion, Options};
 use plant::sensors::instrumentation::{CHANNELS, SensorFault};
-use shakebench::motion::{self, Motion, Options};
 use units::constants::{INCH, STROKE};
 
 /// When the fault occurs, s.
@@ -64,7 +64,7 @@ fn a_reading_that_is_no_number_brings_the_valve_to_null_in_22_ms() {
         rig.sensors.fault_time = AT;
         let run = rig.play(&motion());
         check(
-            &format!("{name} is no number"),
+            &format!("{name} is not a number"),
             &run,
             &[Trip::NotFinite],
             0.022,

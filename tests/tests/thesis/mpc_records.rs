@@ -11,7 +11,6 @@ use nalgebra::{DVector, dvector};
 use plant::identified::coupled::Rig;
 use plant::specimens::linear::LinearSpecimen;
 use rayon::prelude::*;
-use shakebench::motion;
 
 const H: f64 = 0.002;
 
@@ -76,12 +75,10 @@ fn median(mut values: Vec<f64>) -> f64 {
     (values[(n - 1) / 2] + values[n / 2]) / 2.0
 }
 
+#[needs::shared("records")]
 #[test]
 fn records_are_followed_to_the_goals_and_before_three_variable_control() {
     let records = records();
-    if records.is_empty() {
-        return;
-    }
     let bare = Rig::default();
     let loaded = Rig {
         specimen: Some(LinearSpecimen::appendix_a()),

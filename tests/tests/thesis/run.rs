@@ -5,10 +5,10 @@
 use std::path::PathBuf;
 
 use acceptance::shared;
+use fmi_import::FmiVersion;
+use fmi_master::{Algorithm, Ended, Record};
+use laboratory::run::experiment::{Request, prepare};
 use rayon::prelude::*;
-use shakebench::fmu::FmiVersion;
-use shakebench::master::{Algorithm, Ended, Record};
-use shakebench::run::experiment::{Request, prepare};
 
 fn play(request: &Request) -> Record {
     let prepared = prepare(request).unwrap();
@@ -58,6 +58,7 @@ fn agree(system: &str, specimen: &str, record: Option<PathBuf>) {
     );
 }
 
+#[needs::shared("records")]
 #[test]
 fn every_record_is_played_alike_by_both_versions_and_again() {
     shared::records().par_iter().for_each(|record| {
@@ -69,8 +70,8 @@ fn every_record_is_played_alike_by_both_versions_and_again() {
 
 #[test]
 fn the_built_in_motion_is_played_by_every_system() {
-    for system in shakebench::system::built_in::names() {
-        for specimen in shakebench::system::built_in::specimens() {
+    for system in laboratory::systems::built_in::names() {
+        for specimen in laboratory::systems::built_in::specimens() {
             // Its prediction needs valve and oil apart, which the printed plant does not have: with those of
             // the physical rig it does not follow under a heavy specimen (docs/published-methods.md).
             if (system, specimen) != ("receding-horizon", "linear") {

@@ -46,9 +46,13 @@ pub(super) fn text(interface: &Interface, token: &str) -> String {
 fn abilities(interface: &Interface, name: &str) -> Element {
     Element::new(name)
         .attribute("modelIdentifier", interface.name)
+        .optional(
+            "needsExecutionTool",
+            interface.needs_execution_tool.then_some(true),
+        )
         .attribute("canNotUseMemoryManagementFunctions", true)
-        .attribute("canGetAndSetFMUstate", true)
-        .attribute("canSerializeFMUstate", true)
+        .attribute("canGetAndSetFMUstate", interface.saves_state)
+        .attribute("canSerializeFMUstate", interface.saves_state)
         .attribute(
             "providesDirectionalDerivative",
             interface.partial_derivatives,

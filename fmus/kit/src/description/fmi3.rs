@@ -20,36 +20,46 @@ pub(super) fn text(interface: &Interface, token: &str) -> String {
         ));
     }
     let rows = interface.rows.iter().enumerate();
-    root.child(abilities(interface, "CoSimulation").attribute(
-        "canHandleVariableCommunicationStepSize",
-        interface.any_step_size,
-    ))
-    .children(unit_definitions(&interface.rows))
-    .children((!types.is_empty()).then_some(types))
-    .child(log_categories())
-    .child(default_experiment(interface))
-    .child(
-        Element::new("ModelVariables")
-            .child(
-                Element::new("Float64")
-                    .attribute("name", "time")
-                    .attribute("valueReference", 0)
-                    .attribute("description", "Simulation time")
-                    .attribute("causality", "independent")
-                    .attribute("variability", "continuous")
-                    .attribute("unit", "s"),
-            )
-            .children(rows.map(|(i, row)| typed(interface, i, row))),
-    )
-    .child(structure(interface))
-    .document()
+    let co_simulation = abilities(interface, "CoSimulation")
+        .attribute(
+            "canHandleVariableCommunicationStepSize",
+            interface.any_step_size,
+        )
+        .optional(
+            "fixedInternalStepSize",
+            (!interface.any_step_size).then_some(interface.step_size),
+        );
+    root.child(co_simulation)
+        .children(unit_definitions(&interface.rows))
+        .children((!types.is_empty()).then_some(types))
+        .child(log_categories())
+        .child(default_experiment(interface))
+        .child(
+            Element::new("ModelVariables")
+                .child(
+                    Element::new("Float64")
+                        .attribute("name", "time")
+                        .attribute("valueReference", 0)
+                        .attribute("description", "Simulation time")
+                        .attribute("causality", "independent")
+                        .attribute("variability", "continuous")
+                        .attribute("unit", "s"),
+                )
+                .children(rows.map(|(i, row)| typed(interface, i, row))),
+        )
+        .child(structure(interface))
+        .document()
 }
 
 fn abilities(interface: &Interface, name: &str) -> Element {
     Element::new(name)
         .attribute("modelIdentifier", interface.name)
-        .attribute("canGetAndSetFMUState", true)
-        .attribute("canSerializeFMUState", true)
+        .optional(
+            "needsExecutionTool",
+            interface.needs_execution_tool.then_some(true),
+        )
+        .attribute("canGetAndSetFMUState", interface.saves_state)
+        .attribute("canSerializeFMUState", interface.saves_state)
         .attribute(
             "providesDirectionalDerivatives",
             interface.partial_derivatives,

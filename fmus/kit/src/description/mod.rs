@@ -56,6 +56,8 @@ struct Interface<'a> {
     step_size: f64,
     any_step_size: bool,
     partial_derivatives: bool,
+    saves_state: bool,
+    needs_execution_tool: bool,
     event_indicators: usize,
     rows: Vec<Row<'a>>,
     dependencies: &'a [Vec<(usize, Dependency)>],
@@ -73,6 +75,8 @@ impl<'a> Interface<'a> {
             step_size: C::STEP_SIZE,
             any_step_size: C::ANY_STEP_SIZE,
             partial_derivatives: C::PARTIAL_DERIVATIVES,
+            saves_state: C::SAVES_STATE,
+            needs_execution_tool: C::NEEDS_EXECUTION_TOOL,
             event_indicators: C::EVENT_INDICATORS,
             rows: model.variables.iter().map(|v| v.row(start)).collect(),
             dependencies: &model.dependencies,
@@ -400,5 +404,85 @@ mod tests {
             );
         }
         assert!(page.contains("Free text &lt;&amp;&gt;"));
+    }
+
+    #[test]
+    fn terminals_name_their_members_and_how_they_match() {
+        use crate::panel::{Panel, SOUND};
+        let text = terminals(Model::<Panel<SOUND>>::get().unwrap());
+        let document = Document::parse(&text).unwrap();
+        let root = document.root_element();
+        assert!(root.has_tag_name("fmiTerminalsAndIcons"));
+        let found: Vec<_> = root
+            .descendants()
+            .filter(|node| node.has_tag_name("Terminal"))
+            .map(|node| {
+                let members: Vec<_> = node
+                    .children()
+                    .filter(|child| child.has_tag_name("TerminalMemberVariable"))
+                    .map(|child| {
+                        (
+                            child.attribute("memberName"),
+                            child.attribute("variableName"),
+                        )
+                    })
+                    .collect();
+                (
+                    node.attribute("name"),
+                    node.attribute("matchingRule"),
+                    node.attribute("terminalKind"),
+                    members,
+                )
+            })
+            .collect();
+        let expected = [
+            (
+                Some("ports"),
+                Some("bus"),
+                Some("signals"),
+                vec![(Some("first"), Some("a")), (Some("second"), Some("b"))],
+            ),
+            (
+                Some("out"),
+                Some("plug"),
+                Some("signals"),
+                vec![(Some("first"), Some("product"))],
+            ),
+        ];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn choices_are_listed_with_their_values_in_both_versions() {
+        use crate::panel::{Panel, SOUND};
+        let model = Model::<Panel<SOUND>>::get().unwrap();
+        for text in [fmi2(model), fmi3(model)] {
+            let document = Document::parse(&text).unwrap();
+            let items: Vec<_> = document
+                .descendants()
+                .filter(|node| node.has_tag_name("Item"))
+                .map(|node| (node.attribute("name"), node.attribute("value")))
+                .collect();
+            assert_eq!(
+                items,
+                [(Some("slow"), Some("1")), (Some("fast"), Some("4"))]
+            );
+            let bounds = |name: &str| {
+                let node = document
+                    .descendants()
+                    .find(|node| node.attribute("name") == Some(name))
+                    .unwrap();
+                let typed = node.children().find(|child| child.is_element());
+                let of = |attribute: &str| {
+                    let own = node.attribute(attribute);
+                    own.or_else(|| typed.and_then(|child| child.attribute(attribute)))
+                        .map(str::to_string)
+                };
+                (of("min"), of("max"), of("start"))
+            };
+            let text = |text: &str| Some(text.to_string());
+            assert_eq!(bounds("count"), (text("1"), text("5"), text("3")));
+            assert_eq!(bounds("gain"), (None, text("100"), text("2")));
+        }
     }
 }

@@ -151,7 +151,7 @@ pub struct Parameter {
 const PLAUSIBLE: &str = "plausible on a rig of this size, from barely there to dominating; tried \
                          up to four times the strongest";
 /// Source of bounds that are not those of [`PLAUSIBLE`].
-const WIDE: &str = "plausible on a rig of this size; tried as far as the model is one";
+const WIDE: &str = "plausible on a rig of this size; tried as far as the model is valid";
 /// Source of a form.
 const USUAL: &str = "usual value, with a spread that covers the forms in use";
 /// Source of a delay's bounds.
@@ -167,7 +167,7 @@ impl Parameter {
             role: Role::Given,
             basis: Basis::Absolute,
             bounds: (f64::NEG_INFINITY, f64::INFINITY),
-            source: "a detail that records do not tell",
+            source: "a detail that records do not determine",
             field: None,
             variable: Variable::Own,
             min: None,

@@ -323,4 +323,30 @@ mod tests {
         // A parallelogram of width 2 w and height 2 (1 - w).
         assert!((area.abs() - 2.0 * 0.1 * 2.0 * 0.9).abs() < 1e-3, "{area}");
     }
+
+    #[test]
+    fn each_sign_of_the_opening_has_its_own_gain() {
+        let valve = ValveEffects {
+            flow_gain: 0.1,
+            asymmetry: 0.2,
+            ..Default::default()
+        };
+        // (1 + g)(1 + q) and (1 + g)(1 - q).
+        assert!((valve.flow(0.5) - 0.5 * 1.1 * 1.2).abs() < 1e-15);
+        assert!((valve.flow(-0.5) + 0.5 * 1.1 * 0.8).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_spool_rings_as_a_second_order_lag() {
+        // From rest at 1 V: zeta = 0 swings as cos(w t).
+        let valve = ValveEffects {
+            spool_frequency: 10.0,
+            spool_damping: 0.3,
+            ..Default::default()
+        };
+        let w = TAU * 10.0;
+        assert!((valve.spool_acceleration(0.0, 0.0, 1.0) - w * w).abs() < 1e-9);
+        assert!((valve.spool_acceleration(1.0, 0.0, 0.0) + w * w).abs() < 1e-9);
+        assert!((valve.spool_acceleration(0.0, 1.0, 0.0) + 2.0 * 0.3 * w).abs() < 1e-9);
+    }
 }

@@ -1,0 +1,97 @@
+//! One step of every tracking law of hybrid simulation, timed step by step in a closed loop on
+//! the nominal plant.
+//!
+//! ```text
+//! cargo bench -p controllers --bench tracking
+//! ```
+//!
+//! A tenth of the benchmark's period is 24.4 us.
+
+use std::error::Error;
+use std::time::Instant;
+
+use controllers::Controller;
+use hybrid::laws::TrackingInput;
+use hybrid::laws::adaptive_inverse::AdaptiveInverse;
+use hybrid::laws::gradient_inverse::GradientInverse;
+use hybrid::laws::linear_quadratic::{LinearQuadraticDesign, LinearQuadraticTracking};
+use hybrid::laws::model_inverse::ModelInverse;
+use hybrid::laws::phase_lead_pi::PhaseLeadPi;
+use hybrid::laws::robust_tracking::RobustTracking;
+use hybrid::laws::sliding_mode::TrackingSlidingMode;
+use hybrid::vrths::{
+    BenchmarkCase, NumericalSubstructure, PERIOD, TransferSystem, TransferSystemParameters,
+};
+
+const STEPS: usize = 40_000;
+/// The run is repeated; the fastest time of each step is what the step takes, the rest is what
+/// else the machine does.
+const REPEATS: usize = 9;
+
+type Law = Box<dyn Controller<Input = TrackingInput, Output = f64>>;
+
+fn laws() -> Result<Vec<(&'static str, Law)>, Box<dyn Error>> {
+    let plant = TransferSystemParameters::default();
+    Ok(vec![
+        ("phase-lead-pi", Box::new(PhaseLeadPi::default()) as Law),
+        ("inverse", Box::new(ModelInverse::of(&plant, 5)?)),
+        (
+            "robust",
+            Box::new(RobustTracking::synthesise(&plant, 60.0, 50.0, 1.5, PERIOD)?),
+        ),
+        (
+            "linear-quadratic",
+            Box::new(LinearQuadraticTracking::design(
+                &plant,
+                &LinearQuadraticDesign::default(),
+                PERIOD,
+            )?),
+        ),
+        ("sliding-mode", Box::new(TrackingSlidingMode::published()?)),
+        ("gradient-inverse", Box::new(GradientInverse::default())),
+        (
+            "adaptive-inverse",
+            Box::new(AdaptiveInverse::benchmark(PERIOD)?),
+        ),
+    ])
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    println!("law                 median   99.9 %   longest  (ns, {STEPS} steps)");
+    for (name, mut law) in laws()? {
+        let parameters = TransferSystemParameters::default();
+        let specimen = [
+            parameters.specimen_mass,
+            parameters.specimen_damping(),
+            parameters.specimen_stiffness,
+        ];
+        let frame = BenchmarkCase::ALL[0].frame();
+        let mut times = vec![u128::MAX; STEPS];
+        for _ in 0..REPEATS {
+            law.reset();
+            let mut plant = TransferSystem::default();
+            let mut part = NumericalSubstructure::new(&frame, specimen, 0, 1, PERIOD)?;
+            for (k, time) in times.iter_mut().enumerate() {
+                let input = TrackingInput {
+                    desired: part.displacements()[0],
+                    measured: plant.state.displacement,
+                    force: plant.force(),
+                };
+                let start = Instant::now();
+                let command = std::hint::black_box(law.step(std::hint::black_box(&input), PERIOD));
+                *time = start.elapsed().as_nanos().min(*time);
+                let ground = 0.8 * (21.0 * k as f64 * PERIOD).sin();
+                plant.step(command);
+                part.step(input.force, [ground; 3]);
+            }
+        }
+        times.sort_unstable();
+        println!(
+            "{name:18} {:>7}  {:>7}  {:>8}",
+            times[STEPS / 2],
+            times[STEPS * 999 / 1000],
+            times[STEPS - 1]
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! What an effect is worth: against the model without it, refitted, under the noises that then fit best.
+
+use super::fit::{Fit, evaluate, residuals};
+use super::likelihood::{Hypothesis, PenalisedLikelihood, named, special_case};
+use super::model::{ExtensibleModel, Point};
+use super::progress::{Observer, Progress};
+
+/// Times that noises are learned and the model refitted under them.
+const ROUNDS: usize = 3;
+/// Rounds of a fit in between.
+const ROUNDS_OF_A_FIT: usize = 4;
+/// Twice the log likelihood below which noises that are learned once more change nothing.
+const NOTHING_NEW: f64 = 20.0;
+/// Samples in a block over which unseen likelihoods are summed, as a share of a record.
+const BLOCKS: usize = 40;
+
+/// A fitted model with the noises that fit it. Scores of models under different noises compare.
+#[derive(Clone)]
+pub(super) struct Settled<M> {
+    pub model: M,
+    pub hypothesis: Hypothesis,
+    /// False where they are those that the fit began with.
+    pub has_learned: bool,
+}
+
+/// The model at `start` fitted to `records` under `model`'s noises, then under those that its own
+/// residuals show, in turn, as long as the score falls.
+pub(super) fn settled<M: ExtensibleModel + Clone>(
+    model: &M,
+    start: &Point,
+    records: &[usize],
+    observer: Observer<'_>,
+) -> Option<Settled<M>> {
+    let fitted = |model: &M, start: &Point| {
+        let selection = PenalisedLikelihood::of(model, records, observer);
+        let start = evaluate(model, start, records)?;
+        selection.hypothesis_in(&start, ROUNDS_OF_A_FIT)
+    };
+    let mut best = Settled {
+        hypothesis: fitted(model, start)?,
+        model: model.clone(),
+        has_learned: false,
+    };
+    for _ in 0..ROUNDS {
+        if observer.is_over() {
+            break;
+        }
+        let Fit {
+            point, residuals, ..
+        } = &best.hypothesis.fit;
+        let lesson = best.model.with_learned_noise(point, residuals, records);
+        let Some(lesson) = lesson.filter(|own| own.is_believable && own.gain > NOTHING_NEW) else {
+            break;
+        };
+        let Some(next) = fitted(&lesson.model, point) else {
+            break;
+        };
+        if next.score >= best.hypothesis.score {
+            break;
+        }
+        best = Settled {
+            model: lesson.model,
+            hypothesis: next,
+            has_learned: true,
+        };
+    }
+    Some(best)
+}
+
+/// As [`settled`] from `near`, and from the `assumed` noises where those of `near` may hide what the model
+/// lacks: of both the better.
+pub(super) fn settled_from<M: ExtensibleModel + Clone>(
+    assumed: &M,
+    near: &M,
+    start: &Point,
+    records: &[usize],
+    observer: Observer<'_>,
+) -> Option<Settled<M>> {
+    let first = settled(near, start, records, observer);
+    if first.as_ref().is_some_and(|own| own.model.is_usual()) {
+        return first;
+    }
+    let second = settled(assumed, start, records, observer);
+    first
+        .into_iter()
+        .chain(second)
+        .min_by(|a, b| a.hypothesis.score.total_cmp(&b.hypothesis.score))
+}
+
+/// `point` without its effect at `place`.
+pub(super) fn without(point: &Point, place: usize) -> Point {
+    let mut smaller = point.clone();
+    smaller.effects.remove(place);
+    smaller
+}
+
+/// `found` without the effects, or what they have beyond their special cases, that do not earn their price
+/// once the noises may take their place.
+pub(super) fn ablated<M: ExtensibleModel + Clone>(
+    assumed: &M,
+    found: Settled<M>,
+    records: &[usize],
+    observer: Observer<'_>,
+) -> Settled<M> {
+    let mut current = found;
+    loop {
+        let candidates = current.model.candidates();
+        let point = &current.hypothesis.fit.point;
+        let places = 0..point.effects.len();
+        let simpler = places.clone().map(|place| without(point, place));
+        let special = places.filter_map(|place| special_case(candidates, point, place));
+        let smaller = simpler
+            .chain(special)
+            .filter(|_| !observer.is_over())
+            .filter_map(|smaller| {
+                observer.tell(|| Progress::Trying(format!("only {}", named(candidates, &smaller))));
+                settled_from(assumed, &current.model, &smaller, records, observer)
+            })
+            .min_by(|a, b| a.hypothesis.score.total_cmp(&b.hypothesis.score));
+        match smaller {
+            Some(smaller) if smaller.hypothesis.score <= current.hypothesis.score => {
+                current = smaller;
+            }
+            _ => return current,
+        }
+    }
+}
+
+/// Normal deviate of what `with` predicts better than `without` on `records` that neither was fitted to:
+/// twice the log likelihood, summed by blocks whose scatter is its error.
+pub(super) fn unseen_gain<M: ExtensibleModel>(
+    model: &M,
+    with: &Point,
+    without: &Point,
+    records: &[usize],
+) -> Option<f64> {
+    let mut gains = Vec::new();
+    for &record in records {
+        let cost = |point: &Point| {
+            let predictor = model.predictor(point)?;
+            let residuals = residuals(model, &predictor, point, &[record])?;
+            Some((residuals, model.log_determinant(&predictor)))
+        };
+        let ((better, own), (worse, other)) = (cost(with)?, cost(without)?);
+        let samples = model.sample_count(record).max(1);
+        let width = better.len() / samples;
+        let block = samples.div_ceil(BLOCKS).max(1) * width.max(1);
+        let pairs = better.chunks(block).zip(worse.chunks(block));
+        gains.extend(pairs.map(|(a, b)| {
+            let squares = |values: &[f64]| values.iter().map(|r| r * r).sum::<f64>();
+            let count = (a.len() / width.max(1)) as f64;
+            squares(b) - squares(a) + count * (other - own)
+        }));
+    }
+    let count = gains.len() as f64;
+    let sum: f64 = gains.iter().sum();
+    let mean = sum / count;
+    let scatter: f64 = gains.iter().map(|gain| (gain - mean).powi(2)).sum();
+    (count > 1.0 && scatter > 0.0).then(|| sum / (scatter * count / (count - 1.0)).sqrt())
+}

@@ -1,0 +1,354 @@
+//! Is the residual noise? Every test gives a normal deviate; the largest one decides.
+
+use realfft::RealFftPlanner;
+
+use super::fit::Fit;
+use super::model::ExtensibleModel;
+
+/// Largest deviate that noise alone may show among the few hundred tests. Were they exact, 4.5
+/// would be passed by chance once in a thousand cases (300 tests). The rest allows for the constant
+/// gain of the predictor, which is optimal only for the linear part. Chosen on the generator's
+/// cases.
+pub const LARGEST_DEVIATE: f64 = 5.6;
+
+/// Root mean square error of a channel in a band, in units of the noise floor, up to which it says nothing of
+/// the model. The spectrum of a few thousand samples of noise is known no better.
+const KNOWN: f64 = 1.25;
+/// As [`KNOWN`], of a channel's whole record, whose level may differ from that of another record.
+const KNOWN_WHOLE: f64 = 1.12;
+/// As [`KNOWN`], of a part of a record: slow noise wanders.
+const KNOWN_PART: f64 = 1.4;
+/// Correlation with state or command up to which it says nothing of the model: 1/1000 of the residual's power.
+const UNRELATED: f64 = 0.03;
+
+/// One look at the residuals of one record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Test {
+    /// What was looked at.
+    pub what: String,
+    /// Normal deviate under "only noise is left".
+    pub deviate: f64,
+    /// Where, if it is a channel's error in a band or a part of the record.
+    pub place: Option<Place>,
+}
+
+/// Where a model leaves more than noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Place {
+    /// Name of the channel; none where all were looked at together.
+    pub channel: Option<String>,
+    /// Which of its errors.
+    pub part: Part,
+    /// Root mean square error in units of the noise floor.
+    pub over_floor: f64,
+}
+
+/// A part of a record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Part {
+    /// All of it.
+    Whole,
+    /// From and to this share of the sampling rate.
+    Band(f64, f64),
+    /// From and to this sample.
+    Samples(usize, usize),
+}
+
+impl Test {
+    fn of(what: String, deviate: f64) -> Self {
+        Self {
+            what,
+            deviate,
+            place: None,
+        }
+    }
+
+    fn at(self, channel: Option<&str>, part: Part, mean_square: f64) -> Self {
+        let place = Place {
+            channel: channel.map(str::to_owned),
+            part,
+            over_floor: mean_square.sqrt(),
+        };
+        Self {
+            place: Some(place),
+            ..self
+        }
+    }
+}
+
+/// First line of a periodogram that is asked for noise: what is slower is a drift of zeros.
+const FIRST_LINE: usize = 2;
+/// Parts of a record, of forty, that may be louder than the rest: bursts of a noise, which no model explains.
+const BURSTS: usize = 8;
+/// Standard deviations by which their motion may rank above the middle.
+const WITH_THE_MOTION: f64 = 1.5;
+/// Slowest lines of a periodogram that a mean is measured by.
+const SLOWEST: usize = 4;
+/// Edges of the frequency bands as shares of the sampling rate.
+const BANDS: [f64; 11] = [
+    0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064, 0.128, 0.256, 0.5,
+];
+
+/// Normal deviate of a sum of squares of `count` standard normal values (Wilson and Hilferty).
+pub fn chi_square_deviate(sum: f64, count: f64) -> f64 {
+    if count < 1.0 {
+        return 0.0;
+    }
+    let v = 2.0 / (9.0 * count);
+    ((sum / count).cbrt() - (1.0 - v)) / v.sqrt()
+}
+
+/// Looks at whitened residuals, `channels` a sample, with the channels' names; `regressors` are
+/// functions of state and command that a wrong model leaves traces of.
+pub fn tests(
+    record: &str,
+    residuals: &[f64],
+    channels: &[&str],
+    regressors: &[(String, Vec<f64>)],
+) -> Vec<Test> {
+    let width = channels.len();
+    let n = residuals.len() / width.max(1);
+    let mut tests = Vec::new();
+    if n < 64 {
+        return tests;
+    }
+    let mut planner = RealFftPlanner::<f64>::new();
+    let transform = planner.plan_fft_forward(n);
+    for (c, channel) in channels.iter().enumerate() {
+        let series: Vec<f64> = residuals.iter().skip(c).step_by(width).copied().collect();
+        let energy: f64 = series.iter().map(|r| r * r).sum();
+        if energy == 0.0 {
+            continue;
+        }
+        let mean_square = energy / n as f64;
+        let whole = Test::of(
+            format!("{record}: {channel}, mean square {mean_square:.3}"),
+            chi_square_deviate(energy / KNOWN_WHOLE.powi(2), n as f64),
+        );
+        tests.push(whole.at(Some(channel), Part::Whole, mean_square));
+        let mean = series.iter().sum::<f64>() / n as f64;
+        let mut time = series.clone();
+        let mut spectrum = transform.make_output_vec();
+        if transform.process(&mut time, &mut spectrum).is_ok() {
+            // A mean is one more draw of what is slow: it is measured by the slowest lines where those are
+            // louder than white noise.
+            let slowest = &spectrum[1..(1 + SLOWEST).min(spectrum.len())];
+            let power: f64 = slowest.iter().map(|z| z.norm_sqr()).sum();
+            let slow = (power / (slowest.len().max(1) * n) as f64).max(1.0);
+            tests.push(Test::of(
+                format!("{record}: {channel}, mean"),
+                mean.abs() * (n as f64 / slow).sqrt(),
+            ));
+            let mut low = FIRST_LINE;
+            for edge in BANDS {
+                let high = ((edge * n as f64).round() as usize).min(spectrum.len() - 1);
+                if high < low + 2 {
+                    continue;
+                }
+                let power: f64 = spectrum[low..high].iter().map(|z| z.norm_sqr()).sum();
+                let count = (high - low) as f64;
+                let band = Test::of(
+                    format!("{record}: {channel}, below {edge} of the sampling rate"),
+                    chi_square_deviate(2.0 * power / (KNOWN.powi(2) * n as f64), 2.0 * count),
+                );
+                let share = |line: usize| line as f64 / n as f64;
+                tests.push(band.at(
+                    Some(channel),
+                    Part::Band(share(low), share(high)),
+                    power / (n as f64 * count),
+                ));
+                low = high;
+            }
+        }
+        for (name, regressor) in regressors {
+            // What they share with the mean is seen there.
+            let centre = regressor.iter().sum::<f64>() / regressor.len().max(1) as f64;
+            let size: f64 = regressor.iter().map(|g| (g - centre).powi(2)).sum();
+            let pairs = regressor.iter().zip(&series);
+            let along: f64 = pairs.map(|(g, r)| (g - centre) * r).sum();
+            if size > 0.0 {
+                tests.push(Test::of(
+                    format!("{record}: {channel} against {name}"),
+                    (along / size.sqrt()).abs() - UNRELATED * energy.sqrt(),
+                ));
+            }
+        }
+    }
+    let mut parts = Vec::new();
+    let block = (n / 40).max(16) * width;
+    for (i, part) in residuals.chunks_exact(block).enumerate() {
+        let energy: f64 = part.iter().map(|r| r * r).sum();
+        let live = part.iter().filter(|r| **r != 0.0).count();
+        let samples = block / width;
+        let part = Test::of(
+            format!("{record}: part {} of 40", i + 1),
+            chi_square_deviate(energy / KNOWN_PART.powi(2), live as f64),
+        );
+        parts.push(part.at(
+            None,
+            Part::Samples(i * samples, (i + 1) * samples),
+            energy / live.max(1) as f64,
+        ));
+    }
+    let motion: Vec<f64> = (0..parts.len())
+        .map(|i| {
+            let samples = i * block / width..((i + 1) * block / width).min(n);
+            let power = |signal: &[f64]| -> f64 {
+                let all: f64 = signal.iter().map(|g| g * g).sum();
+                let own = signal.get(samples.clone()).unwrap_or_default();
+                own.iter().map(|g| g * g).sum::<f64>() / all.max(f64::MIN_POSITIVE)
+            };
+            regressors.iter().map(|(_, signal)| power(signal)).sum()
+        })
+        .collect();
+    let loud: Vec<usize> = (0..parts.len())
+        .filter(|i| parts[*i].deviate > LARGEST_DEVIATE)
+        .collect();
+    let are_bursts = are_bursts(&loud, &motion);
+    parts.retain(|part| !are_bursts || part.deviate <= LARGEST_DEVIATE);
+    tests.extend(parts);
+    tests
+}
+
+/// Whether `loud` parts of a record are bursts of a noise: few, and no more where there is more `motion`, as
+/// those of a wrong model are.
+fn are_bursts(loud: &[usize], motion: &[f64]) -> bool {
+    let rank = |own: &usize| {
+        let less = motion.iter().filter(|other| **other < motion[*own]).count();
+        let same = motion
+            .iter()
+            .filter(|other| **other == motion[*own])
+            .count();
+        (less as f64 + 0.5 * same as f64) / motion.len() as f64
+    };
+    let count = loud.len() as f64;
+    let mean = loud.iter().map(rank).sum::<f64>() / count.max(1.0);
+    // Ranks of parts that have nothing to do with the motion are even between 0 and 1.
+    let deviation = 1.0 / (12.0 * count.max(1.0)).sqrt();
+    loud.len() <= BURSTS && mean < 0.5 + WITH_THE_MOTION * deviation
+}
+
+/// Tests of whether what `fit` leaves over on `records` is noise, and its parameters plausible.
+pub(crate) fn left_over<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usize]) -> Vec<Test> {
+    let mut all = Vec::new();
+    let mut rest = fit.residuals.as_slice();
+    for &record in records {
+        let count = model.residual_count(record).min(rest.len());
+        let (mine, others) = rest.split_at(count);
+        rest = others;
+        all.extend(tests(
+            model.record_name(record),
+            mine,
+            model.channels(),
+            &model.regressors(record),
+        ));
+    }
+    let nuisance = &fit.point.nuisance;
+    all.push(Test::of(
+        "nominal parameters against their stated uncertainty".into(),
+        chi_square_deviate(nuisance.iter().map(|p| p * p).sum(), nuisance.len() as f64),
+    ));
+    let priors = fit.point.prior_rows(model.candidates());
+    for (_, off, spread) in priors {
+        all.push(Test::of(
+            "form of an effect against what is usual".into(),
+            (off / spread).abs(),
+        ));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Chi-square quantiles of printed tables at the normal deviates 1.6449 (95 %) and 2.3263 (99 %).
+    #[test]
+    fn the_deviate_of_a_chi_square_is_that_of_the_tables() {
+        for (count, at_95, at_99) in [
+            (5.0, 11.070, 15.086),
+            (10.0, 18.307, 23.209),
+            (30.0, 43.773, 50.892),
+            (100.0, 124.342, 135.807),
+        ] {
+            assert!(
+                (chi_square_deviate(at_95, count) - 1.6449).abs() < 0.03,
+                "{count}"
+            );
+            assert!(
+                (chi_square_deviate(at_99, count) - 2.3263).abs() < 0.03,
+                "{count}"
+            );
+        }
+        // The median of ten.
+        assert!(chi_square_deviate(9.342, 10.0).abs() < 0.02);
+        assert_eq!(chi_square_deviate(7.0, 0.0), 0.0);
+    }
+
+    /// Normal values by the sum of twelve uniform ones.
+    fn white(samples: usize) -> Vec<f64> {
+        let mut random = ChaCha8Rng::seed_from_u64(11);
+        let mut one = || (0..12).map(|_| random.random_range(-0.5..0.5)).sum::<f64>();
+        (0..samples).map(|_| one()).collect()
+    }
+
+    #[test]
+    fn white_noise_of_unit_variance_passes_every_test() {
+        let noise = white(8192);
+        let regressors = [("ramp".to_string(), (0..4096).map(f64::from).collect())];
+        let all = tests("record", &noise, &["one", "two"], &regressors);
+        // A mean square, a mean, bands and a regressor for each channel, and the parts of the record.
+        assert!(all.len() > 60, "{}", all.len());
+        for test in &all {
+            assert!(test.deviate < 4.0, "{test:?}");
+        }
+    }
+
+    #[test]
+    fn a_burst_is_not_a_model_s_error_and_a_loud_half_is() {
+        let loud_parts = |loud: std::ops::Range<usize>| {
+            let mut noise = white(8000);
+            noise[loud].iter_mut().for_each(|value| *value *= 2.0);
+            let all = tests("record", &noise, &["one"], &[]);
+            let parts = all.iter().filter(|test| test.what.contains("part"));
+            parts.filter(|test| test.deviate > LARGEST_DEVIATE).count()
+        };
+        assert_eq!(loud_parts(1000..1300), 0);
+        assert!(loud_parts(4000..8000) > 15);
+        // Where there is most motion it is.
+        let motion: Vec<f64> = (0..40).map(f64::from).collect();
+        assert!(are_bursts(&[3, 12, 30], &motion));
+        assert!(!are_bursts(&[35, 37, 38], &motion));
+    }
+
+    /// A level that is a tenth off says nothing of the model, one that is a third off does.
+    #[test]
+    fn noise_is_known_to_a_tenth() {
+        let worst = |factor: f64| {
+            let noise: Vec<f64> = white(40_000).iter().map(|value| factor * value).collect();
+            let all = tests("record", &noise, &["one"], &[]);
+            all.iter().map(|test| test.deviate).fold(0.0, f64::max)
+        };
+        assert!(worst(1.1) < LARGEST_DEVIATE);
+        assert!(worst(1.33) > LARGEST_DEVIATE);
+    }
+
+    #[test]
+    fn a_tone_shows_in_its_band_and_not_in_the_others() {
+        let mut noise = white(4096);
+        for (k, value) in noise.iter_mut().enumerate() {
+            *value += 0.7 * (std::f64::consts::TAU * 0.1 * k as f64).sin();
+        }
+        let all = tests("record", &noise, &["one"], &[]);
+        let bands = all
+            .iter()
+            .filter(|test| test.what.contains("sampling rate"));
+        for test in bands {
+            // 0.1 of the sampling rate is above 0.064 and below 0.128.
+            let is_there = test.what.contains("below 0.128");
+            assert_eq!(test.deviate > 5.6, is_there, "{test:?}");
+        }
+    }
+}

@@ -1,0 +1,530 @@
+//! Selection where even a right model leaves correlated errors: by what an effect gains on data that
+//! it was not fitted to.
+//!
+//! Forward selection adds one effect per round: the one with which a model fitted to one half of
+//! the part best predicts the other half, in both directions. It stops when the gain may be due to
+//! chance, with correlated samples counted once. Backward at the end by the same test. Every model
+//! in every comparison is the least-squares one ([`super::least_squares`]).
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::least_squares::{
+    Columns, Free, SimulatedModel, Solution, all_errors, deviations, least_squares, solution,
+    squares,
+};
+use super::model::Point;
+use super::opening::opened;
+use super::progress::{Observer, Progress, Step};
+use super::resampling::correlation_time;
+use super::search::{Selection, search};
+
+/// Standard deviations by which the likelihood of unseen data must rise. A dozen candidates are
+/// tried, so that one in a thousand times would be chance.
+const LEAST_DEVIATE: f64 = 3.0;
+/// Share of the squared error below which an effect is not worth a name.
+const LEAST_GAIN: f64 = 0.05;
+/// A candidate that gains this share of what the one taken gains is its rival.
+const RIVAL: f64 = 0.9;
+/// A candidate whose fit gains less than this share of the best one's is not tested on unseen data.
+const WORTH_TESTING: f64 = 0.7;
+/// Effects in one model.
+const MOST_EFFECTS: usize = 8;
+/// Candidates that are fitted to the end in a round.
+const FINALISTS: usize = 6;
+/// Starts of the nominal model beside the stated values, and how far they lie from these, in stated
+/// standard deviations.
+const OTHER_STARTS: usize = 6;
+const APART: f64 = 2.0;
+/// Seed of those starts.
+pub const STARTS_SEED: u64 = 15;
+/// Steps of a first look, of a fit to the end, and of one that begins near its end.
+const LOOK: usize = 6;
+const TO_THE_END: usize = 40;
+const AGAIN: usize = 12;
+
+/// A model fitted to a part.
+#[derive(Debug, Clone)]
+pub struct Simulated {
+    /// Where.
+    pub point: Point,
+    /// Sum of squared errors on the part.
+    pub squares: f64,
+    /// Share of the squared error on unseen data that its last effect takes away.
+    gain: f64,
+}
+
+/// An effect that lost against the one taken by little.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rival {
+    /// Its candidate.
+    pub effect: usize,
+    /// The candidate taken in its place.
+    pub against: usize,
+}
+
+/// What a part asks for.
+pub struct Selected {
+    /// Nominal parameters refitted, no effect.
+    pub nominal: Simulated,
+    /// With all effects.
+    pub extended: Simulated,
+    /// What each effect gains on unseen data, in standard deviations of that gain.
+    pub deviates: Vec<f64>,
+    /// The extended model without each effect.
+    pub without: Vec<Simulated>,
+    /// Rivals that are not in the extended model.
+    pub rivals: Vec<Rival>,
+    /// One standard deviation of each coordinate: nuisance first, then the effects'.
+    pub deviations: Vec<f64>,
+}
+
+impl From<Solution> for Simulated {
+    fn from(found: Solution) -> Self {
+        Self {
+            squares: squares(&found.errors),
+            point: found.point,
+            gain: 0.0,
+        }
+    }
+}
+
+/// Fits everything from `start`.
+fn settle<M: SimulatedModel>(
+    model: &M,
+    start: &Point,
+    record: usize,
+    steps: usize,
+) -> Option<Simulated> {
+    least_squares(model, start, record, &Free::All, steps).map(Simulated::from)
+}
+
+/// The model with the effects of `start`, fitted to `record` to the end, with the standard deviations
+/// of all coordinates.
+pub fn refit<M: SimulatedModel>(
+    model: &M,
+    start: &Point,
+    record: usize,
+) -> Option<(Simulated, Vec<f64>)> {
+    let found = least_squares(model, start, record, &Free::All, TO_THE_END)?;
+    let deviations = deviations(model, &found, record).unwrap_or_default();
+    Some((found.into(), deviations))
+}
+
+/// The nominal model, from the stated values and from others around them.
+pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated> {
+    let stated = Point {
+        nuisance: vec![0.0; model.nuisance()],
+        effects: Vec::new(),
+    };
+    let mut random = ChaCha8Rng::seed_from_u64(STARTS_SEED);
+    let mut starts = vec![stated.clone()];
+    for _ in 0..OTHER_STARTS {
+        let mut start = stated.clone();
+        for (i, p) in start.nuisance.iter_mut().enumerate() {
+            let off = random.random_range(-APART..APART);
+            // What differs from file to file begins as it is.
+            *p = if model.block_of(i).is_some() {
+                0.0
+            } else {
+                off
+            };
+        }
+        starts.push(start);
+    }
+    let screen = model.screen(record);
+    let mut looked: Vec<Solution> = starts
+        .par_iter()
+        .filter_map(|start| least_squares(model, start, screen, &Free::All, LOOK))
+        .collect();
+    let first = looked.first()?.clone();
+    let best_of = |looked: &[Solution]| {
+        let all = looked.iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+        all.cloned()
+    };
+    // Read from the records only where no start finds the motion.
+    let begun = model.begun(&best_of(&looked)?.point, screen);
+    let begun: Vec<&Point> = begun
+        .iter()
+        .filter(|point| point.effects.is_empty())
+        .collect();
+    looked.extend(opened(model, &begun, screen, LOOK));
+    let best = best_of(&looked)?;
+    // The look may have been at a part of the record only.
+    let ends: Vec<Simulated> = [first, best]
+        .par_iter()
+        .filter_map(|one| settle(model, &one.point, record, TO_THE_END))
+        .collect();
+    ends.into_iter()
+        .min_by(|a, b| a.squares.total_cmp(&b.squares))
+}
+
+/// `point`, of which the nuisance of a block that `fitted` does not tell is fitted to `tested`: a
+/// transducer's zero and the like belong to a file and not to the rig.
+pub fn completed<M: SimulatedModel>(
+    model: &M,
+    point: &Point,
+    fitted: Option<usize>,
+    tested: usize,
+) -> Point {
+    let open = |i: usize| {
+        let is_held = |block| {
+            model.samples(tested, block) == 0
+                || fitted.is_some_and(|fitted| model.tells(fitted, i, tested))
+        };
+        i < model.nuisance() && model.block_of(i).is_some_and(|block| !is_held(block))
+    };
+    if !(0..model.nuisance()).any(open) {
+        return point.clone();
+    }
+    least_squares(model, point, tested, &Free::Chosen(&open), AGAIN)
+        .map_or_else(|| point.clone(), |found| found.point)
+}
+
+/// What a model fitted to one fold gains on the other, both ways.
+struct Inside {
+    /// Share of the squared error that goes.
+    gain: f64,
+    /// The larger of two normal deviates: root of twice the logarithm of the likelihood ratio, and
+    /// mean of the differences of squared errors over its standard deviation.
+    deviate: f64,
+    /// True when both ways gain.
+    both: bool,
+}
+
+impl Inside {
+    fn holds(&self) -> bool {
+        self.both && self.deviate > LEAST_DEVIATE && self.gain > LEAST_GAIN
+    }
+}
+
+/// Whether an effect with this `gain` rivals the one `taken`: it takes away nearly as much, and
+/// `leaves` at most so many times what that leaves.
+fn rivals(gain: f64, taken: f64, leaves: f64) -> bool {
+    gain > RIVAL * taken && 1.0 - gain < leaves * (1.0 - taken)
+}
+
+/// Compares two models by their errors from [`CrossValidation::crossed`].
+fn compare(before: &[Vec<f64>; 2], after: &[Vec<f64>; 2]) -> Inside {
+    let both = before
+        .iter()
+        .zip(after)
+        .all(|(b, a)| squares(b) > squares(a));
+    let squares = |errors: &[Vec<f64>; 2]| errors.iter().flatten().map(|e| e * e).sum::<f64>();
+    let (worse, better) = (squares(before), squares(after));
+    let independent: f64 = after
+        .iter()
+        .map(|a| a.len() as f64 / correlation_time(a))
+        .sum();
+    // Twice the logarithm of the likelihood ratio on data that neither model was fitted to.
+    let ratio = independent * (worse / better).ln();
+    // A small effect all along a record hides behind slow drift there: its own differences tell.
+    let pairs = before.iter().flatten().zip(after.iter().flatten());
+    let differences: Vec<f64> = pairs.map(|(b, a)| b * b - a * a).collect();
+    let n = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / n;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / n;
+    let paired = mean / (variance * correlation_time(&differences) / n).sqrt();
+    Inside {
+        gain: 1.0 - better / worse,
+        deviate: ratio.abs().sqrt().copysign(ratio).max(paired),
+        both,
+    }
+}
+
+/// Selection by what an effect gains on the half of a record that was not fitted.
+struct CrossValidation<'a, M: SimulatedModel> {
+    model: &'a M,
+    record: usize,
+    observer: Observer<'a>,
+    /// Effects that came near the one taken in any round.
+    rivals: Vec<Rival>,
+    /// Deviates and reduced models of the last look backward.
+    deviates: Vec<f64>,
+    without: Vec<Simulated>,
+}
+
+impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
+    fn new(model: &'a M, record: usize, observer: Observer<'a>) -> Self {
+        Self {
+            model,
+            record,
+            observer,
+            rivals: Vec::new(),
+            deviates: Vec::new(),
+            without: Vec::new(),
+        }
+    }
+
+    /// The effects that another search ends with, fitted here and without those that do not pay here.
+    fn end_of(&mut self, mut other: CrossValidation<'_, M>) -> Option<Simulated> {
+        let found = search(&mut other)?.best?;
+        self.rivals.append(&mut other.rivals);
+        let mut current = settle(self.model, &found.point, self.record, TO_THE_END)?;
+        while !current.point.effects.is_empty() {
+            match self.reduced(&current)? {
+                Some(smaller) => current = smaller,
+                None => break,
+            }
+        }
+        let named = !current.point.effects.is_empty() && !self.is_at_bound(&current.point);
+        named.then_some(current)
+    }
+
+    /// Whether `one` predicts each fold from the other better than `two` does.
+    fn predicts_better(&self, one: &Simulated, two: &Simulated) -> bool {
+        let sum = |fitted: &Simulated| {
+            let errors = self.crossed(fitted)?;
+            Some(errors.iter().map(|fold| squares(fold)).sum::<f64>())
+        };
+        matches!((sum(one), sum(two)), (Some(one), Some(two)) if one < two)
+    }
+
+    /// Errors of `fitted` on each fold when its parameters are refitted to the other.
+    fn crossed(&self, fitted: &Simulated) -> Option<[Vec<f64>; 2]> {
+        let model = self.model;
+        let [one, two] = model.folds(self.record);
+        let on_other = |own: usize, tested: usize| {
+            let refitted = settle(model, &fitted.point, own, AGAIN)?;
+            let point = completed(model, &refitted.point, Some(own), tested);
+            Some(all_errors(model, &point, tested))
+        };
+        let (first, second) = rayon::join(|| on_other(two, one), || on_other(one, two));
+        Some([first?, second?])
+    }
+
+    /// The extensions of `base` by one of `among` that fit best.
+    fn fitted(&self, base: &Simulated, among: &[usize]) -> Option<Vec<(usize, Simulated)>> {
+        let (model, record) = (self.model, self.record);
+        let screen = model.screen(record);
+        let candidates = model.candidates();
+        // A model without an effect bends its parameters towards it: from the stated ones the way to
+        // the right effect may be straighter.
+        let mut stated = base.point.clone();
+        for (i, p) in stated.nuisance.iter_mut().enumerate() {
+            *p = if model.block_of(i).is_some() { *p } else { 0.0 };
+        }
+        let bases: Vec<(Point, Columns)> = [base.point.clone(), stated]
+            .into_par_iter()
+            .filter_map(|point| {
+                let start = solution(model, &point, screen)?;
+                Some((point, Columns::at(model, &start, screen)?))
+            })
+            .collect();
+        let in_base = |effect: usize| {
+            let alike = candidates[effect].look_alikes;
+            let held = |i: usize| i == effect || alike.contains(&candidates[i].effect);
+            base.point.effects.iter().any(|(i, _)| held(*i))
+        };
+        let suggested = model.starts(&base.point, screen);
+        let begun = if base.point.effects.is_empty() {
+            model.begun(&base.point, screen)
+        } else {
+            Vec::new()
+        };
+        let mut quick: Vec<(usize, Solution)> = among
+            .par_iter()
+            .filter(|effect| !in_base(**effect))
+            .filter_map(|&effect| {
+                let candidate = &candidates[effect];
+                let own = suggested.iter().filter(|(i, _)| *i == effect);
+                let own = own.map(|(_, values)| values);
+                let values: Vec<&Vec<f64>> = candidate.starts.iter().chain(own).collect();
+                let starts = bases.iter().flat_map(|(base, frozen)| {
+                    values.iter().filter_map(move |values| {
+                        let mut point = base.clone();
+                        point.effects.push((effect, candidate.internal(values)));
+                        least_squares(model, &point, screen, &Free::Frozen(frozen), LOOK)
+                    })
+                });
+                let with_it = |point: &Point| point.effects.iter().any(|(i, _)| *i == effect);
+                let begun: Vec<&Point> = begun.iter().filter(|point| with_it(point)).collect();
+                let all = starts.chain(opened(model, &begun, screen, LOOK));
+                let best = all.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+                Some((effect, best))
+            })
+            .collect();
+        quick.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        quick.truncate(FINALISTS);
+        let settled = quick.par_iter().filter_map(|(effect, quick)| {
+            let settled = settle(model, &quick.point, record, TO_THE_END)?;
+            Some((*effect, settled))
+        });
+        Some(settled.collect())
+    }
+
+    /// Whether an effect of `point` is at a bound other than zero.
+    fn is_at_bound(&self, point: &Point) -> bool {
+        let candidates = self.model.candidates();
+        point
+            .effects
+            .iter()
+            .any(|(i, q)| candidates[*i].bound(q).is_some())
+    }
+
+    /// Whether `rival` in the place of the effect that `without` lacks gains nearly what that gains.
+    fn replaces(&self, rival: usize, without: &Simulated, current: &Simulated) -> Option<bool> {
+        let (_, replaced) = self.fitted(without, &[rival])?.pop()?;
+        let before = self.crossed(without)?;
+        let gain = |fitted: &Simulated| Some(compare(&before, &self.crossed(fitted)?).gain);
+        let leaves = self.model.rivals_leave();
+        Some(rivals(gain(&replaced)?, gain(current)?, leaves))
+    }
+
+    fn tell(&self, fitted: &Simulated, inside: &Inside) {
+        let candidates = self.model.candidates();
+        let effects = fitted.point.effects.iter();
+        self.observer.tell(|| Progress::Model {
+            step: Step::Extended,
+            effects: effects
+                .map(|(i, q)| (candidates[*i].effect, candidates[*i].values(q)))
+                .collect(),
+            figures: vec![
+                ("squared error", fitted.squares),
+                ("share gained on the other fold", inside.gain),
+                ("standard deviations", inside.deviate),
+                ("holds", f64::from(u8::from(inside.holds()))),
+            ],
+        });
+    }
+}
+
+impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
+    type Hypothesis = Simulated;
+
+    fn nominal(&self) -> Option<Simulated> {
+        nominal(self.model, self.record)
+    }
+
+    fn is_over(&self) -> bool {
+        self.observer.is_over()
+    }
+
+    fn effects(&self, fitted: &Simulated) -> usize {
+        fitted.point.effects.len()
+    }
+
+    fn most_effects(&self) -> usize {
+        MOST_EFFECTS
+    }
+
+    fn extensions(&mut self, current: &Simulated, _: &[Simulated]) -> Option<Vec<Simulated>> {
+        let all: Vec<usize> = (0..self.model.candidates().len()).collect();
+        let mut fitted = self.fitted(current, &all)?;
+        // What stands at its bound is never named, and stands in for something else.
+        fitted.retain(|(_, one)| !self.is_at_bound(&one.point));
+        let gained = |one: &Simulated| current.squares - one.squares;
+        let best = fitted.iter().map(|(_, one)| gained(one));
+        let best = best.fold(0.0, f64::max);
+        if best < LEAST_GAIN * current.squares {
+            return Some(Vec::new());
+        }
+        fitted.retain(|(_, one)| gained(one) > WORTH_TESTING * best);
+        let before = self.crossed(current)?;
+        let mut tried: Vec<(Inside, Simulated)> = fitted
+            .into_iter()
+            .filter_map(|(_, mut fitted)| {
+                let inside = compare(&before, &self.crossed(&fitted)?);
+                fitted.gain = inside.gain;
+                Some((inside, fitted))
+            })
+            .collect();
+        tried.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+        for (inside, fitted) in &tried {
+            self.tell(fitted, inside);
+        }
+        let pays = |fitted: &Simulated| fitted.squares < (1.0 - LEAST_GAIN) * current.squares;
+        tried.retain(|(inside, fitted)| inside.holds() && pays(fitted));
+        Some(tried.into_iter().map(|(_, fitted)| fitted).collect())
+    }
+
+    fn round(&mut self, taken: &Simulated, lost: &[Simulated]) {
+        let newest = |fitted: &Simulated| fitted.point.effects.last().map(|(i, _)| *i);
+        let leaves = self.model.rivals_leave();
+        let near = lost
+            .iter()
+            .filter(|one| rivals(one.gain, taken.gain, leaves));
+        self.rivals.extend(near.filter_map(|rival| {
+            Some(Rival {
+                effect: newest(rival)?,
+                against: newest(taken)?,
+            })
+        }));
+    }
+
+    fn reduced(&mut self, current: &Simulated) -> Option<Option<Simulated>> {
+        let after = self.crossed(current)?;
+        let places = 0..current.point.effects.len();
+        let all: Option<Vec<(Inside, Simulated)>> = places
+            .map(|i| {
+                let mut point = current.point.clone();
+                point.effects.remove(i);
+                // What runs away without an effect is compared with the model that has none.
+                let smaller = settle(self.model, &point, self.record, TO_THE_END)
+                    .or_else(|| nominal(self.model, self.record))?;
+                Some((compare(&self.crossed(&smaller)?, &after), smaller))
+            })
+            .collect();
+        let (compared, without): (Vec<Inside>, Vec<Simulated>) = all?.into_iter().unzip();
+        self.without = without;
+        self.deviates = compared.iter().map(|inside| inside.deviate).collect();
+        let least = (0..compared.len())
+            .min_by(|&a, &b| compared[a].gain.total_cmp(&compared[b].gain))
+            .filter(|&i| !compared[i].holds());
+        Some(least.map(|i| self.without.swap_remove(i)))
+    }
+}
+
+/// Finds the effects that `record` asks for; none where nothing can be simulated.
+pub fn select<M: SimulatedModel>(
+    model: &M,
+    record: usize,
+    observer: Observer<'_>,
+) -> Option<Selected> {
+    let mut selection = CrossValidation::new(model, record, observer);
+    let mut found = search(&mut selection)?;
+    if model.is_cheap() {
+        // Free parameters may bend to stand in for an effect, and the first effects that are taken to
+        // straighten them again. With parameters held near what was stated the way is another; the
+        // end is fitted and judged as ever.
+        let held = model.held();
+        let begun = CrossValidation::new(&held, record, observer);
+        if let Some(other) = selection.end_of(begun)
+            && selection.predicts_better(&other, found.best.as_ref().unwrap_or(&found.nominal))
+        {
+            found.best = Some(other);
+        }
+        // What the last look backward left behind belongs to the one that was chosen.
+        if let Some(best) = &found.best {
+            selection.reduced(best)?;
+        }
+    }
+    let nominal = found.nominal;
+    let extended = found.best.unwrap_or_else(|| nominal.clone());
+    // What came near while other effects were still missing may be far behind at the end.
+    let place = |effect: usize| {
+        extended
+            .point
+            .effects
+            .iter()
+            .position(|(i, _)| *i == effect)
+    };
+    let mut rivals = std::mem::take(&mut selection.rivals);
+    rivals.retain(|rival| match (place(rival.against), place(rival.effect)) {
+        (Some(i), None) => selection
+            .replaces(rival.effect, &selection.without[i], &extended)
+            .unwrap_or(false),
+        _ => false,
+    });
+    let last = solution(model, &extended.point, record)?;
+    let deviations = deviations(model, &last, record).unwrap_or_default();
+    Some(Selected {
+        nominal,
+        extended,
+        deviates: selection.deviates,
+        without: selection.without,
+        rivals,
+        deviations,
+    })
+}

@@ -1,0 +1,561 @@
+//! Maximum-likelihood fits by Levenberg-Marquardt, with the nuisance estimated along.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::model::{ExtensibleModel, Point};
+
+/// Internal coordinates move by this for a difference quotient.
+const DIFFERENCE: f64 = 1e-3;
+/// No nuisance moves farther than this many standard deviations in one step.
+const LONGEST_STEP: f64 = 4.0;
+/// Samples of all columns that are multiplied with one another at a time.
+const PIECE: usize = 1024;
+/// Times that the nuisance is held four times as strongly, from a prior's own strength on.
+const HOLDS: usize = 40;
+/// Gain of a step below which a fit with the gain held has settled.
+const STILL: f64 = 0.02;
+/// Steps with derivatives that learn, before the gain follows.
+const STEPS: usize = 6;
+/// Expected gains below this may be outweighed by the predictor's change along the step.
+const WITHIN_GAINS_REACH: f64 = 1e3;
+
+/// A model at a point with its residuals on the records it was fitted to.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Where.
+    pub point: Point,
+    /// `-2 log` likelihood up to a constant, priors included.
+    pub cost: f64,
+    /// Whitened residuals, the fitted records after one another.
+    pub residuals: Vec<f64>,
+}
+
+/// Derivatives of the residuals by coordinates of a point.
+#[derive(Debug, Clone)]
+pub struct Jacobian {
+    columns: Vec<Vec<f64>>,
+    gram: DMatrix<f64>,
+}
+
+/// Whitened residuals and cost at `point` on `records`; nothing where it cannot be simulated.
+pub fn evaluate<M: ExtensibleModel>(model: &M, point: &Point, records: &[usize]) -> Option<Fit> {
+    Some(evaluated(model, point, records)?.0)
+}
+
+/// As [`evaluate`], with the predictor.
+fn evaluated<M: ExtensibleModel>(
+    model: &M,
+    point: &Point,
+    records: &[usize],
+) -> Option<(Fit, M::Predictor)> {
+    let predictor = model.predictor(point)?;
+    let residuals = residuals(model, &predictor, point, records)?;
+    let samples: usize = records.iter().map(|&r| model.sample_count(r)).sum();
+    let cost = squares(&residuals)
+        + samples as f64 * model.log_determinant(&predictor)
+        + point.prior_cost(model.candidates());
+    let fit = Fit {
+        point: point.clone(),
+        cost,
+        residuals,
+    };
+    cost.is_finite().then_some((fit, predictor))
+}
+
+/// Whitened residuals at `point` with the gain of `predictor`.
+pub fn residuals<M: ExtensibleModel>(
+    model: &M,
+    predictor: &M::Predictor,
+    point: &Point,
+    records: &[usize],
+) -> Option<Vec<f64>> {
+    let count: usize = records.iter().map(|&r| model.residual_count(r)).sum();
+    let mut all = vec![0.0; count];
+    let mut rest = all.as_mut_slice();
+    for &record in records {
+        let (mine, others) = rest.split_at_mut(model.residual_count(record));
+        if !model.residuals(predictor, point, record, mine) {
+            return None;
+        }
+        rest = others;
+    }
+    Some(all)
+}
+
+fn squares(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Four sums at once keep the adders busy.
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let tail: f64 = a4
+        .remainder()
+        .iter()
+        .zip(b4.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in a4.zip(b4) {
+        for i in 0..4 {
+            sums[i] += x[i] * y[i];
+        }
+    }
+    sums.iter().sum::<f64>() + tail
+}
+
+/// Derivatives of the residuals at `fit` by the coordinates in `which` (nuisance first, then the
+/// effects'), with the gain of `predictor`.
+fn columns<M: ExtensibleModel>(
+    model: &M,
+    predictor: &M::Predictor,
+    fit: &Fit,
+    records: &[usize],
+    which: impl Iterator<Item = usize>,
+) -> Option<Vec<Vec<f64>>> {
+    let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
+    let difference = |coordinate: usize, size: f64| {
+        let mut step = vec![0.0; count];
+        step[coordinate] = size;
+        let moved = fit.point.moved(&step, model.candidates());
+        if moved == fit.point {
+            return None;
+        }
+        let mut column = residuals(model, predictor, &moved, records)?;
+        for (c, r) in column.iter_mut().zip(&fit.residuals) {
+            *c = (*c - r) / size;
+        }
+        Some(column)
+    };
+    which
+        .map(|coordinate| {
+            let size = if coordinate < fit.point.nuisance.len() {
+                0.02
+            } else {
+                DIFFERENCE
+            };
+            // At an upper bound the other side is taken.
+            difference(coordinate, size).or_else(|| difference(coordinate, -size))
+        })
+        .collect()
+}
+
+impl Jacobian {
+    /// All coordinates of `fit`.
+    pub fn at<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usize]) -> Option<Self> {
+        let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
+        let predictor = model.predictor(&fit.point)?;
+        Some(Self::of(columns(
+            model,
+            &predictor,
+            fit,
+            records,
+            0..count,
+        )?))
+    }
+
+    /// As [`Self::at`] by central differences: twice the work, and no false information along
+    /// directions in which the residuals do not change.
+    pub fn central<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usize]) -> Option<Self> {
+        let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
+        let predictor = model.predictor(&fit.point)?;
+        let columns = (0..count).map(|coordinate| {
+            let nuisance = coordinate < fit.point.nuisance.len();
+            let size = if nuisance { 0.02 } else { DIFFERENCE };
+            let at = |size: f64| {
+                let mut step = vec![0.0; count];
+                step[coordinate] = size;
+                let moved = fit.point.moved(&step, model.candidates());
+                let residuals = residuals(model, &predictor, &moved, records)?;
+                Some((moved != fit.point, residuals))
+            };
+            let ((up, mut column), (down, below)) = (at(size)?, at(-size)?);
+            // At a bound only one side moves.
+            let width = size * (f64::from(u8::from(up)) + f64::from(u8::from(down)));
+            for (c, r) in column.iter_mut().zip(&below) {
+                *c = (*c - r) / width.max(f64::MIN_POSITIVE);
+            }
+            Some(column)
+        });
+        Some(Self::of(columns.collect::<Option<_>>()?))
+    }
+
+    fn of(columns: Vec<Vec<f64>>) -> Self {
+        let count = columns.len();
+        let samples = columns.first().map_or(0, Vec::len);
+        let mut gram = DMatrix::zeros(count, count);
+        // Pieces that stay near the processor.
+        for begin in (0..samples).step_by(PIECE) {
+            let piece = begin..(begin + PIECE).min(samples);
+            for i in 0..count {
+                for j in 0..=i {
+                    gram[(i, j)] += dot(&columns[i][piece.clone()], &columns[j][piece.clone()]);
+                }
+            }
+        }
+        for i in 0..count {
+            for j in 0..i {
+                gram[(j, i)] = gram[(i, j)];
+            }
+        }
+        Self { columns, gram }
+    }
+
+    /// These with further `columns`.
+    fn with(&self, columns: &[Vec<f64>]) -> Self {
+        let (known, count) = (self.columns.len(), self.columns.len() + columns.len());
+        let mut all = self.columns.clone();
+        all.extend_from_slice(columns);
+        let mut gram = DMatrix::zeros(count, count);
+        gram.view_mut((0, 0), (known, known)).copy_from(&self.gram);
+        for i in known..count {
+            for j in 0..=i {
+                let value = dot(&all[i], &all[j]);
+                gram[(i, j)] = value;
+                gram[(j, i)] = value;
+            }
+        }
+        Self { columns: all, gram }
+    }
+
+    /// These, and those by the further coordinates of `fit`.
+    pub(crate) fn extended<M: ExtensibleModel>(
+        &self,
+        model: &M,
+        fit: &Fit,
+        records: &[usize],
+    ) -> Option<Self> {
+        let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
+        let predictor = model.predictor(&fit.point)?;
+        let further = self.columns.len()..count;
+        Some(self.with(&columns(model, &predictor, fit, records, further)?))
+    }
+
+    /// Those on the first `count` residuals.
+    pub(crate) fn begin(&self, count: usize) -> Self {
+        let begin = |column: &Vec<f64>| column[..count.min(column.len())].to_vec();
+        Self::of(self.columns.iter().map(begin).collect())
+    }
+
+    /// Takes in that the residuals change by `change` along `step`, and changes nothing across it, each
+    /// coordinate weighed by what the residuals tell of it.
+    fn learn(&mut self, step: &DVector<f64>, change: &[f64]) {
+        let n = self.columns.len();
+        let weighed = DVector::from_fn(n, |i, _| self.gram[(i, i)] * step[i]);
+        let size = weighed.dot(step);
+        if size.is_nan() || size <= 0.0 {
+            return;
+        }
+        let along = weighed / size;
+        let mut missed = change.to_vec();
+        for (column, &s) in self.columns.iter().zip(step.iter()) {
+            if s != 0.0 {
+                for (m, c) in missed.iter_mut().zip(column) {
+                    *m -= s * c;
+                }
+            }
+        }
+        let cross = DVector::from_fn(n, |i, _| dot(&self.columns[i], &missed));
+        let own = dot(&missed, &missed);
+        for (column, &share) in self.columns.iter_mut().zip(along.iter()) {
+            if share != 0.0 {
+                for (c, m) in column.iter_mut().zip(&missed) {
+                    *c += share * m;
+                }
+            }
+        }
+        self.gram += &cross * along.transpose()
+            + &along * cross.transpose()
+            + &along * along.transpose() * own;
+    }
+
+    /// What a further column would gain at `fit`; none where the coordinates are not told apart.
+    pub(crate) fn scorer<'a, M: ExtensibleModel>(
+        &'a self,
+        model: &M,
+        fit: &'a Fit,
+    ) -> Option<Scorer<'a>> {
+        let (hessian, gradient) = self.normal_equations(model, fit);
+        let factor = hessian.cholesky()?;
+        Some(Scorer {
+            columns: &self.columns,
+            residuals: &fit.residuals,
+            pull: factor.solve(&gradient),
+            factor,
+        })
+    }
+
+    fn normal_equations<M: ExtensibleModel>(
+        &self,
+        model: &M,
+        fit: &Fit,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let mut hessian = self.gram.clone();
+        let n = self.columns.len();
+        let mut gradient = DVector::from_fn(n, |i, _| -dot(&self.columns[i], &fit.residuals));
+        add_priors(model, &fit.point, &mut hessian, &mut gradient);
+        (hessian, gradient)
+    }
+
+    /// Covariance of all coordinates at `fit`.
+    pub fn covariance<M: ExtensibleModel>(&self, model: &M, fit: &Fit) -> Option<DMatrix<f64>> {
+        self.normal_equations(model, fit).0.try_inverse()
+    }
+
+    /// Standard deviations of all coordinates at `fit`, nuisance first.
+    pub fn deviations<M: ExtensibleModel>(&self, model: &M, fit: &Fit) -> Option<Vec<f64>> {
+        let covariance = self.covariance(model, fit)?;
+        let variance = |i: usize| covariance[(i, i)].max(0.0);
+        Some(
+            (0..covariance.nrows())
+                .map(|i| variance(i).sqrt())
+                .collect(),
+        )
+    }
+}
+
+/// See [`Jacobian::scorer`].
+pub(crate) struct Scorer<'a> {
+    columns: &'a [Vec<f64>],
+    residuals: &'a [f64],
+    factor: Cholesky<f64, Dyn>,
+    pull: DVector<f64>,
+}
+
+impl Scorer<'_> {
+    /// How much `column` (in the residuals' space) would lower the cost if it entered linearly with the best
+    /// amplitude, everything else estimated along; and that amplitude.
+    pub fn score(&self, column: &[f64]) -> (f64, f64) {
+        let n = self.columns.len();
+        let cross = DVector::from_fn(n, |i, _| dot(&self.columns[i], column));
+        let size = dot(column, column);
+        let own = size - cross.dot(&self.factor.solve(&cross));
+        let slope = -dot(column, self.residuals) - cross.dot(&self.pull);
+        if own <= 1e-13 * size {
+            return (0.0, 0.0);
+        }
+        (slope * slope / own, slope / own)
+    }
+}
+
+fn add_priors<M: ExtensibleModel>(
+    model: &M,
+    point: &Point,
+    hessian: &mut DMatrix<f64>,
+    gradient: &mut DVector<f64>,
+) {
+    let nuisance = point.nuisance.len();
+    for (i, p) in point.nuisance.iter().enumerate() {
+        hessian[(i, i)] += 1.0;
+        gradient[i] -= p;
+    }
+    for (place, off, spread) in point.prior_rows(model.candidates()) {
+        let i = nuisance + place;
+        if i < gradient.len() {
+            hessian[(i, i)] += 1.0 / (spread * spread);
+            gradient[i] -= off / (spread * spread);
+        }
+    }
+}
+
+/// Fits all coordinates of `start` with the gain held that belongs to it. The first ones that `frozen` holds
+/// keep its derivatives; those of the others are computed again in every iteration.
+pub fn fit<M: ExtensibleModel>(
+    model: &M,
+    start: &Point,
+    records: &[usize],
+    frozen: &Jacobian,
+    iterations: usize,
+) -> Option<Fit> {
+    let (first, predictor) = evaluated(model, start, records)?;
+    let mut held = Held::of(model, &first);
+    let known = frozen.columns.len();
+    let count = start.nuisance.len() + start.effect_coordinates();
+    for _ in 0..iterations {
+        let fresh = columns(model, &predictor, &held.fit, records, known..count)?;
+        let jacobian = frozen.with(&fresh);
+        let Stepped { gained, expected } =
+            held.step(model, &predictor, records, &jacobian, |_, _| ())?;
+        if gained < STILL || expected < STILL {
+            break;
+        }
+    }
+    let next = evaluate(model, &held.fit.point, records);
+    Some(next.filter(|next| next.cost < first.cost).unwrap_or(first))
+}
+
+/// A fit whose cost is that with the gain held, which is what the derivatives are of.
+struct Held {
+    fit: Fit,
+    damping: f64,
+}
+
+struct Stepped {
+    gained: f64,
+    expected: f64,
+}
+
+impl Held {
+    fn of<M: ExtensibleModel>(model: &M, fit: &Fit) -> Self {
+        let cost = squares(&fit.residuals) + fit.point.prior_cost(model.candidates());
+        Self {
+            fit: Fit {
+                cost,
+                ..fit.clone()
+            },
+            // Directions that only the priors hold are a million times flatter than others: any damping
+            // to begin with would stop them.
+            damping: 0.0,
+        }
+    }
+
+    /// One damped step of Gauss and Newton. `tried` receives every step that was looked at with the change
+    /// of the residuals.
+    fn step<M: ExtensibleModel>(
+        &mut self,
+        model: &M,
+        predictor: &M::Predictor,
+        records: &[usize],
+        jacobian: &Jacobian,
+        mut tried: impl FnMut(&DVector<f64>, &[f64]),
+    ) -> Option<Stepped> {
+        let (hessian, gradient) = jacobian.normal_equations(model, &self.fit);
+        let mut stepped = Stepped {
+            gained: 0.0,
+            expected: 0.0,
+        };
+        for _ in 0..5 {
+            let mut damped = hessian.clone();
+            for i in 0..gradient.len() {
+                damped[(i, i)] *= 1.0 + self.damping;
+            }
+            let nuisance = self.fit.point.nuisance.len();
+            let Some(step) = bounded_step(damped, &gradient, nuisance) else {
+                self.damping = (self.damping * 20.0).max(1e-6);
+                continue;
+            };
+            stepped.expected = gradient.dot(&step);
+            let moved = self.fit.point.moved(step.as_slice(), model.candidates());
+            if let Some(residuals) = residuals(model, predictor, &moved, records) {
+                let cost = squares(&residuals) + moved.prior_cost(model.candidates());
+                let change: Vec<f64> = residuals
+                    .iter()
+                    .zip(&self.fit.residuals)
+                    .map(|(after, before)| after - before)
+                    .collect();
+                tried(&self.fit.point.step_to(&moved), &change);
+                stepped.gained = self.fit.cost - cost;
+                if stepped.gained > 0.0 {
+                    self.fit = Fit {
+                        point: moved,
+                        cost,
+                        residuals,
+                    };
+                    self.damping = if self.damping < 1e-5 {
+                        0.0
+                    } else {
+                        self.damping * 0.03
+                    };
+                    break;
+                }
+            }
+            self.damping = (self.damping * 30.0).max(1e-5);
+            if stepped.expected < 0.05 {
+                break;
+            }
+        }
+        Some(stepped)
+    }
+}
+
+/// The step that solves `hessian` x = `gradient`, its first `nuisance` coordinates held as strongly as it
+/// takes for none to go beyond [`LONGEST_STEP`]: a trust region in those alone. Shortening the whole step
+/// instead would hold back what an effect explains where the nuisance pulls at what is still missing.
+fn bounded_step(
+    mut hessian: DMatrix<f64>,
+    gradient: &DVector<f64>,
+    nuisance: usize,
+) -> Option<DVector<f64>> {
+    let mut held = 0.0;
+    for _ in 0..HOLDS {
+        let step = hessian.clone().cholesky()?.solve(gradient);
+        let longest = step.rows(0, nuisance).amax();
+        if longest <= LONGEST_STEP {
+            return Some(step);
+        }
+        let more = if held == 0.0 { 1.0 } else { 3.0 * held };
+        for i in 0..nuisance {
+            hessian[(i, i)] += more;
+        }
+        held += more;
+    }
+    None
+}
+
+/// Fits until the cost settles, from derivatives near `start` where they are known. A fit that is far from
+/// noise is settled when a round gains less than `share` of the residual above noise.
+///
+/// A round holds the gain and takes steps with derivatives that learn from each step (Broyden, Math. Comp.
+/// 19, 1965), since a step costs one walk through the records and new derivatives one a coordinate. Those are
+/// computed where the fit seems settled: it is, if they agree.
+pub(crate) fn polish<M: ExtensibleModel>(
+    model: &M,
+    start: &Fit,
+    records: &[usize],
+    known: Option<Jacobian>,
+    rounds: usize,
+    share: f64,
+) -> Option<(Fit, Jacobian)> {
+    let mut best = start.clone();
+    let mut predictor = model.predictor(&best.point)?;
+    let count = best.point.nuisance.len() + best.point.effect_coordinates();
+    let at = |predictor: &M::Predictor, fit: &Fit| {
+        let columns = columns(model, predictor, fit, records, 0..count)?;
+        Some(Jacobian::of(columns))
+    };
+    let mut jacobian = match known {
+        Some(known) => known,
+        None => at(&predictor, &best)?,
+    };
+    let mut is_fresh = false;
+    for _ in 0..rounds {
+        let mut held = Held::of(model, &best);
+        let mut expected = 0.0;
+        for _ in 0..STEPS {
+            let mut learned = Vec::new();
+            let stepped = held.step(model, &predictor, records, &jacobian, |step, change| {
+                learned.push((step.clone(), change.to_vec()));
+            })?;
+            for (step, change) in &learned {
+                jacobian.learn(step, change);
+            }
+            expected += stepped.gained.max(0.0);
+            if stepped.gained < STILL || stepped.expected < STILL {
+                break;
+            }
+        }
+        let excess = (squares(&best.residuals) - best.residuals.len() as f64).max(0.0);
+        let enough = 0.1 + share * excess;
+        let next = evaluated(model, &held.fit.point, records);
+        // Near the optimum the gain's own dependence on the point can outweigh the step: what was
+        // gained with the gain held counts.
+        let better =
+            next.filter(|(next, _)| next.cost < best.cost || expected < WITHIN_GAINS_REACH);
+        let is_settled = match better {
+            Some((next, own)) => {
+                let gained = (best.cost - next.cost).abs().max(expected);
+                (best, predictor) = (next, own);
+                gained < enough
+            }
+            None => true,
+        };
+        if is_settled && is_fresh {
+            break;
+        }
+        is_fresh = is_settled;
+        if is_settled {
+            jacobian = at(&predictor, &best)?;
+        }
+    }
+    Some((best, jacobian))
+}

@@ -1,0 +1,579 @@
+//! Least squares for models whose errors are those of a simulation.
+//!
+//! Minimised is `N ln Σe² + priors`: the scale of the errors is part of the fit, so that it settles
+//! together with the fit, and the priors count little against `N` samples (Levenberg 1944,
+//! Marquardt 1963; the profile of the scale as in Seber and Wild, Nonlinear Regression, 1989,
+//! section 2.2). What is known of a nominal parameter keeps directions that the data do not see
+//! from running away; it does not hold back what they do see.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::model::{Candidate, Point, Scale};
+use super::resampling::correlation_time;
+
+/// A prior counts as if it were this many times as wide as stated.
+pub const WEAK: f64 = 10.0;
+/// Steps of difference quotients, in internal units: nominal parameters, sizes of effects, and what is
+/// counted by its logarithm, of which a period may repeat a hundred times in a record.
+const DIFFERENCE: (f64, f64, f64) = (4e-3, 1e-3, 1e-4);
+/// A nominal parameter moves at most by this many of its stated standard deviations in a step.
+const LONGEST_STEP: f64 = 6.0;
+/// Gain in twice the logarithm of the likelihood below which a fit has settled.
+const STILL: f64 = 0.3;
+/// Runs of neighbouring samples whose scatter tells standard errors.
+const RUNS: usize = 24;
+
+/// A model that simulates records which consist of blocks (a file each); errors are in the output's
+/// unit.
+pub trait SimulatedModel: Sync {
+    /// Number of coordinates that do not belong to an effect: nominal parameters and what differs
+    /// from file to file.
+    fn nuisance(&self) -> usize;
+
+    /// The catalogue.
+    fn candidates(&self) -> &[Candidate];
+
+    /// Number of blocks.
+    fn blocks(&self) -> usize;
+
+    /// The only block that nuisance coordinate `i` acts on, if it is one.
+    fn block_of(&self, i: usize) -> Option<usize>;
+
+    /// Whether a fit to record `fitted` tells nuisance coordinate `i` of a block for `tested` as well.
+    fn tells(&self, fitted: usize, i: usize, _tested: usize) -> bool {
+        self.block_of(i)
+            .is_none_or(|block| self.samples(fitted, block) > 0)
+    }
+
+    /// Number of samples of `block` in `record`.
+    fn samples(&self, record: usize, block: usize) -> usize;
+
+    /// Errors at `point` on the samples of `block` in `record`.
+    fn errors(&self, point: &Point, record: usize, block: usize) -> Vec<f64>;
+
+    /// The first `count` of them.
+    fn first_errors(&self, point: &Point, record: usize, block: usize, count: usize) -> Vec<f64> {
+        let mut errors = self.errors(point, record, block);
+        errors.truncate(count);
+        errors
+    }
+
+    /// The two records that are the halves of `record`.
+    fn folds(&self, record: usize) -> [usize; 2];
+
+    /// A record that stands for `record` where many candidates are looked at.
+    fn screen(&self, record: usize) -> usize;
+
+    /// Whether a simulation costs so little that more may be tried.
+    fn is_cheap(&self) -> bool {
+        true
+    }
+
+    /// How much wider than stated the priors of the nominal parameters count.
+    fn prior_width(&self) -> f64 {
+        WEAK
+    }
+
+    /// How many times the squared error of the effect that was taken a rival of it leaves at most; more
+    /// than little where even a right model leaves errors of its own.
+    fn rivals_leave(&self) -> f64 {
+        1.5
+    }
+
+    /// The same model with its nominal parameters held near what was stated.
+    #[must_use]
+    fn held(&self) -> Self
+    where
+        Self: Sized;
+
+    /// The name of a record.
+    fn record_name(&self, record: usize) -> &str;
+
+    /// Further values (SI) from which fits of a candidate begin, as the errors that `base` leaves
+    /// on `record` suggest them.
+    fn starts(&self, _base: &Point, _record: usize) -> Vec<(usize, Vec<f64>)> {
+        Vec::new()
+    }
+
+    /// Whole models with one effect at most from which fits to `record` begin as well, where `base` loses the
+    /// motion.
+    fn begun(&self, _base: &Point, _record: usize) -> Vec<Point> {
+        Vec::new()
+    }
+}
+
+/// Errors on all blocks of `record`, one after another.
+pub fn all_errors<M: SimulatedModel>(model: &M, point: &Point, record: usize) -> Vec<f64> {
+    (0..model.blocks())
+        .filter(|&block| model.samples(record, block) > 0)
+        .flat_map(|block| model.errors(point, record, block))
+        .collect()
+}
+
+/// A model at a point with its errors on a record.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// Where.
+    pub point: Point,
+    /// Errors, the blocks after one another.
+    pub errors: Vec<f64>,
+    /// `N ln Σe²` and priors.
+    pub cost: f64,
+}
+
+/// Derivatives of the errors by the first coordinates of a point.
+pub struct Columns {
+    columns: Vec<Vec<f64>>,
+}
+
+pub(crate) fn squares(errors: &[f64]) -> f64 {
+    errors.iter().map(|e| e * e).sum()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+fn prior<M: SimulatedModel>(model: &M, point: &Point) -> f64 {
+    let nuisance = point.nuisance.iter().enumerate();
+    let nuisance: f64 = nuisance.map(|(i, p)| (p / width(model, i)).powi(2)).sum();
+    let shapes = point.prior_rows(model.candidates());
+    nuisance
+        + shapes
+            .iter()
+            .map(|(_, off, spread)| (off / spread).powi(2))
+            .sum::<f64>()
+}
+
+/// Width of the prior of a nuisance coordinate; what belongs to a file is as free as ever.
+fn width<M: SimulatedModel>(model: &M, i: usize) -> f64 {
+    if model.block_of(i).is_some() {
+        WEAK
+    } else {
+        model.prior_width()
+    }
+}
+
+/// Errors and cost at `point`; none where they are not finite.
+pub fn solution<M: SimulatedModel>(model: &M, point: &Point, record: usize) -> Option<Solution> {
+    let errors = all_errors(model, point, record);
+    let sum = squares(&errors);
+    let cost = errors.len() as f64 * sum.max(f64::MIN_POSITIVE).ln() + prior(model, point);
+    (sum.is_finite() && cost.is_finite()).then(|| Solution {
+        point: point.clone(),
+        errors,
+        cost,
+    })
+}
+
+fn coordinates(point: &Point) -> usize {
+    point.nuisance.len() + point.effect_coordinates()
+}
+
+/// The derivative by one coordinate, zero where nothing depends on it; none where it is not finite.
+fn column<M: SimulatedModel>(
+    model: &M,
+    at: &Solution,
+    record: usize,
+    coordinate: usize,
+    central: bool,
+) -> Option<Vec<f64>> {
+    let is_nuisance = coordinate < at.point.nuisance.len();
+    let size = if is_nuisance {
+        DIFFERENCE.0
+    } else if is_logarithmic(&at.point, coordinate, model.candidates()) {
+        DIFFERENCE.2
+    } else {
+        DIFFERENCE.1
+    };
+    let only = is_nuisance.then(|| model.block_of(coordinate)).flatten();
+    if only.is_some_and(|block| model.samples(record, block) == 0) {
+        return Some(vec![0.0; at.errors.len()]);
+    }
+    let moved = |size: f64| {
+        let mut step = vec![0.0; coordinates(&at.point)];
+        step[coordinate] = size;
+        let moved = at.point.moved(&step, model.candidates());
+        (moved != at.point).then_some(moved)
+    };
+    let errors = |point: &Point| match only {
+        None => all_errors(model, point, record),
+        Some(only) => {
+            let before: usize = (0..only).map(|b| model.samples(record, b)).sum();
+            let mut errors = at.errors.clone();
+            let own = model.errors(point, record, only);
+            errors[before..before + own.len()].copy_from_slice(&own);
+            errors
+        }
+    };
+    let (up, down) = (moved(size), moved(-size));
+    let (mut column, other, width) = match (&up, &down) {
+        (Some(up), Some(down)) if central => (errors(up), errors(down), 2.0 * size),
+        (Some(up), _) => (errors(up), at.errors.clone(), size),
+        (None, Some(down)) => (at.errors.clone(), errors(down), size),
+        (None, None) => return Some(vec![0.0; at.errors.len()]),
+    };
+    for (c, o) in column.iter_mut().zip(&other) {
+        *c = (*c - o) / width;
+    }
+    column.iter().all(|c| c.is_finite()).then_some(column)
+}
+
+fn is_logarithmic(point: &Point, coordinate: usize, candidates: &[Candidate]) -> bool {
+    let mut scales = point
+        .effects
+        .iter()
+        .flat_map(|(i, _)| candidates[*i].parameters.iter().map(|p| p.scale));
+    scales.nth(coordinate - point.nuisance.len()) == Some(Scale::Logarithmic)
+}
+
+impl Columns {
+    /// Derivatives by all coordinates of `at`.
+    pub fn at<M: SimulatedModel>(model: &M, at: &Solution, record: usize) -> Option<Self> {
+        Self::of(model, at, record, 0, false)
+    }
+
+    fn of<M: SimulatedModel>(
+        model: &M,
+        at: &Solution,
+        record: usize,
+        first: usize,
+        central: bool,
+    ) -> Option<Self> {
+        let all = first..coordinates(&at.point);
+        let columns = all.map(|i| column(model, at, record, i, central));
+        Some(Self {
+            columns: columns.collect::<Option<_>>()?,
+        })
+    }
+}
+
+/// What a fit may move.
+pub enum Free<'a> {
+    /// Everything.
+    All,
+    /// Everything; the derivatives by the first coordinates are these throughout.
+    Frozen(&'a Columns),
+    /// Coordinates for which this is true.
+    Chosen(&'a dyn Fn(usize) -> bool),
+}
+
+/// Fits `start` to `record` in at most `iterations` steps.
+pub fn least_squares<M: SimulatedModel>(
+    model: &M,
+    start: &Point,
+    record: usize,
+    free: &Free<'_>,
+    iterations: usize,
+) -> Option<Solution> {
+    let mut best = solution(model, start, record)?;
+    let count = coordinates(start);
+    let n = best.errors.len() as f64;
+    let is_free = |i: usize| match free {
+        Free::All | Free::Frozen(_) => true,
+        Free::Chosen(chosen) => chosen(i),
+    };
+    let held = match free {
+        Free::Frozen(columns) => columns.columns.as_slice(),
+        _ => &[],
+    };
+    let mut damping = 1e-4;
+    for _ in 0..iterations {
+        let variance = squares(&best.errors) / n;
+        if variance <= f64::MIN_POSITIVE {
+            break;
+        }
+        let fresh: Vec<Vec<f64>> = (held.len()..count)
+            .map(|i| {
+                if is_free(i) {
+                    column(model, &best, record, i, false)
+                } else {
+                    Some(vec![0.0; best.errors.len()])
+                }
+            })
+            .collect::<Option<_>>()?;
+        let columns: Vec<&Vec<f64>> = held.iter().chain(&fresh).collect();
+        let (hessian, gradient) = normal(model, &best.point, &columns, &best.errors, variance);
+        let gained = {
+            let mut gained = 0.0;
+            let mut active: Vec<bool> = (0..count).map(|i| hessian[(i, i)] > 0.0).collect();
+            for _ in 0..8 {
+                let Some(step) = step(&hessian, &gradient, &active, damping) else {
+                    damping = (damping * 10.0).max(1e-6);
+                    continue;
+                };
+                let step = shortened(step, start.nuisance.len());
+                let moved = best.point.moved(&step, model.candidates());
+                // What stands at a bound and wants beyond leaves the step.
+                let stuck: Vec<usize> = stuck(&best.point, &moved, &step);
+                if !stuck.is_empty() && stuck.iter().any(|&i| active[i]) {
+                    stuck.iter().for_each(|&i| active[i] = false);
+                    continue;
+                }
+                if let Some(next) = solution(model, &moved, record)
+                    && next.cost < best.cost
+                {
+                    gained = best.cost - next.cost;
+                    best = next;
+                    damping = (damping * 0.1).max(1e-9);
+                    break;
+                }
+                damping = (damping * 10.0).max(1e-6);
+            }
+            gained
+        };
+        if gained < STILL {
+            break;
+        }
+    }
+    Some(best)
+}
+
+/// Normal equations; rows of coordinates that nothing depends on are zero.
+fn normal<M: SimulatedModel>(
+    model: &M,
+    point: &Point,
+    columns: &[&Vec<f64>],
+    errors: &[f64],
+    variance: f64,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let count = columns.len();
+    let mut hessian = DMatrix::zeros(count, count);
+    let mut gradient = DVector::zeros(count);
+    for i in 0..count {
+        gradient[i] = -dot(columns[i], errors) / variance;
+        for j in 0..=i {
+            let value = dot(columns[i], columns[j]) / variance;
+            hessian[(i, j)] = value;
+            hessian[(j, i)] = value;
+        }
+    }
+    let sees = |hessian: &DMatrix<f64>, i: usize| hessian[(i, i)] > 0.0;
+    for (i, p) in point.nuisance.iter().enumerate() {
+        if sees(&hessian, i) {
+            let weight = width(model, i).powi(-2);
+            hessian[(i, i)] += weight;
+            gradient[i] -= p * weight;
+        }
+    }
+    for (place, off, spread) in point.prior_rows(model.candidates()) {
+        let i = point.nuisance.len() + place;
+        hessian[(i, i)] += spread.powi(-2);
+        gradient[i] -= off * spread.powi(-2);
+    }
+    (hessian, gradient)
+}
+
+fn step(
+    hessian: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    active: &[bool],
+    damping: f64,
+) -> Option<Vec<f64>> {
+    let places: Vec<usize> = (0..active.len()).filter(|&i| active[i]).collect();
+    let reduced = DMatrix::from_fn(places.len(), places.len(), |i, j| {
+        let value = hessian[(places[i], places[j])];
+        if i == j {
+            value * (1.0 + damping)
+        } else {
+            value
+        }
+    });
+    let right = DVector::from_fn(places.len(), |i, _| gradient[places[i]]);
+    let solved = reduced.cholesky()?.solve(&right);
+    let mut step = vec![0.0; active.len()];
+    for (place, value) in places.iter().zip(solved.iter()) {
+        step[*place] = *value;
+    }
+    step.iter().all(|s| s.is_finite()).then_some(step)
+}
+
+fn shortened(mut step: Vec<f64>, nuisance: usize) -> Vec<f64> {
+    let longest = step[..nuisance].iter().fold(0.0f64, |m, s| m.max(s.abs()));
+    if longest > LONGEST_STEP {
+        step.iter_mut().for_each(|s| *s *= LONGEST_STEP / longest);
+    }
+    step
+}
+
+/// Effect coordinates that a step would move and a bound keeps in place.
+fn stuck(before: &Point, after: &Point, step: &[f64]) -> Vec<usize> {
+    let flat = |point: &Point| -> Vec<f64> {
+        let effects = point.effects.iter().flat_map(|(_, q)| q.iter().copied());
+        point.nuisance.iter().copied().chain(effects).collect()
+    };
+    let (before, after) = (flat(before), flat(after));
+    (0..step.len())
+        .filter(|&i| step[i] != 0.0 && before[i] == after[i])
+        .collect()
+}
+
+/// One standard deviation of each coordinate at `at`: the larger of what correlated errors leave
+/// (correlated samples counted once) and of the scatter of the gradient between runs of the record
+/// (Newey and West, Econometrica 55, 1987, with runs for lags). Not a number where the data do not
+/// see a coordinate.
+pub fn deviations<M: SimulatedModel>(model: &M, at: &Solution, record: usize) -> Option<Vec<f64>> {
+    let columns = Columns::of(model, at, record, 0, true)?.columns;
+    let all: Vec<&Vec<f64>> = columns.iter().collect();
+    let n = at.errors.len();
+    let variance = (squares(&at.errors) / n as f64).max(f64::MIN_POSITIVE);
+    let (hessian, _) = normal(model, &at.point, &all, &at.errors, variance);
+    let places: Vec<usize> = (0..all.len()).filter(|&i| hessian[(i, i)] > 0.0).collect();
+    let count = places.len();
+    let reduced = DMatrix::from_fn(count, count, |i, j| hessian[(places[i], places[j])]);
+    let inverse = reduced.try_inverse()?;
+    let mut scatter = DMatrix::zeros(count, count);
+    for run in 0..RUNS {
+        let (from, to) = (run * n / RUNS, (run + 1) * n / RUNS);
+        let gradient = DVector::from_fn(count, |i, _| {
+            dot(&all[places[i]][from..to], &at.errors[from..to]) / variance
+        });
+        scatter += &gradient * gradient.transpose();
+    }
+    let scattered = &inverse * scatter * &inverse;
+    let correlated = correlation_time(&at.errors);
+    let mut deviations = vec![f64::NAN; all.len()];
+    for (i, place) in places.iter().enumerate() {
+        let variance = (inverse[(i, i)] * correlated).max(scattered[(i, i)]);
+        deviations[*place] = variance.max(0.0).sqrt();
+    }
+    Some(deviations)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{EffectParameter, Role};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// `y = a e^{-b t} + z_s`, a zero for each of two blocks; the effect adds `c t`.
+    struct Decay {
+        candidates: Vec<Candidate>,
+        measured: [Vec<f64>; 2],
+    }
+
+    const TIMES: usize = 400;
+
+    impl Decay {
+        fn new(true_values: [f64; 5], noise: f64) -> Self {
+            let mut random = ChaCha8Rng::seed_from_u64(3);
+            let [a, b, c, zero, other] = true_values;
+            let mut block = |zero: f64| -> Vec<f64> {
+                (0..TIMES)
+                    .map(|k| {
+                        let t = k as f64 / TIMES as f64;
+                        a * (-b * t).exp() + c * t + zero + noise * random.random_range(-1.0..1.0)
+                    })
+                    .collect()
+            };
+            let measured = [block(zero), block(other)];
+            let drift = EffectParameter {
+                name: "slope",
+                unit: "1",
+                scale: Scale::Linear(0.1),
+                role: Role::Size { weak: 0.1 },
+                bounds: (0.0, 5.0),
+            };
+            Self {
+                candidates: vec![Candidate {
+                    effect: "drift",
+                    parameters: vec![drift],
+                    starts: vec![vec![0.5]],
+                    look_alikes: &[],
+                    tolerance: 1.0,
+                    contains: None,
+                }],
+                measured,
+            }
+        }
+    }
+
+    impl SimulatedModel for Decay {
+        fn nuisance(&self) -> usize {
+            4
+        }
+        fn candidates(&self) -> &[Candidate] {
+            &self.candidates
+        }
+        fn blocks(&self) -> usize {
+            2
+        }
+        fn block_of(&self, i: usize) -> Option<usize> {
+            i.checked_sub(2)
+        }
+        fn samples(&self, _: usize, _: usize) -> usize {
+            TIMES
+        }
+        fn errors(&self, point: &Point, _: usize, block: usize) -> Vec<f64> {
+            // Stated: a = 1 ± 0.01, b = 1 ± 0.01, zeros 0 ± 0.01.
+            let p = &point.nuisance;
+            let (a, b) = (1.0 + 0.01 * p[0], 1.0 + 0.01 * p[1]);
+            let slope = point.effects.first().map_or(0.0, |(_, q)| 0.1 * q[0]);
+            let at = |k: usize| {
+                let t = k as f64 / TIMES as f64;
+                a * (-b * t).exp() + slope * t + 0.01 * p[2 + block]
+            };
+            let measured = self.measured[block].iter().enumerate();
+            measured.map(|(k, y)| y - at(k)).collect()
+        }
+        fn folds(&self, _: usize) -> [usize; 2] {
+            [0, 0]
+        }
+        fn screen(&self, record: usize) -> usize {
+            record
+        }
+        fn held(&self) -> Self {
+            Self {
+                candidates: self.candidates.clone(),
+                measured: self.measured.clone(),
+            }
+        }
+        fn record_name(&self, _: usize) -> &'static str {
+            "decay"
+        }
+    }
+
+    fn origin() -> Point {
+        Point {
+            nuisance: vec![0.0; 4],
+            effects: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn parameters_far_outside_what_is_stated_are_found() {
+        // A hundred and two hundred stated deviations away.
+        let model = Decay::new([2.0, 3.0, 0.0, 0.3, -0.2], 0.01);
+        let found = least_squares(&model, &origin(), 0, &Free::All, 200).unwrap();
+        let p = &found.point.nuisance;
+        assert!((p[0] - 100.0).abs() < 1.0, "{p:?}");
+        assert!((p[1] - 200.0).abs() < 2.0, "{p:?}");
+        assert!((p[2] - 30.0).abs() < 0.5 && (p[3] + 20.0).abs() < 0.5);
+        let errors = deviations(&model, &found, 0).unwrap();
+        let off = (p[0] - 100.0) / errors[0];
+        assert!(errors[0] < 0.5 && off.abs() < 3.5, "{off} {errors:?}");
+    }
+
+    #[test]
+    fn what_stands_at_its_bound_does_not_hold_the_rest() {
+        let model = Decay::new([1.5, 1.2, -1.0, 0.0, 0.0], 0.01);
+        let mut start = origin();
+        start.effects.push((0, vec![0.0]));
+        let found = least_squares(&model, &start, 0, &Free::All, 200).unwrap();
+        let alone = least_squares(&model, &origin(), 0, &Free::All, 200).unwrap();
+        assert_eq!(found.point.effects[0].1, [0.0]);
+        assert!((squares(&found.errors) / squares(&alone.errors) - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_block_by_itself_leaves_the_rest_alone() {
+        let model = Decay::new([1.0, 1.0, 0.0, 0.0, -0.2], 0.001);
+        let second = |i: usize| model.block_of(i) == Some(1);
+        let free = Free::Chosen(&second);
+        let found = least_squares(&model, &origin(), 0, &free, 20).unwrap();
+        let p = &found.point.nuisance;
+        assert_eq!(&p[..3], &[0.0; 3]);
+        assert!((p[3] + 20.0).abs() < 0.1, "{p:?}");
+    }
+}

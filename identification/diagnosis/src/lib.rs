@@ -1,0 +1,29 @@
+//! The search for effects that a model lacks, independent of any rig.
+
+mod ablation;
+pub mod adequacy;
+mod cross_validation;
+mod fit;
+mod least_squares;
+mod likelihood;
+mod model;
+mod opening;
+mod progress;
+pub mod resampling;
+mod search;
+mod verdict;
+
+pub use adequacy::{Part, Place, Test};
+pub use cross_validation::{Rival, Selected, Simulated, completed, nominal, refit, select};
+pub use fit::{Fit, Jacobian, evaluate};
+pub use least_squares::WEAK;
+pub use least_squares::{
+    Columns, Free, SimulatedModel, Solution, all_errors, deviations, least_squares, solution,
+};
+pub use likelihood::{FLOOR, Hypothesis, PRICE_OF_A_PARAMETER, PenalisedLikelihood};
+pub use model::{Candidate, EffectParameter, ExtensibleModel, Lesson, Point, Role, Scale};
+pub use progress::{Deadline, Observer, Progress, Step};
+pub use search::{Found, Selection, search};
+pub use verdict::{
+    Judgement, NamedEffect, ParameterEstimate, SUREST, Verdict, WeighedModel, estimates, judge,
+};

@@ -1,0 +1,464 @@
+//! From a search to a verdict: is the best model adequate, and does anything rival it?
+
+use std::collections::BTreeSet;
+
+use super::ablation::{self, Settled, ablated, settled, settled_from};
+use super::adequacy::{LARGEST_DEVIATE, Test, left_over};
+use super::fit::{Fit, Jacobian, evaluate, fit as refit, polish};
+use super::likelihood::{
+    FLOOR, Hypothesis, MOST_EFFECTS, NEAR_NOISE, NEARLY_NOISE, PenalisedLikelihood, RIVAL_WITHIN,
+    ROUNDS, SETTLED, matters, named,
+};
+use super::model::{Candidate, ExtensibleModel, Point, Role};
+use super::progress::{Observer, Progress, Step};
+use serde::{Deserialize, Serialize};
+
+/// No name is surer than hidden effects in worlds of another form have shown, of which too few were judged for
+/// more (docs/diagnosis.md). In those of the engine's own form 233 of 234 names were right.
+pub const SUREST: f64 = 0.95;
+/// Extensions that are fitted under noises of their own, in the first round; one less in each further.
+const PROPOSED: usize = 3;
+/// Share of what the best of them gains that they gain at least.
+const NEAR: f64 = 0.5;
+/// Models that are reported with their weights at most.
+const CANDIDATES: usize = 5;
+
+/// What came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The nominal model explains the records within its uncertainty.
+    Adequate,
+    /// The effects are these.
+    Named,
+    /// The effects are these, or one of the alternatives.
+    Ambiguous,
+    /// What is there is an effect of the catalogue, weaker than what matters.
+    #[serde(rename = "too_small")]
+    TooSmall,
+    /// Something is there that the catalogue does not hold.
+    Unexplained,
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Adequate => "adequate",
+            Self::Named => "named",
+            Self::Ambiguous => "ambiguous",
+            Self::TooSmall => "too small",
+            Self::Unexplained => "unexplained",
+        })
+    }
+}
+
+/// An estimated parameter, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterEstimate {
+    /// Its name in the catalogue.
+    pub name: String,
+    /// The estimate.
+    pub value: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// One standard deviation.
+    pub standard_error: f64,
+    /// True for a detail of the effect's form rather than its size.
+    pub is_shape: bool,
+}
+
+/// An effect with its parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedEffect {
+    /// Its name in the catalogue.
+    pub effect: &'static str,
+    /// Its parameters.
+    pub parameters: Vec<ParameterEstimate>,
+    /// Posterior share against the models tried in its place, 0 to 1, no surer than the diagnosis has
+    /// been shown to be.
+    pub confidence: f64,
+}
+
+/// A model with effects, weighed against the others that were fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WeighedModel {
+    /// Its effects.
+    pub effects: Vec<NamedEffect>,
+    /// Posterior share among the models weighed, 0 to 1.
+    pub weight: f64,
+    /// Share of the nominal model's excess error that it explains.
+    pub explains: f64,
+}
+
+/// The judged search.
+pub struct Judgement {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Effects of the best model (also under `Unexplained`, where they only help).
+    pub effects: Vec<NamedEffect>,
+    /// Rival sets of effects.
+    pub alternatives: Vec<Vec<&'static str>>,
+    /// Points of the rivals, in the order of `alternatives`.
+    pub rival_points: Vec<Point>,
+    /// Standard errors of the nominal parameters, in their stated standard deviations.
+    pub nuisance_errors: Vec<f64>,
+    /// The best model, fitted to the fitting records.
+    pub best: Fit,
+    /// The best model fitted to all records, the held-out ones too, where it is adequate.
+    pub all: Fit,
+    /// Tests of the residual, strongest first.
+    pub tests: Vec<Test>,
+    /// Share of the nominal model's excess error that the best model explains.
+    pub share_explained: f64,
+    /// All models that were weighed, the best first.
+    pub candidates: Vec<WeighedModel>,
+    /// The nominal model, refitted under the same noises.
+    pub nominal: Point,
+    /// Of every effect of [`Self::best`]: the model without it, refitted under the same noises.
+    pub without: Vec<Option<Point>>,
+    /// And by how many standard deviations the effect predicts the held-out records better than that.
+    pub unseen_gains: Vec<Option<f64>>,
+}
+
+/// Estimates of the effects at `point`, with `deviations` of all coordinates, nuisance first; not a
+/// number where they are unknown.
+pub fn estimates(candidates: &[Candidate], point: &Point, deviations: &[f64]) -> Vec<NamedEffect> {
+    let mut deviations = deviations.iter().skip(point.nuisance.len());
+    point
+        .effects
+        .iter()
+        .map(|(i, internal)| {
+            let candidate = &candidates[*i];
+            let pairs = candidate.parameters.iter().zip(internal);
+            NamedEffect {
+                effect: candidate.effect,
+                parameters: pairs
+                    .map(|(parameter, &q)| ParameterEstimate {
+                        name: parameter.name.into(),
+                        value: parameter.scale.to_value(q),
+                        unit: parameter.unit,
+                        standard_error: deviations.next().copied().unwrap_or(f64::NAN)
+                            * parameter.scale.slope(q).abs(),
+                        is_shape: matches!(parameter.role, Role::Shape { .. }),
+                    })
+                    .collect(),
+                confidence: 1.0,
+            }
+        })
+        .collect()
+}
+
+fn names<M: ExtensibleModel>(model: &M, hypothesis: &Hypothesis) -> Vec<&'static str> {
+    let effects = hypothesis.effects();
+    effects
+        .iter()
+        .map(|&i| model.candidates()[i].effect)
+        .collect()
+}
+
+/// Searches on the records `fitted`, judges on all of them and `held_out`. Every model is fitted under the
+/// noises that its own residuals show, and `model` has those of the best one afterwards.
+///
+/// A round proposes effects under the noises of the model found so far. Where those are louder than is
+/// usual, they may be the missing effect: it is looked for under the noises of the quiet records as well, or
+/// under the assumed ones. What was proposed is fitted under noises of its own and kept if its score is
+/// better. In the end every effect that the noises can take the place of goes.
+///
+/// Effects are not named where the observer's deadline cut the search short.
+pub fn judge<M: ExtensibleModel + Clone>(
+    model: &mut M,
+    fitted: &[usize],
+    held_out: &[usize],
+    observer: Observer<'_>,
+) -> Option<Judgement> {
+    let at_rest = learned_at_rest(model, &model.quiet_records(fitted));
+    let rounds = Rounds {
+        assumed: &*model,
+        quiet: at_rest.as_ref().unwrap_or(&*model),
+        records: fitted,
+        observer,
+    };
+    let origin = Point {
+        nuisance: vec![0.0; model.nuisance()],
+        effects: Vec::new(),
+    };
+    let nominal = rounds.settled(rounds.quiet, &origin)?;
+    let (mut best, others) = rounds.search(nominal, FLOOR);
+    let mut judgement = weigh(&best, &others, fitted, held_out, observer)?;
+    let is_near = best.model.is_usual() && best.hypothesis.mean_square() < NEAR_NOISE;
+    if judgement.verdict == Verdict::Unexplained && is_near && !observer.is_over() {
+        // Too weak to matter, but perhaps all that is left.
+        let (weak, rivals) = rounds.search(best.clone(), 0.0);
+        let again = weigh(&weak, &rivals, fitted, held_out, observer)?;
+        if matches!(again.verdict, Verdict::Named | Verdict::Ambiguous) {
+            let strong = matters(model.candidates(), &again.best.point, FLOOR);
+            judgement = Judgement {
+                verdict: if strong {
+                    again.verdict
+                } else {
+                    Verdict::TooSmall
+                },
+                ..again
+            };
+            best = weak;
+        }
+    }
+    *model = best.model;
+    if observer.has_cut() && judgement.verdict != Verdict::Adequate {
+        judgement.verdict = Verdict::Unexplained;
+    }
+    Some(judgement)
+}
+
+/// A search in rounds.
+struct Rounds<'a, M> {
+    /// The model with the noises that were stated.
+    assumed: &'a M,
+    /// With those of the quiet records.
+    quiet: &'a M,
+    records: &'a [usize],
+    observer: Observer<'a>,
+}
+
+impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
+    fn settled(&self, near: &M, start: &Point) -> Option<Settled<M>> {
+        let found = settled_from(self.assumed, near, start, self.records, self.observer)?;
+        let selection = PenalisedLikelihood::of(&found.model, self.records, self.observer);
+        selection.tell(Step::Refitted, &found.hypothesis);
+        Some(found)
+    }
+
+    /// From `start` as long as an effect pays, then without what does not; and the rivals of the last round.
+    fn search(&self, start: Settled<M>, floor: f64) -> (Settled<M>, Vec<Hypothesis>) {
+        let mut current = start;
+        let mut others: Vec<Settled<M>> = Vec::new();
+        while current.hypothesis.effects().len() < MOST_EFFECTS && !self.observer.is_over() {
+            let mut tried: Vec<Settled<M>> = self
+                .proposals(&current, floor)
+                .iter()
+                .filter_map(|point| {
+                    self.observer.tell(|| {
+                        let what = named(self.assumed.candidates(), point);
+                        Progress::Trying(format!("{what} under its own noises"))
+                    });
+                    self.settled(&current.model, point)
+                })
+                .filter(|own| {
+                    let point = &own.hypothesis.fit.point;
+                    matters(self.assumed.candidates(), point, floor)
+                })
+                .collect();
+            tried.sort_by(|a, b| a.hypothesis.score.total_cmp(&b.hypothesis.score));
+            let pays = tried
+                .first()
+                .is_some_and(|first| first.hypothesis.score < current.hypothesis.score);
+            if !pays {
+                if others.is_empty() {
+                    others = tried;
+                }
+                break;
+            }
+            current = tried.remove(0);
+            others = tried;
+        }
+        let best = ablated(self.assumed, current, self.records, self.observer);
+        let others = others.into_iter().map(|own| own.hypothesis);
+        (best, others.collect())
+    }
+
+    /// Models with one more effect than `current`, the most promising first.
+    fn proposals(&self, current: &Settled<M>, floor: f64) -> Vec<Point> {
+        let under = |model: &M, current: &Hypothesis| -> Vec<Point> {
+            let mut selection = PenalisedLikelihood::of(model, self.records, self.observer);
+            selection.floor = floor;
+            let mut level = selection.extensions(current);
+            let gains: Vec<f64> = level.iter().map(|own| current.score - own.score).collect();
+            let best = gains.first().copied().unwrap_or_default();
+            level.truncate(gains.iter().filter(|gain| **gain > NEAR * best).count());
+            let most = PROPOSED.saturating_sub(current.effects().len()).max(1);
+            let level = level.into_iter().map(|own| own.fit.point);
+            level.take(most).collect()
+        };
+        let mut all = Vec::new();
+        if !current.model.is_usual() || current.hypothesis.mean_square() > NEAR_NOISE {
+            let selection = PenalisedLikelihood::of(self.quiet, self.records, self.observer);
+            let start = evaluate(self.quiet, &current.hypothesis.fit.point, self.records);
+            if let Some(own) = start.and_then(|start| selection.hypothesis(&start)) {
+                all = under(self.quiet, &own);
+            }
+        }
+        let set =
+            |point: &Point| -> BTreeSet<usize> { point.effects.iter().map(|(i, _)| *i).collect() };
+        if !all.is_empty() && !current.has_learned {
+            return all;
+        }
+        for point in under(&current.model, &current.hypothesis) {
+            if all.iter().all(|known| set(known) != set(&point)) {
+                all.push(point);
+            }
+        }
+        all
+    }
+}
+
+/// The model with the noises that the `quiet` records show under the nominal one, where with them the residual
+/// there is nearly noise. A missing effect is then visible only at a higher level, and is not part of the
+/// noises.
+fn learned_at_rest<M: ExtensibleModel + Clone>(model: &M, quiet: &[usize]) -> Option<M> {
+    if quiet.is_empty() {
+        return None;
+    }
+    let origin = Point {
+        nuisance: vec![0.0; model.nuisance()],
+        effects: Vec::new(),
+    };
+    let found = settled(model, &origin, quiet, Observer::none())?;
+    let tests = left_over(&found.model, &found.hypothesis.fit, quiet);
+    let is_nearly_noise = tests.iter().all(|test| test.deviate < NEARLY_NOISE);
+    (is_nearly_noise && found.model.is_usual()).then_some(found.model)
+}
+
+/// Judges the `found` model against its rivals, whose scores are those under their own noises.
+fn weigh<M: ExtensibleModel>(
+    found: &Settled<M>,
+    rivals: &[Hypothesis],
+    fitted: &[usize],
+    held_out: &[usize],
+    observer: Observer<'_>,
+) -> Option<Judgement> {
+    let model = &found.model;
+    let selection = PenalisedLikelihood::of(model, fitted, observer);
+    let nominal = selection.nominal()?;
+    let best = found.hypothesis.clone();
+    let named = !best.fit.point.effects.is_empty();
+    let others = rivals.iter().take(CANDIDATES).filter_map(|rival| {
+        let start = evaluate(model, &rival.fit.point, fitted)?;
+        Some(Hypothesis {
+            score: rival.score,
+            ..selection.hypothesis(&start)?
+        })
+    });
+    let others: Vec<Hypothesis> = others.collect();
+    let nominal_square = nominal.mean_square();
+    let nominal_point = nominal.fit.point.clone();
+    let first = named.then(|| best.clone());
+    let everything: Vec<usize> = fitted.iter().chain(held_out).copied().collect();
+    // The held-out record is predicted with the fitted parameters for the gain; whether noise is
+    // all that is left is asked of a fit to everything, free of the parameters' own errors.
+    let joint = evaluate(model, &best.fit.point, &everything)
+        .and_then(|start| polish(model, &start, &everything, None, ROUNDS, SETTLED))
+        .map(|(fit, jacobian)| {
+            // Directions that only the priors hold are told from others by exact derivatives only.
+            let exact = Jacobian::central(model, &fit, &everything).unwrap_or(jacobian);
+            let settled = refit(model, &fit.point, &everything, &exact, 3);
+            (settled.unwrap_or(fit), exact)
+        });
+    let (joint_fit, joint_jacobian) = match joint {
+        Some((fit, jacobian)) => (fit, Some(jacobian)),
+        None => (best.fit.clone(), None),
+    };
+    let mut tests = left_over(model, &joint_fit, &everything);
+    tests.sort_by(|a, b| b.deviate.total_cmp(&a.deviate));
+    let effects = best.fit.point.effects.iter();
+    let tolerance = effects.fold(1.0f64, |most, (i, _)| {
+        most.max(model.candidates()[*i].tolerance)
+    });
+    let adequate = tests
+        .first()
+        .is_none_or(|worst| worst.deviate < tolerance * LARGEST_DEVIATE);
+
+    let best_names = names(model, &best);
+    let nested = |set: &[&'static str]| {
+        let without = |a: &[&'static str], b: &[&'static str]| -> Vec<&'static str> {
+            a.iter().filter(|name| !b.contains(name)).copied().collect()
+        };
+        let (mine, theirs) = (without(&best_names, set), without(set, &best_names));
+        let [mine, theirs] = [mine.as_slice(), theirs.as_slice()];
+        let contains = |outer: &str, inner: &str| {
+            let mut all = model.candidates().iter();
+            all.any(|c| c.effect == outer && c.contains == Some(inner))
+        };
+        matches!((mine, theirs), ([a], [b]) if contains(a, b) || contains(b, a))
+    };
+    let mut alternatives = Vec::new();
+    let mut rival_points = Vec::new();
+    let mut weight = 1.0;
+    for other in &others {
+        let behind = other.score - best.score;
+        let set = names(model, other);
+        if named && !nested(&set) {
+            weight += (-0.5 * behind).exp();
+            if behind < RIVAL_WITHIN && set.len() == best_names.len() {
+                alternatives.push(set);
+                rival_points.push(other.fit.point.clone());
+            }
+        }
+    }
+    let verdict = match (adequate, named, alternatives.is_empty()) {
+        (false, _, _) => Verdict::Unexplained,
+        (true, false, _) => Verdict::Adequate,
+        (true, true, true) => Verdict::Named,
+        (true, true, false) => Verdict::Ambiguous,
+    };
+    let excess = |square: f64| (square - 1.0).max(0.0);
+    let share_explained = if excess(nominal_square) > 0.0 {
+        1.0 - excess(best.mean_square()) / excess(nominal_square)
+    } else {
+        1.0
+    };
+    // What is told of the effects rests on all records, as long as the model holds on them.
+    let (all, jacobian) = match joint_jacobian.filter(|_| adequate) {
+        Some(jacobian) => (joint_fit, jacobian),
+        None => (best.fit.clone(), best.jacobian),
+    };
+    let refitted = |smaller: Point| -> Option<Point> {
+        let start = evaluate(model, &smaller, fitted)?;
+        let (fit, _) = polish(model, &start, fitted, None, ROUNDS, SETTLED)?;
+        Some(fit.point)
+    };
+    let own = &best.fit.point;
+    let smaller = (0..own.effects.len()).map(|place| refitted(ablation::without(own, place)));
+    let without: Vec<Option<Point>> = smaller.collect();
+    let unseen_gains = without.iter().map(|without| {
+        let without = without.as_ref()?;
+        ablation::unseen_gain(model, own, without, held_out)
+    });
+    let unseen_gains = unseen_gains.collect();
+    let explains = |own: &Hypothesis| {
+        1.0 - excess(own.mean_square()) / excess(nominal_square).max(f64::MIN_POSITIVE)
+    };
+    let lowest = first.as_ref().map_or(0.0, |own| own.score);
+    let weighed = first.iter().chain(&others).take(CANDIDATES);
+    let candidates: Vec<WeighedModel> = weighed
+        .map(|own| {
+            let deviations = own.jacobian.deviations(model, &own.fit).unwrap_or_default();
+            WeighedModel {
+                effects: estimates(model.candidates(), &own.fit.point, &deviations),
+                weight: (-0.5 * (own.score - lowest)).exp() / weight,
+                explains: explains(own),
+            }
+        })
+        .collect();
+    let deviations = jacobian.deviations(model, &all).unwrap_or_default();
+    let mut effects = estimates(model.candidates(), &all.point, &deviations);
+    let mut nuisance_errors = deviations;
+    nuisance_errors.truncate(all.point.nuisance.len());
+    for effect in &mut effects {
+        effect.confidence = SUREST / weight;
+    }
+    Some(Judgement {
+        verdict,
+        effects,
+        alternatives,
+        rival_points,
+        nuisance_errors,
+        best: best.fit,
+        all,
+        tests,
+        share_explained,
+        candidates,
+        without,
+        unseen_gains,
+        nominal: nominal_point,
+    })
+}

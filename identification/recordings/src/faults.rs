@@ -1,0 +1,114 @@
+//! What is wrong with a channel: constant, clipped, stuck.
+
+use std::fmt;
+
+use super::clipping::{cuts_a_peak, step};
+use super::{Recording, is_constant};
+
+/// Something about a recording that its reader should know.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// The recording.
+    pub recording: String,
+    /// What was found, with its place.
+    pub what: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.recording, self.what)
+    }
+}
+
+/// A stretch at the same extreme value this long is a clipped channel.
+const CLIPPED_RUN: usize = 4;
+/// A stretch of one repeated value this long, in a channel that otherwise moves, is a drop-out.
+const STUCK_RUN: usize = 25;
+
+impl Recording {
+    /// Constant, clipped and stuck channels.
+    pub fn faults(&self) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        let mut tell = |what: String| {
+            findings.push(Finding {
+                recording: self.name.clone(),
+                what,
+            });
+        };
+        for (channel, values) in self.channels() {
+            let name = channel.name();
+            if is_constant(values) {
+                tell(format!("`{name}` is constant"));
+                continue;
+            }
+            let (low, high) = values
+                .iter()
+                .fold((f64::MAX, f64::MIN), |(low, high), &value| {
+                    (low.min(value), high.max(value))
+                });
+            let step = step(values);
+            let mut clipped = 0;
+            for extreme in [low, high] {
+                clipped += runs(values, |value| value == extreme)
+                    .iter()
+                    .filter(|run| run.1 - run.0 >= CLIPPED_RUN)
+                    .filter(|run| cuts_a_peak(values, run.0, run.1, step))
+                    .map(|run| run.1 - run.0)
+                    .sum::<usize>();
+            }
+            if clipped > 0 {
+                tell(format!(
+                    "`{name}` is clipped: {clipped} samples are at {low:.4e} or {high:.4e} (SI)"
+                ));
+            }
+            let stuck: Vec<(usize, usize)> = stuck_runs(values)
+                .into_iter()
+                .filter(|run| ![low, high, 0.0].contains(&values[run.0]))
+                .collect();
+            if let Some(&(first, end)) = stuck.first() {
+                tell(format!(
+                    "drop-out in `{name}`: the value repeats for {:.3} s from {:.3} s ({} such \
+                     places)",
+                    (end - first) as f64 * self.period(),
+                    self.time_at(first),
+                    stuck.len()
+                ));
+            }
+        }
+        findings
+    }
+}
+
+/// Stretches `first..end` of values that are so.
+pub(super) fn runs(values: &[f64], is: impl Fn(f64) -> bool) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut first = None;
+    for (at, &value) in values.iter().enumerate() {
+        match (is(value), first) {
+            (true, None) => first = Some(at),
+            (false, Some(start)) => {
+                found.push((start, at));
+                first = None;
+            }
+            _ => {}
+        }
+    }
+    if let Some(start) = first {
+        found.push((start, values.len()));
+    }
+    found
+}
+
+fn stuck_runs(values: &[f64]) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut first = 0;
+    for at in 1..=values.len() {
+        if at == values.len() || values[at] != values[first] {
+            if at - first >= STUCK_RUN {
+                found.push((first, at));
+            }
+            first = at;
+        }
+    }
+    found
+}

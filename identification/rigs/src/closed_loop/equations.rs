@@ -1,0 +1,410 @@
+//! The equations between the channels of a hydraulic rig, whatever its controller and specimen do.
+//!
+//! With the displacement as the truth, `F̂ = F exp(s τ_F)` and so on, and `S` the friction over its
+//! Coulomb force ([`super::friction`]):
+//!
+//! - motion: `â/γ = s² x`;
+//! - table (Eq 2-5 with the specimen's inertia): `F̂ = (m s² + c s + k) x + m_s â_s`;
+//! - actuator (Eq 2-4 with the structure of valve and oil):
+//!   `F̂ = g/(s + p) (W(s) H(s) exp(-s T) u + d) - (K/(s + p) + c_p) s x - F_c S`,
+//!   `W = 1/(s²/w² + 2 D s/w + 1)`, `H` the hold, `d` what the valve's opening differs from its spool by
+//!   ([`super::valve`]).
+//!
+//! Each is linear in the channels, so each holds between the projections on the reference too, and
+//! for the stochastic distortions that friction and a yielding specimen cause.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::bands::{Band, Bands};
+use super::friction::{SHAPE, SealShape, Searched};
+use super::least_squares::Residuals;
+
+/// Channels of an experiment, in the order of [`Bands::new`].
+pub const CHANNELS: usize = 7 + SHAPE;
+/// Valve command.
+pub const COMMAND: usize = 0;
+/// Displacement.
+pub const DISPLACEMENT: usize = 1;
+/// Acceleration.
+pub const ACCELERATION: usize = 2;
+/// Actuator force.
+pub const FORCE: usize = 3;
+/// Friction over its Coulomb force, by the velocity and the present shape.
+pub const SIGN: usize = 4;
+/// Specimen acceleration, zero without one.
+pub const SPECIMEN: usize = 5;
+/// The first of the derivatives of the friction by its shape.
+pub const SLOPES: usize = 6;
+/// What the valve's opening differs from its spool's position by, V.
+pub const OPENING: usize = SLOPES + SHAPE;
+
+/// Parameters of the equations, SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HydraulicRig {
+    /// `2 D/w`, lag of the spool, s.
+    pub spool_lag: f64,
+    /// `1/w²`, its inertia, s².
+    pub spool_inertia: f64,
+    /// `g`, rate of the force under a valve open by one volt, N/(V s).
+    pub force_rate: f64,
+    /// `K`, stiffness of the oil column, N/m.
+    pub oil_stiffness: f64,
+    /// `p`, rate at which leakage empties it, 1/s.
+    pub leakage_rate: f64,
+    /// `c_p`, damping of the piston's seals, N s/m.
+    pub seal_damping: f64,
+    /// `F_c`, their dry friction, N.
+    pub seal_friction: f64,
+    /// `m`, kg.
+    pub mass: f64,
+    /// `c`, N s/m.
+    pub damping: f64,
+    /// `k`, N/m.
+    pub stiffness: f64,
+    /// `m_s`, kg.
+    pub specimen_mass: f64,
+    /// `T`, delay from the command to the force, including that of the displacement sensor, s.
+    pub command_delay: f64,
+    /// `τ_a`, delay of the accelerometers relative to the displacement, s.
+    pub accelerometer_delay: f64,
+    /// `τ_F`, the load cell's, s.
+    pub load_cell_delay: f64,
+    /// `γ`, what the accelerometer shows over `s² x`.
+    pub accelerometer_scale: f64,
+}
+
+/// Number of [`HydraulicRig`]'s parameters.
+pub const PARAMETERS: usize = 15;
+
+/// Names of the parameters, in order.
+pub const NAMES: [&str; PARAMETERS] = [
+    "spool lag",
+    "spool inertia",
+    "force rate",
+    "oil stiffness",
+    "leakage rate",
+    "seal damping",
+    "seal friction",
+    "table mass",
+    "table damping",
+    "table stiffness",
+    "specimen mass",
+    "command delay",
+    "accelerometer delay",
+    "load cell delay",
+    "accelerometer scale",
+];
+
+impl From<[f64; PARAMETERS]> for HydraulicRig {
+    fn from(p: [f64; PARAMETERS]) -> Self {
+        Self {
+            spool_lag: p[0],
+            spool_inertia: p[1],
+            force_rate: p[2],
+            oil_stiffness: p[3],
+            leakage_rate: p[4],
+            seal_damping: p[5],
+            seal_friction: p[6],
+            mass: p[7],
+            damping: p[8],
+            stiffness: p[9],
+            specimen_mass: p[10],
+            command_delay: p[11],
+            accelerometer_delay: p[12],
+            load_cell_delay: p[13],
+            accelerometer_scale: p[14],
+        }
+    }
+}
+
+impl From<HydraulicRig> for [f64; PARAMETERS] {
+    fn from(r: HydraulicRig) -> Self {
+        [
+            r.spool_lag,
+            r.spool_inertia,
+            r.force_rate,
+            r.oil_stiffness,
+            r.leakage_rate,
+            r.seal_damping,
+            r.seal_friction,
+            r.mass,
+            r.damping,
+            r.stiffness,
+            r.specimen_mass,
+            r.command_delay,
+            r.accelerometer_delay,
+            r.load_cell_delay,
+            r.accelerometer_scale,
+        ]
+    }
+}
+
+/// Parameters that are fitted by their logarithms.
+const POSITIVE: [usize; 4] = [2, 3, 4, 7];
+
+impl HydraulicRig {
+    /// The rig at coordinates of the fit: logarithms of what is positive.
+    pub fn at(coordinates: &[f64]) -> Option<Self> {
+        let mut own: [f64; PARAMETERS] = coordinates.get(..PARAMETERS)?.try_into().ok()?;
+        for i in POSITIVE {
+            own[i] = own[i].exp();
+        }
+        Some(own.into())
+    }
+
+    /// Its coordinates.
+    pub fn coordinates(&self) -> [f64; PARAMETERS] {
+        let mut own: [f64; PARAMETERS] = (*self).into();
+        for i in POSITIVE {
+            own[i] = own[i].ln();
+        }
+        own
+    }
+
+    /// Derivative of each parameter by its coordinate.
+    pub fn slopes(&self) -> [f64; PARAMETERS] {
+        let own: [f64; PARAMETERS] = (*self).into();
+        std::array::from_fn(|i| if POSITIVE.contains(&i) { own[i] } else { 1.0 })
+    }
+
+    /// Whether the numbers are a rig.
+    pub fn is_sound(&self) -> bool {
+        let positive = [
+            self.force_rate,
+            self.oil_stiffness,
+            self.leakage_rate,
+            self.mass,
+            self.accelerometer_scale,
+        ];
+        positive.iter().all(|v| v.is_finite() && *v > 0.0)
+    }
+
+    /// Response of the spool to the sampled command that is held over `period` s, delay included.
+    pub fn spool(&self, s: Complex<f64>, period: f64) -> Complex<f64> {
+        let hold = (1.0 - (-s * period).exp()) / (s * period);
+        let lag = (s * self.spool_inertia + self.spool_lag) * s + 1.0;
+        hold / lag * (-s * self.command_delay).exp()
+    }
+
+    /// Force that the actuator gives way by per displacement, N/m.
+    pub fn compliance_path(&self, s: Complex<f64>) -> Complex<f64> {
+        s * (self.oil_stiffness / (s + self.leakage_rate) + self.seal_damping)
+    }
+
+    /// Force that table and a payload (kg) need per displacement, N/m.
+    pub fn table(&self, s: Complex<f64>, payload: f64) -> Complex<f64> {
+        ((self.mass + payload) * s + self.damping) * s + self.stiffness
+    }
+}
+
+/// Number of `coefficients`' rows.
+pub const EQUATIONS: usize = 3;
+
+/// Coefficients of the three equations at `s`, `[equation][channel]`.
+fn coefficients(
+    rig: &HydraulicRig,
+    shape: &[f64],
+    payload: f64,
+    s: Complex<f64>,
+    period: f64,
+) -> [[Complex<f64>; CHANNELS]; EQUATIONS] {
+    let zero = Complex::new(0.0, 0.0);
+    let one = Complex::new(1.0, 0.0);
+    let early = |delay: f64| (s * delay).exp();
+    let acceleration = early(rig.accelerometer_delay) / rig.accelerometer_scale;
+    let force = early(rig.load_cell_delay);
+    let oil = rig.force_rate / (s + rig.leakage_rate);
+    let drive = oil * rig.spool(s, period);
+    let mut rows = [[zero; CHANNELS]; EQUATIONS];
+    rows[0][DISPLACEMENT] = -s * s;
+    rows[0][ACCELERATION] = acceleration;
+    rows[1][DISPLACEMENT] = -rig.table(s, payload);
+    rows[1][FORCE] = force;
+    rows[1][SPECIMEN] = -acceleration * rig.specimen_mass;
+    rows[2][COMMAND] = -drive;
+    rows[2][OPENING] = -oil;
+    rows[2][DISPLACEMENT] = rig.compliance_path(s);
+    rows[2][FORCE] = force;
+    rows[2][SIGN] = one * rig.seal_friction;
+    for (slot, change) in rows[2][SLOPES..OPENING].iter_mut().zip(shape) {
+        *slot = one * rig.seal_friction * change;
+    }
+    rows
+}
+
+/// The experiments of one rig, to be fitted.
+#[derive(Debug, Clone)]
+pub struct Equations {
+    /// Their bands.
+    pub experiments: Vec<Bands>,
+    /// Coordinates at which the residuals' covariance is held; by default it goes with the rig, as
+    /// maximum likelihood with errors in all channels has it.
+    pub held: Option<Vec<f64>>,
+    /// The friction's shape from which changes are counted, where there is friction.
+    pub shape: Option<SealShape>,
+}
+
+impl Equations {
+    /// Residuals of unit variance of each equation of each band, real and imaginary; `values` are
+    /// the rig's coordinates, the changes of the friction's shape and then each further
+    /// experiment's payload (kg).
+    fn whitened(&self, values: &[f64]) -> Option<Vec<[Complex<f64>; EQUATIONS]>> {
+        let rig = HydraulicRig::at(values)?;
+        if !rig.is_sound() {
+            return None;
+        }
+        let held = self.held.as_deref().unwrap_or(values);
+        let weigher = HydraulicRig::at(held)?;
+        let shape = values.get(PARAMETERS..PARAMETERS + SHAPE)?;
+        let held = held.get(PARAMETERS..PARAMETERS + SHAPE)?;
+        let mut all = Vec::new();
+        for (index, experiment) in self.experiments.iter().enumerate() {
+            let payload = match index {
+                0 => 0.0,
+                _ => *values.get(PARAMETERS + SHAPE + index - 1)?,
+            };
+            for band in &experiment.bands {
+                let rows = rows(&weigher, held, payload, experiment, band);
+                let whitener = Whitener::new(&rows, &band.noise)?;
+                for sums in sums(&rig, shape, payload, experiment, band) {
+                    all.push(whitener.apply(sums)?);
+                }
+            }
+        }
+        Some(all)
+    }
+
+    /// What is left of each equation over its largest term, root mean squares over the bands'
+    /// projections on the reference.
+    pub fn relative_errors(&self, values: &[f64]) -> Option<[f64; EQUATIONS]> {
+        const LARGEST: [usize; EQUATIONS] = [ACCELERATION, FORCE, COMMAND];
+        let rig = HydraulicRig::at(values)?;
+        let shape = values.get(PARAMETERS..PARAMETERS + SHAPE)?;
+        let (mut left, mut size) = ([0.0; EQUATIONS], [0.0; EQUATIONS]);
+        for (index, experiment) in self.experiments.iter().enumerate() {
+            let payload = match index {
+                0 => 0.0,
+                _ => *values.get(PARAMETERS + SHAPE + index - 1)?,
+            };
+            for band in &experiment.bands {
+                let rows = rows(&rig, shape, payload, experiment, band);
+                let sums = sums(&rig, shape, payload, experiment, band);
+                for equation in 0..EQUATIONS {
+                    let channel = LARGEST[equation];
+                    let term = rows[(equation, channel)] * band.projected(channel);
+                    size[equation] += term.norm_sqr();
+                    left[equation] += sums.first()?[equation].norm_sqr();
+                }
+            }
+        }
+        Some(std::array::from_fn(|i| (left[i] / size[i]).sqrt()))
+    }
+
+    /// Mean square of each equation's whitened residuals, near one for a rig that obeys it. The
+    /// equations are whitened one after the other: the motion's first.
+    pub fn mean_squares(&self, values: &[f64]) -> Option<[f64; EQUATIONS]> {
+        let all = self.whitened(values)?;
+        let mut sums = [0.0; EQUATIONS];
+        for band in &all {
+            for (sum, value) in sums.iter_mut().zip(band) {
+                *sum += value.norm_sqr();
+            }
+        }
+        Some(sums.map(|sum| sum / (2 * all.len().max(1)) as f64))
+    }
+}
+
+/// The equations of a band, projected on each of its instruments.
+fn sums(
+    rig: &HydraulicRig,
+    shape: &[f64],
+    payload: f64,
+    experiment: &Bands,
+    band: &Band,
+) -> Vec<[Complex<f64>; EQUATIONS]> {
+    let mut sums = vec![[Complex::new(0.0, 0.0); EQUATIONS]; band.instruments.len()];
+    for (line, &omega) in band.omega.iter().enumerate() {
+        let s = Complex::new(0.0, omega);
+        let rows = coefficients(rig, shape, payload, s, experiment.period);
+        for (equation, row) in rows.iter().enumerate() {
+            let channels = band.spectra.iter().zip(row).zip(&experiment.scale);
+            let value: Complex<f64> = channels.map(|((z, c), scale)| c * z[line] * *scale).sum();
+            for (sum, instrument) in sums.iter_mut().zip(&band.instruments) {
+                sum[equation] += instrument[line].conj() * value;
+            }
+        }
+    }
+    sums
+}
+
+/// Coefficients of the scaled channels in the middle of a band.
+fn rows(
+    rig: &HydraulicRig,
+    shape: &[f64],
+    payload: f64,
+    experiment: &Bands,
+    band: &Band,
+) -> DMatrix<Complex<f64>> {
+    let s = Complex::new(0.0, band.middle());
+    let rows = coefficients(rig, shape, payload, s, experiment.period);
+    DMatrix::from_fn(EQUATIONS, band.spectra.len(), |i, j| {
+        rows[i][j] * experiment.scale[j]
+    })
+}
+
+/// Whitens complex residuals to unit variance of each real part.
+struct Whitener {
+    size: [f64; EQUATIONS],
+    factor: nalgebra::Cholesky<Complex<f64>, nalgebra::Const<EQUATIONS>>,
+}
+
+impl Whitener {
+    /// For residuals `rows` of channels with a covariance of `noise`.
+    fn new(rows: &DMatrix<Complex<f64>>, noise: &DMatrix<Complex<f64>>) -> Option<Self> {
+        let product = rows * noise * rows.adjoint();
+        let mut covariance =
+            nalgebra::SMatrix::<Complex<f64>, EQUATIONS, EQUATIONS>::from_fn(|i, j| {
+                product[(i, j)]
+            });
+        // Equations are of different units: scale before factoring.
+        let size: [f64; EQUATIONS] = std::array::from_fn(|i| covariance[(i, i)].re.sqrt());
+        if size.iter().any(|own| own.is_nan() || *own <= 0.0) {
+            return None;
+        }
+        for i in 0..EQUATIONS {
+            for j in 0..EQUATIONS {
+                covariance[(i, j)] /= size[i] * size[j];
+            }
+            covariance[(i, i)] += Complex::new(1e-9, 0.0);
+        }
+        Some(Self {
+            size,
+            factor: covariance.cholesky()?,
+        })
+    }
+
+    fn apply(&self, residuals: [Complex<f64>; EQUATIONS]) -> Option<[Complex<f64>; EQUATIONS]> {
+        let mut own = nalgebra::SVector::<Complex<f64>, EQUATIONS>::from_fn(|i, _| {
+            residuals[i] / self.size[i]
+        });
+        if !self.factor.l_dirty().solve_lower_triangular_mut(&mut own) {
+            return None;
+        }
+        Some(std::array::from_fn(|i| own[i] * std::f64::consts::SQRT_2))
+    }
+}
+
+impl Residuals for Equations {
+    fn residuals(&self, values: &[f64]) -> Option<Vec<f64>> {
+        let all = self.whitened(values)?;
+        let mut residuals: Vec<f64> = all.iter().flatten().flat_map(|v| [v.re, v.im]).collect();
+        if let Some(shape) = &self.shape {
+            residuals.extend(
+                shape
+                    .changed(&values[PARAMETERS..PARAMETERS + SHAPE])
+                    .surprise(),
+            );
+        }
+        Some(residuals)
+    }
+}

@@ -1,0 +1,443 @@
+//! What a valve lacks to an ideal one: overlap or underlap, gain lost around null, asymmetry.
+//!
+//! The rig is replayed under its recorded command ([`super::replay`]), and valve, oil and seals are fitted
+//! together. The search begins with an ideal valve. In each round every member that is not in the curve yet
+//! is tried, and the one stays whose refit gains most on the part of the records that was not fitted; it ends when
+//! none gains more than chance and `LEAST`. What the null leaves uncertain is the scatter between blocks of the
+//! records, widened by how much more is left where nothing was fitted.
+
+use nalgebra::DMatrix;
+use plant::identified::valve_curve::ValveCurve;
+use plant::integration::{inner_steps, runge_kutta_4};
+use rayon::prelude::*;
+use recordings::{Channel, Recording, mean_and_deviation};
+
+use super::Found;
+use super::equations::{Equations, HydraulicRig, PARAMETERS};
+use super::least_squares::{Coordinate, Optimum, minimise_within};
+use super::replay::{
+    Actuator, CORRECTION, Errors, FITTED, MISTAKEN, OF_CURVE, PART, Replay, coordinates, speed,
+};
+
+/// Least part of the squared error that a member of the curve has to take away.
+const LEAST: f64 = 0.03;
+/// Least overlap over the command (rms), least share lost, least asymmetry: what is smaller is none.
+const SMALLEST: f64 = 5e-3;
+/// Error of the delay, s, that the form of the spool leaves beside its scatter: a quarter of a sample.
+const DELAY_MISTAKEN: f64 = 5e-4;
+/// Standard errors of that gain, from block to block, by which it has to be more than none.
+const SURE: f64 = 2.5;
+/// Length of such a block, s.
+const BLOCK: f64 = 0.5;
+/// Longest inner step of the search, s.
+const STEP: f64 = 1e-3;
+/// Iterations in which a member shows what it is worth, and in which the one that is taken is fitted; and the part of
+/// the cost that an iteration has to take away.
+const TRIED: (usize, f64) = (6, 1e-2);
+const FITTED_WITHIN: (usize, f64) = (20, 1e-3);
+
+/// What a valve's curve may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Member {
+    /// Overlap, or underlap.
+    Lap,
+    /// Gain lost around null.
+    NullLoss,
+    /// Different gains to either side.
+    Asymmetry,
+}
+
+impl Member {
+    const ALL: [Self; 3] = [Self::Lap, Self::NullLoss, Self::Asymmetry];
+
+    /// Its places among the parameters.
+    fn places(self) -> &'static [usize] {
+        const PLACES: [usize; 4] = [OF_CURVE, OF_CURVE + 1, OF_CURVE + 2, OF_CURVE + 3];
+        match self {
+            Self::Lap => &PLACES[..1],
+            Self::NullLoss => &PLACES[1..3],
+            Self::Asymmetry => &PLACES[3..],
+        }
+    }
+
+    /// Where its search starts, for commands of a size (rms, V).
+    fn starts(self, command: f64) -> Vec<Vec<f64>> {
+        match self {
+            Self::Lap => [0.05, 0.4, -0.05].map(|part| vec![part * command]).to_vec(),
+            Self::NullLoss => [0.3, 1.0]
+                .map(|part| {
+                    vec![
+                        0.3,
+                        (part * command / ValveCurve::default().null_width).ln(),
+                    ]
+                })
+                .to_vec(),
+            Self::Asymmetry => vec![vec![0.0]],
+        }
+    }
+}
+
+/// A valve that is not ideal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Valve {
+    /// Its opening.
+    pub curve: ValveCurve,
+    /// Standard errors of the curve's numbers.
+    pub standard_error: ValveCurve,
+    /// What was found in it, the first found first.
+    pub members: Vec<Member>,
+    /// Root mean square of the replay's error where nothing was fitted, over that with an ideal valve.
+    pub improvement: f64,
+}
+
+impl Valve {
+    /// Names of what was found, as a diagnosis has them.
+    pub fn causes(&self) -> Vec<&'static str> {
+        let name = |member: &Member| match member {
+            Member::Lap if self.curve.overlap < 0.0 => "valve_underlap",
+            Member::Lap => "valve_dead_band",
+            Member::NullLoss => "reduced_null_gain",
+            Member::Asymmetry => "valve_asymmetric_gain",
+        };
+        self.members.iter().map(name).collect()
+    }
+}
+
+/// What the opening (V) differs by from the spool's position, at each sample of `command` (V, every `period` s).
+pub(super) fn distortion(
+    rig: &HydraulicRig,
+    curve: &ValveCurve,
+    command: &[f64],
+    period: f64,
+) -> Vec<f64> {
+    const LONGEST: f64 = 5e-4;
+    let late = (rig.command_delay / period).max(0.0);
+    let (whole, part) = (late.floor() as usize, late.fract());
+    let mut spool = [0.0; 2];
+    let mut all = Vec::with_capacity(command.len());
+    for k in 0..command.len() {
+        all.push(curve.opening(spool[0]) - spool[0]);
+        let at = |back: usize| k.checked_sub(back).map_or(0.0, |k| command[k]);
+        for (u, share) in [(at(whole + 1), part), (at(whole), 1.0 - part)] {
+            if share > 0.0 {
+                let count = inner_steps(share * period, LONGEST);
+                let step = share * period / f64::from(count);
+                for _ in 0..count {
+                    spool = runge_kutta_4(&spool, step, |s| {
+                        [s[1], (u - s[0] - rig.spool_lag * s[1]) / rig.spool_inertia]
+                    });
+                }
+            }
+        }
+    }
+    all
+}
+
+/// A fit of the search.
+#[derive(Clone)]
+struct Trial {
+    members: Vec<Member>,
+    fit: Optimum,
+    /// Squared errors over their weights where nothing was fitted, block by block.
+    blocks: Vec<f64>,
+}
+
+impl Trial {
+    fn left(&self) -> f64 {
+        self.blocks.iter().sum::<f64>() / self.blocks.len().max(1) as f64
+    }
+
+    /// Whether it leaves less than `other` by more than chance.
+    fn is_better_than(&self, other: &Self) -> bool {
+        let gains: Vec<f64> = other
+            .blocks
+            .iter()
+            .zip(&self.blocks)
+            .map(|(a, b)| a - b)
+            .collect();
+        let (mean, deviation) = mean_and_deviation(&gains);
+        let error = deviation / (gains.len().max(1) as f64).sqrt();
+        mean > LEAST * other.left() && mean > SURE * error
+    }
+}
+
+/// Mean squares of blocks of errors.
+fn blocks(errors: &Errors, replay: &Replay) -> Vec<f64> {
+    let mut all = Vec::new();
+    for (errors, own) in errors.iter().zip(replay.records) {
+        let length = (BLOCK / own.recording.period()).max(1.0) as usize;
+        let square = |e: &[f64; 2]| e[0] * e[0] + e[1] * e[1];
+        all.extend(
+            errors
+                .chunks_exact(length)
+                .map(|block| block.iter().map(square).sum::<f64>() / length as f64),
+        );
+    }
+    all
+}
+
+/// The search on recordings.
+struct Search<'a> {
+    replay: Replay<'a>,
+    command: f64,
+}
+
+impl Search<'_> {
+    fn is_free(&self, members: &[Member], parameter: usize) -> bool {
+        let rig = &self.replay.start.rig;
+        match parameter {
+            0 => rig.seal_friction > 0.0,
+            1 => rig.seal_damping > 0.0,
+            own if own < OF_CURVE => true,
+            own => members.iter().any(|member| member.places().contains(&own)),
+        }
+    }
+
+    fn fit(&self, members: &[Member], start: &[f64], within: (usize, f64)) -> Option<Trial> {
+        let start: [f64; FITTED] = start.try_into().ok()?;
+        let own: Vec<Coordinate> = coordinates(&start, |i| self.is_free(members, i));
+        let fit = minimise_within(&self.replay, &own, within.0, within.1)?;
+        let rest = self.replay.rest();
+        let blocks = blocks(&rest.errors(&fit.values)?, &rest);
+        Some(Trial {
+            members: members.to_vec(),
+            fit,
+            blocks,
+        })
+    }
+
+    /// The same values with a seal that is as abrupt as seals are: where the valve lacked something its shape may
+    /// have gone to a limit, from which no fit comes back.
+    fn with_usual_seals(&self, values: &[f64]) -> Vec<f64> {
+        let (known, mut own) = (&self.replay.start.shape, values.to_vec());
+        own[3] = 0.2 - known.excess;
+        own[4] = (4e-3 / known.stribeck_velocity).ln();
+        own[5] = (3.0 / known.sharpness).ln();
+        own
+    }
+
+    /// The best fit with one member more.
+    fn extended(&self, from: &Trial) -> Option<Trial> {
+        let wanting = Member::ALL
+            .into_iter()
+            .filter(|member| !from.members.contains(member));
+        let starts: Vec<(Member, Vec<f64>)> = wanting
+            .flat_map(|member| {
+                let all = member.starts(self.command);
+                all.into_iter().map(move |own| (member, own))
+            })
+            .collect();
+        let size = |own: &Trial, member: Member| match member {
+            Member::Lap => own.fit.values[OF_CURVE].abs() / self.command,
+            Member::NullLoss => own.fit.values[OF_CURVE + 1],
+            Member::Asymmetry => own.fit.values[OF_CURVE + 3].abs(),
+        };
+        let trials = starts.par_iter().filter_map(|(member, own)| {
+            let mut members = from.members.clone();
+            members.push(*member);
+            let mut start = self.with_usual_seals(&from.fit.values);
+            for (place, value) in member.places().iter().zip(own) {
+                start[*place] = *value;
+            }
+            let trial = self.fit(&members, &start, TRIED)?;
+            (size(&trial, *member) > SMALLEST).then_some(trial)
+        });
+        let best = trials.min_by(|a, b| a.left().total_cmp(&b.left()))?;
+        self.fit(&best.members, &best.fit.values, FITTED_WITHIN)
+    }
+}
+
+/// What an equations' fit gives for a rig: the optimum and its equations.
+type Refit<'a> = dyn Fn(&Found) -> Option<(Optimum, Equations)> + 'a;
+
+impl Found {
+    /// Looks for what the valve lacks to an ideal one, and takes it over where there is something; `refit` fits the
+    /// equations again from a rig.
+    pub(super) fn replay_valve(&mut self, recordings: &[Recording], refit: &Refit) {
+        let Some(records) = self.replayed(recordings) else {
+            return;
+        };
+        let sizes = recordings.iter().filter_map(|own| {
+            let values = own.channel(Channel::ValveCommand)?;
+            Some(mean_and_deviation(values).1)
+        });
+        let command = sizes.fold(0.0, f64::max);
+        let start = Actuator {
+            rig: self.rig,
+            shape: self.shape,
+            curve: ValveCurve::default(),
+        };
+        let replay = Replay {
+            records: &records,
+            start,
+            weights: [1.0; 2],
+            known: f64::INFINITY,
+            part: (0.0, PART),
+            step: STEP,
+        };
+        let found = search(replay, command);
+        let Some((search, plain, mut best)) = found else {
+            return;
+        };
+        if best.members.is_empty() {
+            return;
+        }
+        let mut own = self.clone();
+        let mut search = search;
+        // What is known of the table by equations that a valve of another form has bent.
+        for _ in 0..2 {
+            own.take(&search.replay.start.at(&best.fit.values), &best.members);
+            let Some((fit, equations)) = refit(&own) else {
+                break;
+            };
+            let Some(rig) = HydraulicRig::at(&fit.values) else {
+                break;
+            };
+            own.take_table(&rig, &fit);
+            search.replay.start = Actuator {
+                rig: own.rig,
+                shape: own.shape,
+                curve: own.curve(),
+            };
+            let mut moved = fit.values.clone();
+            moved[..PARAMETERS].copy_from_slice(&own.rig.coordinates());
+            own.mean_squares = equations.mean_squares(&moved).unwrap_or(own.mean_squares);
+            let start = search.with_usual_seals(&[0.0; FITTED]);
+            let Some(next) = search.fit(&best.members, &start, FITTED_WITHIN) else {
+                break;
+            };
+            best = next;
+        }
+        let moved = search.replay.start.at(&best.fit.values);
+        own.take(&moved, &best.members);
+        if own.take_errors(&search, &best, &plain).is_some() {
+            *self = own;
+        }
+    }
+
+    fn take(&mut self, moved: &Actuator, members: &[Member]) {
+        self.rig = moved.rig;
+        self.shape = moved.shape;
+        self.valve = Some(Valve {
+            curve: moved.curve,
+            standard_error: ValveCurve::default(),
+            members: members.to_vec(),
+            improvement: 1.0,
+        });
+    }
+
+    /// Takes table, payloads and sensors over from a fit of the equations.
+    fn take_table(&mut self, rig: &HydraulicRig, fit: &Optimum) {
+        self.rig = HydraulicRig {
+            mass: rig.mass,
+            damping: rig.damping,
+            stiffness: rig.stiffness,
+            specimen_mass: rig.specimen_mass,
+            accelerometer_delay: rig.accelerometer_delay,
+            load_cell_delay: rig.load_cell_delay,
+            accelerometer_scale: rig.accelerometer_scale,
+            ..self.rig
+        };
+        let slopes = rig.slopes();
+        let excess = self.mean_squares.iter().copied().fold(1.0, f64::max);
+        self.covariance = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
+            excess * fit.covariance[(i, j)] * slopes[i] * slopes[j]
+        });
+    }
+
+    /// Errors of what was replayed, and the position of the null.
+    fn take_errors(&mut self, search: &Search, best: &Trial, plain: &Trial) -> Option<()> {
+        let replay = &search.replay;
+        let free: Vec<usize> = (0..FITTED)
+            .filter(|i| search.is_free(&best.members, *i))
+            .collect();
+        let values = &best.fit.values;
+        let fitted = blocks(&replay.errors(values)?, replay);
+        let fitted = fitted.iter().sum::<f64>() / fitted.len().max(1) as f64;
+        let misfit = (best.left() / fitted).max(1.0);
+        let covariance = replay.covariance(values, &free)? * misfit;
+        let place = |i: usize| free.iter().position(|own| *own == i);
+        let moved = replay.start.at(values);
+        let slopes = moved.slopes();
+        for (_, parameter, _) in slopes {
+            for other in 0..PARAMETERS {
+                self.covariance[(parameter, other)] = 0.0;
+                self.covariance[(other, parameter)] = 0.0;
+            }
+        }
+        for (i, row, by_row) in slopes {
+            for (j, column, by_column) in slopes {
+                if let (Some(i), Some(j)) = (place(i), place(j)) {
+                    self.covariance[(row, column)] = by_row * by_column * covariance[(i, j)];
+                }
+            }
+        }
+        let seal = slopes[0].1;
+        let mistaken = MISTAKEN * moved.rig.seal_damping * speed(replay.records)?;
+        self.covariance[(seal, seal)] += mistaken * mistaken;
+        let delay = slopes[7].1;
+        self.covariance[(delay, delay)] += DELAY_MISTAKEN * DELAY_MISTAKEN;
+        self.standard_error = std::array::from_fn(|i| self.covariance[(i, i)].max(0.0).sqrt());
+        let error = |i: usize| place(i).map_or(0.0, |i| covariance[(i, i)].max(0.0).sqrt());
+        let (bias, bias_error) = null(replay, &moved)?;
+        let valve = self.valve.as_mut()?;
+        valve.curve.null_bias = bias;
+        valve.standard_error = ValveCurve {
+            overlap: error(OF_CURVE),
+            null_loss: error(OF_CURVE + 1),
+            null_width: moved.curve.null_width * error(OF_CURVE + 2),
+            asymmetry: error(OF_CURVE + 3),
+            null_bias: bias_error,
+        };
+        valve.improvement = (best.left() / plain.left()).sqrt();
+        Some(())
+    }
+}
+
+/// Fits the rig with an ideal valve, and then with what gains most, as long as something does. None where the rig
+/// cannot be replayed.
+fn search(replay: Replay<'_>, command: f64) -> Option<(Search<'_>, Trial, Trial)> {
+    let replay = replay.weighed(&[0.0; FITTED])?;
+    let mut search = Search { replay, command };
+    let first = search.fit(&[], &[0.0; FITTED], FITTED_WITHIN)?;
+    search.replay = search.replay.weighed(&first.fit.values)?;
+    let plain = search.fit(&[], &first.fit.values, FITTED_WITHIN)?;
+    let mut best = plain.clone();
+    while let Some(next) = search.extended(&best) {
+        if !next.is_better_than(&best) {
+            break;
+        }
+        best = next;
+    }
+    Some((search, plain, best))
+}
+
+/// Position of the spool at zero command (V) and its standard error: what has to be added to the command so that
+/// the replayed displacement stays at the measured one.
+fn null(replay: &Replay, moved: &Actuator) -> Option<(f64, f64)> {
+    let whole = Replay {
+        start: *moved,
+        part: (0.0, 1.0),
+        weights: [1.0; 2],
+        ..*replay
+    };
+    let lead = CORRECTION * moved.rig.oil_stiffness / moved.rig.force_rate;
+    let (errors, offsets) = whole.raw(&[0.0; FITTED])?;
+    let corrections: Vec<f64> = errors
+        .iter()
+        .zip(&offsets)
+        .map(|(_, offset)| -lead * offset[0])
+        .collect();
+    let mean = corrections.iter().sum::<f64>() / corrections.len().max(1) as f64;
+    let mut blocks = Vec::new();
+    for (errors, own) in errors.iter().zip(replay.records) {
+        let length = (10.0 * BLOCK / own.recording.period()) as usize;
+        blocks.extend(
+            errors
+                .chunks_exact(length.max(1))
+                .map(|block| lead * block.iter().map(|e| e[0]).sum::<f64>() / block.len() as f64),
+        );
+    }
+    let (_, deviation) = mean_and_deviation(&blocks);
+    Some((mean, deviation / (blocks.len().max(1) as f64).sqrt()))
+}

@@ -1,0 +1,183 @@
+//! What differs from a rig as it should be, with its value and interval, in words.
+
+use serde::{Deserialize, Serialize};
+
+use super::named_value::NamedValue;
+
+/// Standard deviations of an interval of 95 %.
+const CLEAR: f64 = 1.96;
+
+/// A nominal parameter such as a scale or an offset that is not what was stated, or a sensor that
+/// contradicts another one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Cause {
+    /// What was found, SI, under the parameter's name.
+    pub found: NamedValue,
+    /// What was stated, SI.
+    pub stated: f64,
+}
+
+impl Cause {
+    /// The cause, if `found` is beyond two of the deviations `stated_within` of `stated`, and by more than
+    /// chance.
+    pub fn of(found: NamedValue, (stated, stated_within): (f64, f64)) -> Option<Self> {
+        let off = (found.value - stated).abs();
+        let clear = off > 2.0 * stated_within && off > 2.5 * found.standard_error;
+        clear.then_some(Self { found, stated })
+    }
+
+    /// The cause in words, with value, unit and 95 % interval.
+    pub fn words(&self) -> String {
+        let NamedValue {
+            name,
+            value,
+            unit,
+            standard_error,
+        } = &self.found;
+        let by = value - self.stated;
+        let size = |unit: &str| measure(by.abs(), *standard_error, unit);
+        let share = || {
+            let text = measure(100.0 * by.abs(), 100.0 * standard_error, "1");
+            format!("{text} %")
+        };
+        let more = if by > 0.0 { "more" } else { "less" };
+        match name.as_str() {
+            "command_delay" => {
+                let when = if by > 0.0 { "late" } else { "early" };
+                format!("the command arrives {} {when}", size(unit))
+            }
+            "scale" => format!("the table moves {} {more} than commanded", share()),
+            "offset" if unit == "m" => {
+                let way = if by > 0.0 { "high" } else { "low" };
+                format!("the displacement reads {} too {way}", size(unit))
+            }
+            "accelerometer_scale" => format!(
+                "the accelerometer reads {} {more} than the displacement says",
+                share()
+            ),
+            _ => format!(
+                "{} is {} and not {}",
+                name.replace('_', " "),
+                measure(*value, *standard_error, unit),
+                measure(self.stated, f64::NAN, unit)
+            ),
+        }
+    }
+}
+
+/// An effect with its parameters, for a sentence.
+pub(super) fn effect_in_words(name: &str, values: &[NamedValue]) -> String {
+    let own = |p: &NamedValue| measure(p.value, p.standard_error, &p.unit);
+    let name = name.replace('_', " ");
+    match values {
+        [] => name,
+        [one] => format!("{name} ({})", own(one)),
+        many => {
+            let all: Vec<String> = many
+                .iter()
+                .map(|p| format!("{} {}", p.name.replace('_', " "), own(p)))
+                .collect();
+            format!("{name} ({})", all.join(", "))
+        }
+    }
+}
+
+/// A value with its 95 % interval, in a unit that laboratories use.
+fn measure(value: f64, standard_error: f64, unit: &str) -> String {
+    let (unit, factor) = match unit {
+        "m" => ("mm", 1e3),
+        "s" => ("ms", 1e3),
+        "1" => ("", 1.0),
+        other => (other, 1.0),
+    };
+    let (value, half) = (factor * value, CLEAR * factor * standard_error);
+    let power = value.abs().log10().floor();
+    if value.is_finite() && value != 0.0 && !(-4.0..5.0).contains(&power) {
+        let one = 10f64.powf(power);
+        let text = plain(value / one, half / one);
+        return format!("({text})e{power} {unit}").trim_end().to_owned();
+    }
+    format!("{} {unit}", plain(value, half))
+        .trim_end()
+        .to_owned()
+}
+
+/// A value and half its interval, by the interval's first digit; a value alone by three.
+fn plain(value: f64, half: f64) -> String {
+    let digits_of = |size: f64| -> usize {
+        if size.is_finite() && size > 0.0 {
+            (-size.log10().floor()).clamp(0.0, 9.0) as usize
+        } else {
+            0
+        }
+    };
+    if half.is_finite() && half > 0.0 {
+        let digits = digits_of(half).min(digits_of(value) + 4);
+        let half = half.max(10f64.powi(-(digits as i32)));
+        format!("{value:.digits$} ± {half:.digits$}")
+    } else {
+        let digits = digits_of(value) + if value == 0.0 { 0 } else { 2 };
+        format!("{value:.digits$}")
+    }
+}
+
+/// Parts of a sentence, joined.
+pub(super) fn joined(parts: &[String]) -> String {
+    match parts {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(name: &str, value: f64, standard_error: f64, unit: &str) -> NamedValue {
+        NamedValue {
+            name: name.into(),
+            value,
+            unit: unit.into(),
+            standard_error,
+        }
+    }
+
+    #[test]
+    fn causes_have_their_value_unit_and_interval() {
+        let cause = |value: NamedValue, stated| Cause::of(value, stated).map(|own| own.words());
+        let delay = found("command_delay", 12.1e-3, 5e-5, "s");
+        assert_eq!(
+            cause(delay, (0.0, 1e-3)).as_deref(),
+            Some("the command arrives 12.10 ± 0.10 ms late")
+        );
+        let scale = found("scale", 1.0498, 6e-4, "1");
+        assert_eq!(
+            cause(scale, (1.0, 0.01)).as_deref(),
+            Some("the table moves 5.0 ± 0.1 % more than commanded")
+        );
+        assert_eq!(cause(found("scale", 1.015, 1e-3, "1"), (1.0, 0.01)), None);
+        assert_eq!(cause(found("scale", 1.05, 0.03, "1"), (1.0, 0.01)), None);
+        let offset = found("offset", -1.2e-3, 1e-4, "m");
+        assert_eq!(
+            cause(offset, (0.0, 1e-4)).as_deref(),
+            Some("the displacement reads 1.2 ± 0.2 mm too low")
+        );
+    }
+
+    #[test]
+    fn an_effect_has_its_parameters_beside_it() {
+        let width = found("half_width", 3.6e-5, 1e-6, "m");
+        assert_eq!(
+            effect_in_words("dead_band", std::slice::from_ref(&width)),
+            "dead band (0.036 ± 0.002 mm)"
+        );
+        let stiffness = found("stiffness", 2.9978e7, 1.8e4, "N/m3");
+        assert_eq!(
+            effect_in_words("cubic_stiffness", &[stiffness]),
+            "cubic stiffness ((2.998 ± 0.004)e7 N/m3)"
+        );
+        let parts = ["a", "b", "c"].map(String::from);
+        assert_eq!(joined(&parts), "a, b and c");
+    }
+}

@@ -1,0 +1,493 @@
+//! Servo-hydraulic actuator in a closed displacement loop: command to displacement.
+//!
+//! Nominal: `τ u' = g r(t - D) + o - u`, `e = u - x`, `z' = i e`, `c = e + z + f u' / K`,
+//! `T w' = K c - w`, `x' = w` (Merritt, Hydraulic Control Systems, 1967: a valve-controlled cylinder
+//! integrates, the loop closes it to one pole). A motor or a shaker on a voltage amplifier in such a loop
+//! has the same form; its mass is part of `T`. The command runs evenly from sample to sample; the
+//! linear equations are solved exactly, and what is not linear by steps.
+//!
+//! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
+
+use nalgebra::SMatrix;
+
+use super::sensors::accelerometer_scale;
+use super::table::{effects, nominal_parameters, session_parameters, shape, size};
+use super::{Cause, Equations, Natural, RigRecording};
+use recordings::Channel;
+
+/// The rig.
+pub struct ClosedLoopActuator;
+
+const COMMAND: Channel = Channel::Other {
+    name: "command",
+    unit: "m",
+};
+
+/// The loop's gain times a step at most, where it is not linear, and the most steps of a sample.
+const FINE: f64 = 0.25;
+const MOST_STEPS: f64 = 64.0;
+
+nominal_parameters! {
+    /// K: speed over position error.
+    loop_gain: "1/s",
+    /// τ: lag of the command before the loop.
+    command_lag: "s",
+    /// g: steady displacement over command.
+    scale: "1" = 1.0,
+    /// o: shift of the command, or of the displacement's zero.
+    offset: "m" = 0.0,
+    /// D: the command arrives late by this.
+    command_delay: "s" = 0.0,
+    /// T: lag of what moves the table, inside the loop.
+    loop_lag: "s" = 0.0,
+    /// f: share of the command's speed that the controller sends ahead.
+    feedforward: "1" = 0.0,
+    /// i: integral over proportional gain.
+    integral: "1/s" = 0.0,
+    /// One over the speed at which what drives the table is at its rail; 0 for none.
+    rail: "s/m" = 0.0,
+}
+
+session_parameters! {
+    /// Of the displacement's transducer; of the first file the offset tells it.
+    zero: "m" within 0.05 as AgainstFirst,
+}
+
+effects! {
+    /// r(t - T): conversion, computation and valve electronics.
+    delay: Delay {
+        delay: size("s", 0.05, (0.0, 5.0)),
+    } from [[0.1], [0.3], [1.0]], like ["valve_lag"];
+    /// Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
+    dead_band: DeadBand {
+        half_width: size("m", 3e-3, (0.0, 3.0)),
+    } from [[0.02], [0.15]], like ["reduced_null_gain"];
+    /// Lands that overlap and leak, so that the flow gain is lower around null (higher where
+    /// they underlap): x' = K (e - s w tanh(e / w)) (Merritt 1967, section 5-2).
+    reduced_null_gain: ReducedNullGain {
+        reduction: size("1", 0.05, (-1.0, 1.0)),
+        width: shape("m", 0.1, 1.0),
+    } from [[0.4, 0.1], [-0.3, 0.1]], like ["dead_band"];
+    /// Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
+    /// of Hydraulic Servosystems, 1980).
+    asymmetric_gain: AsymmetricGain {
+        asymmetry: size("1", 0.01, (-0.8, 0.8)),
+    } from [[0.03], [-0.03]];
+    /// Spool: T w' = K e - w, x' = w.
+    valve_lag: ValveLag {
+        time_constant: size("s", 0.05, (0.0, 1.0)),
+    } from [[0.1], [0.3]], like ["delay"];
+    /// Flow falls with speed as the load pressure rises: x' = w / (1 + |w| / s).
+    flow_saturation: FlowSaturation {
+        compression: size("s/m", 0.01, (0.0, 5.0)),
+    } from [[0.05]];
+    /// Transducer: y = x (1 + c x).
+    sensor_curvature: SensorCurvature {
+        curvature: size("1/m", 3e-3, (-0.3, 0.3)),
+    } from [[5e-3], [-5e-3]];
+    /// Transducer linkage: y follows x only beyond a gap.
+    free_play: FreePlay {
+        gap: size("m", 5e-3, (0.0, 1.0)),
+    } from [[0.03]];
+    /// Disturbance n that command and output share in the recorder: the loop gets r - n, the
+    /// record y = x + c n; n is what a median of five samples takes out of the command.
+    shared_disturbance: SharedDisturbance {
+        coupling: size("1", 0.1, (-5.0, 5.0)),
+    } from [[1.0]];
+}
+
+impl Equations for ClosedLoopActuator {
+    const KIND: &'static str = "closed_loop_actuator";
+    type Nominal = Nominal;
+    type Effects = Effects;
+    type Session = Session;
+    const INPUTS: &'static [Channel] = &[COMMAND];
+    const OPTIONAL: &'static [(Channel, &'static [&'static str])] = &[(Channel::Acceleration, &[])];
+    const OUTPUT: Channel = Channel::Displacement;
+    const IS_SCALED: bool = true;
+    const SCREENED: usize = 8192;
+    const SAID_BY: &'static [(&'static str, &'static str)] = &[
+        ("delay", "command_delay"),
+        ("valve_lag", "loop_lag"),
+        ("flow_saturation", "rail"),
+    ];
+    const CAUSES: &'static [&'static str] = &["command_delay", "scale", "offset"];
+    // Of a drive that is not known: a motor sticks as a valve with an overlap does.
+    const LOOKS_LIKE: &'static [[&'static str; 3]] = &[
+        ["dead_band", "friction", "rail"],
+        ["reduced_null_gain", "friction", "rail"],
+    ];
+
+    fn natural(nominal: &Nominal, channels: Natural) -> Natural {
+        Natural {
+            time: 1.0 / nominal.loop_gain,
+            ..channels
+        }
+    }
+
+    fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause> {
+        // Calibrations of accelerometer and transducer agree within this.
+        const CALIBRATED: f64 = 0.01;
+        let scale = accelerometer_scale(recordings, COMMAND);
+        let cause = scale.and_then(|scale| Cause::of(scale, (1.0, CALIBRATED)));
+        cause.into_iter().collect()
+    }
+
+    fn simulate(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        effects: &Effects,
+        session: &Session,
+        out: &mut [f64],
+    ) {
+        let Nominal {
+            loop_gain: gain,
+            command_lag: lag,
+            scale,
+            offset,
+            command_delay,
+            loop_lag,
+            feedforward,
+            integral,
+            rail,
+        } = *nominal;
+        let Effects {
+            delay: Delay { delay },
+            dead_band: DeadBand {
+                half_width: dead_band,
+            },
+            reduced_null_gain: null,
+            asymmetric_gain: AsymmetricGain { asymmetry },
+            valve_lag: ValveLag {
+                time_constant: valve,
+            },
+            flow_saturation: FlowSaturation { compression },
+            sensor_curvature: SensorCurvature { curvature },
+            free_play: FreePlay { gap },
+            shared_disturbance: SharedDisturbance { coupling },
+        } = *effects;
+        let command = recording.input(COMMAND);
+        let clean = &recording.cleaned;
+        let loop_input = if coupling == 0.0 { command } else { clean };
+        let Some(&first) = loop_input.first() else {
+            return;
+        };
+        let sample = recording.period();
+        let delay = (delay + command_delay) / sample;
+        let form = Loop {
+            gain,
+            command_lag: lag,
+            loop_lag: valve + loop_lag,
+            feedforward,
+            integral,
+        };
+        let fastest = if rail > 0.0 {
+            1.0 / rail
+        } else {
+            f64::INFINITY
+        };
+        let has_effect =
+            dead_band != 0.0 || null.reduction != 0.0 || asymmetry != 0.0 || compression != 0.0;
+        let is_linear = !has_effect && fastest == f64::INFINITY;
+        // A step ends where the delayed command bends.
+        let bend = delay - delay.floor();
+        let parts = [(0.0, bend), (bend, 1.0)].into_iter();
+        let parts: Vec<(f64, Step, usize)> = parts
+            .filter(|(from, to)| to - from > 1e-3)
+            .map(|(from, to)| {
+                let length = (to - from) * sample;
+                let steps = if is_linear {
+                    1.0
+                } else {
+                    let most = gain * (1.0 + asymmetry.abs());
+                    (length * most / FINE).ceil().clamp(1.0, MOST_STEPS)
+                };
+                (from, form.step(length / steps, sample), steps as usize)
+            })
+            .collect();
+        let last = loop_input.len() - 1;
+        let at = |place: f64| {
+            let place = (place - delay).max(0.0);
+            let before = (place as usize).min(last);
+            let share = (place - before as f64).min(1.0);
+            let after = (before + 1).min(last);
+            scale * (loop_input[before] * (1.0 - share) + loop_input[after] * share) + offset
+        };
+        // What the flow is beyond that of the linear loop.
+        let beyond = |sent: f64| {
+            if !has_effect {
+                let flow = gain * sent;
+                return flow.min(fastest).max(-fastest) - flow;
+            }
+            let mut open = (sent.abs() - dead_band).max(0.0).copysign(sent);
+            if null.reduction != 0.0 {
+                open -= null.reduction * null.width * (sent / null.width).tanh();
+            }
+            let flow = gain * (open + asymmetry * open.abs());
+            let flow = flow.min(fastest).max(-fastest);
+            flow / (1.0 + compression * flow.abs()) - gain * sent
+        };
+        let start = scale * first + offset;
+        let mut state = [start, start, 0.0, 0.0];
+        let mut shown = state[1];
+        for (k, y) in out.iter_mut().enumerate() {
+            let x = state[1];
+            // Not `clamp`, which panics where a model has left the finite.
+            shown = shown.max(x - 0.5 * gap).min(x + 0.5 * gap);
+            *y = shown * (1.0 + curvature * shown) + session.zero;
+            if coupling != 0.0 {
+                *y += coupling * (command[k] - clean[k]);
+            }
+            for (from, step, steps) in &parts {
+                for part in 0..*steps {
+                    let begin = k as f64 + from + part as f64 * step.length / sample;
+                    let ends = [at(begin), at(begin + step.length / sample)];
+                    state = step.advance(state, ends, (!is_linear).then_some(&beyond));
+                }
+            }
+        }
+    }
+}
+
+/// The linear loop.
+struct Loop {
+    gain: f64,
+    command_lag: f64,
+    loop_lag: f64,
+    feedforward: f64,
+    integral: f64,
+}
+
+/// The solution over a step for a command that runs straight and a flow beyond the linear one that does
+/// (exponential time differencing; Cox and Matthews, J. Comput. Phys. 176, 2002): exact for any lag.
+struct Step {
+    /// s.
+    length: f64,
+    /// Lagging command, displacement, flow, integral of the error, of themselves and of the command, its
+    /// slope, the flow beyond, its slope.
+    rows: [[f64; 8]; 4],
+    /// What the controller sends, of the states, the command and its slope.
+    sent: [f64; 6],
+}
+
+impl Loop {
+    fn step(&self, length: f64, sample: f64) -> Step {
+        let Self {
+            gain,
+            feedforward,
+            integral,
+            ..
+        } = *self;
+        // A lag that is nothing beside a sample is none.
+        let pole = |time: f64| {
+            if time > 1e-3 * sample {
+                1.0 / time
+            } else {
+                0.0
+            }
+        };
+        let (command_pole, pole) = (pole(self.command_lag), pole(self.loop_lag));
+        let ahead = feedforward / gain;
+        let error = if command_pole > 0.0 {
+            [1.0, -1.0, 0.0, 0.0, 0.0, 0.0]
+        } else {
+            [0.0, -1.0, 0.0, 0.0, 1.0, 0.0]
+        };
+        let speed = if command_pole > 0.0 {
+            [-command_pole, 0.0, 0.0, 0.0, command_pole, 0.0]
+        } else {
+            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+        };
+        let mut sent: [f64; 6] = std::array::from_fn(|i| error[i] + ahead * speed[i]);
+        sent[3] += 1.0;
+        let mut a = SMatrix::<f64, 8, 8>::zeros();
+        let flow: [f64; 7] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| gain * s));
+        for i in 0..6 {
+            if command_pole > 0.0 {
+                a[(0, i)] = speed[i];
+            }
+            a[(3, i)] = integral * error[i];
+        }
+        for (i, value) in flow.into_iter().enumerate() {
+            if pole > 0.0 {
+                a[(2, i)] = pole * value;
+            } else {
+                a[(1, i)] = value;
+            }
+        }
+        if pole > 0.0 {
+            a[(2, 2)] -= pole;
+            a[(1, 2)] = 1.0;
+        }
+        a[(4, 5)] = 1.0;
+        a[(6, 7)] = 1.0;
+        let a = a * length;
+        let solution = if a.iter().all(|value| value.is_finite()) {
+            a.exp()
+        } else {
+            a.map(|_| f64::NAN)
+        };
+        Step {
+            length,
+            rows: std::array::from_fn(|i| std::array::from_fn(|j| solution[(i, j)])),
+            sent,
+        }
+    }
+}
+
+impl Step {
+    /// The state after the step; the command at its ends, and the flow beyond the linear one for what the
+    /// controller sends, where there is one.
+    fn advance(
+        &self,
+        state: [f64; 4],
+        [begin, end]: [f64; 2],
+        beyond: Option<&impl Fn(f64) -> f64>,
+    ) -> [f64; 4] {
+        let slope = (end - begin) / self.length;
+        let [u, x, w, z] = state;
+        let after = |more: f64, its_slope: f64| -> [f64; 4] {
+            let all = [u, x, w, z, begin, slope, more, its_slope];
+            self.rows
+                .map(|row| row.iter().zip(all).map(|(a, b)| a * b).sum())
+        };
+        let Some(beyond) = beyond else {
+            return after(0.0, 0.0);
+        };
+        let sent = |[u, x, w, z]: [f64; 4], command: f64| -> f64 {
+            let all = [u, x, w, z, command, slope];
+            self.sent.iter().zip(all).map(|(a, b)| a * b).sum()
+        };
+        let now = beyond(sent(state, begin));
+        let then = beyond(sent(after(now, 0.0), end));
+        after(now, (then - now) / self.length)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::EffectTable;
+    use super::*;
+    use recordings::Recording;
+
+    #[test]
+    fn a_step_is_the_closed_form_at_any_rate() {
+        // 1 / ((1 + τ s)(1 + s / K)) at 1 kHz and at 25 Hz, where K h = 2.
+        let (gain, lag) = (50.0, 0.005);
+        for rate in [1000.0, 100.0, 25.0] {
+            let n = 200;
+            let ramp: Vec<f64> = (0..n).map(|k| f64::from(k) / rate).collect();
+            let channels = vec![
+                (COMMAND, ramp),
+                (Channel::Displacement, vec![0.0; n as usize]),
+            ];
+            let recording = Recording::new("ramp", 1.0 / rate, channels).unwrap();
+            let recording =
+                RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
+            let nominal = Nominal {
+                loop_gain: gain,
+                command_lag: lag,
+                scale: 1.0,
+                offset: 0.0,
+                command_delay: 0.0,
+                loop_lag: 0.0,
+                feedforward: 0.0,
+                integral: 0.0,
+                rail: 0.0,
+            };
+            let mut out = vec![0.0; n as usize];
+            let off = Effects::off().unwrap();
+            let session = Session::default();
+            ClosedLoopActuator.simulate(&recording, &nominal, &off, &session, &mut out);
+            let slow = 1.0 / gain;
+            for (k, y) in out.iter().enumerate() {
+                let t = k as f64 / rate;
+                let fading = |time: f64| time * time * (-t / time).exp();
+                let exact = t - slow - lag + (fading(slow) - fading(lag)) / (slow - lag);
+                assert!(
+                    (y - exact).abs() < 2e-4 * slow,
+                    "{rate} Hz, {k}: {y} {exact}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn feedforward_integral_and_rail_have_their_closed_forms() {
+        // Into a ramp of 1 m/s the error ends at (1 - f) / K, with an integral at 0; at a rail of 0.5 m/s
+        // the table follows at that speed.
+        let (rate, n, gain) = (200.0, 800, 20.0);
+        let ramp: Vec<f64> = (0..n).map(|k| k as f64 / rate).collect();
+        let channels = vec![
+            (COMMAND, ramp.clone()),
+            (Channel::Displacement, vec![0.0; n]),
+        ];
+        let recording = Recording::new("ramp", 1.0 / rate, channels).unwrap();
+        let recording =
+            RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
+        let last = |feedforward: f64, integral: f64, rail: f64, delay: f64| {
+            let nominal = Nominal {
+                loop_gain: gain,
+                command_lag: 0.0,
+                scale: 1.0,
+                offset: 0.0,
+                command_delay: delay,
+                loop_lag: 0.003,
+                feedforward,
+                integral,
+                rail,
+            };
+            let off = Effects::off().unwrap();
+            let mut out = vec![0.0; n];
+            let session = Session::default();
+            ClosedLoopActuator.simulate(&recording, &nominal, &off, &session, &mut out);
+            ramp[n - 1] - out[n - 1]
+        };
+        assert!((last(0.0, 0.0, 0.0, 0.0) - 0.05).abs() < 1e-9);
+        assert!((last(0.8, 0.0, 0.0, 0.0) - 0.01).abs() < 1e-9);
+        assert!((last(0.8, 0.0, 0.0, 0.0123) - 0.0223).abs() < 1e-9);
+        assert!(last(0.0, 5.0, 0.0, 0.0).abs() < 1e-6);
+        let slow = last(0.0, 0.0, 2.0, 0.0);
+        assert!((slow - 0.5 * ramp[n - 1]).abs() < 0.01, "{slow}");
+    }
+
+    #[test]
+    fn around_null_the_loop_is_slower_and_far_from_it_as_ever() {
+        // A step: half the gain while the error is small against the width of null.
+        let (gain, rate, n) = (40.0, 1000.0, 60);
+        let moved = |step: f64, at: usize| {
+            let command: Vec<f64> = (0..n).map(|k| if k > 0 { step } else { 0.0 }).collect();
+            let channels = vec![(COMMAND, command), (Channel::Displacement, vec![0.0; n])];
+            let recording = Recording::new("step", 1.0 / rate, channels).unwrap();
+            let recording =
+                RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
+            let nominal = Nominal {
+                loop_gain: gain,
+                command_lag: 0.0,
+                scale: 1.0,
+                offset: 0.0,
+                command_delay: 0.0,
+                loop_lag: 0.0,
+                feedforward: 0.0,
+                integral: 0.0,
+                rail: 0.0,
+            };
+            let effects = Effects {
+                reduced_null_gain: ReducedNullGain {
+                    reduction: 0.5,
+                    width: 1e-4,
+                },
+                ..Effects::off().unwrap()
+            };
+            let mut out = vec![0.0; n];
+            let session = Session::default();
+            ClosedLoopActuator.simulate(&recording, &nominal, &effects, &session, &mut out);
+            out[at] / step
+        };
+        // The command rises over the first sample.
+        let closed = |gain: f64, at: usize| 1.0 - (-gain * (at as f64 - 0.5) / rate).exp();
+        assert!((moved(1e-6, 50) - closed(0.5 * gain, 50)).abs() < 1e-3);
+        assert!((moved(1.0, 50) - closed(gain, 50)).abs() < 1e-3);
+    }
+}

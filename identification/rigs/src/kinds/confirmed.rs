@@ -1,0 +1,393 @@
+//! The model with the effects that every part of the data shows: its estimates, what they differ by
+//! between parts and files, and what it brings on data that were not fitted.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::named_value::NamedValue;
+use super::parts::{EVERYTHING, InParts, Part, file};
+use crate::report::ends_or_not_a_number;
+use diagnosis::resampling::{correlation_time, gain_interval};
+use diagnosis::{Point, Role, all_errors, completed, estimates, refit};
+use recordings::mean_and_deviation;
+
+/// A parameter differs between parts where its estimates lie this many of their standard errors
+/// apart. Some twenty are compared.
+const DIFFERS: f64 = 3.5;
+/// A refitted nominal parameter is surprising where it lies this many stated deviations off.
+const SURPRISING: f64 = 3.0;
+/// Standard deviations of an interval of 95 %.
+const CLEAR: f64 = 1.96;
+/// Samples that a file must bring to be fitted by itself.
+const FEWEST: usize = 500;
+
+/// The confirmed model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Confirmed {
+    /// Normalised error on the held-out data of the model fitted to the rest.
+    pub error: f64,
+    /// The same with the parts swapped.
+    pub swapped_error: f64,
+    /// 95 % interval of the share of the refitted nominal model's squared error that the effects
+    /// take away on the held-out data.
+    #[serde(deserialize_with = "ends_or_not_a_number")]
+    pub gain_interval: (f64, f64),
+    /// Normalised error on all data of the nominal model refitted to all data.
+    pub refitted_error: f64,
+    /// The same of the confirmed model.
+    pub fitted_error: f64,
+    /// Nominal parameters of the nominal model, refitted to all data.
+    pub refitted: Vec<NamedValue>,
+    /// Nominal parameters of the confirmed model, fitted to all data.
+    pub parameters: Vec<NamedValue>,
+    /// Parameters of its effects.
+    pub effects: Vec<(String, Vec<NamedValue>)>,
+    /// Where it is.
+    #[serde(skip)]
+    pub(super) point: Point,
+    /// Where the refitted nominal model is.
+    #[serde(skip)]
+    pub(super) refitted_point: Point,
+}
+
+/// An effect with a reason why it is not named.
+pub(super) type Refused = (usize, String);
+
+/// Why effects of `point`, fitted to `record`, are not to be named: a size at its bound, or sizes of
+/// which none differs from zero. Where standard errors do not show that one does, since its parameters
+/// or others make up for each other or stand near where they must end, the effect itself is tested: its
+/// interval by the profile of the likelihood (Venzon and Moolgavkar, Applied Statistics 37, 1988)
+/// holds zero where the fit without it is as good.
+pub(super) fn unfit<M: InParts>(
+    measured: &M,
+    point: &Point,
+    deviations: &[f64],
+    record: usize,
+) -> Vec<Refused> {
+    let mut refused = Vec::new();
+    let mut place = point.nuisance.len();
+    for (index, internal) in &point.effects {
+        let candidate = &measured.candidates()[*index];
+        let (mut clear, mut sizes) = (false, false);
+        for (parameter, &q) in candidate.parameters.iter().zip(internal) {
+            let error = deviations.get(place).copied().unwrap_or(f64::NAN);
+            place += 1;
+            if !matches!(parameter.role, Role::Shape { .. }) {
+                sizes = true;
+                clear |= q.abs() > CLEAR * error;
+            }
+        }
+        let bound = candidate.bound(internal).map(|parameter| {
+            let values = candidate.parameters.iter().zip(internal);
+            let own = values.into_iter().find(|(p, _)| p.name == parameter.name);
+            let value = own.map_or(f64::NAN, |(p, &q)| p.scale.to_value(q));
+            let of = candidate.parameters.iter();
+            let place = of.clone().position(|p| p.name == parameter.name);
+            let unit = measured.unit(*index, place.unwrap_or(0));
+            let name = parameter.name;
+            format!("`{name}` is at its bound of {value:.4e} {unit}")
+        });
+        if let Some(reason) = bound {
+            refused.push((*index, reason));
+        } else if sizes && !clear && !is_missed(measured, point, *index, record) {
+            refused.push((
+                *index,
+                "the 95 % interval of its size contains zero".to_owned(),
+            ));
+        }
+    }
+    refused
+}
+
+/// Whether the fit to `record` without an effect is worse by more than chance.
+fn is_missed<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize) -> bool {
+    let mut without = point.clone();
+    without.effects.retain(|(index, _)| *index != effect);
+    let Some((without, _)) = refit(measured, &without, record) else {
+        return false;
+    };
+    let after = all_errors(measured, point, record);
+    let before = all_errors(measured, &without.point, record);
+    clearly_better(&before, &after)
+}
+
+/// Whether the squared errors `after` are smaller than those `before` by more than chance, correlated
+/// samples counted once: by the ratio of the likelihoods, or, where slow drift in both hides that, by the
+/// differences (Vuong, Econometrica 57, 1989; for nested models half the root of the ratio's chi-square
+/// at most).
+fn clearly_better(before: &[f64], after: &[f64]) -> bool {
+    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
+    let independent = |values: &[f64]| values.len() as f64 / correlation_time(values);
+    let ratio = independent(after) * (squares(before) / squares(after)).ln();
+    let pairs = before.iter().zip(after);
+    let differences: Vec<f64> = pairs.map(|(b, a)| b * b - a * a).collect();
+    let (mean, deviation) = mean_and_deviation(&differences);
+    ratio > CLEAR * CLEAR || mean > CLEAR * deviation / independent(&differences).sqrt()
+}
+
+/// Parameters of the effects at `point` with standard errors, under the model's names.
+pub(super) fn effects<M: InParts>(
+    measured: &M,
+    point: &Point,
+    deviations: &[f64],
+) -> Vec<(String, Vec<NamedValue>)> {
+    let named = estimates(measured.candidates(), point, deviations);
+    let own = named.into_iter().zip(&point.effects);
+    own.map(|(effect, (index, _))| {
+        let values = effect.parameters.into_iter().enumerate();
+        let values = values.map(|(i, p)| NamedValue {
+            name: p.name,
+            value: p.value,
+            unit: measured.unit(*index, i),
+            standard_error: p.standard_error,
+        });
+        (measured.name(*index), values.collect())
+    })
+    .collect()
+}
+
+/// All parameters of a fit, by a name for people.
+fn listed<M: InParts>(measured: &M, point: &Point, deviations: &[f64]) -> Vec<NamedValue> {
+    let mut all = measured.parameters(point, deviations);
+    for (effect, values) in effects(measured, point, deviations) {
+        all.extend(values.into_iter().map(|value| NamedValue {
+            name: format!("{effect}.{}", value.name),
+            ..value
+        }));
+    }
+    all
+}
+
+/// One model, fitted to parts and to files.
+struct Fits {
+    everything: (Point, Vec<f64>),
+    parts: [(Point, Vec<f64>); 2],
+    files: Vec<(usize, Point, Vec<f64>)>,
+}
+
+fn fits<M: InParts>(measured: &M, start: &Point) -> Option<Fits> {
+    let (first, second) = rayon::join(
+        || refit(measured, start, Part::Fitted as usize),
+        || refit(measured, start, Part::LeftOut as usize),
+    );
+    let (first, second) = (first?, second?);
+    let everything = refit(measured, &first.0.point, EVERYTHING)?;
+    let many = measured.blocks() > 2;
+    let own = (0..measured.blocks()).into_par_iter();
+    let files = own
+        .filter(|&s| many && measured.samples(EVERYTHING, s) >= FEWEST)
+        .filter_map(|s| {
+            let (found, deviations) = refit(measured, &everything.0.point, file(s))?;
+            Some((s, found.point, deviations))
+        })
+        .collect();
+    Some(Fits {
+        everything: (everything.0.point, everything.1),
+        parts: [(first.0.point, first.1), (second.0.point, second.1)],
+        files,
+    })
+}
+
+/// What is found beside the effects, and the model; none where it cannot be fitted. Effects of
+/// `start` that turn out to be unfit leave it, each with its reason.
+pub(super) fn confirm<M: InParts>(
+    measured: &M,
+    start: &Point,
+    refused: &mut Vec<Refused>,
+    findings: &mut Vec<String>,
+) -> Option<Confirmed> {
+    let mut start = start.clone();
+    let fits = loop {
+        let fits = fits(measured, &start)?;
+        let all = [
+            (&fits.everything, EVERYTHING),
+            (&fits.parts[0], Part::Fitted as usize),
+            (&fits.parts[1], Part::LeftOut as usize),
+        ];
+        let out: Vec<Refused> = all
+            .into_iter()
+            .flat_map(|((point, deviations), record)| unfit(measured, point, deviations, record))
+            .collect();
+        if out.is_empty() {
+            break fits;
+        }
+        start
+            .effects
+            .retain(|(i, _)| out.iter().all(|(o, _)| o != i));
+        for (index, reason) in out {
+            if refused.iter().all(|(known, _)| *known != index) {
+                refused.push((index, reason));
+            }
+        }
+    };
+    let (point, deviations) = &fits.everything;
+    let origin = measured.origin();
+    let (refitted, refitted_deviations) = refit(measured, &origin, EVERYTHING).map_or_else(
+        || (origin.clone(), Vec::new()),
+        |(found, deviations)| (found.point, deviations),
+    );
+    let own = measured.parameters(point, deviations);
+    let count = own.len();
+    let mut all = listed(measured, point, deviations);
+    differences(measured, &fits, &mut all, findings);
+    surprises(measured, &all, count, findings);
+    let scattered: Vec<f64> = all.iter().map(|value| value.standard_error).collect();
+    let with_errors = |values: Vec<NamedValue>, from: usize| -> Vec<NamedValue> {
+        let pairs = values.into_iter().zip(&scattered[from..]);
+        pairs
+            .map(|(value, &standard_error)| NamedValue {
+                standard_error,
+                ..value
+            })
+            .collect()
+    };
+    let mut from = count;
+    let effects = effects(measured, point, deviations)
+        .into_iter()
+        .map(|(name, values)| {
+            let first = from;
+            from += values.len();
+            (name, with_errors(values, first))
+        })
+        .collect();
+    let on = |part: Part| {
+        let (own, other) = (part as usize, part.other() as usize);
+        completed(measured, &fits.parts[own].0, Some(own), other)
+    };
+    let (here, there) = (on(Part::Fitted), on(Part::LeftOut));
+    let (tested, swapped) = (Part::LeftOut as usize, Part::Fitted as usize);
+    let nominal = refit(measured, &origin, Part::Fitted as usize)
+        .map_or_else(|| origin.clone(), |(found, _)| found.point);
+    let nominal = completed(measured, &nominal, Some(swapped), tested);
+    Some(Confirmed {
+        error: measured.normalised_error(&here, tested),
+        swapped_error: measured.normalised_error(&there, swapped),
+        gain_interval: gain_interval(
+            &all_errors(measured, &nominal, tested),
+            &all_errors(measured, &here, tested),
+        ),
+        refitted_error: measured.normalised_error(&refitted, EVERYTHING),
+        fitted_error: measured.normalised_error(point, EVERYTHING),
+        refitted: measured.parameters(&refitted, &refitted_deviations),
+        parameters: with_errors(own, 0),
+        effects,
+        point: point.clone(),
+        refitted_point: refitted,
+    })
+}
+
+/// Widens the standard errors of `all` to the scatter between parts and files, and tells which
+/// parameters are not the same there.
+fn differences<M: InParts>(
+    measured: &M,
+    fits: &Fits,
+    all: &mut [NamedValue],
+    findings: &mut Vec<String>,
+) {
+    let lists: Vec<(String, Vec<NamedValue>)> = if fits.files.is_empty() {
+        let of = |part: Part| {
+            let (point, deviations) = &fits.parts[part as usize];
+            let name = measured.record_name(part as usize).to_owned();
+            (name, listed(measured, point, deviations))
+        };
+        vec![of(Part::Fitted), of(Part::LeftOut)]
+    } else {
+        let own = fits.files.iter().map(|(s, point, deviations)| {
+            let name = measured.record_name(file(*s)).to_owned();
+            (name, listed(measured, point, deviations))
+        });
+        own.collect()
+    };
+    for (i, parameter) in all.iter_mut().enumerate() {
+        let own: Vec<(&str, &NamedValue)> = lists
+            .iter()
+            .filter_map(|(name, list)| Some((name.as_str(), list.get(i)?)))
+            .filter(|(_, value)| value.value.is_finite() && value.standard_error.is_finite())
+            .collect();
+        let n = own.len() as f64;
+        if own.len() < 2 {
+            continue;
+        }
+        let mean = own.iter().map(|(_, v)| v.value).sum::<f64>() / n;
+        let variance = own
+            .iter()
+            .map(|(_, v)| (v.value - mean).powi(2))
+            .sum::<f64>()
+            / (n - 1.0);
+        let scatter = (variance / n).sqrt();
+        if scatter > parameter.standard_error || parameter.standard_error.is_nan() {
+            parameter.standard_error = scatter;
+        }
+        let ends = |order: fn(f64, f64) -> bool| {
+            own.iter()
+                .copied()
+                .reduce(|a, b| if order(a.1.value, b.1.value) { a } else { b })
+        };
+        let (Some(low), Some(high)) = (ends(|a, b| a < b), ends(|a, b| a > b)) else {
+            continue;
+        };
+        let apart = high.1.value - low.1.value;
+        if apart > DIFFERS * low.1.standard_error.hypot(high.1.standard_error) {
+            let told = |(name, v): (&str, &NamedValue)| {
+                format!("{:.4e} ± {:.1e} ({name})", v.value, v.standard_error)
+            };
+            findings.push(format!(
+                "`{}` differs between parts: {} and {} {}; its standard error includes the scatter",
+                parameter.name,
+                told(low),
+                told(high),
+                parameter.unit
+            ));
+        }
+    }
+}
+
+/// Tells which nominal parameters are not what was stated.
+fn surprises<M: InParts>(
+    measured: &M,
+    all: &[NamedValue],
+    count: usize,
+    findings: &mut Vec<String>,
+) {
+    // The effects' parameters follow the nominal ones.
+    for (i, value) in all.iter().take(count).enumerate() {
+        let (stated, deviation) = measured.stated(i);
+        let off = (value.value - stated).abs();
+        if off > SURPRISING * deviation && off > SURPRISING * value.standard_error {
+            findings.push(format!(
+                "`{}` is {:.4e} ± {:.1e} {unit} from these data, stated as {stated:.4e} ± \
+                 {deviation:.1e} {unit}",
+                value.name,
+                value.value,
+                value.standard_error,
+                unit = value.unit,
+            ));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn a_gain_all_along_is_clear_and_one_by_chance_or_of_a_slow_drift_is_not() {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let noise: Vec<f64> = (0..2000).map(|_| random.random_range(-1.0..1.0)).collect();
+        let wave = |k: usize| 0.3 * (0.05 * k as f64).sin();
+        let with = |more: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            let all = noise.iter().enumerate();
+            all.map(|(k, e)| e + more(k)).collect()
+        };
+        assert!(clearly_better(&with(&wave), &noise));
+        assert!(!clearly_better(&noise, &with(&wave)));
+        let chance = |k: usize| 1e-3 * wave(k);
+        assert!(!clearly_better(&with(&chance), &noise));
+        // A drift that is few samples in truth.
+        let drift: Vec<f64> = (0..2000).map(|k| (2e-3 * f64::from(k)).sin()).collect();
+        let shifted: Vec<f64> = drift.iter().map(|e| e + 0.05).collect();
+        assert!(!clearly_better(&shifted, &drift));
+    }
+}

@@ -1,0 +1,409 @@
+//! The diagnosis of a rig on real data.
+
+use serde::{Deserialize, Serialize};
+
+use super::cause::{Cause, effect_in_words, joined};
+use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
+use super::measured::Measured;
+use super::named_value::NamedValue;
+use super::parts::{InParts, LOST, Part};
+use super::{Description, DescriptionError, Measurement};
+use crate::report::ends_or_not_a_number;
+use diagnosis::resampling::gain_interval;
+use diagnosis::{Observer, Point, Progress, Selected, Verdict, all_errors, completed, select};
+
+/// Errors on data that were not fitted that still agree with those on fitted ones: at most so many times
+/// these, or this small.
+const AGREE: f64 = 2.0;
+const NEAR: f64 = 0.01;
+/// Share of the squared error beyond which what is explained is all of it.
+const ALL: f64 = 0.98;
+
+/// An effect that one part of the data asks for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PartEffect {
+    /// Its name.
+    pub effect: String,
+    /// Its parameters.
+    pub parameters: Vec<NamedValue>,
+    /// Probability that its gain on unseen data is not due to chance, with correlated samples
+    /// counted once.
+    pub confidence: f64,
+    /// By how much the squared error on the data not fitted grows without it (all else refitted),
+    /// as a share of the nominal model's.
+    pub share: f64,
+    /// Why it is nevertheless not named: it is at its bound, its interval contains zero, or the
+    /// other part is predicted worse with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub objection: Option<String>,
+}
+
+/// What one part of the data says, tested on the other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PartReport {
+    /// Normalised error of the nominal model on the data not fitted.
+    pub nominal_error: f64,
+    /// With its parameters refitted.
+    pub refitted_error: f64,
+    /// Extended, on the data not fitted.
+    pub extended_error: f64,
+    /// Extended, on the fitted data.
+    pub fitted_error: f64,
+    /// 95 % interval of the share of the refitted model's squared error that the effects explain
+    /// on the data not fitted.
+    #[serde(deserialize_with = "ends_or_not_a_number")]
+    pub gain_interval: (f64, f64),
+    /// Nominal parameters as refitted.
+    pub parameters: Vec<NamedValue>,
+    /// The effects.
+    pub effects: Vec<PartEffect>,
+    /// Share of the nominal model's squared error on the data not fitted that the extended model
+    /// explains.
+    pub explained: f64,
+    /// Pairs of an effect that nearly did as well and the one that was taken.
+    pub rivals: Vec<(String, String)>,
+    /// Where the extended model is.
+    #[serde(skip)]
+    pub(super) point: Point,
+}
+
+/// The diagnosis of a rig.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RigDiagnosis {
+    /// The rig.
+    pub name: String,
+    /// Its kind.
+    pub kind: String,
+    /// What is simulated.
+    pub output: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Effects that both parts of the data name.
+    pub named: Vec<String>,
+    /// Effects that only one part names.
+    pub not_confirmed: Vec<String>,
+    /// Fitted as described, tested on the held-out part.
+    pub as_described: PartReport,
+    /// Fitted on the held-out part, tested on the rest.
+    pub swapped: PartReport,
+    /// What was found and is not named, with the reason.
+    #[serde(default)]
+    pub set_aside: Vec<SetAside>,
+    /// Nominal parameters such as a scale that are not what was stated, and sensors that contradict each
+    /// other.
+    #[serde(default)]
+    pub causes: Vec<Cause>,
+    /// Parameters that differ between parts of the data or from what was stated.
+    #[serde(default)]
+    pub findings: Vec<String>,
+    /// The model with the named effects alone.
+    pub confirmed: Confirmed,
+    /// Share of the squared error on the held-out data that the confirmed model leaves.
+    pub unexplained: f64,
+}
+
+/// An effect that pays on a part of the data and is not named.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SetAside {
+    /// The effect.
+    pub effect: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// Diagnoses a rig on its measurements.
+///
+/// # Errors
+/// When the description does not fit the rig, or the nominal model cannot be simulated.
+pub fn diagnose(
+    description: &Description,
+    measurement: &Measurement,
+    observer: Observer<'_>,
+) -> Result<RigDiagnosis, DescriptionError> {
+    let rig = description.rig()?;
+    let nominal = description.nominal(rig)?;
+    let measured = Measured::new(rig, measurement, nominal).called(&description.name);
+    let mut found = judge(&measured, observer).ok_or_else(|| no_output(description))?;
+    found
+        .findings
+        .extend(measured.notes(&found.confirmed.point));
+    Ok(found)
+}
+
+/// Diagnoses a model on its data; none where the nominal model cannot be simulated.
+pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<RigDiagnosis> {
+    let part = |fitted: Part| -> Option<PartReport> {
+        let record = fitted as usize;
+        observer.tell(|| Progress::Fitting(measured.record_name(record).to_owned()));
+        let selected = select(measured, record, observer)?;
+        Some(part_report(measured, fitted, &selected))
+    };
+    let mut as_described = part(Part::Fitted)?;
+    let swapped = part(Part::LeftOut)?;
+    let list = |part: &PartReport| -> Vec<String> {
+        part.effects
+            .iter()
+            .map(|effect| effect.effect.clone())
+            .collect()
+    };
+    let (here, there) = (list(&as_described), list(&swapped));
+    // Effects that records of a rig cannot tell apart confirm each other.
+    let alike = |name: &str, other: &str| {
+        let known = |name: &str| measured.index(name);
+        name == other
+            || matches!((known(name), known(other)), (Some(a), Some(b)) if measured.are_alike(a, b))
+    };
+    let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
+    let only = here.iter().filter(|name| !in_both(name, &there));
+    let not_confirmed: Vec<String> = only
+        .chain(there.iter().filter(|name| !in_both(name, &here)))
+        .cloned()
+        .collect();
+    let mut set_aside: Vec<SetAside> = not_confirmed
+        .iter()
+        .map(|effect| SetAside {
+            effect: effect.clone(),
+            reason: "one part of the data shows it and the other does not".to_owned(),
+        })
+        .collect();
+    // Of what both parts ask for, what either part gives a reason against is not named.
+    let index = |name: &str| measured.index(name).unwrap_or(usize::MAX);
+    let mut refused: Vec<Refused> = Vec::new();
+    for (part, others) in [(&as_described, &swapped), (&swapped, &as_described)] {
+        for effect in &part.effects {
+            let other = others
+                .effects
+                .iter()
+                .find(|o| alike(&effect.effect, &o.effect));
+            let Some(other) = other else { continue };
+            let reasons = [effect, other]
+                .into_iter()
+                .filter_map(|one| one.objection.clone());
+            if let Some(reason) = reasons.into_iter().next() {
+                refused.push((index(&effect.effect), reason));
+            }
+        }
+    }
+    let mut start = as_described.point.clone();
+    start.effects.retain(|(i, _)| {
+        let name = measured.name(*i);
+        in_both(&name, &there) && refused.iter().all(|(known, _)| known != i)
+    });
+    let mut findings = Vec::new();
+    let confirmed = confirm(measured, &start, &mut refused, &mut findings)?;
+    for (i, reason) in refused {
+        let effect = measured.name(i);
+        if set_aside.iter().all(|known| known.effect != effect) {
+            set_aside.push(SetAside { effect, reason });
+        }
+    }
+    let named: Vec<String> = confirmed
+        .effects
+        .iter()
+        .map(
+            |(name, _)| match there.iter().find(|other| alike(name, other)) {
+                Some(other) if other != name => format!("{name} or {other}"),
+                _ => name.clone(),
+            },
+        )
+        .collect();
+    for (name, _) in &confirmed.effects {
+        let other = measured.looks_like(name);
+        let rivals = other.map(|other| (other.to_owned(), name.clone()));
+        as_described.rivals.extend(rivals);
+    }
+    let pays = confirmed.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
+    let is_named = |effect: &str| confirmed.effects.iter().any(|(name, _)| name == effect);
+    let rivalled = as_described
+        .rivals
+        .iter()
+        .any(|(rival, against)| is_named(against) && !alike(against, rival));
+    // Each part is predicted from the other about as well as it is fitted.
+    let tests = [
+        (confirmed.error, as_described.fitted_error),
+        (confirmed.swapped_error, swapped.fitted_error),
+    ];
+    let holds = tests
+        .into_iter()
+        .all(|(error, fitted)| error < LOST && (error < NEAR || error < AGREE * fitted));
+    let values = confirmed.parameters.iter().enumerate();
+    let causes: Vec<Cause> = values
+        .filter(|(i, _)| holds && measured.is_cause(*i))
+        .filter_map(|(i, value)| Cause::of(value.clone(), measured.stated(i)))
+        .chain(measured.contradictions())
+        .collect();
+    let verdict = match (named.is_empty() || !pays, rivalled) {
+        (true, _) if !causes.is_empty() => Verdict::Named,
+        (true, _) if here.is_empty() && there.is_empty() && holds => Verdict::Adequate,
+        (true, _) => Verdict::Unexplained,
+        (_, true) => Verdict::Ambiguous,
+        _ => Verdict::Named,
+    };
+    Some(RigDiagnosis {
+        name: measured.subject().to_owned(),
+        kind: measured.kind().to_owned(),
+        output: measured.output(),
+        verdict,
+        named,
+        not_confirmed,
+        set_aside,
+        causes,
+        findings,
+        unexplained: (confirmed.error / as_described.nominal_error).powi(2),
+        confirmed,
+        as_described,
+        swapped,
+    })
+}
+
+fn no_output(description: &Description) -> DescriptionError {
+    DescriptionError::Description {
+        path: description.path.clone(),
+        what: "the nominal model gives no finite output on these data: check the values in \
+            `nominal` (such as a mass of zero) and the units of `columns`"
+            .to_owned(),
+    }
+}
+
+fn part_report<M: InParts>(measured: &M, fitted: Part, selected: &Selected) -> PartReport {
+    let (own, tested) = (fitted as usize, fitted.other() as usize);
+    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
+    // What belongs to a file and not to the rig is fitted there, for every model alike.
+    let on_tested = |point: &Point| completed(measured, point, Some(own), tested);
+    let origin = completed(measured, &measured.origin(), None, tested);
+    let before = squares(&all_errors(measured, &origin, tested));
+    let nominal = on_tested(&selected.nominal.point);
+    let point = on_tested(&selected.extended.point);
+    let refitted = all_errors(measured, &nominal, tested);
+    let extended = all_errors(measured, &point, tested);
+    let after = squares(&extended);
+    let found = &selected.extended.point;
+    let objections = unfit(measured, found, &selected.deviations, own);
+    let mut effects = Vec::new();
+    for (i, (effect, parameters)) in named_values(measured, found, &selected.deviations)
+        .into_iter()
+        .enumerate()
+    {
+        let without = on_tested(&selected.without[i].point);
+        let without = squares(&all_errors(measured, &without, tested));
+        let share = (without - after) / before;
+        let objection = objections
+            .iter()
+            .find(|(index, _)| *index == found.effects[i].0)
+            .map(|(_, reason)| reason.clone());
+        let negative = || "the prediction of the other part is better without it".to_owned();
+        effects.push(PartEffect {
+            effect,
+            parameters,
+            confidence: confidence(selected.deviates[i]),
+            share,
+            objection: objection.or_else(|| (share <= 0.0).then(negative)),
+        });
+    }
+    let name = |i: usize| measured.name(i);
+    PartReport {
+        nominal_error: measured.normalised_error(&origin, tested),
+        refitted_error: measured.normalised_error(&nominal, tested),
+        extended_error: measured.normalised_error(&point, tested),
+        fitted_error: measured.normalised_error(found, own),
+        gain_interval: gain_interval(&refitted, &extended),
+        parameters: measured.parameters(found, &selected.deviations),
+        effects,
+        explained: 1.0 - after / before,
+        rivals: selected
+            .rivals
+            .iter()
+            .map(|r| (name(r.effect), name(r.against)))
+            .collect(),
+        point: found.clone(),
+    }
+}
+
+/// Probability below `deviate` of Student's distribution with four degrees of freedom: two folds of two
+/// parts tell how far it may be off, so that no confidence is that of a normal tail.
+fn confidence(deviate: f64) -> f64 {
+    let square = deviate * deviate / (1.0 + deviate * deviate / 4.0);
+    0.5 + 0.375 * square.sqrt().copysign(deviate) * (1.0 - square / 12.0)
+}
+
+impl RigDiagnosis {
+    /// What the reader should know beside the verdict, a sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        let aside = self.set_aside.iter();
+        let aside = aside.map(|one| format!("`{}` is not named: {}", one.effect, one.reason));
+        aside.chain(self.findings.iter().cloned()).collect()
+    }
+
+    /// What was found, in a sentence.
+    pub fn sentence(&self) -> String {
+        let listed = |names: &[String]| names.join(", ").replace('_', " ");
+        let effects = self.confirmed.effects.iter();
+        let with_values: Vec<String> = effects
+            .map(|(name, values)| effect_in_words(name, values))
+            .collect();
+        let shown = joined(&with_values);
+        let part = &self.as_described;
+        let falls = format!(
+            "the error of {} on the held-out data falls from {:.1} to {:.1} %",
+            self.output,
+            100.0 * part.nominal_error,
+            100.0 * self.confirmed.error
+        );
+        let name = &self.name;
+        match self.verdict {
+            Verdict::Adequate => format!(
+                "{name}: the nominal model is adequate; refitted{}, its error of {} on the \
+                 held-out data is {:.1} %.",
+                if self.findings.is_empty() {
+                    " within its uncertainty"
+                } else {
+                    ""
+                },
+                self.output,
+                100.0 * part.refitted_error
+            ),
+            Verdict::Named => {
+                let mut all: Vec<String> = self.causes.iter().map(Cause::words).collect();
+                if !with_values.is_empty() {
+                    all.push(format!("every part of the data shows {shown}"));
+                }
+                let left = 1.0 - self.unexplained;
+                let share = match (all.len(), left > ALL) {
+                    (1, true) => "that is all of the error".to_owned(),
+                    (_, true) => "together they are all of the error".to_owned(),
+                    (..) => format!("they explain {:.0} % of the squared error", 100.0 * left),
+                };
+                format!("{name}: {}; {share}; {falls}.", joined(&all))
+            }
+            Verdict::Ambiguous => {
+                let causes: Vec<String> = self.causes.iter().map(Cause::words).collect();
+                let causes = match causes.as_slice() {
+                    [] => String::new(),
+                    some => format!("{}; ", joined(some)),
+                };
+                let rivals = part.rivals.iter();
+                let rivals: Vec<String> = rivals
+                    .map(|(rival, against)| format!("{rival} instead of {against}"))
+                    .collect();
+                format!(
+                    "{name}: {causes}every part of the data shows {shown}, and {} explains it \
+                     nearly as well; {falls}.",
+                    listed(&rivals)
+                )
+            }
+            Verdict::Unexplained if part.effects.is_empty() && self.swapped.effects.is_empty() => {
+                format!(
+                    "{name}: no effect improves the model, and the nominal model is not adequate: \
+                     refitted, its error of {} \
+                     on the held-out data is {:.1} %.",
+                    self.output,
+                    100.0 * part.refitted_error
+                )
+            }
+            Verdict::TooSmall | Verdict::Unexplained => format!(
+                "{name}: no effect is shown by every part of the data and improves the model on \
+                 all of them; with the effects of one part, {falls}."
+            ),
+        }
+    }
+}

@@ -1,0 +1,415 @@
+//! Friction device: displacement to force.
+//!
+//! Nominal: elastic up to a Coulomb force, `f' = k v (1 - (f / F)^n sgn v)` with n → ∞ (Dahl 1968;
+//! n = 1 is his curve, n between is Bouc and Wen's with no post-yield stiffness).
+//!
+//! Effects are counted in natural units: the standard deviation of the displacement, the Coulomb
+//! force, and the time in which the displacement passes at its mean speed.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use realfft::RealFftPlanner;
+
+use super::table::{effects, nominal_parameters, session_parameters, shape, size};
+use super::{Equations, Natural, RigRecording};
+use recordings::{Channel, mean_and_deviation};
+
+/// The rig.
+pub struct HystereticDevice;
+
+const FORCE: Channel = Channel::Other {
+    name: "force",
+    unit: "N",
+};
+
+/// Forces measured inside the device, such as those of a band's two ends.
+const FIRST_INNER_FORCE: Channel = Channel::Other {
+    name: "inner_force_1",
+    unit: "N",
+};
+const SECOND_INNER_FORCE: Channel = Channel::Other {
+    name: "inner_force_2",
+    unit: "N",
+};
+
+/// A device whose first force is less than this share of its friction is in its gap.
+const HELD: f64 = 0.05;
+
+/// Greatest asymmetry: one side holds a twentieth.
+const ONE_SIDED: f64 = 0.95;
+
+nominal_parameters! {
+    /// F: force at which it slides.
+    coulomb_force: "N",
+    /// k: of the device before it slides.
+    stiffness: "N/m",
+}
+
+session_parameters! {
+    /// Part of a gap that was travelled before the test, less one half.
+    gap_travelled: "1" within 0.2 as Start,
+}
+
+effects! {
+    /// F± = F (1 ± a).
+    asymmetric_coulomb_friction: AsymmetricCoulombFriction {
+        asymmetry: size("1", 0.03, (-0.9, 0.9)),
+    } from [[0.1], [-0.1]];
+    /// After the force has gone to zero, the device moves through a gap before it takes
+    /// hold on the other side.
+    free_play: FreePlay {
+        gap: size("m", 0.01, (0.0, 3.0)),
+    } from [[0.1], [0.3]];
+    /// Stiffness while the force falls is (1 + s) k: a band that wraps on gives way more
+    /// softly than it lets go.
+    stiffer_unloading: StifferUnloading {
+        excess: size("1", 0.05, (-0.9, 20.0)),
+    } from [[0.5], [-0.3]];
+    /// k± = k (1 ± a).
+    asymmetric_stiffness: AsymmetricStiffness {
+        asymmetry: size("1", 0.03, (-0.9, 0.9)),
+    } from [[0.1], [-0.1]];
+    /// Asymmetry a e^{-c X}, X the greatest excursion so far: a surface, like the rubber of
+    /// Mullins (Rubber Chem. Technol. 42, 1969), remembers how far it was driven.
+    excursion_memory: ExcursionMemory {
+        decay: size("1/m", 0.1, (-2.0, 10.0)),
+    } from [[0.4], [-0.2]];
+    /// k (1 + h |f| / F): contact that stiffens as more of it bears (Popov, Contact Mechanics
+    /// and Friction, 2010, chapter 5).
+    hardening_stiffness: HardeningStiffness {
+        hardening: size("1", 0.05, (0.0, 20.0)),
+    } from [[0.5], [2.0]];
+    /// Rounded transition: k (1 - r |f / F|^n) with exponent n.
+    rounded_transition: RoundedTransition {
+        rounding: size("1", 0.05, (0.0, 1.0)),
+        exponent: shape("1", 2.0, 0.7),
+    } from [[0.5, 2.0], [0.9, 1.0]];
+    /// Soft begin of contact: k (1 - p e^{-|f| / (c F)}); p near one would be free play.
+    progressive_contact: ProgressiveContact {
+        softness: size("1", 0.05, (0.0, 0.8)),
+        share: shape("1", 0.1, 0.7),
+    } from [[0.6, 0.1], [0.6, 0.3]];
+    /// F (1 + s e^{-|v| / v_s}) (Stribeck).
+    stribeck: Stribeck {
+        excess: size("1", 0.03, (-0.9, 2.0)),
+        speed: shape("m/s", 0.25, 1.0),
+    } from [[0.2, 0.25], [-0.2, 0.25]];
+    /// F (1 + s |v| / (1 m/s)).
+    rate_dependence: RateDependence {
+        slope: size("s/m", 0.02, (-0.5, 2.0)),
+    } from [[0.05], [-0.05]];
+    /// c v beside the friction.
+    viscous: Viscous {
+        damping: size("N s/m", 2e-3, (-10.0, 10.0)),
+    } from [[0.02], [-0.02]];
+    /// y follows the force through ω² / (s² + 2 ζ ω s + ω²): mass and spring between device and
+    /// load cell. With ζ from 1/√2 up nothing resonates, it only lags.
+    load_path_resonance: LoadPathResonance {
+        frequency: shape("rad/s", 50.0, 1.5).off_at(0.0),
+        damping_ratio: size("1", 0.02, (0.0, FRAC_1_SQRT_2)),
+    } from [[12.0, 0.1], [25.0, 0.1], [50.0, 0.1], [100.0, 0.1]];
+    /// A force measured inside the device acts on its end, by a lever: the ends of a band around a drum
+    /// pull against each other (Coble, Cao, Downey and Ricles, J. Mech. Des. 140, 2018).
+    inner_force_1: InnerForce1 {
+        lever: size("1", 0.01, (-30.0, 30.0)),
+    } from [[0.5], [-0.5]];
+    /// So does a second one.
+    inner_force_2: InnerForce2 {
+        lever: size("1", 0.01, (-30.0, 30.0)),
+    } from [[0.5], [-0.5]];
+    /// Displacement or force late.
+    delay: Delay {
+        delay: size("s", 6e-3, (0.0, 1.2)),
+    } from [[0.03], [0.12]];
+}
+
+impl Equations for HystereticDevice {
+    const KIND: &'static str = "hysteretic_device";
+    type Nominal = Nominal;
+    type Effects = Effects;
+    type Session = Session;
+    const INPUTS: &'static [Channel] = &[Channel::Displacement, Channel::Velocity];
+    const OPTIONAL: &'static [(Channel, &'static [&'static str])] = &[
+        (FIRST_INNER_FORCE, &["inner_force_1"]),
+        (SECOND_INNER_FORCE, &["inner_force_2"]),
+    ];
+    const OUTPUT: Channel = FORCE;
+    const IS_HYSTERETIC: bool = true;
+    const IS_SCALED: bool = true;
+
+    fn natural(nominal: &Nominal, channels: Natural) -> Natural {
+        Natural {
+            force: nominal.coulomb_force,
+            ..channels
+        }
+    }
+
+    fn simulate(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        effects: &Effects,
+        session: &Session,
+        out: &mut [f64],
+    ) {
+        let Nominal {
+            coulomb_force: coulomb,
+            stiffness,
+        } = *nominal;
+        let Effects {
+            asymmetric_coulomb_friction: AsymmetricCoulombFriction { asymmetry },
+            free_play: FreePlay { gap },
+            stiffer_unloading: StifferUnloading { excess: unloading },
+            asymmetric_stiffness:
+                AsymmetricStiffness {
+                    asymmetry: stiffness_asymmetry,
+                },
+            excursion_memory: ExcursionMemory { decay },
+            hardening_stiffness: HardeningStiffness { hardening },
+            rounded_transition: RoundedTransition { rounding, exponent },
+            progressive_contact:
+                ProgressiveContact {
+                    softness,
+                    share: contact,
+                },
+            stribeck: Stribeck {
+                excess,
+                speed: slow,
+            },
+            rate_dependence: RateDependence { slope: rate },
+            viscous: Viscous { damping },
+            load_path_resonance:
+                LoadPathResonance {
+                    frequency: resonance,
+                    damping_ratio,
+                },
+            inner_force_1: InnerForce1 { lever: first_lever },
+            inner_force_2: InnerForce2 {
+                lever: second_lever,
+            },
+            delay: Delay { delay },
+        } = *effects;
+        let inner = [
+            (first_lever, recording.input(FIRST_INNER_FORCE)),
+            (second_lever, recording.input(SECOND_INNER_FORCE)),
+        ];
+        let (x, v) = (
+            recording.input(Channel::Displacement),
+            recording.input(Channel::Velocity),
+        );
+        // The device begins as it was left: under the first measured force, or somewhere in the gap.
+        let first = recording.output().first().copied().unwrap_or(f64::NAN);
+        let is_held = first.abs() > HELD * coulomb;
+        let mut force = if is_held {
+            first.max(-coulomb).min(coulomb)
+        } else {
+            0.0
+        };
+        // Travelled part of the gap, 0 at its negative end.
+        let mut travelled = if is_held {
+            if force > 0.0 { gap } else { 0.0 }
+        } else {
+            gap * (0.5 + session.gap_travelled).clamp(0.0, 1.0)
+        };
+        let (mut shown, mut shown_rate) = (force, 0.0);
+        // Twelve steps a radian of the load path at least, sixty-four a sample at most.
+        let radians = resonance * recording.period();
+        let steps = (12.0 * radians).ceil().clamp(1.0, 64.0);
+        let late = delay / recording.period();
+        let at = |values: &[f64], k: usize| {
+            let place = (k as f64 - late).max(0.0);
+            let before = place as usize;
+            let share = place - before as f64;
+            let after = (before + 1).min(values.len() - 1);
+            values[before] * (1.0 - share) + values[after] * share
+        };
+        let rest = x.first().copied().unwrap_or(0.0);
+        let mut position = rest;
+        let mut greatest = 0.0f64;
+        for (k, y) in out.iter_mut().enumerate() {
+            let (now, speed) = (at(x, k), at(v, k));
+            let mut move_left = now - position;
+            position = now;
+            greatest = greatest.max((now - rest).abs());
+            // A memory that grows with the excursion ends where one side holds nothing.
+            let asymmetry = (asymmetry * (-decay * greatest).exp()).clamp(-ONE_SIDED, ONE_SIDED);
+            let mut level = 1.0 + rate * speed.abs();
+            if excess != 0.0 {
+                level += excess * (-speed.abs() / slow).exp();
+            }
+            let level = coulomb * level.max(0.05);
+            // At most: let go, cross the gap, take hold.
+            for _ in 0..3 {
+                if move_left == 0.0 {
+                    break;
+                }
+                let direction = move_left.signum();
+                let loose = force == 0.0;
+                if loose {
+                    let room = if direction > 0.0 {
+                        gap - travelled
+                    } else {
+                        travelled
+                    };
+                    if move_left.abs() < room {
+                        travelled += move_left;
+                        break;
+                    }
+                    move_left -= direction * room;
+                    travelled = if direction > 0.0 { gap } else { 0.0 };
+                }
+                let side = if loose { direction } else { force.signum() };
+                let limit = level * (1.0 + side * asymmetry).max(0.05);
+                let bearing = (force.abs() / limit).min(1.0);
+                let k_side =
+                    stiffness * (1.0 + side * stiffness_asymmetry) * (1.0 + hardening * bearing);
+                if side * direction > 0.0 {
+                    let mut k_now = k_side;
+                    if rounding > 0.0 {
+                        k_now *= 1.0 - rounding * bearing.powf(exponent);
+                    }
+                    if softness > 0.0 {
+                        k_now *= 1.0 - softness * (-bearing / contact).exp();
+                    }
+                    force += k_now * move_left;
+                    if force.abs() > limit {
+                        force = side * limit;
+                    }
+                    move_left = 0.0;
+                } else {
+                    let k_now = k_side * (1.0 + unloading);
+                    let rest = force + k_now * move_left;
+                    if rest * side > 0.0 {
+                        force = rest;
+                        move_left = 0.0;
+                    } else {
+                        move_left += force / k_now;
+                        force = 0.0;
+                        travelled = if side > 0.0 { gap } else { 0.0 };
+                    }
+                }
+            }
+            let mut total = force + damping * speed;
+            for (lever, measured) in inner {
+                if lever != 0.0 && !measured.is_empty() {
+                    total += lever * at(measured, k);
+                }
+            }
+            if resonance > 0.0 {
+                let h = recording.period() / steps;
+                for _ in 0..steps as usize {
+                    let pull = resonance * (total - shown) - 2.0 * damping_ratio * shown_rate;
+                    shown_rate += h * resonance * pull;
+                    shown += h * shown_rate;
+                }
+                *y = shown;
+            } else {
+                *y = total;
+            }
+        }
+    }
+
+    fn starts(
+        &self,
+        recording: &RigRecording,
+        _nominal: &Nominal,
+        errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)> {
+        let displacement = recording.input(Channel::Displacement);
+        let found = ringing(displacement, errors, recording.period());
+        let start = found.map(|omega| ("load_path_resonance", vec![omega, 0.1]));
+        start.into_iter().collect()
+    }
+}
+
+/// Angular frequency at which a record rings: where the spectrum of its errors, times the square of
+/// the frequency, is highest above ten times the main frequency of the motion.
+fn ringing(displacement: &[f64], errors: &[f64], period: f64) -> Option<f64> {
+    let n = errors.len();
+    let spectrum = |values: &[f64]| -> Option<Vec<f64>> {
+        let (mean, _) = mean_and_deviation(values);
+        let mut real: Vec<f64> = values.iter().map(|v| v - mean).collect();
+        let plan = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+        let mut bins = plan.make_output_vec();
+        plan.process(&mut real, &mut bins).ok()?;
+        Some(bins.iter().map(|b| b.norm_sqr()).collect())
+    };
+    let motion = spectrum(displacement)?;
+    let main = (1..motion.len()).max_by(|&a, &b| motion[a].total_cmp(&motion[b]))?;
+    let known: Vec<f64> = errors
+        .iter()
+        .map(|e| if e.is_finite() { *e } else { 0.0 })
+        .collect();
+    let left = spectrum(&known)?;
+    // A tenth of an octave is one look.
+    let mut best: Option<(f64, f64)> = None;
+    let mut low = 10.0 * main as f64;
+    while low * 1.07 < 0.9 * left.len() as f64 {
+        let band = low as usize..(low * 1.07) as usize + 1;
+        let middle = 1.035 * low;
+        let count = band.len() as f64;
+        let power = left[band].iter().sum::<f64>() / count * middle * middle;
+        if best.is_none_or(|(most, _)| power > most) {
+            best = Some((power, middle));
+        }
+        low *= 1.07;
+    }
+    best.map(|(_, bin)| std::f64::consts::TAU * bin / (n as f64 * period))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::EffectTable;
+    use super::*;
+    use recordings::Recording;
+
+    #[test]
+    fn asymmetry_fades_with_the_greatest_excursion() {
+        // Slides to 10 mm, back to -5 mm and again to 8 mm: the level keeps that of 10 mm.
+        let path = [0.0, 0.010, -0.005, 0.008];
+        let steps = 1000;
+        let displacement: Vec<f64> = path
+            .windows(2)
+            .flat_map(|p| (0..steps).map(|k| p[0] + (p[1] - p[0]) * f64::from(k) / 1000.0))
+            .chain([0.008])
+            .collect();
+        let n = displacement.len();
+        let channels = vec![
+            (Channel::Displacement, displacement),
+            (Channel::Velocity, vec![0.0; n]),
+            (FORCE, vec![0.0; n]),
+        ];
+        let recording = Recording::new("slides", 1e-3, channels).unwrap();
+        let recording = RigRecording::new(recording, HystereticDevice::INPUTS, FORCE);
+        let effects = Effects {
+            asymmetric_coulomb_friction: AsymmetricCoulombFriction { asymmetry: -0.3 },
+            excursion_memory: ExcursionMemory { decay: 50.0 },
+            ..Effects::off().unwrap()
+        };
+        let nominal = Nominal {
+            coulomb_force: 1e4,
+            stiffness: 1e8,
+        };
+        let mut out = vec![0.0; n];
+        HystereticDevice.simulate(
+            &recording,
+            &nominal,
+            &effects,
+            &Session::default(),
+            &mut out,
+        );
+        let fade = |excursion: f64| 0.3 * (-50.0 * excursion).exp();
+        for (place, force) in [
+            (500, 1e4 * (1.0 - fade(0.005))),
+            (1000, 1e4 * (1.0 - fade(0.010))),
+            (2000, -1e4 * (1.0 + fade(0.010))),
+            (n - 1, 1e4 * (1.0 - fade(0.010))),
+        ] {
+            assert!(
+                (out[place] - force).abs() < 30.0,
+                "{place}: {} {force}",
+                out[place]
+            );
+        }
+    }
+}

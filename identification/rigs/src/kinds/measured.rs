@@ -1,0 +1,450 @@
+//! A rig with its measurements, as the engine of the diagnosis sees it.
+
+use super::named_value::NamedValue;
+use super::parts::{self, EVERYTHING, File, InParts, LOST, NAMES, places};
+use super::{Begun, Cause, Effect, Measurement, Natural, Rig, SessionRole, Values};
+use diagnosis::{Candidate, Point, SimulatedModel, WEAK, all_errors};
+
+/// Samples up to which more may be tried.
+const CHEAP: usize = 40_000;
+
+/// Width of the priors that hold: nothing moves.
+const HELD: f64 = 1e-3;
+
+/// Its records are those of [`places`].
+pub struct Measured<'a> {
+    /// Its equations.
+    pub rig: &'a dyn Rig,
+    /// Its data.
+    pub measurement: &'a Measurement,
+    /// Nominal values and standard deviations.
+    nominal: Vec<(f64, f64)>,
+    /// Which of them are uncertain.
+    uncertain: Vec<usize>,
+    /// One standard deviation of each parameter of a file, SI.
+    session: Vec<f64>,
+    effects: Vec<Effect>,
+    candidates: Vec<Candidate>,
+    /// Per record and recording, the places of its samples.
+    places: Vec<Vec<Vec<usize>>>,
+    /// Whether the first file is the reference for the others.
+    holds_first: bool,
+    /// How much wider than stated the priors of nominal parameters count.
+    width: f64,
+    /// What the rig is called.
+    name: String,
+}
+
+impl<'a> Measured<'a> {
+    /// The rig with nominal values and standard deviations in its order.
+    pub fn new(rig: &'a dyn Rig, measurement: &'a Measurement, nominal: Vec<(f64, f64)>) -> Self {
+        let values: Vec<f64> = nominal.iter().map(|(value, _)| *value).collect();
+        let natural: Natural = rig.natural(&values, &measurement.recordings);
+        let has = |channel| {
+            let mut all = measurement.recordings.iter();
+            all.all(|one| !one.input(channel).is_empty())
+        };
+        let effects: Vec<Effect> = rig
+            .effects()
+            .into_iter()
+            .map(|effect| {
+                let mut effect = if rig.is_scaled() {
+                    effect.scaled(&natural)
+                } else {
+                    effect
+                };
+                let needs = |names: &[&str]| names.contains(&effect.candidate.effect);
+                let mut optional = rig.optional().iter();
+                let is_uncertain = |name: &str| {
+                    let place = rig
+                        .parameters()
+                        .iter()
+                        .position(|(known, _)| *known == name);
+                    place.is_some_and(|i| nominal[i].1 > 0.0)
+                };
+                let is_said =
+                    |(own, by): &(&str, &str)| *own == effect.candidate.effect && is_uncertain(by);
+                if optional.any(|(channel, names)| needs(names) && !has(*channel))
+                    || rig.said_by().iter().any(is_said)
+                {
+                    // Without a start it is not tried.
+                    effect.candidate.starts.clear();
+                }
+                effect
+            })
+            .collect();
+        Self {
+            uncertain: (0..nominal.len()).filter(|&i| nominal[i].1 > 0.0).collect(),
+            session: rig
+                .session()
+                .iter()
+                .map(|own| own.spread * natural.unit(own.unit))
+                .collect(),
+            candidates: effects
+                .iter()
+                .map(|effect| effect.candidate.clone())
+                .collect(),
+            effects,
+            places: {
+                let recordings = measurement.recordings.iter();
+                let files: Vec<File<'_>> = recordings
+                    .map(|one| File {
+                        output: one.output(),
+                        left_out: &one.left_out,
+                        is_given: &one.is_given,
+                    })
+                    .collect();
+                places(&files, rig.screened())
+            },
+            name: String::new(),
+            holds_first: true,
+            width: WEAK,
+            rig,
+            measurement,
+            nominal,
+        }
+    }
+
+    /// Values of the nominal parameters at `point`, SI; those that must be positive stay so.
+    pub fn nominal_values(&self, point: &Point) -> Vec<f64> {
+        let mut values: Vec<f64> = self.nominal.iter().map(|(value, _)| *value).collect();
+        for (&i, p) in self.uncertain.iter().zip(&point.nuisance) {
+            let (value, deviation) = self.nominal[i];
+            // Sizes stay positive: counted by their logarithm unless they may be zero.
+            values[i] = if value > 0.0 && deviation <= value {
+                value * (p * deviation / value).exp()
+            } else {
+                value + p * deviation
+            };
+        }
+        values
+    }
+
+    /// The point of a model that was read from recording `block`; none where it has an unknown effect.
+    fn point_of(&self, own: &Begun, block: usize) -> Option<Point> {
+        let mut nuisance = vec![0.0; self.nuisance()];
+        for (p, &i) in nuisance.iter_mut().zip(&self.uncertain) {
+            let ((value, deviation), read) = (self.nominal[i], own.nominal[i]);
+            // The inverse of `nominal_values`.
+            *p = if value > 0.0 && deviation <= value {
+                (read / value).ln() * value / deviation
+            } else {
+                (read - value) / deviation
+            };
+        }
+        let first = self.uncertain.len() + block * self.session.len();
+        let session = own.session.iter().zip(&self.session);
+        for (p, (read, one)) in nuisance.iter_mut().skip(first).zip(session) {
+            *p = read / one;
+        }
+        let effects = match &own.effect {
+            None => Vec::new(),
+            Some((name, values)) => {
+                let index = self.candidates.iter().position(|c| c.effect == *name)?;
+                vec![(index, self.candidates[index].internal(values))]
+            }
+        };
+        let is_finite = nuisance.iter().all(|p| p.is_finite());
+        is_finite.then_some(Point { nuisance, effects })
+    }
+
+    /// Names of the uncertain nominal parameters, in the order of the nuisance.
+    pub fn uncertain_names(&self) -> Vec<&'static str> {
+        self.uncertain
+            .iter()
+            .map(|&i| self.rig.parameters()[i].0)
+            .collect()
+    }
+
+    fn effect_values(&self, point: &Point) -> Vec<f64> {
+        let mut values = Vec::new();
+        for (i, effect) in self.effects.iter().enumerate() {
+            match point.effects.iter().find(|(index, _)| *index == i) {
+                Some((_, internal)) => values.extend(effect.candidate.values(internal)),
+                None => values.extend(&effect.off),
+            }
+        }
+        values
+    }
+
+    /// Parameters of a file at `point`, SI.
+    pub fn session_values(&self, point: &Point, recording: usize) -> Vec<f64> {
+        let first = self.uncertain.len() + recording * self.session.len();
+        let own = point.nuisance.iter().skip(first);
+        let is_first = recording == 0 && self.holds_first;
+        let table = self.rig.session().iter();
+        own.zip(&self.session)
+            .zip(table)
+            .map(|((p, one), of)| match of.role {
+                SessionRole::AgainstFirst if is_first => 0.0,
+                _ => p * one,
+            })
+            .collect()
+    }
+
+    /// The same where the first file is none of those that the model was fitted to.
+    #[must_use]
+    pub fn of_later_files(mut self) -> Self {
+        self.holds_first = false;
+        self
+    }
+
+    /// The same rig under its name.
+    #[must_use]
+    pub fn called(mut self, name: &str) -> Self {
+        name.clone_into(&mut self.name);
+        self
+    }
+
+    /// Puts the same parameters of a file into every one.
+    pub fn set_session(&self, point: &mut Point, values: &[f64]) {
+        let own = point.nuisance.iter_mut().skip(self.uncertain.len());
+        let all = values.iter().zip(&self.session).cycle();
+        for (p, (value, one)) in own.zip(all) {
+            *p = value / one;
+        }
+    }
+
+    /// Root mean square of the errors on `record`.
+    pub fn root_mean_square(&self, point: &Point, record: usize) -> f64 {
+        let errors = all_errors(self, point, record);
+        (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+    }
+
+    /// Everything that the equations read for `recording`, SI.
+    pub fn values(&self, point: &Point, recording: usize) -> Values {
+        Values {
+            nominal: self.nominal_values(point),
+            effects: self.effect_values(point),
+            session: self.session_values(point, recording),
+        }
+    }
+
+    /// What the equations read out of the recordings beside their inputs.
+    pub fn notes(&self, point: &Point) -> Vec<String> {
+        let nominal = self.nominal_values(point);
+        let recordings = self.measurement.recordings.iter();
+        recordings
+            .flat_map(|one| self.rig.notes(one, &nominal))
+            .collect()
+    }
+
+    /// Simulated output of one recording.
+    pub fn simulate(&self, point: &Point, recording: usize) -> Vec<f64> {
+        self.simulate_to(
+            point,
+            recording,
+            self.measurement.recordings[recording].len(),
+        )
+    }
+
+    fn simulate_to(&self, point: &Point, recording: usize, samples: usize) -> Vec<f64> {
+        let mut out = vec![0.0; samples];
+        let values = self.values(point, recording);
+        let recording = &self.measurement.recordings[recording];
+        self.rig.simulate(recording, &values, &mut out);
+        out
+    }
+}
+
+impl SimulatedModel for Measured<'_> {
+    fn nuisance(&self) -> usize {
+        self.uncertain.len() + self.measurement.recordings.len() * self.session.len()
+    }
+
+    fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
+    fn blocks(&self) -> usize {
+        self.measurement.recordings.len()
+    }
+
+    fn block_of(&self, i: usize) -> Option<usize> {
+        let own = i.checked_sub(self.uncertain.len())?;
+        own.checked_div(self.session.len())
+    }
+
+    fn tells(&self, fitted: usize, i: usize, tested: usize) -> bool {
+        let Some(own) = i.checked_sub(self.uncertain.len()) else {
+            return true;
+        };
+        let (block, place) = (own / self.session.len(), own % self.session.len());
+        let [fitted, tested] = [fitted, tested].map(|record| &self.places[record][block]);
+        // How a file begins has died away where a later part of it was fitted.
+        let is_start = self.rig.session()[place].role == SessionRole::Start;
+        !fitted.is_empty() && (!is_start || tested.first() >= fitted.first())
+    }
+
+    fn samples(&self, record: usize, block: usize) -> usize {
+        self.places[record][block].len()
+    }
+
+    fn errors(&self, point: &Point, record: usize, block: usize) -> Vec<f64> {
+        self.first_errors(point, record, block, usize::MAX)
+    }
+
+    // No more is simulated than is asked for.
+    fn first_errors(&self, point: &Point, record: usize, block: usize, count: usize) -> Vec<f64> {
+        let places = &self.places[record][block];
+        let places = &places[..count.min(places.len())];
+        let length = places.last().map_or(0, |last| last + 1);
+        let simulated = self.simulate_to(point, block, length);
+        let measured = self.measurement.recordings[block].output();
+        places.iter().map(|&k| measured[k] - simulated[k]).collect()
+    }
+
+    fn folds(&self, record: usize) -> [usize; 2] {
+        parts::folds(record)
+    }
+
+    fn screen(&self, record: usize) -> usize {
+        parts::screen(record)
+    }
+
+    fn prior_width(&self) -> f64 {
+        self.width
+    }
+
+    fn held(&self) -> Self {
+        Self {
+            rig: self.rig,
+            measurement: self.measurement,
+            nominal: self.nominal.clone(),
+            uncertain: self.uncertain.clone(),
+            session: self.session.clone(),
+            effects: self.effects.clone(),
+            candidates: self.candidates.clone(),
+            places: self.places.clone(),
+            holds_first: self.holds_first,
+            name: self.name.clone(),
+            width: HELD,
+        }
+    }
+
+    fn is_cheap(&self) -> bool {
+        let all = self.places[EVERYTHING].iter();
+        self.rig.screened() == usize::MAX && all.map(Vec::len).sum::<usize>() < CHEAP
+    }
+
+    fn record_name(&self, record: usize) -> &str {
+        let of_file = || {
+            Some(
+                self.measurement
+                    .recordings
+                    .get(record.checked_sub(NAMES.len())?)?
+                    .name(),
+            )
+        };
+        NAMES
+            .get(record)
+            .copied()
+            .or_else(of_file)
+            .unwrap_or("none")
+    }
+
+    fn starts(&self, base: &Point, record: usize) -> Vec<(usize, Vec<f64>)> {
+        let Some(block) = (0..self.blocks()).max_by_key(|&b| self.samples(record, b)) else {
+            return Vec::new();
+        };
+        let recording = &self.measurement.recordings[block];
+        let mut errors = vec![f64::NAN; recording.len()];
+        let own = self.errors(base, record, block);
+        for (&place, error) in self.places[record][block].iter().zip(own) {
+            errors[place] = error;
+        }
+        let nominal = self.nominal_values(base);
+        let starts = self.rig.starts(recording, &nominal, &errors).into_iter();
+        let place = |name: &str| self.candidates.iter().position(|c| c.effect == name);
+        starts
+            .filter_map(|(name, values)| Some((place(name)?, values)))
+            .filter(|(i, _)| !self.candidates[*i].starts.is_empty())
+            .collect()
+    }
+
+    fn begun(&self, base: &Point, record: usize) -> Vec<Point> {
+        if self.normalised_error(base, record) < LOST {
+            return Vec::new();
+        }
+        let Some(block) = (0..self.blocks()).max_by_key(|&b| self.samples(record, b)) else {
+            return Vec::new();
+        };
+        let recording = &self.measurement.recordings[block];
+        let stated: Vec<f64> = self.nominal.iter().map(|(value, _)| *value).collect();
+        let places = &self.places[record][block];
+        let all = self.rig.read_off(recording, places, &stated).into_iter();
+        all.filter_map(|own| self.point_of(&own, block)).collect()
+    }
+}
+
+impl InParts for Measured<'_> {
+    fn subject(&self) -> &str {
+        &self.name
+    }
+
+    fn kind(&self) -> &str {
+        self.rig.kind()
+    }
+
+    fn output(&self) -> String {
+        self.rig.output().name().to_owned()
+    }
+
+    fn normalised_error(&self, point: &Point, record: usize) -> f64 {
+        let errors = all_errors(self, point, record);
+        let mut size = 0.0;
+        for (s, places) in self.places[record].iter().enumerate() {
+            let measured = self.measurement.recordings[s].output();
+            let mean =
+                places.iter().map(|&k| measured[k]).sum::<f64>() / places.len().max(1) as f64;
+            size += places
+                .iter()
+                .map(|&k| (measured[k] - mean).powi(2))
+                .sum::<f64>();
+        }
+        (errors.iter().map(|e| e * e).sum::<f64>() / size).sqrt()
+    }
+
+    fn parameters(&self, point: &Point, deviations: &[f64]) -> Vec<NamedValue> {
+        let values = self.nominal_values(point);
+        let names = self.uncertain_names();
+        let known = self.rig.parameters();
+        names
+            .iter()
+            .enumerate()
+            .filter_map(|(i, name)| {
+                let place = known.iter().position(|(k, _)| k == name)?;
+                let mut moved = point.clone();
+                // A small step: the logarithm of a badly known parameter is curved.
+                moved.nuisance[i] += 1e-3;
+                let slope = (self.nominal_values(&moved)[place] - values[place]).abs() / 1e-3;
+                Some(NamedValue {
+                    name: (*name).to_owned(),
+                    value: values[place],
+                    unit: known[place].1.to_owned(),
+                    standard_error: slope * deviations.get(i).copied().unwrap_or(f64::NAN),
+                })
+            })
+            .collect()
+    }
+
+    fn stated(&self, i: usize) -> (f64, f64) {
+        self.nominal[self.uncertain[i]]
+    }
+
+    fn is_cause(&self, i: usize) -> bool {
+        let (name, _) = self.rig.parameters()[self.uncertain[i]];
+        self.rig.causes().contains(&name)
+    }
+
+    fn looks_like(&self, effect: &str) -> Option<&'static str> {
+        let names = self.uncertain_names();
+        let mut all = self.rig.looks_like().iter();
+        let own = all.find(|[own, _, by]| *own == effect && names.contains(by))?;
+        Some(own[1])
+    }
+
+    fn contradictions(&self) -> Vec<Cause> {
+        self.rig.contradictions(&self.measurement.recordings)
+    }
+}

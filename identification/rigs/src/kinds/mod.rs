@@ -1,0 +1,414 @@
+//! Real rigs: what was measured, what the nominal model gets wrong, which cause it has.
+//!
+//! A rig is one file that meets [`Equations`]; a set of measurements is a [`Description`] in TOML. The
+//! diagnosis never asks for white residuals, which no real rig leaves: it names a cause that pays
+//! on data not fitted and that is found on each part of the data.
+
+mod carriage;
+mod cause;
+mod closed_loop_actuator;
+mod confirmed;
+mod controlled_damper;
+pub mod curves;
+mod cyclic_material;
+mod description;
+mod diagnosis;
+mod extended;
+pub mod foreign;
+pub mod guess;
+mod hysteretic_device;
+mod linear_axis;
+mod measured;
+mod named_value;
+mod natural;
+mod oscillator;
+mod parts;
+mod positioning_drive;
+mod reading;
+mod recording;
+mod restoring_force;
+mod sensors;
+pub mod shake_table;
+mod table;
+mod template;
+mod transfer_system;
+
+pub use cause::Cause;
+pub use confirmed::Confirmed;
+pub use description::{
+    Column, Description, DescriptionError, LeftOut, Quantity, Windows, column_map, renamed,
+};
+pub use diagnosis::{PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
+pub use extended::{ExtendedRig, FileErrors, Prediction};
+pub use named_value::NamedValue;
+
+pub use natural::Natural;
+pub use reading::{Measurement, even_period};
+pub use recording::{Begin, RigRecording};
+pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole, SessionTable};
+pub use template::template;
+pub use transfer_system::TransferSystemRig;
+
+use recordings::Channel;
+
+/// A quantity by name and SI unit.
+pub type Named = (&'static str, &'static str);
+
+/// The equations of a kind of rig. A new kind is one file that implements this, and its line in
+/// [`KINDS`].
+pub trait Equations: Sync {
+    /// Its name in a description.
+    const KIND: &'static str;
+    /// Parameters of the nominal model.
+    type Nominal: NominalTable;
+    /// The effects that it may have.
+    type Effects: EffectTable;
+    /// What every file has for itself: the zero of a transducer, where a test began.
+    type Session: SessionTable;
+
+    /// What the data must hold beside the output.
+    const INPUTS: &'static [Channel];
+    /// What they may hold; an effect that needs it is not looked for without it.
+    const OPTIONAL: &'static [(Channel, &'static [&'static str])] = &[];
+    /// What is simulated and compared.
+    const OUTPUT: Channel;
+    /// True where the output depends on the input's path, which a loop shows best.
+    const IS_HYSTERETIC: bool = false;
+    /// True where a row without a time is a point of a path and no sample.
+    const IS_PATH: bool = false;
+    /// True where the table of effects is in natural units.
+    const IS_SCALED: bool = false;
+    /// True if the equations restart wherever the recording states it.
+    const BEGINS_ANEW: bool = false;
+    /// Samples that are enough for a first look at candidates, where a simulation is costly.
+    const SCREENED: usize = usize::MAX;
+    /// Effects that an uncertain nominal parameter says as well.
+    const SAID_BY: &'static [(&'static str, &'static str)] = &[];
+    /// Nominal parameters whose deviation from what was stated is a cause, such as a scale.
+    const CAUSES: &'static [&'static str] = &[];
+    /// Effects that another cause looks like as long as a nominal parameter is uncertain: effect, cause,
+    /// parameter.
+    const LOOKS_LIKE: &'static [[&'static str; 3]] = &[];
+
+    /// Output for the inputs of `recording` alone.
+    fn simulate(
+        &self,
+        recording: &RigRecording,
+        nominal: &Self::Nominal,
+        effects: &Self::Effects,
+        session: &Self::Session,
+        out: &mut [f64],
+    );
+
+    /// Natural units, from those of the channels.
+    fn natural(_nominal: &Self::Nominal, channels: Natural) -> Natural {
+        channels
+    }
+
+    /// Further starts of effects, read from the `errors` (not a number where there is none) of a
+    /// model without them.
+    fn starts(
+        &self,
+        _recording: &RigRecording,
+        _nominal: &Self::Nominal,
+        _errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)> {
+        Vec::new()
+    }
+
+    /// Whole models with one effect at most, read from the measured samples at `places`, from which fits begin
+    /// as well: for where a simulation from the nominal values loses the motion.
+    fn read_off(
+        &self,
+        _recording: &RigRecording,
+        _places: &[usize],
+        _nominal: &Self::Nominal,
+    ) -> Vec<Begun> {
+        Vec::new()
+    }
+
+    /// What the equations read out of a recording beside its inputs, a sentence each.
+    fn notes(&self, _recording: &RigRecording, _nominal: &Self::Nominal) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Sensors of `recordings` that contradict each other.
+    fn contradictions(&self, _recordings: &[RigRecording]) -> Vec<Cause> {
+        Vec::new()
+    }
+}
+
+/// [`Equations`] of any kind.
+pub trait Rig: Sync {
+    /// Its name in a description.
+    fn kind(&self) -> &'static str;
+
+    /// What the data must hold beside the output.
+    fn inputs(&self) -> &'static [Channel];
+
+    /// What they may hold, with the effects that need it.
+    fn optional(&self) -> &'static [(Channel, &'static [&'static str])];
+
+    /// What is simulated and compared.
+    fn output(&self) -> Channel;
+
+    /// Whether the output depends on the input's path.
+    fn is_hysteretic(&self) -> bool;
+
+    /// Whether a row without a time is a point of a path and no sample.
+    fn is_path(&self) -> bool;
+
+    /// Whether the equations restart wherever the recording states it.
+    fn begins_anew(&self) -> bool;
+
+    /// Parameters of the nominal model.
+    fn parameters(&self) -> &'static [Named];
+
+    /// What each of them is.
+    fn about_parameters(&self) -> &'static [&'static str];
+
+    /// Their values where a description leaves them out.
+    fn defaults(&self) -> &'static [Option<f64>];
+
+    /// The effects, in natural units where [`Self::is_scaled`].
+    fn effects(&self) -> Vec<Effect>;
+
+    /// Whether the table of effects is in natural units.
+    fn is_scaled(&self) -> bool;
+
+    /// What every file has for itself.
+    fn session(&self) -> &'static [SessionParameter];
+
+    /// Samples that are enough for a first look at candidates.
+    fn screened(&self) -> usize;
+
+    /// Effects that an uncertain nominal parameter says as well, with its name.
+    fn said_by(&self) -> &'static [(&'static str, &'static str)];
+
+    /// Nominal parameters whose deviation from what was stated is a cause.
+    fn causes(&self) -> &'static [&'static str];
+
+    /// Effects that another cause looks like as long as a nominal parameter is uncertain.
+    fn looks_like(&self) -> &'static [[&'static str; 3]];
+
+    /// Natural units of `recordings`; `nominal` in the order of [`Self::parameters`].
+    fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural;
+
+    /// As [`Equations::starts`].
+    fn starts(
+        &self,
+        recording: &RigRecording,
+        nominal: &[f64],
+        errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)>;
+
+    /// As [`Equations::read_off`].
+    fn read_off(&self, recording: &RigRecording, places: &[usize], nominal: &[f64]) -> Vec<Begun>;
+
+    /// As [`Equations::notes`].
+    fn notes(&self, recording: &RigRecording, nominal: &[f64]) -> Vec<String>;
+
+    /// As [`Equations::contradictions`].
+    fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause>;
+
+    /// Output for the inputs of `recording` alone, SI; not a number where a count is wrong.
+    fn simulate(&self, recording: &RigRecording, values: &Values, out: &mut [f64]);
+}
+
+/// A model from which a fit begins, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Begun {
+    /// In the order of [`Rig::parameters`].
+    pub nominal: Vec<f64>,
+    /// In the order of [`Rig::session`], of the recording that it was read from.
+    pub session: Vec<f64>,
+    /// An effect with the values of its parameters.
+    pub effect: Option<(&'static str, Vec<f64>)>,
+}
+
+/// Values of everything that a rig's equations read, SI.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Values {
+    /// In the order of [`Rig::parameters`].
+    pub nominal: Vec<f64>,
+    /// Of all parameters of [`Rig::effects`].
+    pub effects: Vec<f64>,
+    /// In the order of [`Rig::session`].
+    pub session: Vec<f64>,
+}
+
+impl<E: Equations> Rig for E {
+    fn kind(&self) -> &'static str {
+        E::KIND
+    }
+
+    fn inputs(&self) -> &'static [Channel] {
+        E::INPUTS
+    }
+
+    fn optional(&self) -> &'static [(Channel, &'static [&'static str])] {
+        E::OPTIONAL
+    }
+
+    fn output(&self) -> Channel {
+        E::OUTPUT
+    }
+
+    fn is_hysteretic(&self) -> bool {
+        E::IS_HYSTERETIC
+    }
+
+    fn is_path(&self) -> bool {
+        E::IS_PATH
+    }
+
+    fn begins_anew(&self) -> bool {
+        E::BEGINS_ANEW
+    }
+
+    fn parameters(&self) -> &'static [Named] {
+        E::Nominal::TABLE
+    }
+
+    fn about_parameters(&self) -> &'static [&'static str] {
+        E::Nominal::ABOUT
+    }
+
+    fn defaults(&self) -> &'static [Option<f64>] {
+        E::Nominal::DEFAULTS
+    }
+
+    fn effects(&self) -> Vec<Effect> {
+        E::Effects::table()
+    }
+
+    fn is_scaled(&self) -> bool {
+        E::IS_SCALED
+    }
+
+    fn session(&self) -> &'static [SessionParameter] {
+        E::Session::TABLE
+    }
+
+    fn screened(&self) -> usize {
+        E::SCREENED
+    }
+
+    fn said_by(&self) -> &'static [(&'static str, &'static str)] {
+        E::SAID_BY
+    }
+
+    fn causes(&self) -> &'static [&'static str] {
+        E::CAUSES
+    }
+
+    fn looks_like(&self) -> &'static [[&'static str; 3]] {
+        E::LOOKS_LIKE
+    }
+
+    fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural {
+        let channels: Vec<Channel> = [E::OUTPUT]
+            .into_iter()
+            .chain(E::INPUTS.iter().copied())
+            .chain(E::OPTIONAL.iter().map(|(channel, _)| *channel))
+            .collect();
+        let natural = Natural::of(recordings, &channels);
+        E::Nominal::from_values(nominal).map_or(natural, |nominal| E::natural(&nominal, natural))
+    }
+
+    fn starts(
+        &self,
+        recording: &RigRecording,
+        nominal: &[f64],
+        errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)> {
+        E::Nominal::from_values(nominal).map_or_else(Vec::new, |nominal| {
+            Equations::starts(self, recording, &nominal, errors)
+        })
+    }
+
+    fn read_off(&self, recording: &RigRecording, places: &[usize], nominal: &[f64]) -> Vec<Begun> {
+        E::Nominal::from_values(nominal).map_or_else(Vec::new, |nominal| {
+            Equations::read_off(self, recording, places, &nominal)
+        })
+    }
+
+    fn notes(&self, recording: &RigRecording, nominal: &[f64]) -> Vec<String> {
+        E::Nominal::from_values(nominal).map_or_else(Vec::new, |nominal| {
+            Equations::notes(self, recording, &nominal)
+        })
+    }
+
+    fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause> {
+        Equations::contradictions(self, recordings)
+    }
+
+    fn simulate(&self, recording: &RigRecording, values: &Values, out: &mut [f64]) {
+        match (
+            E::Nominal::from_values(&values.nominal),
+            E::Effects::from_values(&values.effects),
+            E::Session::from_values(&values.session),
+        ) {
+            (Some(nominal), Some(effects), Some(session)) => {
+                Equations::simulate(self, recording, &nominal, &effects, &session, out);
+            }
+            _ => out.fill(f64::NAN),
+        }
+    }
+}
+
+/// Every kind of rig.
+pub static KINDS: [&dyn Rig; 8] = [
+    &closed_loop_actuator::ClosedLoopActuator,
+    &positioning_drive::PositioningDrive,
+    &linear_axis::LinearAxis,
+    &hysteretic_device::HystereticDevice,
+    &cyclic_material::CyclicMaterial,
+    &transfer_system::TransferSystemKind,
+    &oscillator::Oscillator,
+    &controlled_damper::ControlledDamper,
+];
+
+/// The only rig whose kind holds `word`, such as `actuator` or `hysteretic device`.
+pub fn like(word: &str) -> Option<&'static dyn Rig> {
+    let word = word.trim().to_lowercase().replace([' ', '-'], "_");
+    let mut all = KINDS.into_iter().filter(|rig| rig.kind().contains(&word));
+    let found = all.next()?;
+    (all.next().is_none() && !word.is_empty()).then_some(found)
+}
+
+/// The rig of a kind.
+pub fn of_kind(kind: &str) -> Option<&'static dyn Rig> {
+    KINDS.into_iter().find(|rig| rig.kind() == kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use recordings::Recording;
+
+    #[test]
+    fn a_wrong_number_of_values_gives_no_number() {
+        for rig in KINDS {
+            let mut channels = rig.inputs().to_vec();
+            channels.push(rig.output());
+            let channels = channels.into_iter().map(|c| (c, vec![0.0; 16])).collect();
+            let recording = Recording::new("none", 1.0, channels).unwrap();
+            let recording = RigRecording::new(recording, rig.inputs(), rig.output());
+            let values = Values {
+                nominal: vec![1.0; rig.parameters().len()],
+                effects: rig.effects().into_iter().flat_map(|e| e.off).collect(),
+                session: vec![0.0; rig.session().len()],
+            };
+            let mut short = [values.clone(), values.clone(), values];
+            short[0].nominal.pop();
+            short[1].effects.pop();
+            short[2].session.push(0.0);
+            for values in short {
+                let mut out = vec![0.0; 16];
+                rig.simulate(&recording, &values, &mut out);
+                assert!(out.iter().all(|y| y.is_nan()), "{}", rig.kind());
+            }
+        }
+    }
+}

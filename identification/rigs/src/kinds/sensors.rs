@@ -1,0 +1,174 @@
+//! Whether two sensors of one motion agree: the accelerometer against the displacement's second derivative.
+
+use std::f64::consts::TAU;
+
+use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
+
+use super::RigRecording;
+use super::named_value::NamedValue;
+use recordings::Channel;
+
+/// Frequencies that are looked at, Hz, the upper one also as a share of the sampling rate.
+const BAND: (f64, f64) = (0.4, 15.0);
+const HIGHEST: f64 = 0.3;
+/// Bands into which they are cut, by equal ratios, and lines that each must hold.
+const BANDS: usize = 24;
+const FEWEST: usize = 6;
+/// Coherence with the command from which on a band counts, and bands that must count.
+const COHERENT: f64 = 0.5;
+const COUNTED: usize = 5;
+/// Least power of the commanded acceleration in a band over that in the strongest.
+const STIRRED: f64 = 1e-3;
+
+/// The accelerometer's scale from the response of both sensors to the command, which has none of their
+/// noise (an instrument; Söderström and Stoica, System Identification, 1989, chapter 8); the weighted mean
+/// over frequencies with its standard error. None where a recording lacks it or is too short.
+pub(super) fn accelerometer_scale(
+    recordings: &[RigRecording],
+    command: Channel,
+) -> Option<NamedValue> {
+    let mut lines: Vec<Line> = Vec::new();
+    for one in recordings {
+        lines.extend(responses(one, command)?);
+    }
+    if lines.len() < COUNTED {
+        return None;
+    }
+    // Sensors and their filters differ in delay.
+    let sum = |own: &dyn Fn(&Line) -> f64| lines.iter().map(own).sum::<f64>();
+    let delay = sum(&|(omega, g, w)| w * omega * g.arg()) / sum(&|(omega, _, w)| w * omega * omega);
+    let aligned = |omega: f64, g: Complex<f64>| (g * Complex::new(0.0, -omega * delay).exp()).re;
+    let weight = sum(&|(_, _, w)| *w);
+    let scale = sum(&|(omega, g, w)| w * aligned(*omega, *g)) / weight;
+    let variance = sum(&|(omega, g, w)| w * (aligned(*omega, *g) - scale).powi(2)) / weight;
+    let count = weight * weight / sum(&|(_, _, w)| w * w);
+    Some(NamedValue {
+        name: "accelerometer_scale".into(),
+        value: scale,
+        unit: "1".into(),
+        standard_error: (variance / (count - 1.0).max(1.0)).sqrt(),
+    })
+}
+
+/// Angular frequency, rad/s; a ratio there; its weight.
+type Line = (f64, Complex<f64>, f64);
+
+/// Acceleration over the displacement's second derivative by angular frequency, with a weight. Every line of
+/// a band is differentiated at its own frequency, so that the response of the rig may turn inside it.
+fn responses(one: &RigRecording, command: Channel) -> Option<Vec<Line>> {
+    let channels = [
+        one.input(command),
+        one.output(),
+        one.input(Channel::Acceleration),
+    ];
+    let length = one.len();
+    if length < 2 || channels.iter().any(|own| own.len() != length) {
+        return None;
+    }
+    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+    let spectra = channels.map(|values| {
+        let mean = values.iter().sum::<f64>() / length as f64;
+        let tapered = values.iter().enumerate().map(|(k, value)| {
+            let taper = 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos();
+            (value - mean) * taper
+        });
+        let mut tapered: Vec<f64> = tapered.collect();
+        let mut out = plan.make_output_vec();
+        plan.process(&mut tapered, &mut out).map(|()| out)
+    });
+    let [Ok(c), Ok(x), Ok(a)] = spectra else {
+        return None;
+    };
+    let rate = 1.0 / one.period();
+    let highest = BAND.1.min(HIGHEST * rate);
+    let edge = |band: usize| BAND.0 * (highest / BAND.0).powf(band as f64 / BANDS as f64);
+    let line = |frequency: f64| (frequency * length as f64 / rate).ceil() as usize;
+    let within = |band: usize| line(edge(band))..line(edge(band + 1)).min(c.len());
+    // Where the command moves nothing, what leaks from elsewhere is coherent and has another frequency.
+    let stirred = |band: usize| {
+        let lines = within(band);
+        let count = lines.len().max(1) as f64;
+        let power = lines.map(|k| c[k].norm_sqr() * (k as f64).powi(4));
+        power.sum::<f64>() / count
+    };
+    let most = (0..BANDS).map(stirred).fold(0.0, f64::max);
+    let bands = (0..BANDS).filter_map(|band| {
+        let lines = within(band);
+        if lines.len() < FEWEST || stirred(band) < STIRRED * most {
+            return None;
+        }
+        let mut powers = [0.0; 3];
+        let mut with_command = [Complex::new(0.0, 0.0); 2];
+        for k in lines {
+            let omega = TAU * k as f64 * rate / length as f64;
+            let both = [x[k] * -(omega * omega), a[k]];
+            powers[0] += c[k].norm_sqr();
+            for (i, own) in both.into_iter().enumerate() {
+                powers[i + 1] += own.norm_sqr();
+                with_command[i] += c[k].conj() * own;
+            }
+        }
+        let coherence = |i: usize| {
+            with_command[i].norm_sqr() / (powers[0] * powers[i + 1]).max(f64::MIN_POSITIVE)
+        };
+        let both = [coherence(0), coherence(1)];
+        if !both.iter().all(|own| *own > COHERENT) {
+            return None;
+        }
+        let noise: f64 = both.iter().map(|own| (1.0 - own).max(1e-4) / own).sum();
+        let middle = TAU * (edge(band) * edge(band + 1)).sqrt();
+        Some((middle, with_command[1] / with_command[0], 1.0 / noise))
+    });
+    Some(bands.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use recordings::Recording;
+
+    #[test]
+    fn an_accelerometer_that_reads_too_much_is_told_from_its_displacement() {
+        // A sum of sines, known in closed form, with noise on both sensors.
+        let (rate, n) = (200.0, 12_000);
+        let tone = |i: usize| (0.4 + 0.13 * i as f64, 1.7 * i as f64);
+        let sum = |order: i32, k: usize| -> f64 {
+            (0..60)
+                .map(|i| {
+                    let (frequency, phase) = tone(i);
+                    let (omega, t) = (TAU * frequency, k as f64 / rate);
+                    let size = 1e-3 / (1.0 + frequency);
+                    if order == 0 {
+                        size * (omega * t + phase).sin()
+                    } else {
+                        -size * omega * omega * (omega * t + phase).sin()
+                    }
+                })
+                .sum()
+        };
+        let noise = |k: usize, seed: f64| (k as f64 * seed).sin() * (k as f64 * 0.37 * seed).cos();
+        let command = Channel::Other {
+            name: "command",
+            unit: "m",
+        };
+        let channels = vec![
+            (command, (0..n).map(|k| sum(0, k)).collect::<Vec<f64>>()),
+            (
+                Channel::Displacement,
+                (0..n).map(|k| sum(0, k) + 2e-6 * noise(k, 91.7)).collect(),
+            ),
+            (
+                Channel::Acceleration,
+                (0..n)
+                    .map(|k| 1.08 * sum(2, k) + 0.01 * noise(k, 57.3))
+                    .collect(),
+            ),
+        ];
+        let recording = Recording::new("two", 1.0 / rate, channels).unwrap();
+        let recording = RigRecording::new(recording, &[command], Channel::Displacement);
+        let found = accelerometer_scale(&[recording], command).unwrap();
+        assert!((found.value - 1.08).abs() < 4e-3, "{found:?}");
+        assert!(found.standard_error < 4e-3, "{found:?}");
+    }
+}

@@ -1,0 +1,251 @@
+//! A verdict as one sentence for a laboratory engineer.
+
+use super::diagnosis::Finding;
+use super::gain::Gain;
+use diagnosis::Test;
+use diagnosis::{NamedEffect, ParameterEstimate, Verdict, WeighedModel};
+use plant::identified::effects::{find, quantity::laboratory_unit};
+use units::convert;
+
+/// Value and standard error of `parameter` in `unit`, as [`with_error`] writes them.
+pub fn amount(parameter: &ParameterEstimate, unit: &str) -> String {
+    with_error(
+        parameter.value,
+        parameter.standard_error,
+        parameter.unit,
+        unit,
+    )
+}
+
+/// Value and standard error, given in `si`, in `unit`, with as many digits as the error leaves
+/// meaning: `0.0865 ± 0.0001 V`.
+pub fn with_error(value: f64, standard_error: f64, si: &str, unit: &str) -> String {
+    let converted = convert(1.0, si, unit);
+    let (factor, unit) = converted.map_or((1.0, si), |factor| (factor, unit));
+    let (value, error) = (factor * value, factor * standard_error);
+    let unit = if unit == "1" { "" } else { unit };
+    let order = |x: f64| x.abs().log10().floor() as i32;
+    if !(error.is_finite() && error > 0.0 && value.is_finite() && value != 0.0) {
+        return format!("{value:.4} {unit}").trim_end().to_string();
+    }
+    // One digit of an error of 3 and more, two of a smaller one.
+    let place = order(error);
+    let digits = if error / 10f64.powi(place) < 2.95 {
+        1
+    } else {
+        0
+    };
+    let last = place - digits;
+    if order(value) < -4 || order(value) > 5 {
+        let ten = order(value.abs().max(error));
+        let (value, error) = (value / 10f64.powi(ten), error / 10f64.powi(ten));
+        let decimals = (ten - last).clamp(0, 8) as usize;
+        return format!("({value:.decimals$} ± {error:.decimals$})e{ten} {unit}")
+            .trim_end()
+            .to_string();
+    }
+    let decimals = (-last).clamp(0, 8) as usize;
+    format!("{value:.decimals$} ± {error:.decimals$} {unit}")
+        .trim_end()
+        .to_string()
+}
+
+/// An effect in words, its sizes in the laboratory's units.
+pub fn said(effect: &NamedEffect) -> String {
+    let mut sizes = effect.parameters.iter().filter(|p| !p.is_shape);
+    let mut text = String::new();
+    let phrase = find(effect.effect).map_or("there is an effect of {}", |known| known.sentence);
+    let mut pieces = phrase.split("{}").peekable();
+    while let Some(piece) = pieces.next() {
+        text += piece;
+        if pieces.peek().is_some() {
+            text += &sizes.next().map_or_else(
+                || "an unknown amount".into(),
+                |p| amount(p, laboratory_unit(p.unit)),
+            );
+        }
+    }
+    text
+}
+
+/// Share of the excess error from which on a candidate is told with its values, though more is left.
+const MOST: f64 = 0.5;
+
+fn uncapitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_lowercase().chain(letters).collect()
+    })
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
+}
+
+/// The sentence.
+pub(super) fn sentence(
+    verdict: Verdict,
+    effects: &[NamedEffect],
+    alternatives: &[Vec<&'static str>],
+    gain: &Gain,
+    tests: &[Test],
+    candidates: &[WeighedModel],
+) -> String {
+    let causes: Vec<String> = effects.iter().map(said).collect();
+    let causes = capitalised(&causes.join(" and "));
+    let it = if effects.len() > 1 { "them" } else { "it" };
+    let falls = format!(
+        "the error on the validation record falls from {:.2} to {:.2} times the noise floor",
+        gain.before_ratio, gain.after_ratio
+    );
+    match verdict {
+        Verdict::Adequate => format!(
+            "The nominal model is adequate: within its stated uncertainty the error on the \
+             validation record is {:.2} times the noise floor.",
+            gain.after_ratio
+        ),
+        Verdict::Named => format!("{causes}; with {it} {falls}."),
+        Verdict::Ambiguous => {
+            let sets: Vec<String> = alternatives
+                .iter()
+                .map(|set| set.join(" and ").replace('_', " "))
+                .collect();
+            format!(
+                "{causes}, or equally likely {}; with {it} {falls}.",
+                sets.join(", or ")
+            )
+        }
+        Verdict::TooSmall => format!(
+            "Present but too small to matter: {}; with {it} {falls}.",
+            uncapitalised(&causes)
+        ),
+        Verdict::Unexplained => {
+            let left = tests.first().map_or("nothing", |test| test.what.as_str());
+            let best = candidates.first();
+            match best.filter(|own| own.explains > MOST) {
+                Some(best) => {
+                    let causes: Vec<String> = best.effects.iter().map(said).collect();
+                    format!(
+                        "{:.0} % of the excess error is explained if {}; the rest is not explained \
+                         and is largest in \"{left}\".",
+                        100.0 * best.explains.min(1.0),
+                        causes.join(" and ")
+                    )
+                }
+                None => format!(
+                    "No set of effects that was searched explains the records: the best one explains \
+                     {:.0} % of the excess error; the residual is largest in \"{left}\".",
+                    100.0 * best.map_or(0.0, |own| own.explains.clamp(0.0, 1.0))
+                ),
+            }
+        }
+    }
+}
+
+/// Findings that the sentence holds; the report has them all.
+const TOLD: usize = 2;
+/// Standard deviations from which the sentence holds them. One of fifteen parameters is farther off than
+/// two by chance in every second rig, than this in one of a hundred.
+const FAR: f64 = 3.5;
+
+/// What is said of nominal parameters that are not what was stated; nothing without one.
+pub(super) fn of_findings(findings: &[Finding]) -> String {
+    let off = |own: &&Finding| (own.found / own.stated - 1.0).abs();
+    let is_far = |own: &&Finding| own.deviations.is_none_or(|own| own.abs() > FAR);
+    let far = findings.iter().filter(is_far);
+    let mut farthest: Vec<&Finding> = far.collect();
+    farthest.sort_by(|a, b| off(b).total_cmp(&off(a)));
+    let count = farthest.len();
+    let told = farthest.iter().take(TOLD).map(|own| {
+        let unit = laboratory_unit(&own.unit);
+        format!(
+            "`{}` is {}, stated {}",
+            own.parameter,
+            with_error(own.found, own.standard_error, &own.unit, unit),
+            with_error(own.stated, 0.0, &own.unit, unit),
+        )
+    });
+    let told: Vec<String> = told.collect();
+    match (told.is_empty(), count.saturating_sub(TOLD)) {
+        (true, _) => String::new(),
+        (false, 0) => format!(" Beyond its stated uncertainty: {}.", told.join("; ")),
+        (false, more) => format!(
+            " Beyond their stated uncertainty: {}; and {more} more.",
+            told.join("; ")
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(value: f64, standard_error: f64, unit: &'static str) -> ParameterEstimate {
+        ParameterEstimate {
+            name: "size".into(),
+            value,
+            unit,
+            standard_error,
+            is_shape: false,
+        }
+    }
+
+    #[test]
+    fn digits_end_where_the_error_begins() {
+        for (value, error, si, unit, want) in [
+            (0.086_532, 0.000_109, "V", "V", "0.08653 ± 0.00011 V"),
+            (0.086_532, 0.000_8, "V", "V", "0.0865 ± 0.0008 V"),
+            (0.025_4, 0.001_27, "m", "in", "1.00 ± 0.05 in"),
+            (0.154_2, 0.004, "1", "%", "15.4 ± 0.4 %"),
+            (-0.007_614, 0.000_2, "s", "ms", "-7.61 ± 0.20 ms"),
+            (6.928, 0.031, "Hz", "Hz", "6.93 ± 0.03 Hz"),
+            (2.4e-6, 1e-8, "V s/N", "V s/N", "(2.400 ± 0.010)e-6 V s/N"),
+            (4321.0, 250.0, "N", "N", "4321 ± 250 N"),
+        ] {
+            assert_eq!(amount(&estimate(value, error, si), unit), want);
+        }
+    }
+
+    #[test]
+    fn the_findings_that_are_farthest_off_are_said() {
+        let finding = |parameter: &str, found: f64| Finding {
+            parameter: parameter.into(),
+            stated: 100.0,
+            found,
+            standard_error: 1.0,
+            deviations: Some(found - 100.0),
+            unit: "kg".into(),
+        };
+        assert_eq!(of_findings(&[]), "");
+        let said = of_findings(&[
+            finding("by chance", 102.5),
+            finding("one", 104.0),
+            finding("two", 90.0),
+            finding("three", 105.0),
+        ]);
+        assert!(said.contains("`two`") && said.contains("`three`"), "{said}");
+        assert!(
+            !said.contains("`one`") && !said.contains("chance") && said.contains("and 1 more"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn an_effect_is_said_with_its_sizes() {
+        let friction = NamedEffect {
+            effect: "stribeck_friction",
+            parameters: vec![
+                estimate(4.448_221_6, 0.044, "N"),
+                estimate(8.896_443_2, 0.2, "N"),
+            ],
+            confidence: 1.0,
+        };
+        assert_eq!(
+            said(&friction),
+            "the table has dry friction of 1.000 ± 0.010 lbf and 2.00 ± 0.04 lbf more to break away"
+        );
+    }
+}

@@ -1,0 +1,415 @@
+//! A sound description, and the same with one fault at a time: each is found at its line.
+
+use super::*;
+
+const SECOND: &str = r#"<?xml version="1.0"?>
+<fmiModelDescription fmiVersion="2.0" modelName="m" guid="g" numberOfEventIndicators="0">
+  <CoSimulation modelIdentifier="m" needsExecutionTool="false"/>
+  <UnitDefinitions>
+    <Unit name="m"><BaseUnit m="1"/></Unit>
+    <Unit name="mm"><BaseUnit m="1" factor="0.001"/></Unit>
+  </UnitDefinitions>
+  <TypeDefinitions>
+    <SimpleType name="Mode"><Enumeration><Item name="a" value="1"/><Item name="b" value="2"/></Enumeration></SimpleType>
+  </TypeDefinitions>
+  <DefaultExperiment startTime="0" stopTime="1" stepSize="0.1" tolerance="1e-6"/>
+  <ModelVariables>
+    <ScalarVariable name="u" valueReference="0" causality="input"><Real unit="m" min="-1" max="1" nominal="0.5" start="0"/></ScalarVariable>
+    <ScalarVariable name="p" valueReference="1" causality="parameter" variability="fixed"><Enumeration declaredType="Mode" start="1"/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="2" causality="output" initial="calculated"><Real unit="mm"/></ScalarVariable>
+    <ScalarVariable name="k" valueReference="3" causality="output" variability="discrete"><Integer/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure><Outputs><Unknown index="3"/><Unknown index="4"/></Outputs></ModelStructure>
+</fmiModelDescription>
+"#;
+
+const THIRD: &str = r#"<?xml version="1.0"?>
+<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">
+  <CoSimulation modelIdentifier="m" fixedInternalStepSize="0.1"/>
+  <DefaultExperiment startTime="0" stopTime="1"/>
+  <ModelVariables>
+    <Float64 name="time" valueReference="0" causality="independent"/>
+    <Float64 name="u" valueReference="1" causality="input" initial="exact" start="0"/>
+    <Int32 name="n" valueReference="2" causality="parameter" start="3" min="1" max="5"/>
+    <String name="s" valueReference="3" causality="parameter"><Start value="x"/></String>
+    <Float64 name="y" valueReference="4" causality="output"/>
+  </ModelVariables>
+  <ModelStructure><Output valueReference="4"/></ModelStructure>
+</fmiModelDescription>
+"#;
+
+/// What is found, the severities before it.
+fn found(text: &str) -> Vec<String> {
+    let mut findings = Findings::default();
+    findings.count_lines(text);
+    schema::check(&mut findings, text);
+    rules::check(&mut findings, text);
+    let all = findings.findings.iter();
+    all.map(|f| format!("{} {}: {}", f.severity, f.place, f.message))
+        .collect()
+}
+
+/// Each change of a description (what is replaced, by what), and all that the one finding must say.
+type Fault = (&'static str, &'static str, &'static [&'static str]);
+
+fn every_fault_is_found(sound: &str, faults: &[Fault]) {
+    for (old, new, expected) in faults {
+        assert_eq!(sound.matches(old).count(), 1, "`{old}` is not there once");
+        let row = sound[..sound.find(old).unwrap()].lines().count();
+        let said = found(&sound.replacen(old, new, 1));
+        let place = format!("{DESCRIPTION}:{row}: ");
+        let is_meant = |line: &String| {
+            line.contains(&place) && expected.iter().all(|part| line.contains(part))
+        };
+        assert_eq!(
+            said.iter().filter(|line| is_meant(line)).count(),
+            1,
+            "`{new}`: {said:#?} lacks {place} {expected:?}"
+        );
+    }
+}
+
+#[test]
+fn sound_descriptions_pass() {
+    assert_eq!(found(SECOND), [""; 0]);
+    assert_eq!(found(THIRD), [""; 0]);
+}
+
+#[test]
+fn the_shape_of_fmi_2_is_checked() {
+    every_fault_is_found(
+        SECOND,
+        &[
+            (" guid=\"g\"", "", &["error", "guid"]),
+            (
+                "modelName=\"m\"",
+                "modelName=\"m\" colour=\"x\"",
+                &["error", "colour"],
+            ),
+            (
+                "needsExecutionTool=\"false\"",
+                "needsExecutionTool=\"no\"",
+                &["error", "true or false"],
+            ),
+            (
+                "stepSize=\"0.1\"",
+                "stepSize=\"a\"",
+                &["error", "stepSize", "a number"],
+            ),
+            (
+                "valueReference=\"2\"",
+                "valueReference=\"2.5\"",
+                &["error", "a whole number"],
+            ),
+            (
+                "<Unit name=\"m\"><BaseUnit m=\"1\"/></Unit>",
+                "<Unit name=\"m\"><BaseUnit m=\"x\"/></Unit>",
+                &["error", "a whole number"],
+            ),
+            (
+                "<Integer/>",
+                "<Float64/>",
+                &["error", "Float64", "ScalarVariable"],
+            ),
+            (
+                "<Enumeration declaredType=\"Mode\" start=\"1\"/>",
+                "<Enumeration start=\"1\"/>",
+                &["error", "declaredType"],
+            ),
+            (
+                "<Item name=\"a\" value=\"1\"/>",
+                "<Item name=\"a\" value=\"one\"/>",
+                &["error", "value", "a whole number"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn what_must_be_held_is_missed() {
+    let bare = SECOND.replace(
+        "<ModelStructure><Outputs><Unknown index=\"3\"/><Unknown index=\"4\"/></Outputs></ModelStructure>",
+        "",
+    );
+    let said = found(&bare);
+    assert!(
+        said.iter().any(|line| line.contains("ModelStructure")),
+        "{said:?}"
+    );
+    let spaced = SECOND.replace(
+        "<fmiModelDescription ",
+        "<fmiModelDescription xmlns=\"urn:x\" ",
+    );
+    assert!(found(&spaced).iter().any(|line| line.contains("namespace")));
+    assert!(found("<a").iter().any(|line| line.contains("well-formed")));
+    let note = SECOND.replace(
+        "<DefaultExperiment startTime=\"0\" stopTime=\"1\" stepSize=\"0.1\" tolerance=\"1e-6\"/>",
+        "",
+    );
+    let said = found(&note);
+    assert!(said.len() == 1 && said[0].starts_with("note"), "{said:?}");
+}
+
+#[test]
+fn the_rules_of_fmi_2_are_checked() {
+    every_fault_is_found(
+        SECOND,
+        &[
+            ("stopTime=\"1\"", "stopTime=\"0\"", &["error", "0 s"]),
+            ("stepSize=\"0.1\"", "stepSize=\"0\"", &["error", "stepSize"]),
+            (
+                "tolerance=\"1e-6\"",
+                "tolerance=\"-1\"",
+                &["error", "tolerance"],
+            ),
+            (
+                "<Unit name=\"mm\">",
+                "<Unit name=\"m\">",
+                &["error", "`m`", "twice"],
+            ),
+            (
+                "<BaseUnit m=\"1\" factor=\"0.001\"/>",
+                "<BaseUnit m=\"1\" factor=\"0\"/>",
+                &["error", "factor", "`mm`"],
+            ),
+            ("<BaseUnit m=\"1\"/>", "", &["note", "`m`", "base units"]),
+            (
+                "<Item name=\"b\" value=\"2\"/>",
+                "<Item name=\"b\" value=\"1\"/>",
+                &["error", "`Mode`"],
+            ),
+            (
+                "declaredType=\"Mode\"",
+                "declaredType=\"Mood\"",
+                &["error", "`Mood`"],
+            ),
+            (
+                "name=\"y\" valueReference=\"2\"",
+                "name=\"u\" valueReference=\"2\"",
+                &["error", "`u`", ":13"],
+            ),
+            ("name=\"y\"", "name=\"\"", &["error", "empty"]),
+            (
+                "valueReference=\"2\"",
+                "valueReference=\"0\"",
+                &["error", "`u`", "`y`", "units"],
+            ),
+            (
+                "causality=\"input\"",
+                "causality=\"entry\"",
+                &["error", "entry"],
+            ),
+            (
+                "causality=\"input\"",
+                "causality=\"input\" variability=\"fixed\"",
+                &["error", "`u`", "input", "fixed"],
+            ),
+            (
+                "variability=\"discrete\"",
+                "variability=\"continuous\"",
+                &["error", "`k`", "Integer", "continuous"],
+            ),
+            (
+                "initial=\"calculated\"",
+                "initial=\"maybe\"",
+                &["error", "maybe"],
+            ),
+            (
+                "causality=\"input\"",
+                "causality=\"input\" initial=\"exact\"",
+                &["error", "`u`", "input", "exact"],
+            ),
+            (" start=\"0\"", "", &["error", "`u`", "must have a start"]),
+            (
+                "<Real unit=\"mm\"/>",
+                "<Real unit=\"mm\" start=\"1\"/>",
+                &["error", "`y`", "must not have a start"],
+            ),
+            ("min=\"-1\"", "min=\"2\"", &["error", "min 2", "max 1"]),
+            (" start=\"0\"", " start=\"1.5\"", &["warning", "`u`", "1.5"]),
+            (
+                " start=\"0\"",
+                " start=\"-1.5\"",
+                &["warning", "`u`", "-1.5"],
+            ),
+            ("nominal=\"0.5\"", "nominal=\"0\"", &["error", "nominal 0"]),
+            (
+                "unit=\"mm\"/>",
+                "unit=\"furlong\"/>",
+                &["warning", "`furlong`"],
+            ),
+        ],
+    );
+    // The limits themselves are within.
+    for start in ["1", "-1"] {
+        let text = SECOND.replacen(" start=\"0\"", &format!(" start=\"{start}\""), 1);
+        assert_eq!(found(&text), [""; 0]);
+    }
+}
+
+#[test]
+fn the_rules_of_fmi_3_are_checked() {
+    every_fault_is_found(
+        THIRD,
+        &[
+            (
+                "valueReference=\"2\"",
+                "valueReference=\"1\"",
+                &["error", "`n`", "`u`"],
+            ),
+            (
+                "initial=\"exact\" start=\"0\"",
+                "initial=\"calculated\" start=\"0\"",
+                &["error", "`u`", "input", "calculated"],
+            ),
+            (
+                "causality=\"independent\"",
+                "causality=\"independent\" start=\"0\"",
+                &["error", "`time`", "must not have a start"],
+            ),
+            (
+                "<String name=\"s\" valueReference=\"3\" causality=\"parameter\"><Start value=\"x\"/></String>",
+                "<String name=\"s\" valueReference=\"3\" causality=\"parameter\"/>",
+                &["error", "`s`", "must have a start"],
+            ),
+            (
+                "causality=\"parameter\" start=\"3\"",
+                "causality=\"parameter\" variability=\"continuous\" start=\"3\"",
+                &["error", "`n`", "parameter", "continuous"],
+            ),
+            ("start=\"3\"", "start=\"3 9\"", &["warning", "`n`", "9"]),
+            (
+                "name=\"y\" valueReference=\"4\" causality=\"output\"",
+                "name=\"y\" valueReference=\"4\" causality=\"output\" priority=\"1\"",
+                &["error", "priority"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn references_and_numbers_of_fmi_2_are_checked() {
+    every_fault_is_found(
+        SECOND,
+        &[
+            (
+                "<Unknown index=\"4\"/>",
+                "<Unknown index=\"3\"/>",
+                &["error", "index 3", "twice"],
+            ),
+            (
+                "<Unknown index=\"4\"/>",
+                "<Unknown index=\"9\"/>",
+                &["error", "index 9", "not a variable"],
+            ),
+            (
+                "<Unknown index=\"4\"/>",
+                "<Unknown index=\"4\"/><Unknown index=\"1\"/>",
+                &["error", "`u`", "input", "expected output"],
+            ),
+            (
+                "<Unknown index=\"4\"/>",
+                "<Unknown index=\"4\" dependencies=\"1 2\" dependenciesKind=\"dependent\"/>",
+                &["error", "2 dependencies", "1 kind"],
+            ),
+            (
+                "<Unknown index=\"4\"/>",
+                "<Unknown index=\"4\" dependencies=\"7\"/>",
+                &["error", "dependency `7`"],
+            ),
+            (
+                "start=\"0\"",
+                "start=\"0,5\"",
+                &["error", "`u`", "`0,5`", "Real"],
+            ),
+            (
+                "start=\"0\"",
+                "start=\"0 1\"",
+                &["error", "`u`", "2 start values"],
+            ),
+            (
+                "<Real unit=\"mm\"/>",
+                "<Real unit=\"mm\" derivative=\"3\"/>",
+                &["error", "`y`", "its own derivative"],
+            ),
+            (
+                "<Real unit=\"mm\"/>",
+                "<Real unit=\"mm\" derivative=\"30\"/>",
+                &["error", "`y`", "`30`"],
+            ),
+        ],
+    );
+    // Its line is that of the variable.
+    let without = SECOND.replace("<Unknown index=\"4\"/>", "");
+    let said = found(&without);
+    assert!(
+        said[0].starts_with("error") && said[0].contains("`k`"),
+        "{said:?}"
+    );
+    let twice = SECOND.replace(
+        "<Integer/></ScalarVariable>",
+        "<Integer/></ScalarVariable>
+<ScalarVariable name=\"a\" valueReference=\"8\" initial=\"exact\"><Real start=\"1\"/></ScalarVariable>
+<ScalarVariable name=\"b\" valueReference=\"8\" initial=\"exact\"><Real start=\"1\"/></ScalarVariable>",
+    );
+    let said = found(&twice);
+    assert!(
+        said.len() == 1 && said[0].contains("both have a start"),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn references_and_numbers_of_fmi_3_are_checked() {
+    every_fault_is_found(
+        THIRD,
+        &[
+            (
+                "fixedInternalStepSize=\"0.1\"",
+                "fixedInternalStepSize=\"-0.1\"",
+                &["error", "fixedInternalStepSize", "-0.1"],
+            ),
+            (
+                "start=\"3\"",
+                "start=\"3000000000\"",
+                &["error", "`n`", "Int32"],
+            ),
+            (
+                "initial=\"exact\" start=\"0\"/>",
+                "initial=\"exact\" start=\"0 1\"><Dimension start=\"3\"/></Float64>",
+                &["error", "`u`", "2 start values for 3"],
+            ),
+            (
+                "name=\"y\" valueReference=\"4\"",
+                "name=\"y\" valueReference=\"4\" clocks=\"1\"",
+                &["error", "`y`", "clock `1`"],
+            ),
+            (
+                "name=\"y\" valueReference=\"4\"",
+                "name=\"y\" valueReference=\"4\" derivative=\"4\"",
+                &["error", "`y`", "its own derivative"],
+            ),
+            (
+                "<Output valueReference=\"4\"/>",
+                "<Output valueReference=\"4\"/><InitialUnknown valueReference=\"40\"/>",
+                &["error", "valueReference 40"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn very_many_findings_are_counted_and_found_in_time() {
+    let mut text = SECOND.split("<ScalarVariable").next().unwrap().to_string();
+    for k in 0..200_000 {
+        text += &format!(
+            "\n<ScalarVariable name=\"v{k}\" valueReference=\"1\" causality=\"parameter\"><Real/></ScalarVariable>"
+        );
+    }
+    text += "\n</ModelVariables><ModelStructure/></fmiModelDescription>";
+    let mut findings = Findings::default();
+    findings.count_lines(&text);
+    rules::check(&mut findings, &text);
+    assert_eq!(findings.findings.len(), 1000);
+    assert!(findings.count(Severity::Error) > 400_000);
+}

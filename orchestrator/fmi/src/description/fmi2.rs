@@ -1,0 +1,171 @@
+//! `modelDescription.xml` of FMI 2.0.
+
+use std::collections::HashMap;
+
+use fmi_rs::model_description::fmi2;
+
+use super::structure::Dependencies;
+use super::{
+    BaseUnit, Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable,
+    default_stop, preferred_step,
+};
+
+/// Reads the text.
+pub(super) fn read(text: &str) -> Result<Description, String> {
+    let file = fmi2::ModelDescription::from_string(text).map_err(|error| error.to_string())?;
+    let types: HashMap<&str, &fmi2::SimpleType> = file
+        .typeDefinitions
+        .iter()
+        .map(|known| (known.name(), known))
+        .collect();
+    let units: HashMap<&str, _> = file
+        .unitDefintions
+        .iter()
+        .map(|unit| (unit.name.as_str(), unit))
+        .collect();
+    let mut variables = Vec::with_capacity(file.modelVariables.len());
+    for variable in &file.modelVariables {
+        use fmi2::{Causality as C, Initial as I, Variability as V, VariableType as T};
+        let items = |declared: &str| match types.get(declared) {
+            Some(fmi2::SimpleType::Enumeration { items, .. }) => items
+                .iter()
+                .map(|item| Item {
+                    name: item.name.clone(),
+                    value: i64::from(item.value),
+                    description: item.description.clone().unwrap_or_default(),
+                })
+                .collect(),
+            _ => Vec::new(),
+        };
+        let (mut unit, mut display_unit, mut is_relative) = (None, None, false);
+        if let T::Real {
+            unit: own,
+            displayUnit,
+            declaredType,
+            relativeQuantity,
+            ..
+        } = &variable.variableType
+        {
+            (unit, display_unit, is_relative) =
+                (own.clone(), displayUnit.clone(), *relativeQuantity);
+            if let Some(fmi2::SimpleType::Real {
+                unit: declared,
+                displayUnit,
+                relativeQuantity,
+                ..
+            }) = declaredType.as_deref().and_then(|name| types.get(name))
+            {
+                unit = unit.or(declared.clone());
+                display_unit = display_unit.or(displayUnit.clone());
+                is_relative |= relativeQuantity;
+            }
+        }
+        let start = variable.variableType.start().clone();
+        let is_exact = match variable.initial {
+            Some(I::Exact | I::Approx) => true,
+            Some(I::Calculated) => false,
+            None => start.is_some(),
+        };
+        variables.push(Variable {
+            name: variable.name.clone(),
+            reference: variable.valueReference,
+            kind: match &variable.variableType {
+                T::Real { .. } => Kind::Float64,
+                T::Integer { .. } => Kind::Int32,
+                T::Boolean { .. } => Kind::Boolean,
+                T::String { .. } => Kind::String,
+                T::Enumeration { declaredType, .. } => Kind::Enumeration(items(declaredType)),
+            },
+            causality: match variable.causality {
+                C::Parameter => Causality::Parameter,
+                C::Input => Causality::Input,
+                C::Output => Causality::Output,
+                _ => Causality::Local,
+            },
+            is_settable: variable.variability != V::Constant
+                && variable.causality != C::Independent
+                && (variable.causality == C::Input || is_exact),
+            is_structural: false,
+            variability: match variable.variability {
+                V::Constant | V::Fixed => Variability::Fixed,
+                V::Tunable => Variability::Tunable,
+                V::Discrete => Variability::Discrete,
+                V::Continuous => Variability::Continuous,
+            },
+            base_unit: unit
+                .as_deref()
+                .and_then(|unit| units.get(unit)?.baseUnit.as_ref())
+                .map(|base| BaseUnit::new(base, is_relative)),
+            unit,
+            display_unit,
+            start,
+            clocks: Vec::new(),
+            element: (0, 1),
+            is_element: false,
+            description: variable.description.clone().unwrap_or_default(),
+            dependencies: [].into(),
+        });
+    }
+    let mut dependencies = Dependencies::default();
+    for output in &file.outputs {
+        // Counted from 1 by position.
+        let known = output.dependencies.as_ref();
+        let known = known.map(|all| all.iter().map(|&index| index.wrapping_sub(1) as usize));
+        let known = known.map(Iterator::collect);
+        dependencies.note(&mut variables, output.index.wrapping_sub(1) as usize, known)?;
+    }
+    let remarks = file
+        .validate()
+        .into_iter()
+        .map(|problem| problem.message)
+        .collect();
+    let steps = file.coSimulation.as_ref();
+    let exchange = file.modelExchange.as_ref();
+    let Some(model_identifier) = steps
+        .map(|it| &it.modelIdentifier)
+        .or(exchange.map(|it| &it.modelIdentifier))
+    else {
+        return Err("neither <CoSimulation> nor <ModelExchange>".to_string());
+    };
+    let flag = |co: fn(&fmi2::CoSimulation) -> bool, me: fn(&fmi2::ModelExchange) -> bool| {
+        steps.map(co).or(exchange.map(me)).unwrap_or(false)
+    };
+    Ok(Description {
+        version: FmiVersion::V2,
+        model_identifier: model_identifier.clone(),
+        interface: match steps {
+            Some(_) => Interface::CoSimulation,
+            None => Interface::ModelExchange,
+        },
+        has_event_mode: false,
+        only_one_per_process: flag(
+            |it| it.canBeInstantiatedOnlyOncePerProcess,
+            |it| it.canBeInstantiatedOnlyOncePerProcess,
+        ),
+        needs_execution_tool: flag(|it| it.needsExecutionTool, |it| it.needsExecutionTool),
+        log_categories: file.logCategories.iter().map(|c| c.name.clone()).collect(),
+        saves_state: flag(|it| it.canGetAndSetFMUstate, |it| it.canGetAndSetFMUstate),
+        writes_state: flag(|it| it.canSerializeFMUstate, |it| it.canSerializeFMUstate),
+        directional_derivatives: flag(
+            |it| it.providesDirectionalDerivative,
+            |it| it.providesDirectionalDerivative,
+        ),
+        adjoint_derivatives: false,
+        variable_step: steps.is_none_or(|it| it.canHandleVariableCommunicationStepSize),
+        internal_step: None,
+        input_clocks: Vec::new(),
+        offers_model_exchange: exchange.is_some(),
+        event_indicators: file.numberOfEventIndicators as usize,
+        states: file.derivatives.len(),
+        preferred_step: preferred_step(file.defaultExperiment.as_ref()),
+        default_stop: default_stop(file.defaultExperiment.as_ref()),
+        remarks,
+        model_name: file.modelName,
+        token: file.guid,
+        about: file.description.unwrap_or_default(),
+        generation_tool: file.generationTool.unwrap_or_default(),
+        variables,
+        positions: HashMap::new(),
+        arrays: HashMap::new(),
+    })
+}

@@ -1,0 +1,176 @@
+//! What both versions of descriptions have in common: arrays, aliases, units, dependencies.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::{Causality, Description, Variable};
+
+/// A unit in SI: `value_si = factor value + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BaseUnit {
+    /// Exponents of kg, m, s, A, K, mol, cd.
+    pub exponents: [i32; 7],
+    /// Factor to SI.
+    pub factor: f64,
+    /// Offset in SI.
+    pub offset: f64,
+}
+
+impl BaseUnit {
+    /// Of `fmi-rs`; differences of a quantity have no offset. A radian is a number here, so that
+    /// `rpm` fits `rad/s` whether or not it is declared as an angle.
+    pub(super) fn new(base: &fmi_rs::model_description::BaseUnit, is_relative: bool) -> Self {
+        Self {
+            exponents: [base.kg, base.m, base.s, base.A, base.K, base.mol, base.cd],
+            factor: base.factor,
+            offset: if is_relative { 0.0 } else { base.offset },
+        }
+    }
+}
+
+/// The largest number of elements that the arrays of an FMU may have together.
+pub(super) const MOST_ELEMENTS: usize = 4_000_000;
+
+/// The names of an array's elements: `u[1]`, `u[2]` or `A[1,1]`, `A[1,2]`, the last index first to
+/// change.
+pub(super) fn element_names(name: &str, dimensions: &[usize]) -> Vec<String> {
+    let count: usize = dimensions.iter().product();
+    (0..count)
+        .map(|element| {
+            let mut rest = element;
+            let mut indices: Vec<String> = dimensions
+                .iter()
+                .rev()
+                .map(|&size| {
+                    let index = rest % size;
+                    rest /= size;
+                    (index + 1).to_string()
+                })
+                .collect();
+            indices.reverse();
+            format!("{name}[{}]", indices.join(","))
+        })
+        .collect()
+}
+
+/// Lists of dependencies, each kept once.
+#[derive(Default)]
+pub(super) struct Dependencies {
+    known: HashMap<Vec<usize>, Arc<[usize]>>,
+    all: Option<Arc<[usize]>>,
+}
+
+impl Dependencies {
+    /// Notes the inputs among `known` (all inputs, by default) as dependencies of an
+    /// output.
+    ///
+    /// # Errors
+    /// There is no variable at `output`.
+    pub(super) fn note(
+        &mut self,
+        variables: &mut [Variable],
+        output: usize,
+        known: Option<Vec<usize>>,
+    ) -> Result<(), String> {
+        let is_input = |index: &usize| {
+            variables
+                .get(*index)
+                .is_some_and(|variable| variable.causality == Causality::Input)
+        };
+        let dependencies = match known {
+            Some(mut known) => {
+                known.retain(is_input);
+                known.sort_unstable();
+                known.dedup();
+                let shared = self.known.entry(known);
+                let shared = shared.or_insert_with_key(|known| known.as_slice().into());
+                shared.clone()
+            }
+            None => {
+                let all = self.all.get_or_insert_with(|| {
+                    (0..variables.len())
+                        .filter(|index| is_input(index))
+                        .collect()
+                });
+                all.clone()
+            }
+        };
+        let output = variables.get_mut(output).ok_or_else(|| {
+            "<ModelStructure> lists an output that is not among the variables".to_string()
+        })?;
+        output.dependencies = dependencies;
+        Ok(())
+    }
+}
+
+/// Notes where each name stands: variables, arrays and aliases.
+///
+/// # Errors
+/// A name that occurs twice.
+pub(super) fn name(description: &mut Description, root: roxmltree::Node) -> Result<(), String> {
+    for (index, variable) in description.variables.iter().enumerate() {
+        let (element, size) = variable.element;
+        if let Some((array, _)) = variable.name.rsplit_once('[')
+            && variable.name.ends_with(']')
+            && element == 0
+            && variable.is_element
+        {
+            description
+                .arrays
+                .insert(array.to_string(), index..index + size);
+        }
+        if let Some(first) = description.positions.insert(variable.name.clone(), index) {
+            return Err(format!(
+                "the variable `{}` occurs twice (as number {} and {})",
+                variable.name,
+                first + 1,
+                index + 1
+            ));
+        }
+    }
+    let aliases = root
+        .children()
+        .filter(|node| node.has_tag_name("ModelVariables"))
+        .flat_map(|node| node.children())
+        .flat_map(|variable| {
+            variable
+                .children()
+                .filter(|node| node.has_tag_name("Alias"))
+                .map(move |alias| (variable.attribute("name"), alias.attribute("name")))
+        });
+    for (variable, alias) in aliases {
+        let (Some(variable), Some(alias)) = (variable, alias) else {
+            continue;
+        };
+        if let Some(elements) = description.arrays.get(variable).cloned() {
+            for index in elements.clone() {
+                let name = &description.variables[index].name[variable.len()..];
+                let name = format!("{alias}{name}");
+                description.positions.entry(name).or_insert(index);
+            }
+            description
+                .arrays
+                .entry(alias.to_string())
+                .or_insert(elements);
+        } else if let Some(&index) = description.positions.get(variable) {
+            let first = description.positions.insert(alias.to_string(), index);
+            if first.is_some_and(|first| first != index) {
+                return Err(format!("the alias `{alias}` is also a variable"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The text of a description in UTF-8, or in ISO-8859-1 where it says so.
+///
+/// # Errors
+/// Another encoding, or bytes that do not fit it.
+pub(super) fn decode(bytes: Vec<u8>) -> Result<String, String> {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]).to_lowercase();
+    let declared = head.split_once("?>").map_or("", |(head, _)| head);
+    if declared.contains("iso-8859-1") || declared.contains("us-ascii") {
+        return Ok(bytes.iter().map(|&byte| char::from(byte)).collect());
+    }
+    String::from_utf8(bytes).map_err(|error| format!("cannot be read as UTF-8 text ({error})"))
+}

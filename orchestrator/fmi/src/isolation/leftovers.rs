@@ -1,0 +1,79 @@
+//! Processes that FMUs start and leave behind. They end with the guest: those of its group by the
+//! group, those that left it (daemons) by a mark in the environment that they inherited.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// The variable of the environment that holds the mark.
+pub(super) const VARIABLE: &str = "SHAKEBENCH_GUEST";
+
+/// What tells the processes of one guest from all others.
+#[derive(Debug)]
+pub(super) struct Mark(String);
+
+impl Mark {
+    /// A mark that no other guest has.
+    pub(super) fn new() -> Self {
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let now = SystemTime::now().duration_since(UNIX_EPOCH);
+        let now = now.map_or(0, |since| since.as_nanos());
+        Self(format!("{}-{count}-{now}", std::process::id()))
+    }
+
+    pub(super) fn value(&self) -> &str {
+        &self.0
+    }
+}
+
+/// Ends the group that the guest `process` leads, and the processes that bear its mark.
+#[cfg(unix)]
+pub(super) fn kill(process: u32, mark: &Mark) {
+    if let Ok(group) = libc::pid_t::try_from(process)
+        && group > 1
+    {
+        // SAFETY: it sends a signal. The guest leads the group and is waited for afterwards, or its
+        // group has the number for as long as a member lives.
+        unsafe { libc::kill(-group, libc::SIGKILL) };
+    }
+    // A process that forks meanwhile is found the next time.
+    for _ in 0..5 {
+        let marked = marked(mark);
+        if marked.is_empty() {
+            return;
+        }
+        for process in marked {
+            // SAFETY: it sends a signal to a process that bears the mark.
+            unsafe { libc::kill(process, libc::SIGKILL) };
+        }
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+}
+
+/// Processes with the mark in the environment that they began with.
+#[cfg(target_os = "linux")]
+fn marked(mark: &Mark) -> Vec<libc::pid_t> {
+    let entry = format!("{VARIABLE}={}", mark.value());
+    let bears = |process: &libc::pid_t| {
+        let environment = std::fs::read(format!("/proc/{process}/environ")).unwrap_or_default();
+        environment
+            .split(|byte| *byte == 0)
+            .any(|line| line == entry.as_bytes())
+    };
+    let own = libc::pid_t::try_from(std::process::id()).unwrap_or(0);
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let processes = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+    processes
+        .filter(|process| *process > 1 && *process != own)
+        .filter(bears)
+        .collect()
+}
+
+#[cfg(all(unix, not(target_os = "linux")))]
+fn marked(_mark: &Mark) -> Vec<libc::pid_t> {
+    Vec::new()
+}
+
+/// Elsewhere the guest alone is ended.
+#[cfg(not(unix))]
+pub(super) fn kill(_process: u32, _mark: &Mark) {}

@@ -1,0 +1,312 @@
+//! Calls as bytes: a fixed head, the references, the values. Several may follow each other; a parcel
+//! begins at a multiple of 8 bytes, and so do its values.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::super::call::{Call, Function, Lost, Texts, Values};
+
+/// The head of a parcel.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(super) struct Head {
+    /// Bytes of the whole parcel.
+    pub size: u64,
+    pub function: u32,
+    pub instance: u32,
+    /// The status that came back.
+    pub status: i32,
+    /// 0: the status is one; 1: the values are the reason why there is none.
+    pub lost: u32,
+    pub references: u32,
+    pub kind: u32,
+    pub count: u64,
+    /// Bytes of the values.
+    pub length: u64,
+    pub numbers: [f64; 3],
+    pub flags: [u8; 8],
+    pub handle: u64,
+}
+
+// SAFETY: numbers without padding between them, valid whatever their bits.
+unsafe impl Zeroable for Head {}
+// SAFETY: as above.
+unsafe impl Pod for Head {}
+
+/// Values of a parcel.
+pub(super) const NONE: u32 = 0;
+pub(super) const IN: u32 = 1;
+pub(super) const OUT: u32 = 2;
+pub(super) const TEXTS_IN: u32 = 3;
+pub(super) const TEXTS_OUT: u32 = 4;
+pub(super) const BOTH: u32 = 5;
+
+const HEAD: usize = size_of::<Head>();
+
+/// Room kept for texts whose lengths are not known before; the last call of several only.
+const TEXTS: usize = 64 << 20;
+
+fn padded(length: usize) -> usize {
+    length.next_multiple_of(8)
+}
+
+impl Head {
+    fn new(instance: u32, call: &Call) -> Self {
+        let (kind, length) = match &call.values {
+            Values::None => (NONE, 0),
+            Values::In(bytes) => (IN, bytes.len()),
+            Values::Out(bytes) => (OUT, bytes.len()),
+            Values::Both(bytes) => (BOTH, bytes.len()),
+            Values::TextsIn(texts) => (TEXTS_IN, texts.iter().map(|text| 8 + text.len()).sum()),
+            Values::TextsOut(_) => (TEXTS_OUT, 0),
+        };
+        let mut flags = [0; 8];
+        for (byte, flag) in flags.iter_mut().zip(call.flags) {
+            *byte = u8::from(flag);
+        }
+        let size = HEAD + padded(4 * call.references.len()) + padded(length);
+        Self {
+            size: size as u64,
+            function: call.function.number(),
+            instance,
+            status: 0,
+            lost: 0,
+            references: call.references.len() as u32,
+            kind,
+            count: call.count as u64,
+            length: length as u64,
+            numbers: call.numbers,
+            flags,
+            handle: call.handle,
+        }
+    }
+
+    fn values_at(&self) -> usize {
+        HEAD + padded(4 * self.references as usize)
+    }
+}
+
+/// Adds a call to `bytes`.
+pub(super) fn append(bytes: &mut Vec<u8>, instance: u32, call: &Call) {
+    let at = bytes.len();
+    let head = Head::new(instance, call);
+    bytes.resize(at + head.size as usize, 0);
+    write(&mut bytes[at..], &head, call);
+}
+
+/// How many bytes a call takes.
+pub(super) fn size(call: &Call) -> usize {
+    Head::new(0, call).size as usize
+}
+
+/// Writes a call to the beginning of `bytes`, which has room for it.
+pub(super) fn place(bytes: &mut [u8], instance: u32, call: &Call) {
+    let head = Head::new(instance, call);
+    write(bytes, &head, call);
+}
+
+fn write(bytes: &mut [u8], head: &Head, call: &Call) {
+    bytes[..HEAD].copy_from_slice(bytemuck::bytes_of(head));
+    let references: &[u8] = bytemuck::cast_slice(call.references);
+    bytes[HEAD..HEAD + references.len()].copy_from_slice(references);
+    let at = head.values_at();
+    match &call.values {
+        Values::In(values) => bytes[at..at + values.len()].copy_from_slice(values),
+        Values::Both(values) => bytes[at..at + values.len()].copy_from_slice(values),
+        Values::TextsIn(texts) => write_texts(&mut bytes[at..], texts),
+        _ => {}
+    }
+}
+
+fn write_texts(bytes: &mut [u8], texts: &Texts) {
+    let mut at = 0;
+    for text in texts {
+        bytes[at..at + 8].copy_from_slice(&(text.len() as u64).to_ne_bytes());
+        at += 8;
+        bytes[at..at + text.len()].copy_from_slice(text);
+        at += text.len();
+    }
+}
+
+fn read_texts(bytes: &[u8], count: usize) -> Option<Texts> {
+    let mut at = 0;
+    let mut texts = Texts::new();
+    for _ in 0..count {
+        let length = bytes.get(at..at + 8)?;
+        let length = u64::from_ne_bytes(length.try_into().ok()?) as usize;
+        at += 8;
+        texts.push(bytes.get(at..at.checked_add(length)?)?.to_vec());
+        at += length;
+    }
+    Some(texts)
+}
+
+/// The head of the parcel at the beginning of `bytes`.
+pub(super) fn head(bytes: &[u8]) -> Option<Head> {
+    let head: Head = bytemuck::try_pod_read_unaligned(bytes.get(..HEAD)?).ok()?;
+    // A guest gone mad may have written anything: no sum may wrap.
+    let size = usize::try_from(head.size).ok()?;
+    let length = usize::try_from(head.length).ok()?;
+    let values_end = head.values_at().checked_add(length)?;
+    let fits = (HEAD..=bytes.len()).contains(&size)
+        && size.is_multiple_of(8)
+        && head.values_at() <= size
+        && values_end <= bytes.len();
+    fits.then_some(head)
+}
+
+/// The references of a parcel.
+pub(super) fn references(bytes: &[u8], head: &Head) -> Vec<u32> {
+    let bytes = &bytes[HEAD..HEAD + 4 * head.references as usize];
+    bytes
+        .chunks_exact(4)
+        .map(|four| u32::from_ne_bytes([four[0], four[1], four[2], four[3]]))
+        .collect()
+}
+
+/// In the guest: carries out the parcel at the beginning of `bytes` by `endpoint` and writes what
+/// came of it in its place; gives whether it went well.
+pub(super) fn carry_out(
+    bytes: &mut [u8],
+    head: &Head,
+    endpoint: impl FnOnce(&mut Call) -> Result<i32, Lost>,
+) -> bool {
+    let at = head.values_at();
+    let (before, values) = bytes.split_at_mut(at);
+    let references = &before[HEAD..HEAD + 4 * head.references as usize];
+    let length = (head.length as usize).min(values.len());
+    let (count, mut texts) = (head.count as usize, Texts::new());
+    let Some(function) = Function::numbered(head.function) else {
+        let reason = Lost("is no function".to_string());
+        answer(bytes, *head, Err(reason));
+        return false;
+    };
+    let mut flags = [false; 5];
+    for (flag, byte) in flags.iter_mut().zip(head.flags) {
+        *flag = byte != 0;
+    }
+    let mut call = Call {
+        function,
+        // Heads take a multiple of 8 bytes, so that they are aligned.
+        references: bytemuck::try_cast_slice(references).unwrap_or_default(),
+        values: match head.kind {
+            IN => Values::In(&values[..length]),
+            OUT => Values::Out(&mut values[..length]),
+            BOTH => Values::Both(&mut values[..length]),
+            TEXTS_IN => {
+                texts = read_texts(&values[..length], count).unwrap_or_default();
+                Values::TextsIn(&texts)
+            }
+            TEXTS_OUT => Values::TextsOut(&mut texts),
+            _ => Values::None,
+        },
+        count,
+        numbers: head.numbers,
+        flags,
+        handle: head.handle,
+        culprit: None,
+    };
+    let mut outcome = endpoint(&mut call);
+    let mut head = *head;
+    head.numbers = call.numbers;
+    head.handle = call.handle;
+    for (byte, flag) in head.flags.iter_mut().zip(call.flags) {
+        *byte = u8::from(flag);
+    }
+    if head.kind == TEXTS_OUT {
+        let needed: usize = texts.iter().map(|text| 8 + text.len()).sum();
+        if needed > values.len().min(TEXTS) {
+            outcome = Err(Lost(format!(
+                "gave {needed} bytes, more than can be passed on"
+            )));
+        } else {
+            head.length = needed as u64;
+            head.count = texts.len() as u64;
+            write_texts(values, &texts);
+        }
+    }
+    let went_well = matches!(outcome, Ok(0 | 1));
+    answer(bytes, head, outcome);
+    went_well
+}
+
+fn answer(bytes: &mut [u8], mut head: Head, outcome: Result<i32, Lost>) {
+    match outcome {
+        Ok(status) => head.status = status,
+        Err(Lost(reason)) => {
+            let at = head.values_at();
+            let room = bytes.len().saturating_sub(at);
+            let reason = &reason.as_bytes()[..reason.len().min(room)];
+            bytes[at..at + reason.len()].copy_from_slice(reason);
+            head.lost = 1;
+            head.length = reason.len() as u64;
+        }
+    }
+    bytes[..HEAD].copy_from_slice(bytemuck::bytes_of(&head));
+}
+
+/// In the host: what came of a parcel.
+pub(super) fn outcome(bytes: &[u8], head: &Head) -> Result<i32, Lost> {
+    if head.lost == 0 {
+        return Ok(head.status);
+    }
+    let at = head.values_at();
+    let reason = &bytes[at..at + head.length as usize];
+    Err(Lost(String::from_utf8_lossy(reason).into_owned()))
+}
+
+/// In the host: gives the call what came back.
+pub(super) fn give_back(bytes: &[u8], head: &Head, call: &mut Call) {
+    call.numbers = head.numbers;
+    call.handle = head.handle;
+    for (flag, byte) in call.flags.iter_mut().zip(head.flags) {
+        *flag = byte != 0;
+    }
+    let at = head.values_at();
+    match &mut call.values {
+        Values::Out(values) | Values::Both(values) => {
+            let length = values.len().min(bytes.len() - at);
+            values[..length].copy_from_slice(&bytes[at..at + length]);
+        }
+        Values::TextsOut(texts) => {
+            let values = &bytes[at..at + head.length as usize];
+            **texts = read_texts(values, head.count as usize).unwrap_or_default();
+        }
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Call, Function, HEAD, Values, append, head};
+
+    #[test]
+    fn heads_with_forged_lengths_are_refused() {
+        let mut bytes = Vec::new();
+        let mut call = Call::plain(Function::Terminate);
+        let references = [1, 2, 3];
+        call.references = &references;
+        call.values = Values::In(&[7; 24]);
+        append(&mut bytes, 0, &call);
+        assert!(head(&bytes).is_some());
+        assert!(head(&bytes[..HEAD - 1]).is_none());
+        // Size, references, length of the values: 8, 4 and 8 bytes in the head.
+        for (at, width) in [(0, 8), (24, 4), (40, 8)] {
+            for forged in [
+                u64::MAX,
+                u64::MAX - 100,
+                (1 << 40) + 1_000_000,
+                4_000_000_000,
+            ] {
+                let mut other = bytes.clone();
+                other[at..at + width].copy_from_slice(&forged.to_le_bytes()[..width]);
+                assert!(head(&other).is_none(), "{at}: {forged}");
+            }
+        }
+        let mut short = bytes.clone();
+        short[..8].copy_from_slice(&(HEAD as u64).to_le_bytes());
+        assert!(
+            head(&short).is_none(),
+            "the references reach beyond the parcel"
+        );
+    }
+}

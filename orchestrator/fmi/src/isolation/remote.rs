@@ -1,0 +1,161 @@
+//! An instance in a guest, called like one in this process.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::super::call::{Call, Culprit, Endpoint, Function, Lost, Values};
+use super::super::native::{Setup, Sink};
+use super::host::{Answer, Host};
+use super::parcel;
+
+/// Bytes of settings that are kept until the next call that gives something.
+const KEPT: usize = 64 << 10;
+
+/// An instance in a guest.
+pub(in super::super) struct Remote {
+    host: Arc<Mutex<Host>>,
+    instance: u32,
+    /// Settings that have not been sent yet.
+    kept: Vec<u8>,
+    /// Whether settings may wait.
+    keeps: bool,
+    ahead: Ahead,
+}
+
+/// What is read right after each step travels with the step: one way to the guest instead of two.
+#[derive(Default)]
+struct Ahead {
+    /// What was read right after the last step.
+    references: Vec<u32>,
+    /// That call as a parcel; empty where there was none.
+    habit: Vec<u8>,
+    /// The same with its answer after a step; empty where anything has been called since.
+    answer: Vec<u8>,
+    /// Nothing has been called since the last step.
+    is_after_step: bool,
+}
+
+impl Ahead {
+    /// Answers a call from what came with the step, where it did.
+    fn answer(&mut self, call: &mut Call) -> Option<i32> {
+        let head = parcel::head(&self.answer)?;
+        let fits = head.function == call.function.number()
+            && head.count == call.count as u64
+            && self.references == call.references
+            && matches!(&call.values, Values::Out(values) if values.len() as u64 == head.length);
+        if !fits {
+            return None;
+        }
+        parcel::give_back(&self.answer, &head, call);
+        Some(head.status)
+    }
+
+    /// Notes what is called after a step.
+    fn learn(&mut self, instance: u32, call: &Call) {
+        self.answer.clear();
+        let is_first = std::mem::take(&mut self.is_after_step);
+        if call.function == Function::DoStep || !is_first {
+            return;
+        }
+        self.habit.clear();
+        self.references.clear();
+        if matches!(call.function, Function::Get(_))
+            && matches!(&call.values, Values::Out(values) if values.len() < KEPT)
+        {
+            self.references.extend(call.references);
+            parcel::append(&mut self.habit, instance, call);
+        }
+    }
+}
+
+impl Remote {
+    /// Makes an instance in the guest of `host`. Where calls are traced settings do not wait.
+    ///
+    /// # Errors
+    /// As for an instance in this process; or the guest ended.
+    pub(in super::super) fn new(
+        host: &Arc<Mutex<Host>>,
+        setup: &Setup,
+        sink: Arc<dyn Sink>,
+        is_traced: bool,
+    ) -> Result<Self, String> {
+        let text = serde_json::to_vec(setup).map_err(|error| error.to_string())?;
+        let mut guest = host.lock().unwrap_or_else(PoisonError::into_inner);
+        let instance = guest.enroll(sink);
+        let mut call = Call::plain(Function::Instantiate);
+        call.values = Values::In(&text);
+        match guest.call(instance, &[], &mut call, &mut Vec::new()) {
+            Answer::Called(Ok(_)) | Answer::Other(..) => {}
+            Answer::Called(Err(Lost(reason))) => return Err(reason),
+        }
+        drop(guest);
+        Ok(Self {
+            host: host.clone(),
+            instance,
+            kept: Vec::new(),
+            keeps: !is_traced,
+            ahead: Ahead::default(),
+        })
+    }
+}
+
+impl Endpoint for Remote {
+    fn call(&mut self, call: &mut Call) -> Result<i32, Lost> {
+        if self.keeps
+            && matches!(call.function, Function::Set(_))
+            && self.kept.len() + parcel::size(call) < KEPT
+        {
+            self.ahead.learn(self.instance, call);
+            parcel::append(&mut self.kept, self.instance, call);
+            return Ok(0);
+        }
+        let mut after = Vec::new();
+        if self.keeps {
+            if self.kept.is_empty()
+                && let Some(status) = self.ahead.answer(call)
+            {
+                self.ahead.answer.clear();
+                self.ahead.is_after_step = false;
+                return Ok(status);
+            }
+            self.ahead.learn(self.instance, call);
+            if call.function == Function::DoStep {
+                after = std::mem::take(&mut self.ahead.answer);
+                after.extend_from_slice(&self.ahead.habit);
+            }
+        }
+        let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+        let answer = host.call(self.instance, &self.kept, call, &mut after);
+        drop(host);
+        self.kept.clear();
+        self.ahead.answer = after;
+        self.ahead.is_after_step = call.function == Function::DoStep;
+        match answer {
+            Answer::Called(outcome) => outcome,
+            Answer::Other(parcel, outcome) => {
+                self.ahead = Ahead::default();
+                if let Some(head) = parcel::head(&parcel)
+                    && let Some(function) = Function::numbered(head.function)
+                {
+                    call.culprit = Some(Box::new(Culprit {
+                        function,
+                        references: parcel::references(&parcel, &head),
+                    }));
+                }
+                outcome
+            }
+        }
+    }
+}
+
+impl Drop for Remote {
+    fn drop(&mut self) {
+        let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+        // An FMU that does not let itself be freed is ended with its guest.
+        let mut call = Call::plain(Function::FreeInstance);
+        let _ = host.call(self.instance, &[], &mut call, &mut Vec::new());
+        // The last one out.
+        if Arc::strong_count(&self.host) == 1 {
+            host.end();
+        }
+    }
+}

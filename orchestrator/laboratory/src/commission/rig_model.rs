@@ -1,0 +1,185 @@
+//! The identified rig in place of the one that was recorded: what its controllers will do on the motion that is
+//! going to be played.
+
+use std::f64::consts::TAU;
+
+use identification::closed_loop::Found;
+use identification::closed_loop::equations::HydraulicRig;
+use identification::closed_loop::friction::SealShape;
+use plant::identified::valve_curve::ValveCurve;
+use plant::servo_hydraulic::ServoHydraulicTable;
+
+use super::Request;
+use crate::error::Error;
+use crate::run::experiment::{self, prepare_file};
+use crate::systems::built_in;
+use crate::systems::tuning::{Rules, Wanted};
+use fmi_system::{ComponentFile, SystemFile};
+use motion::metrics;
+
+/// Component that a plant's table is.
+const TABLE: &str = "table";
+/// Component that stands on it.
+const SPECIMEN: &str = "specimen";
+
+/// Parameters of the physical table's component with the identified rig's numbers, SI. Area, volume and supply
+/// are those of the built-in one: only what follows from them shows in recordings.
+fn parameters(
+    rig: &HydraulicRig,
+    shape: &SealShape,
+    curve: &ValveCurve,
+    sensor_delay: f64,
+) -> Vec<(&'static str, f64)> {
+    let usual = ServoHydraulicTable::default();
+    let (valve, cylinder) = (&usual.valve, &usual.cylinder);
+    let supply = usual.supply.rest_pressure(valve.null_leakage);
+    let bulk = rig.oil_stiffness * cylinder.volume / (4.0 * cylinder.area * cylinder.area);
+    let compliance = cylinder.volume / (4.0 * bulk);
+    let speed = rig.force_rate / rig.oil_stiffness;
+    let inertia = rig.spool_inertia.sqrt();
+    let friction = rig.seal_friction;
+    let delay = (rig.command_delay - sensor_delay).max(0.0);
+    vec![
+        ("valve_frequency", 1.0 / (TAU * inertia)),
+        (
+            "valve_damping_ratio",
+            (0.5 * rig.spool_lag / inertia).max(0.05),
+        ),
+        ("valve_overlap", curve.overlap.max(0.0)),
+        ("valve_null_loss", curve.null_loss),
+        ("valve_null_width", curve.null_width),
+        ("valve_asymmetry", curve.asymmetry),
+        ("valve_null_bias", curve.null_bias),
+        (
+            "flow_coefficient",
+            speed * cylinder.area / (0.5 * supply).sqrt(),
+        ),
+        ("bulk_modulus", bulk),
+        (
+            "piston_leakage",
+            (rig.leakage_rate * compliance - valve.null_leakage).max(0.0),
+        ),
+        ("coulomb_friction", friction),
+        ("static_friction", friction * (1.0 + shape.excess)),
+        ("stribeck_velocity", shape.stribeck_velocity),
+        ("seal_viscous_friction", rig.seal_damping),
+        ("seal_stiffness", (friction / shape.presliding).max(1.0)),
+        (
+            "presliding_damping",
+            friction / shape.presliding * shape.relaxation,
+        ),
+        ("table_mass", rig.mass),
+        ("table_damping", rig.damping.max(0.0)),
+        ("table_stiffness", rig.stiffness.max(0.0)),
+        // A delay of less than a hundredth of a sample is none.
+        (
+            "command_delay.delay",
+            if delay < 2e-5 { 0.0 } else { delay },
+        ),
+    ]
+}
+
+/// `time_domain_percent` of `controller` on the identified rig; none where it is stopped, or where the
+/// rig cannot stand for the recorded one.
+///
+/// # Errors
+/// A motion at fault.
+pub(super) fn predicted(
+    request: &Request,
+    found: &Found,
+    rules: &Rules,
+    controller: &str,
+) -> Result<Option<f64>, Error> {
+    // A specimen inside of the plant has no component that could be replaced.
+    if found.rig.specimen_mass > 0.0 && request.specimen == built_in::NONE {
+        return Ok(None);
+    }
+    let wanted = Wanted {
+        rules: Some(rules),
+        ..Wanted::default()
+    };
+    let mut file = built_in::system(controller, &request.plant, &request.specimen, wanted)?;
+    let settings = request.set.iter();
+    let others = settings.filter(|own| own.split('.').next().map(str::trim) != Some(TABLE));
+    for setting in others {
+        super::systems::set(&mut file, setting);
+    }
+    replace(&mut file, found, request.sensor_delay);
+    let asked = experiment::Request {
+        plant: request.plant.clone(),
+        specimen: request.specimen.clone(),
+        record: request.record.clone(),
+        reference: request.reference.clone(),
+        duration_s: Some(request.played),
+        fmi: request.fmi,
+        ..experiment::Request::built_in(controller)
+    };
+    let prepared = prepare_file(&asked, &file)?;
+    let outcome = prepared.run(prepared.algorithm)?;
+    if !outcome.ended.is_regular() {
+        return Ok(None);
+    }
+    let column = |name: &str| outcome.record.column(&format!("{TABLE}.{name}"));
+    let histories = column("displacement").zip(column("acceleration"));
+    let tracking = histories.and_then(|(x, a)| metrics::tracking(&prepared.motion, &x, &a).ok());
+    Ok(tracking.map(|own| own.time_domain_percent))
+}
+
+fn replace(file: &mut SystemFile, found: &Found, sensor_delay: f64) {
+    if let Some(table) = file.components.get_mut(TABLE) {
+        let inputs = std::mem::take(&mut table.inputs);
+        *table = ComponentFile {
+            fmu: "ServoHydraulicTable".into(),
+            inputs,
+            ..ComponentFile::default()
+        };
+        let own = parameters(&found.rig, &found.shape, &found.curve(), sensor_delay);
+        for (name, value) in own {
+            table.set(name, value);
+        }
+    }
+    if let (Some(own), Some(specimen)) = (&found.specimen, file.components.get_mut(SPECIMEN))
+        && specimen.fmu == "Specimen"
+    {
+        let mass = found.rig.specimen_mass;
+        for (name, value) in [
+            ("mass", mass),
+            ("damping", own.specimen.damping * mass),
+            ("stiffness", own.specimen.stiffness * mass),
+        ] {
+            specimen.set(name, value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::systems::control_model::ControlModel;
+
+    /// What recordings say of the physical rig leads back to the numbers of its valve, oil and seals.
+    #[test]
+    fn the_commissioned_rig_has_the_numbers_of_the_physical_one() {
+        let model = ControlModel::commissioned().unwrap();
+        let (rig, shape) = model.hydraulics.unwrap();
+        let own = parameters(&rig, &shape, &ValveCurve::default(), 0.002);
+        let usual = ServoHydraulicTable::default();
+        let find = |name: &str| own.iter().find(|own| own.0 == name).unwrap().1;
+        for (name, truth, within) in [
+            ("bulk_modulus", usual.cylinder.bulk_modulus, 0.02),
+            ("flow_coefficient", usual.valve.flow_coefficient, 0.02),
+            ("valve_frequency", usual.valve.frequency, 0.15),
+            ("coulomb_friction", usual.friction.coulomb, 0.05),
+            ("seal_viscous_friction", usual.friction.viscous, 0.05),
+            ("table_mass", usual.table.mass, 0.005),
+        ] {
+            let value = find(name);
+            assert!(
+                (value / truth - 1.0).abs() < within,
+                "{name}: {value} {truth}"
+            );
+        }
+        // Its 2.03 ms are the sensors' sample, and a thirtieth of one more.
+        assert!(find("command_delay.delay") < 5e-5);
+    }
+}

@@ -1,0 +1,173 @@
+//! What a comparison finds.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use fmi_master::Ending;
+
+/// Runs of controllers on motions: `comparison.json`, and what `--json` prints.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Comparison {
+    /// Plant of all runs.
+    pub plant: String,
+    /// Specimen of all runs.
+    pub specimen: String,
+    /// The runs, those of one controller together, motions in the same order.
+    pub rows: Vec<Row>,
+    /// Medians by controller.
+    pub medians: BTreeMap<String, Median>,
+}
+
+/// A run of the comparison.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Row {
+    /// Name of the motion.
+    pub record: String,
+    /// The built-in system.
+    pub controller: String,
+    /// Time-domain error of the acceleration, %.
+    pub time_domain_percent: Option<f64>,
+    /// Frequency-domain error of the acceleration, %.
+    pub frequency_domain_percent: Option<f64>,
+    /// Largest deviation of the response spectrum at 5 % damping from 0.5 to 15 Hz, %.
+    #[serde(default)]
+    pub response_spectrum_percent: Option<f64>,
+    /// Time-domain error over the significant duration, %.
+    #[serde(default)]
+    pub significant_duration_percent: Option<f64>,
+    /// Largest displacement of the table, m.
+    pub peak_displacement_m: Option<f64>,
+    /// How it ended.
+    pub ended: Ending,
+    /// Why it ended early.
+    pub ended_because: Option<String>,
+    /// When it was stopped, s.
+    pub ended_s: Option<f64>,
+    /// For the plots, of the first motion only.
+    #[serde(skip)]
+    pub history: Option<History>,
+}
+
+/// Distance of the table from its reference, one value per sample.
+#[derive(Debug, Clone)]
+pub struct History {
+    /// Sample time, s.
+    pub dt: f64,
+    /// m.
+    pub displacement_error: Vec<f64>,
+    /// m/s².
+    pub acceleration_error: Vec<f64>,
+}
+
+/// What a controller reached over all motions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Median {
+    /// Time-domain error, %; none where half of the runs ended early.
+    pub time_domain_percent: Option<f64>,
+    /// Frequency-domain error, %.
+    pub frequency_domain_percent: Option<f64>,
+    /// Largest deviation of the response spectrum, %.
+    #[serde(default)]
+    pub response_spectrum_percent: Option<f64>,
+    /// Time-domain error over the significant duration, %.
+    #[serde(default)]
+    pub significant_duration_percent: Option<f64>,
+    /// Runs that were stopped or failed; they count as worse than any other.
+    pub ended_early: usize,
+}
+
+/// One of the errors of a run.
+pub(super) type Measure = fn(&Row) -> Option<f64>;
+
+impl Row {
+    /// Whether it was played to its end.
+    pub fn is_complete(&self) -> bool {
+        self.ended == Ending::Complete
+    }
+}
+
+impl Comparison {
+    /// Of runs on one rig.
+    pub fn new(plant: &str, specimen: &str, rows: Vec<Row>) -> Self {
+        let mut comparison = Self {
+            plant: plant.to_string(),
+            specimen: specimen.to_string(),
+            rows,
+            medians: BTreeMap::new(),
+        };
+        comparison.medians = comparison.medians();
+        comparison
+    }
+
+    /// The controllers in the order of their runs.
+    pub fn controllers(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = Vec::new();
+        for row in &self.rows {
+            if !names.contains(&row.controller.as_str()) {
+                names.push(&row.controller);
+            }
+        }
+        names
+    }
+
+    /// The runs that did not reach the end of their motion.
+    pub fn ended_early(&self) -> impl Iterator<Item = &Row> {
+        self.rows.iter().filter(|row| !row.is_complete())
+    }
+
+    fn medians(&self) -> BTreeMap<String, Median> {
+        let rows = &self.rows;
+        let of = |controller: &str, measure: Measure| median(&column(rows, controller, measure));
+        let controllers = self.controllers().into_iter();
+        controllers
+            .map(|controller| {
+                let own = self
+                    .ended_early()
+                    .filter(|row| row.controller == controller);
+                let median = Median {
+                    time_domain_percent: of(controller, |row| row.time_domain_percent),
+                    frequency_domain_percent: of(controller, |row| row.frequency_domain_percent),
+                    response_spectrum_percent: of(controller, |row| row.response_spectrum_percent),
+                    significant_duration_percent: of(controller, |row| {
+                        row.significant_duration_percent
+                    }),
+                    ended_early: own.count(),
+                };
+                (controller.to_string(), median)
+            })
+            .collect()
+    }
+}
+
+/// Values of a controller; a run that ended early counts as infinitely bad.
+pub(super) fn column(rows: &[Row], controller: &str, measure: Measure) -> Vec<f64> {
+    let own = rows.iter().filter(|row| row.controller == controller);
+    own.filter_map(|row| match row.is_complete() {
+        true => measure(row),
+        false => Some(f64::INFINITY),
+    })
+    .collect()
+}
+
+/// The middle value; none where it is infinite or there is none.
+pub(super) fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    let median = match sorted.len() {
+        0 => return None,
+        length if length % 2 == 1 => sorted[middle],
+        _ => 0.5 * (sorted[middle - 1] + sorted[middle]),
+    };
+    median.is_finite().then_some(median)
+}
+
+/// Of a sample (over n - 1), as in Table 4-1; none where a run ended early.
+pub(super) fn deviation(values: &[f64]) -> Option<f64> {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let sum: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    let variance = sum / (count - 1.0);
+    (values.len() > 1 && variance.is_finite()).then(|| variance.sqrt())
+}

@@ -1,0 +1,332 @@
+//! The gain in closed loop: the FMUs of the nominal and of the extended rig play the reference of
+//! the validation record under the laboratory's own control law (R5), for comparison with the
+//! measurement. The rig is unstable without its controller, so that nothing else would compare
+//! models over a whole record.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use identification::data::{Channel, OUTPUT_NAMES, Recording, mean_and_deviation};
+use identification::diagnosis::case::{ControlLaw, Nominal};
+use identification::diagnosis::engine::resampling::{running, share_gone};
+use identification::diagnosis::rigs::shake_table::ExtendedModel as Estimated;
+use identification::diagnosis::{GainAgainstNoise, GainReport};
+
+use crate::run::experiment::samples;
+use fmi_master::{Algorithm, Ended, Pace, Simulation};
+use fmi_system::{ComponentFile, Files, Origin, Quantity, SystemFile, VariableName, assemble};
+use motion::Motion;
+use pack::extended_model::{Estimate, ExtendedModel};
+
+/// Coupling steps of table and specimen in a sample, the finest that the rig's delays allow (they
+/// last at most thirty steps).
+const STEPS_A_SAMPLE: [f64; 3] = [4.0, 2.0, 1.0];
+/// Runs with the sensors' noise that the floor is the mean of.
+const SEEDS: [i32; 4] = [1, 2, 3, 4];
+
+/// The sensors' readings of [`Channel::OUTPUTS`], SI.
+pub type Channels = [Vec<f64>; 4];
+
+/// FMUs of a rig.
+#[derive(Debug, Clone, Default)]
+pub struct RigFmus {
+    /// `ShakeTable`.
+    pub table: PathBuf,
+    /// `Specimen`, if one is meant to stand on the table.
+    pub specimen: Option<PathBuf>,
+    /// `Instrumentation`.
+    pub sensors: PathBuf,
+    /// `ThreeVariableControl`.
+    pub control: PathBuf,
+    /// What is set on top of the start values, by the component's name.
+    pub values: BTreeMap<&'static str, BTreeMap<String, Estimate>>,
+}
+
+impl RigFmus {
+    /// The same FMUs with the parameters of the nominal model and the effects that it knows.
+    #[must_use]
+    pub fn nominal(mut self, nominal: &Nominal) -> Self {
+        self.values = ExtendedModel::new(&Estimated::known(nominal), &[]).parameters;
+        self
+    }
+}
+
+/// What a rig measures while its law follows `reference` (m), sampled every `period` s; with
+/// `noise` (one standard deviation of each channel, and a seed) as its sensors add it.
+///
+/// # Errors
+/// A law that the component cannot express, FMUs at fault, a run that ends early: a sentence.
+pub fn play(
+    rig: &RigFmus,
+    law: &ControlLaw,
+    reference: &[f64],
+    period: f64,
+    noise: Option<([f64; 4], i32)>,
+) -> Result<Channels, String> {
+    let file = system(rig, law, period, noise)?;
+    let system = assemble(&file, &[], &mut Files::default()).map_err(|e| e.to_string())?;
+    let samples = samples(&motion(reference, period));
+    let run = |steps: f64| {
+        let simulation = Simulation::new(&system, &samples, Algorithm::GaussSeidel, period / steps);
+        let outcome =
+            simulation
+                .map_err(|e| e.to_string())?
+                .run(reference.len(), Pace::Fastest, &mut |_| {});
+        match outcome.ended {
+            Ended::Complete => Ok(outcome),
+            other => Err(other.message()),
+        }
+    };
+    let mut outcome = Err(String::new());
+    for steps in STEPS_A_SAMPLE {
+        outcome = run(steps);
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    let outcome = outcome?;
+    let column = |name: &str| {
+        let name = format!("sensors.{name}");
+        let column = outcome.record.column(&name);
+        column.ok_or_else(|| format!("`{name}` was not recorded"))
+    };
+    Ok([
+        column("measured_displacement")?,
+        column("measured_acceleration")?,
+        column("measured_force")?,
+        column("measured_specimen_acceleration")?,
+    ])
+}
+
+/// The reference with its derivatives as the law takes them: central differences.
+fn motion(reference: &[f64], period: f64) -> Motion {
+    let last = reference.len().saturating_sub(1);
+    let around = |k: usize| {
+        let (behind, ahead) = (k.saturating_sub(1), (k + 1).min(last));
+        (reference[behind], reference[k], reference[ahead])
+    };
+    let velocity = |k| {
+        let (behind, _, ahead) = around(k);
+        (ahead - behind) / (2.0 * period)
+    };
+    let acceleration = |k| {
+        let (behind, here, ahead) = around(k);
+        (ahead - 2.0 * here + behind) / (period * period)
+    };
+    Motion {
+        name: "validation".into(),
+        dt: period,
+        displacement: reference.to_vec(),
+        velocity: (0..reference.len()).map(velocity).collect(),
+        acceleration: (0..reference.len()).map(acceleration).collect(),
+        notes: Vec::new(),
+        seed: None,
+    }
+}
+
+/// The closed loop as a system.
+fn system(
+    rig: &RigFmus,
+    law: &ControlLaw,
+    period: f64,
+    noise: Option<([f64; 4], i32)>,
+) -> Result<SystemFile, String> {
+    let share = law.velocity_filter;
+    if !(share > 0.0 && share <= 1.0) {
+        return Err(format!(
+            "controller.velocity_filter = {share}, expected more than 0 and at most 1"
+        ));
+    }
+    let mut sensors = vec![("velocity_lag", period * (1.0 - share) / share)];
+    if let Some((noise, _)) = noise {
+        let names = [
+            "displacement_noise",
+            "acceleration_noise",
+            "actuator_force_noise",
+            "specimen_acceleration_noise",
+        ];
+        let finite = names.into_iter().zip(noise).filter(|(_, n)| n.is_finite());
+        sensors.extend(finite);
+    }
+    // The component feeds back the errors of velocity and acceleration, the law the motion itself.
+    let control = [
+        ("proportional_gain", law.proportional),
+        ("integral_gain", law.integral),
+        ("velocity_feedback_gain", law.velocity_feedback),
+        ("acceleration_feedback_gain", law.acceleration_feedback),
+        ("displacement_feedforward_gain", 0.0),
+        (
+            "velocity_feedforward_gain",
+            law.velocity_feedforward - law.velocity_feedback,
+        ),
+        (
+            "acceleration_feedforward_gain",
+            law.acceleration_feedforward - law.acceleration_feedback,
+        ),
+        ("valve_limit", law.limit),
+    ];
+    let component = |fmu: &Path, parameters: &[(&str, f64)]| {
+        let mut component = ComponentFile::new(&fmu.display().to_string());
+        for (parameter, value) in parameters {
+            component.set(parameter, *value);
+        }
+        component
+    };
+    let of_rig = |fmu: &Path, name: &str, parameters: &[(&str, f64)]| {
+        let mut component = component(fmu, parameters);
+        for (parameter, estimate) in rig.values.get(name).into_iter().flatten() {
+            component.set(parameter, estimate.value);
+        }
+        component
+    };
+    let mut table = of_rig(&rig.table, "ShakeTable", &[]);
+    let mut sensors = of_rig(&rig.sensors, "Instrumentation", &sensors).period(period);
+    if let Some((_, seed)) = noise {
+        sensors.set("seed", i64::from(seed));
+    }
+    let mut system = SystemFile::new("closed loop");
+    let mut connect = |from: Origin, component: &str, variable: &str| {
+        system.connect(from, VariableName::new(component, variable));
+    };
+    for quantity in Quantity::ALL {
+        let name = quantity.name();
+        connect(
+            Origin::reference(quantity),
+            "control",
+            &format!("reference_{name}"),
+        );
+        let measured = format!("measured_{name}");
+        connect(Origin::output("sensors", &measured), "control", &measured);
+        connect(Origin::output("table", name), "sensors", name);
+    }
+    for (from, output, to, input) in [
+        ("table", "actuator_force", "sensors", "actuator_force"),
+        ("control", "valve_command", "table", "valve_command"),
+    ] {
+        connect(Origin::output(from, output), to, input);
+    }
+    if let Some(fmu) = &rig.specimen {
+        for (from, output, to, input) in [
+            ("table", "acceleration", "specimen", "table_acceleration"),
+            ("specimen", "force", "table", "specimen_force"),
+            (
+                "specimen",
+                "acceleration",
+                "sensors",
+                "specimen_acceleration",
+            ),
+        ] {
+            connect(Origin::output(from, output), to, input);
+        }
+        system.add("specimen", of_rig(fmu, "Specimen", &[]));
+    } else {
+        table = table.input("specimen_force", 0.0);
+        sensors = sensors.input("specimen_acceleration", 0.0);
+    }
+    system.add("table", table);
+    system.add("sensors", sensors);
+    system.add("control", component(&rig.control, &control).period(period));
+    Ok(system)
+}
+
+/// Simulation of a record by the co-simulated models.
+#[derive(Debug, Clone)]
+pub(super) struct Comparison {
+    /// Readings of the nominal FMUs.
+    pub before: Channels,
+    /// Readings of the extended FMUs.
+    pub after: Channels,
+    /// Deviation that the sensors' noise makes by itself, through the loop and in the readings.
+    pub floor: [f64; 4],
+    /// The figures.
+    pub gain: GainReport,
+}
+
+/// Plays the reference of `recording` through the FMUs of both rigs and holds them against it.
+///
+/// # Errors
+/// As [`play`].
+pub(super) fn compare(
+    recording: &Recording,
+    nominal: &Nominal,
+    law: &ControlLaw,
+    before: &RigFmus,
+    after: &RigFmus,
+) -> Result<Comparison, String> {
+    let period = 1.0 / nominal.sample_rate;
+    let reference = recording.samples(Channel::Reference);
+    let played = |rig: &RigFmus, noise| play(rig, law, reference, period, noise);
+    let (before, after) = (played(before, None)?, {
+        let clean = played(after, None)?;
+        let mut floor = [0.0; 4];
+        for seed in SEEDS {
+            let noisy = played(after, Some((nominal.noise, seed)))?;
+            for (sum, (noisy, clean)) in floor.iter_mut().zip(noisy.iter().zip(&clean)) {
+                *sum += mean_square(noisy, clean) / SEEDS.len() as f64;
+            }
+        }
+        (clean, floor.map(f64::sqrt))
+    });
+    let (after, floor) = after;
+    let gain = gain(recording, &before, &after, &floor);
+    Ok(Comparison {
+        before,
+        after,
+        floor,
+        gain,
+    })
+}
+
+fn mean_square(a: &[f64], b: &[f64]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+    sum / a.len().min(b.len()).max(1) as f64
+}
+
+fn gain(
+    recording: &Recording,
+    before: &Channels,
+    after: &Channels,
+    floor: &[f64; 4],
+) -> GainReport {
+    let measured = Channel::OUTPUTS.map(|channel| recording.samples(channel));
+    let live: Vec<usize> = (0..4)
+        .filter(|&i| !measured[i].is_empty() && floor[i] > 0.0)
+        .collect();
+    let scale = |i: usize| mean_and_deviation(measured[i]).1.max(f64::MIN_POSITIVE);
+    let rms =
+        |simulated: &Channels, i: usize| -> f64 { mean_square(measured[i], &simulated[i]).sqrt() };
+    let channels = live
+        .iter()
+        .map(|&i| {
+            let errors = [rms(before, i), rms(after, i), floor[i]];
+            (
+                OUTPUT_NAMES[i].to_owned(),
+                errors.map(|error| error / scale(i)),
+            )
+        })
+        .collect();
+    let overall = |of: &dyn Fn(usize) -> f64| {
+        let sum: f64 = live.iter().map(|&i| of(i).powi(2)).sum();
+        (sum / live.len().max(1) as f64).sqrt()
+    };
+    // Running sums of the squared error over all channels, in units of their floors.
+    let sums = |simulated: &Channels| -> Vec<f64> {
+        running((0..recording.len()).map(|k| {
+            let error = |&i: &usize| (measured[i][k] - simulated[i][k]) / floor[i];
+            live.iter().map(|i| error(i).powi(2)).sum::<f64>()
+        }))
+    };
+    GainReport {
+        before_nrmse: overall(&|i| rms(before, i) / scale(i)),
+        after_nrmse: overall(&|i| rms(after, i) / scale(i)),
+        noise_floor_nrmse: Some(overall(&|i| floor[i] / scale(i))),
+        interval_95: share_gone(&sums(before), &sums(after)).into(),
+        interval_of: None,
+        record: "validation".to_owned(),
+        against_noise: Some(GainAgainstNoise {
+            before_ratio: overall(&|i| rms(before, i) / floor[i]),
+            after_ratio: overall(&|i| rms(after, i) / floor[i]),
+            channels,
+        }),
+    }
+}

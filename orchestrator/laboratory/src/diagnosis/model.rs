@@ -1,0 +1,398 @@
+//! An extended model on further records, without a fit: what it misses, and what it predicts.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use identification::data::{Called, Channel, named_columns};
+use identification::diagnosis::DiagnosisError;
+use identification::diagnosis::called;
+use identification::diagnosis::rigs::shake_table::{ExtendedTable, TableErrors};
+use identification::diagnosis::rigs::{DescriptionError, ExtendedRig, FileErrors, renamed};
+use serde::Serialize;
+
+use super::{fault, file_fault, foreign};
+use crate::error::Error;
+use crate::results::Results;
+use fmi_import::Isolation;
+use pages::report::columns::aligned;
+
+/// Column of the file of [`predict`].
+const PREDICTION: &str = "prediction";
+
+/// What `diagnose --validate` tells.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Validation {
+    /// The model.
+    pub model: PathBuf,
+    /// A record for each file, of a shake table for each of its channels; there is no refitted
+    /// model between the described and the extended one.
+    pub records: Vec<FileErrors>,
+    /// Of a shake table, all channels of a file together.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tables: Vec<TableErrors>,
+}
+
+/// What `diagnose --predict` tells.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Predicted {
+    /// The model.
+    pub model: PathBuf,
+    /// The file that was predicted.
+    pub file: PathBuf,
+    /// Where the prediction was written.
+    pub prediction: PathBuf,
+    /// What was predicted.
+    pub channel: String,
+    /// Its unit, that of the file.
+    pub unit: String,
+    /// Rows.
+    pub rows: usize,
+    /// Rows in which the output was given; they told how the file begins.
+    pub given: usize,
+}
+
+/// An extended model that a diagnosis wrote, and what is stated next to it.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<'a> {
+    /// The file.
+    pub model: &'a Path,
+    /// File that names the columns otherwise; not of an FMU.
+    pub columns: Option<&'a Path>,
+    /// Of an FMU, where it is now, if not where the file says.
+    pub fmu: Option<&'a Path>,
+    /// Of an FMU, the map of the data, if not the one beside the file.
+    pub map: Option<&'a Path>,
+    /// Of an FMU, whether it runs in a process of its own; absent: it does.
+    pub isolate: Option<Isolation>,
+}
+
+/// Errors of the model that is `asked` for on `files`.
+///
+/// # Errors
+/// A file that cannot be read or understood, by place.
+pub fn validate(asked: &Asked<'_>, files: &[PathBuf]) -> Result<Validation, Error> {
+    let model = asked.model;
+    let (records, tables) = match read(asked)? {
+        Read::Foreign(foreign) => (foreign.validate(files)?, Vec::new()),
+        Read::Rig(rig) => {
+            let found = rig.validate(files);
+            let found = found.map_err(|error| fault(model, error.into()))?;
+            (found, Vec::new())
+        }
+        Read::Table(table, called) => {
+            let found = table.validate(files, &called);
+            let found = found.map_err(|error| fault(model, error.into()))?;
+            (found.iter().flat_map(by_channel).collect(), found)
+        }
+    };
+    Ok(Validation {
+        model: model.into(),
+        records,
+        tables,
+    })
+}
+
+/// Writes what the model that is `asked` for puts out for every row of `file` to `out`; the output's
+/// cells may be empty. A file without a given output begins at rest, or in the steady state of a
+/// motion that repeats it where it `is_periodic`.
+///
+/// # Errors
+/// As [`validate`]; a file that cannot be written.
+pub fn predict(
+    asked: &Asked<'_>,
+    file: &Path,
+    is_periodic: bool,
+    out: &Path,
+) -> Result<Predicted, Error> {
+    let model = asked.model;
+    let read = match read(asked)? {
+        Read::Rig(read) => read,
+        Read::Foreign(foreign) => return predict_foreign(&foreign, file, is_periodic, out),
+        Read::Table(table, called) => {
+            return predict_table(&table, &called, file, is_periodic, out);
+        }
+    };
+    let found = read
+        .predict(file, is_periodic)
+        .map_err(|error| fault(model, error.into()))?;
+    write(out, |file| {
+        writeln!(file, "{PREDICTION}")?;
+        found
+            .rows
+            .iter()
+            .try_for_each(|row| writeln!(file, "{row}"))
+    })?;
+    Ok(Predicted {
+        model: model.into(),
+        file: file.into(),
+        prediction: out.into(),
+        channel: found.channel.into(),
+        unit: found.unit,
+        rows: found.rows.len(),
+        given: found.given,
+    })
+}
+
+fn by_channel(table: &TableErrors) -> impl Iterator<Item = FileErrors> + '_ {
+    table.channels.iter().map(|own| FileErrors {
+        file: table.file.clone(),
+        channel: own.channel.clone(),
+        nominal_percent: own.described_percent,
+        described_percent: own.described_percent,
+        extended_percent: own.extended_percent,
+        extended_rms: own.extended_rms,
+        unit: own.unit.clone(),
+        session: BTreeMap::from([(format!("{}_zero", own.channel), own.zero)]),
+        notes: Vec::new(),
+    })
+}
+
+/// As [`predict`], of a table: the output that was asked for in the file's unit, and, SI, all four beside the time.
+fn predict_table(
+    table: &ExtendedTable,
+    called: &[Called],
+    file: &Path,
+    is_periodic: bool,
+    out: &Path,
+) -> Result<Predicted, Error> {
+    if is_periodic {
+        return Err(Error::Option {
+            option: "--periodic",
+            reason: format!(
+                "{} is a model of a shake table, which begins at rest",
+                table.path.display()
+            ),
+        });
+    }
+    let found = table
+        .predict(file, called)
+        .map_err(|error| fault(file, error.into()))?;
+    let wanted = Channel::OUTPUTS[found.wanted];
+    let heads = named_columns(file).unwrap_or_default();
+    let in_file = heads.into_iter().find(|head| head.channel == wanted);
+    let unit = in_file.map_or_else(|| wanted.unit().to_owned(), |head| head.unit);
+    let factor = units::convert(1.0, wanted.unit(), &unit)
+        .map_err(|why| file_fault(file, format!("`{}`: {why}", wanted.name())))?;
+    write(out, |file| {
+        let heads = Channel::OUTPUTS.map(|own| format!("{} [{}]", own.name(), own.unit()));
+        writeln!(file, "{PREDICTION},time [s],{}", heads.join(","))?;
+        found.time.iter().zip(&found.rows).try_for_each(|(t, row)| {
+            let [x, a, f, s] = row;
+            let wanted = factor * row[found.wanted];
+            writeln!(file, "{wanted},{t},{x:.9e},{a:.9e},{f:.9e},{s:.9e}")
+        })
+    })?;
+    Ok(Predicted {
+        model: table.path.clone(),
+        file: file.into(),
+        prediction: out.into(),
+        channel: wanted.name().into(),
+        unit,
+        rows: found.rows.len(),
+        given: found.given,
+    })
+}
+
+/// As [`predict`], of an FMU: the output that was asked for in the file's unit, and all in the model's beside
+/// the time.
+fn predict_foreign(
+    model: &foreign::Extended,
+    file: &Path,
+    is_periodic: bool,
+    out: &Path,
+) -> Result<Predicted, Error> {
+    if is_periodic {
+        return Err(Error::Option {
+            option: "--periodic",
+            reason: format!(
+                "{} is a model of an FMU, which begins with its start values",
+                model.path.display()
+            ),
+        });
+    }
+    let found = model.predict(file)?;
+    let (unit, factor) = &found.in_file;
+    write(out, |file| {
+        let mut csv = csv::Writer::from_writer(file);
+        let heads = found.outputs.iter().map(foreign::head);
+        let first = [PREDICTION.to_owned(), "time [s]".to_owned()];
+        csv.write_record(first.into_iter().chain(heads))?;
+        for (k, time) in found.time.iter().enumerate() {
+            let wanted = found.values[found.wanted][k] / factor;
+            let own = found.values.iter().map(|own| own[k]);
+            let row = [wanted, *time].into_iter().chain(own);
+            csv.write_record(row.map(|value| value.to_string()))?;
+        }
+        csv.flush()
+    })?;
+    Ok(Predicted {
+        model: model.path.clone(),
+        file: file.into(),
+        prediction: out.into(),
+        channel: found.outputs[found.wanted].name.clone(),
+        unit: unit.clone(),
+        rows: found.time.len(),
+        given: found.given,
+    })
+}
+
+/// Writes the file `out`, all or nothing.
+fn write(
+    out: &Path,
+    text: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<(), Error> {
+    let name = out
+        .file_name()
+        .ok_or_else(|| file_fault(out, "expected the name of an output file"))?;
+    let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let mut results = Results::begin(folder.unwrap_or(Path::new(".")))?;
+    results.write(&name.to_string_lossy(), |file| text(file))?;
+    results.finish()?;
+    Ok(())
+}
+
+enum Read {
+    Rig(Box<ExtendedRig>),
+    Table(Box<ExtendedTable>, Vec<Called>),
+    Foreign(Box<foreign::Extended>),
+}
+
+fn read(asked: &Asked<'_>) -> Result<Read, Error> {
+    let (model, columns) = (asked.model, asked.columns);
+    let text = std::fs::read_to_string(model).unwrap_or_default();
+    if foreign::is_one(&text) {
+        if columns.is_some() {
+            return Err(Error::Option {
+                option: "--columns",
+                reason: format!(
+                    "{} is a model of an FMU: expected --map, the map of its data",
+                    model.display()
+                ),
+            });
+        }
+        let read = foreign::Extended::read(model, asked.fmu, asked.map, asked.isolate)?;
+        return Ok(Read::Foreign(Box::new(read)));
+    }
+    for (option, given) in [("--fmu", asked.fmu), ("--map", asked.map)] {
+        if given.is_some() {
+            return Err(Error::Option {
+                option,
+                reason: format!("{} is not the model of an FMU", model.display()),
+            });
+        }
+    }
+    if ExtendedTable::is_one(&text) {
+        let table = ExtendedTable::read(model).map_err(|error| fault(model, error.into()))?;
+        let called = columns.map(called).transpose();
+        let called = called.map_err(|error: DiagnosisError| fault(model, error))?;
+        return Ok(Read::Table(Box::new(table), called.unwrap_or_default()));
+    }
+    let failed = |error: DescriptionError| fault(model, error.into());
+    let mut read = ExtendedRig::read(model).map_err(failed)?;
+    if let Some(map) = columns {
+        read.columns = renamed(&read.columns, map).map_err(failed)?;
+    }
+    Ok(Read::Rig(Box::new(read)))
+}
+
+impl Validation {
+    /// What is printed without `--json`.
+    pub fn text(&self) -> String {
+        if !self.tables.is_empty() {
+            return self.text_of_tables();
+        }
+        // Between the model as described and the extended one of an FMU stands no refitted one.
+        let refitted = |one: &FileErrors| one.nominal_percent != one.described_percent;
+        let has_refitted = self.records.iter().any(refitted);
+        let row = |cells: [String; 6]| -> Vec<String> {
+            let cells = cells.into_iter().enumerate();
+            let cells = cells.filter(|(place, _)| has_refitted || *place != 3);
+            cells.map(|(_, cell)| cell).collect()
+        };
+        let heading = [
+            "file",
+            "channel",
+            "as described",
+            "refitted",
+            "extended",
+            "rms error",
+        ];
+        let mut rows = vec![row(heading.map(String::from))];
+        for one in &self.records {
+            let percent = |value: f64| format!("{value:.2} %");
+            rows.push(row([
+                one.file.display().to_string(),
+                one.channel.clone(),
+                percent(one.described_percent),
+                percent(one.nominal_percent),
+                percent(one.extended_percent),
+                format!("{:.3e} {}", one.extended_rms, one.unit),
+            ]));
+        }
+        let has_own = self.records.iter().any(|one| !one.session.is_empty());
+        let but = if has_own {
+            "  except parameters of a file"
+        } else {
+            ""
+        };
+        let mut text = format!(
+            "error relative to variation, nothing fitted{but}\n{}",
+            aligned(&rows)
+        );
+        for one in &self.records {
+            let own: Vec<String> = one
+                .session
+                .iter()
+                .map(|(name, value)| format!("{name} {value:.3e}"))
+                .collect();
+            if !own.is_empty() {
+                text += &format!("{}: {} (SI)\n", one.file.display(), own.join(", "));
+            }
+            for note in &one.notes {
+                text += &format!("note: {note}\n");
+            }
+        }
+        text
+    }
+
+    fn text_of_tables(&self) -> String {
+        let heading = ["file", "channel", "as described", "extended", "noise alone"];
+        let mut rows = vec![heading.map(String::from).to_vec()];
+        let percent = |value: f64| format!("{value:.2} %");
+        let times = |value: f64| format!("{value:.2} times");
+        for one in &self.tables {
+            let file = one.file.display().to_string();
+            for own in &one.channels {
+                rows.push(vec![
+                    file.clone(),
+                    own.channel.clone(),
+                    percent(own.described_percent),
+                    percent(own.extended_percent),
+                    percent(own.floor_percent),
+                ]);
+            }
+            rows.push(vec![
+                file,
+                "all, in the noise".into(),
+                times(one.described_in_noise),
+                times(one.extended_in_noise),
+                times(1.0),
+            ]);
+        }
+        let mut text = format!(
+            "one-step error relative to variation, nothing fitted except the sensors' zeros of a \
+             file\n{}",
+            aligned(&rows)
+        );
+        for one in &self.tables {
+            let own: Vec<String> = one
+                .channels
+                .iter()
+                .map(|own| format!("{} {:.2e} {}", own.channel, own.zero, own.unit))
+                .collect();
+            text += &format!("{}: zeros {}\n", one.file.display(), own.join(", "));
+        }
+        text
+    }
+}

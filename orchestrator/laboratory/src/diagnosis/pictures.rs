@@ -1,0 +1,256 @@
+//! The pictures of a case.
+
+use identification::data::{Channel, OUTPUT_NAMES};
+use identification::diagnosis::case::Case;
+use identification::diagnosis::rigs::shake_table::{Diagnosis, Validation};
+use realfft::RealFftPlanner;
+
+use super::co_simulation::Comparison;
+use pages::report::{Abscissa, Axis, Panel, Series, Style, Units};
+
+/// Pictures of errors against the state that are shown.
+const STATES_SHOWN: usize = 6;
+/// Colours of the nominal and of the extended model.
+const BEFORE: usize = 2;
+const AFTER: usize = 1;
+
+/// Errors in time, in frequency, and against the state.
+pub(super) struct Errors {
+    pub time: Vec<Panel>,
+    pub spectra: Vec<Panel>,
+    pub state: Vec<Panel>,
+}
+
+/// Channels with errors on the validation record: place, whitened errors before and after.
+fn channels(validation: &Validation) -> impl Iterator<Item = (usize, [Vec<f64>; 2])> {
+    (0..OUTPUT_NAMES.len()).filter_map(|channel| {
+        let pick = |errors: &[f64]| -> Vec<f64> {
+            errors.iter().skip(channel).step_by(4).copied().collect()
+        };
+        let before = pick(&validation.before);
+        // A missing channel has no errors.
+        let is_live = before.iter().any(|error| *error != 0.0);
+        is_live.then(|| (channel, [before, pick(&validation.after)]))
+    })
+}
+
+/// Values of a series that a page shows.
+const SHOWN: usize = 12_000;
+
+/// The sensors' readings with those of both rigs in closed loop over them.
+pub(super) fn overlays(case: &Case, found: &Comparison) -> Vec<Panel> {
+    let period = 1.0 / case.nominal.sample_rate;
+    let outputs = Channel::OUTPUTS.map(|channel| case.validation.channel(channel));
+    let live = (0..).zip(outputs);
+    let live = live.filter_map(|(i, measured)| Some((i, measured?)));
+    live.map(|(i, measured)| {
+        let line = |name: &str, values: &[f64], colour| {
+            let line = Series::history(name, period, values).coloured(colour);
+            line.thinned(SHOWN)
+        };
+        Panel {
+            title: format!("{}, measured and co-simulated", words(i)),
+            x: Axis::linear("time", Units::TIME),
+            y: Axis::linear(&words(i), units(i)),
+            series: vec![
+                line("measured", measured, 0),
+                line("nominal model", &found.before[i], BEFORE),
+                line("extended model", &found.after[i], AFTER),
+            ],
+        }
+    })
+    .collect()
+}
+
+/// The sensors' readings less those of both rigs in closed loop, over time.
+pub(super) fn closed_loop(case: &Case, found: &Comparison) -> Vec<Panel> {
+    let period = 1.0 / case.nominal.sample_rate;
+    let outputs = Channel::OUTPUTS.map(|channel| case.validation.channel(channel));
+    let live = (0..).zip(outputs);
+    let live = live.filter_map(|(i, measured)| Some((i, measured?)));
+    live.map(|(i, measured)| {
+        let error = |simulated: &[f64]| -> Vec<f64> {
+            measured.iter().zip(simulated).map(|(m, s)| m - s).collect()
+        };
+        Panel {
+            title: format!("{}, measured less co-simulated", words(i)),
+            x: Axis::linear("time", Units::TIME),
+            y: Axis::linear("error", units(i)),
+            series: both(period, &error(&found.before[i]), &error(&found.after[i]))
+                .into_iter()
+                .chain([band(period, measured.len(), 2.0 * found.floor[i])])
+                .rev()
+                .collect(),
+        }
+    })
+    .collect()
+}
+
+fn words(channel: usize) -> String {
+    OUTPUT_NAMES[channel].replace('_', " ")
+}
+
+fn units(channel: usize) -> Units {
+    match channel {
+        0 => Units::DISPLACEMENT,
+        2 => Units::FORCE,
+        _ => Units::ACCELERATION,
+    }
+}
+
+/// The extended model's errors, and the nominal one's, which lie below them when drawn in reverse.
+fn both(period: f64, before: &[f64], after: &[f64]) -> [Series; 2] {
+    [
+        Series::history("extended model", period, after).coloured(AFTER),
+        Series::history("nominal model", period, before).coloured(BEFORE),
+    ]
+}
+
+/// A band of `half` to either side of zero, as its outline.
+fn band(period: f64, length: usize, half: f64) -> Series {
+    let end = period * length.saturating_sub(1) as f64;
+    Series::line(
+        "twice the noise floor",
+        Abscissa::At(vec![0.0, end, end, 0.0, 0.0].into()),
+        vec![half, half, -half, -half, half],
+    )
+    .styled(Style::Path)
+    .coloured(0)
+}
+
+/// One-step errors on the validation record.
+pub(super) fn errors(case: &Case, diagnosis: &Diagnosis) -> Errors {
+    let Validation {
+        period, samples, ..
+    } = &diagnosis.validation;
+    let displacement: Vec<f64> = samples.channels.iter().map(|row| row[0]).collect();
+    let mut states = vec![
+        ("command", Units::VOLTAGE, samples.command.clone()),
+        ("velocity", Units::VELOCITY, slope(&displacement, *period)),
+        ("displacement", Units::DISPLACEMENT, displacement),
+    ];
+    if let Some(specimen) = case.nominal.specimen {
+        // Its spring holds the mass: -m a = k d, but for damping.
+        let acceleration = samples.channels.iter().map(|row| row[3]);
+        let drift: Vec<f64> = acceleration
+            .map(|a| -specimen.mass * a / specimen.stiffness)
+            .collect();
+        states.push(("drift of the specimen", Units::DISPLACEMENT, drift));
+    }
+    // A missing channel is no state.
+    states.retain(|(_, _, values)| values.iter().any(|value| *value != 0.0));
+    let y = || Axis::linear("error, noise floors", Units::NONE);
+    let [mut time, mut spectra] = [Vec::new(), Vec::new()];
+    let mut ranked: Vec<(f64, Panel)> = Vec::new();
+    for (channel, [before, after]) in channels(&diagnosis.validation) {
+        let title = words(channel);
+        let mut series = vec![band(*period, before.len(), 2.0)];
+        series.extend(both(*period, &before, &after).into_iter().rev());
+        time.push(Panel {
+            title: title.clone(),
+            x: Axis::linear("time", Units::TIME),
+            y: y(),
+            series,
+        });
+        spectra.push(Panel {
+            title: title.clone(),
+            x: Axis::logarithmic("frequency", Units::FREQUENCY),
+            y: Axis::logarithmic("error, noise floors", Units::NONE),
+            series: vec![
+                spectrum("nominal model", &before, *period).coloured(BEFORE),
+                spectrum("extended model", &after, *period).coloured(AFTER),
+            ],
+        });
+        for (state, units, values) in &states {
+            let line = binned("nominal model", values, &before).coloured(BEFORE);
+            let bend: f64 = line.values.iter().map(|mean| mean * mean).sum();
+            ranked.push((
+                bend,
+                Panel {
+                    title: format!("{title} against {state}"),
+                    x: Axis::linear(state, units.clone()),
+                    y: y(),
+                    series: vec![
+                        line,
+                        binned("extended model", values, &after).coloured(AFTER),
+                    ],
+                },
+            ));
+        }
+    }
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let state = ranked.into_iter().map(|(_, panel)| panel);
+    Errors {
+        time,
+        spectra,
+        state: state.take(STATES_SHOWN).collect(),
+    }
+}
+
+/// Slope over a tenth of a second, where the noise of single samples is small.
+fn slope(values: &[f64], period: f64) -> Vec<f64> {
+    let half = (0.05 / period).round().max(1.0) as usize;
+    let last = values.len().saturating_sub(1);
+    (0..values.len())
+        .map(|k| {
+            let (from, to) = (k.saturating_sub(half), (k + half).min(last));
+            (values[to] - values[from]) / (period * (to - from).max(1) as f64)
+        })
+        .collect()
+}
+
+/// Mean errors in bins of equally many samples, by the state.
+fn binned(name: &str, state: &[f64], errors: &[f64]) -> Series {
+    const BINS: usize = 40;
+    let mut pairs: Vec<(f64, f64)> = state.iter().copied().zip(errors.iter().copied()).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mean = |values: &mut dyn Iterator<Item = f64>, n: usize| values.sum::<f64>() / n as f64;
+    let (places, means): (Vec<f64>, Vec<f64>) = pairs
+        .chunks(pairs.len().div_ceil(BINS).max(1))
+        .map(|bin| {
+            let place = mean(&mut bin.iter().map(|pair| pair.0), bin.len());
+            (place, mean(&mut bin.iter().map(|pair| pair.1), bin.len()))
+        })
+        .unzip();
+    Series::line(name, Abscissa::At(places.into()), means).styled(Style::Line)
+}
+
+/// Root of the averaged periodogram (Hann, 2 s, half overlapped); white noise of size one gives 1.
+fn spectrum(name: &str, errors: &[f64], period: f64) -> Series {
+    let length = ((2.0 / period) as usize).min(errors.len()) & !1;
+    let window: Vec<f64> = (0..length)
+        .map(|k| {
+            (std::f64::consts::PI * k as f64 / length as f64)
+                .sin()
+                .powi(2)
+        })
+        .collect();
+    let weight: f64 = window.iter().map(|w| w * w).sum();
+    let mut power = vec![0.0; length / 2 + 1];
+    let mut count = 0.0;
+    if length >= 4 {
+        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+        let mut lines = transform.make_output_vec();
+        for start in (0..=errors.len() - length).step_by(length / 2) {
+            let mut piece: Vec<f64> = errors[start..start + length]
+                .iter()
+                .zip(&window)
+                .map(|(error, weight)| error * weight)
+                .collect();
+            if transform.process(&mut piece, &mut lines).is_ok() {
+                count += 1.0;
+                for (sum, line) in power.iter_mut().zip(&lines) {
+                    *sum += line.norm_sqr() / weight;
+                }
+            }
+        }
+    }
+    let frequency = (1..power.len())
+        .map(|k| k as f64 / (length as f64 * period))
+        .collect();
+    let root = power
+        .iter()
+        .skip(1)
+        .map(|sum| (sum / f64::max(count, 1.0)).sqrt());
+    Series::line(name, Abscissa::At(frequency), root.collect())
+}

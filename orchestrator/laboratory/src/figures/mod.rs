@@ -1,0 +1,112 @@
+//! The thesis's figures, drawn with what this program computes: `shakebench figures`.
+
+mod identified;
+mod tracking;
+
+use std::path::{Path, PathBuf};
+
+use crate::design;
+use crate::error::Error;
+use crate::results::Results;
+use pages::report::{self, Panel, Report, Section, identity};
+
+/// A figure of the thesis, as this program draws it.
+#[derive(Debug)]
+pub struct Figure {
+    /// Its number, such as `3-7`.
+    pub number: &'static str,
+    /// What the thesis shows there, and what differs here.
+    pub text: String,
+    /// The plots.
+    pub panels: Vec<Panel>,
+}
+
+/// Numbers of all figures that are drawn.
+pub const NUMBERS: [&str; 14] = [
+    "2-6", "2-7", "2-9", "2-10", "3-3", "3-4", "3-6", "3-7", "3-9", "3-10", "4-4", "4-6", "5-5",
+    "5-6",
+];
+
+/// Draws the figures with these numbers (all for none) on a record, the built-in motion where none
+/// is given; `progress` receives each number before it is drawn.
+///
+/// # Errors
+/// A number that is none of [`NUMBERS`], a record at fault, a run that cannot begin.
+pub fn figures(
+    only: &[String],
+    record: Option<&Path>,
+    progress: &dyn Fn(&str),
+) -> Result<Vec<Figure>, Error> {
+    if let Some(wrong) = only.iter().find(|own| !NUMBERS.contains(&own.as_str())) {
+        return Err(Error::Option {
+            option: "--figure",
+            reason: format!(
+                "there is no figure `{wrong}`; expected some of {}",
+                NUMBERS.join(", ")
+            ),
+        });
+    }
+    let is_wanted = |number: &str| only.is_empty() || only.iter().any(|own| own == number);
+    let mut found = Vec::new();
+    let mut add = |figures: Vec<Figure>| {
+        found.extend(figures.into_iter().filter(|own| is_wanted(own.number)));
+    };
+    if ["2-6", "2-7", "2-9", "2-10"].into_iter().any(is_wanted) {
+        progress("2-6 to 2-10");
+        add(identified::figures()?);
+    }
+    if ["3-3", "3-4", "3-7", "3-9", "3-10"]
+        .into_iter()
+        .any(is_wanted)
+    {
+        progress("3-3 to 3-10");
+        let fault = |error: controllers::ModelError| Error::Option {
+            option: "figures",
+            reason: error.to_string(),
+        };
+        let design = design::design(&design::Options::default()).map_err(fault)?;
+        add(design::thesis_figures(&design));
+    }
+    for (number, draw) in tracking::ALL {
+        if is_wanted(number) {
+            progress(number);
+            add(vec![draw(record)?]);
+        }
+    }
+    found.sort_by_key(|figure| NUMBERS.iter().position(|own| *own == figure.number));
+    Ok(found)
+}
+
+/// Writes `report.html` and a picture of each plot; says where.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write(figures: &[Figure], motion: &str, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let sections = figures.iter().map(|figure| Section {
+        heading: format!("Figure {}", figure.number),
+        text: vec![figure.text.clone()],
+        panels: figure.panels.clone(),
+        ..Section::default()
+    });
+    let page = Report {
+        title: "Figures of the thesis".into(),
+        summary: format!(
+            "{} figures of Lin (2017) as computed by this program, on {motion}, for comparison \
+             with the printed ones.",
+            figures.len()
+        ),
+        identity: vec![identity::entry("Motion", motion), identity::version()],
+        sections: sections.collect(),
+        ..Report::default()
+    };
+    let page = report::render(&page, &folder.join(report::FILE))?;
+    let mut results = Results::begin(folder)?;
+    results.write_text(report::FILE, &page)?;
+    for figure in figures {
+        for (n, panel) in figure.panels.iter().enumerate() {
+            let name = format!("figure-{}-{}.svg", figure.number, n + 1);
+            results.write_text(&name, &report::svg(panel))?;
+        }
+    }
+    Ok(results.finish()?)
+}

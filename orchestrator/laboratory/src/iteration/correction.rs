@@ -1,0 +1,351 @@
+//! The correction of a drive from what a run left over (Eq 1-5 to 1-7, gain by frequency and
+//! coherence).
+
+use std::f64::consts::TAU;
+
+use identification::estimation::spectra::Spectra;
+use realfft::RealFftPlanner;
+use realfft::num_complex::Complex64;
+
+use motion::Motion;
+use motion::metrics::spectrum;
+
+/// Segments of the transfer function, s.
+const SEGMENT: f64 = 4.0;
+/// Most by which a line of the transfer function is inverted: what the table hardly follows is not
+/// forced.
+const MOST_GAIN: f64 = 3.0;
+/// Quiet time after a motion, s: the correction of its end does not reach around to its beginning.
+const QUIET: f64 = 8.0;
+/// Time at either end in which corrections rise from nothing, s.
+const EDGE: f64 = 0.5;
+
+/// What was measured of a table, on the reference's clock.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Displacement, m.
+    pub displacement: Vec<f64>,
+    /// Acceleration, m/s².
+    pub acceleration: Vec<f64>,
+}
+
+/// A line of the transfer function from drive to table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Where it lies, Hz.
+    pub frequency: f64,
+    /// Its size.
+    pub gain: f64,
+    /// Part of the table's motion that is linear in the drive.
+    pub coherence: f64,
+}
+
+/// The transfer function from drive to table, and how what is measured becomes one error.
+#[derive(Debug, Clone)]
+pub struct Inverse {
+    /// Line distance, Hz.
+    step: f64,
+    /// The transfer function within the band, where it was measured.
+    response: Vec<Line>,
+    /// Coherence times the inverse of the transfer function, a line each.
+    lines: Vec<Complex64>,
+    /// Frequency below which displacement counts and above which acceleration does, Hz.
+    crossover: f64,
+    /// Frequencies between which errors are corrected, Hz.
+    band: [f64; 2],
+}
+
+impl Inverse {
+    /// From a run of `drive`; none for one shorter than two segments.
+    #[must_use]
+    pub fn new(
+        drive: &Motion,
+        measured: &Measured,
+        crossover: f64,
+        band: [f64; 2],
+    ) -> Option<Self> {
+        let dt = drive.dt;
+        let length = (SEGMENT / dt) as usize;
+        let output = joined(
+            &measured.displacement,
+            &measured.acceleration,
+            dt,
+            crossover,
+            [0.0, 0.5 / dt],
+        );
+        let input = joined(
+            &drive.displacement,
+            &drive.acceleration,
+            dt,
+            crossover,
+            [0.0, 0.5 / dt],
+        );
+        let spectra = Spectra::new(&[&input, &output], dt, length).ok()?;
+        let mut response = Vec::new();
+        let lines = (0..spectra.frequency.len())
+            .map(|k| {
+                let coherence = spectra.coherence(0, 1, k);
+                let gain = spectra.gain(0, 1, k);
+                let frequency = spectra.frequency[k];
+                if (band[0]..=band[1]).contains(&frequency) {
+                    response.push(Line {
+                        frequency,
+                        gain: gain.norm(),
+                        coherence,
+                    });
+                }
+                let size = gain.norm().max(1.0 / MOST_GAIN);
+                coherence * gain.conj() / (size * gain.norm().max(f64::MIN_POSITIVE))
+            })
+            .collect();
+        Some(Self {
+            step: spectra.frequency.get(1).copied()?,
+            lines,
+            crossover,
+            band,
+            response,
+        })
+    }
+
+    /// From the whole of a `drive` that ends at rest and the answer of something linear without noise: exact
+    /// to its last line.
+    #[must_use]
+    pub fn exact(drive: &Motion, answer: &Measured, crossover: f64, band: [f64; 2]) -> Self {
+        let dt = drive.dt;
+        let length = padded(drive.len(), dt);
+        let all = [0.0, 0.5 / dt];
+        let [input, output] = [
+            (&drive.displacement, &drive.acceleration),
+            (&answer.displacement, &answer.acceleration),
+        ]
+        .map(|(x, a)| spectrum(&joined(x, a, dt, crossover, all), length));
+        let lines = input.iter().zip(&output).map(|(input, output)| {
+            let gain = output / input;
+            let size = gain.norm();
+            // Nothing is there at rest.
+            if size.is_normal() {
+                gain.conj() / (size * size.max(1.0 / MOST_GAIN))
+            } else {
+                Complex64::new(0.0, 0.0)
+            }
+        });
+        Self {
+            step: 1.0 / (length as f64 * dt),
+            lines: lines.collect(),
+            crossover,
+            band,
+            response: Vec::new(),
+        }
+    }
+
+    /// Mean coherence over the band.
+    #[must_use]
+    pub fn coherence(&self) -> f64 {
+        let sum: f64 = self.response.iter().map(|line| line.coherence).sum();
+        sum / f64::max(self.response.len() as f64, 1.0)
+    }
+
+    /// The transfer function within the band.
+    #[must_use]
+    pub fn response(&self) -> &[Line] {
+        &self.response
+    }
+
+    /// The same, which corrects nothing outside of its band: what an error that is cut off at its end has at the
+    /// lowest frequencies would otherwise become a slow drift of the drive.
+    #[must_use]
+    pub fn within_band(mut self) -> Self {
+        for (k, line) in self.lines.iter_mut().enumerate() {
+            *line *= inside(k as f64 * self.step, self.band);
+        }
+        self
+    }
+
+    fn at(&self, frequency: f64) -> Complex64 {
+        let place = frequency / self.step;
+        let (k, part) = (place as usize, place.fract());
+        match (self.lines.get(k), self.lines.get(k + 1)) {
+            (Some(low), Some(high)) => low * (1.0 - part) + high * part,
+            _ => Complex64::new(0.0, 0.0),
+        }
+    }
+
+    /// Acceleration error within the band, from displacement where that is more certain, m/s².
+    #[must_use]
+    pub fn error(&self, wanted: &Motion, measured: &Measured) -> Vec<f64> {
+        let less = |wanted: &[f64], got: &[f64]| -> Vec<f64> {
+            wanted.iter().zip(got).map(|(w, g)| w - g).collect()
+        };
+        let displacement = less(&wanted.displacement, &measured.displacement);
+        let acceleration = less(&wanted.acceleration, &measured.acceleration);
+        joined(
+            &displacement,
+            &acceleration,
+            wanted.dt,
+            self.crossover,
+            self.band,
+        )
+    }
+
+    /// Adds `gain` times the inverse of what `error` (m/s²) is to `drive`.
+    pub fn correct(&self, drive: &mut Motion, error: &[f64], gain: f64) {
+        let (samples, dt) = (drive.len(), drive.dt);
+        let length = padded(samples, dt);
+        let step = 1.0 / (length as f64 * dt);
+        let lines: Vec<Complex64> = spectrum(error, length)
+            .iter()
+            .enumerate()
+            .map(|(k, line)| gain * line * self.at(k as f64 * step))
+            .collect();
+        let history = |power: i32| {
+            let lines = lines.iter().enumerate().map(|(k, line)| {
+                let s = Complex64::new(0.0, TAU * k as f64 * step);
+                if k == 0 {
+                    Complex64::new(0.0, 0.0)
+                } else {
+                    line * s.powi(power)
+                }
+            });
+            inverse(lines.collect(), length)
+        };
+        let (x, v, a) = (history(-2), history(-1), history(0));
+        for n in 0..samples {
+            let [w, dw, ddw] = window(n, samples, dt);
+            drive.displacement[n] += w * x[n];
+            drive.velocity[n] += w * v[n] + dw * x[n];
+            drive.acceleration[n] += w * a[n] + 2.0 * dw * v[n] + ddw * x[n];
+        }
+    }
+}
+
+/// Acceleration from displacement below and from acceleration above `crossover`, within `band`.
+fn joined(
+    displacement: &[f64],
+    acceleration: &[f64],
+    dt: f64,
+    crossover: f64,
+    band: [f64; 2],
+) -> Vec<f64> {
+    let samples = displacement.len().min(acceleration.len());
+    let length = padded(samples, dt);
+    let step = 1.0 / (length as f64 * dt);
+    let slow = spectrum(&displacement[..samples], length);
+    let quick = spectrum(&acceleration[..samples], length);
+    let lines = slow.iter().zip(&quick).enumerate().map(|(k, (x, a))| {
+        let frequency = k as f64 * step;
+        let below = 1.0 / (1.0 + (frequency / crossover).powi(4));
+        let omega = TAU * frequency;
+        (-omega * omega * below * x + (1.0 - below) * a) * inside(frequency, band)
+    });
+    let mut history = inverse(lines.collect(), length);
+    history.truncate(samples);
+    history
+}
+
+/// 1 within the band, 0 half an octave beyond, straight by the logarithm between.
+fn inside(frequency: f64, [low, high]: [f64; 2]) -> f64 {
+    if frequency <= 0.0 {
+        return 0.0;
+    }
+    let beyond = if low > 0.0 {
+        (low / frequency).log2()
+    } else {
+        0.0
+    };
+    let beyond = beyond.max((frequency / high).log2()).max(0.0);
+    (1.0 - 2.0 * beyond).max(0.0)
+}
+
+fn padded(samples: usize, dt: f64) -> usize {
+    (samples + (QUIET / dt) as usize).next_multiple_of(1000)
+}
+
+fn inverse(mut lines: Vec<Complex64>, length: usize) -> Vec<f64> {
+    let plan = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
+    let mut history = plan.make_output_vec();
+    // The first and the last line of a real history are real.
+    if let Some(first) = lines.first_mut() {
+        first.im = 0.0;
+    }
+    if let Some(last) = lines.last_mut() {
+        last.im = 0.0;
+    }
+    // The lengths come from the plan itself: it cannot fail.
+    let done = plan.process(&mut lines, &mut history);
+    debug_assert!(done.is_ok());
+    history.iter_mut().for_each(|value| *value /= length as f64);
+    history
+}
+
+/// Window at sample `n` of `samples` and its first two derivatives by time.
+fn window(n: usize, samples: usize, dt: f64) -> [f64; 3] {
+    let rise = |time: f64| {
+        let u = (time / EDGE).clamp(0.0, 1.0);
+        let left = 1.0 - u;
+        [
+            u.powi(4) * (35.0 - 84.0 * u + 70.0 * u * u - 20.0 * u.powi(3)),
+            140.0 * (u * left).powi(3) / EDGE,
+            420.0 * (u * left).powi(2) * (1.0 - 2.0 * u) / (EDGE * EDGE),
+        ]
+    };
+    let [a, da, dda] = rise(n as f64 * dt);
+    let [b, db, ddb] = rise((samples - 1 - n) as f64 * dt);
+    [a * b, da * b - a * db, dda * b - 2.0 * da * db + a * ddb]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use motion::{Options, built_in};
+
+    /// A table that answers as a lag of 20 ms with a gain of 0.8, on displacement, velocity and
+    /// acceleration alike.
+    fn table(drive: &Motion) -> Measured {
+        let lag = |history: &[f64]| {
+            let mut y = 0.0;
+            let part = 1.0 - (-drive.dt / 0.02).exp();
+            history
+                .iter()
+                .map(|u| {
+                    y += part * (0.8 * u - y);
+                    y
+                })
+                .collect::<Vec<f64>>()
+        };
+        Measured {
+            displacement: lag(&drive.displacement),
+            acceleration: lag(&drive.acceleration),
+        }
+    }
+
+    #[test]
+    fn a_linear_table_is_corrected_at_once_and_its_drive_stays_one_motion() {
+        let wanted = built_in(5, &Options::default()).unwrap();
+        let other = built_in(6, &Options::default()).unwrap();
+        let inverse = Inverse::new(&other, &table(&other), 5.0, [0.3, 20.0]).unwrap();
+        assert!(inverse.coherence() > 0.98, "{}", inverse.coherence());
+        let mut drive = wanted.clone();
+        let size = |drive: &Motion| {
+            let error = inverse.error(&wanted, &table(drive));
+            motion::metrics::rms(&error) / wanted.peak_acceleration()
+        };
+        let before = size(&drive);
+        let error = inverse.error(&wanted, &table(&drive));
+        inverse.correct(&mut drive, &error, 1.0);
+        let after = size(&drive);
+        println!("{before:.4} to {after:.4}");
+        assert!(before > 0.05 && after < 0.15 * before, "{before} {after}");
+        // Velocity and acceleration stay the slopes of displacement and velocity.
+        for (of, rate) in [
+            (&drive.displacement, &drive.velocity),
+            (&drive.velocity, &drive.acceleration),
+        ] {
+            let largest = rate.iter().fold(0.0f64, |m, r| m.max(r.abs()));
+            for n in 1..of.len() - 1 {
+                let slope = (of[n + 1] - of[n - 1]) / (2.0 * drive.dt);
+                assert!((slope - rate[n]).abs() < 0.03 * largest, "sample {n}");
+            }
+        }
+        assert_eq!((drive.displacement[0], drive.velocity[0]), (0.0, 0.0));
+    }
+}

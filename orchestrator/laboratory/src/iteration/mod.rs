@@ -1,0 +1,386 @@
+//! Iterative control as laboratories use it (Section 1.2.3): the drive is corrected from run to run by
+//! the inverse of the measured transfer function; or found on a model, without a run of the rig.
+
+pub mod circle;
+mod correction;
+mod drive;
+pub mod on_model;
+mod page;
+
+use serde::{Deserialize, Serialize};
+
+pub use self::correction::{Inverse, Line, Measured};
+pub use self::drive::{read as read_drive, text as drive_text};
+pub use self::page::{ITERATION, write};
+use crate::error::Error;
+use crate::run::experiment::{Prepared, Request, prepare};
+use crate::systems::control_model::ControlModel;
+use fmi_master::{Ending, Record};
+use motion::metrics::{self, rms};
+use motion::{self, Motion, Scaling};
+use units::STANDARD_GRAVITY;
+
+/// Seed and size of the motion that finds the transfer function.
+const FINDING_SEED: u64 = 17;
+const FINDING_PEAK: f64 = 0.1 * STANDARD_GRAVITY;
+/// Where displacement takes over from acceleration when the sensors' noise is not known, Hz.
+pub(crate) const USUAL_CROSSOVER: f64 = 5.0;
+/// A run that is worse than the best by more than this has not come nearer.
+const WORSE: f64 = 1.05;
+/// An improvement below this share is none worth a specimen's wear.
+const STALLED: f64 = 0.98;
+
+/// How to iterate.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// What is run.
+    pub request: Request,
+    /// Largest number of corrections.
+    pub iterations: usize,
+    /// Part of the inverse that a correction applies.
+    pub gain: f64,
+    /// Measured error at which to stop, %.
+    pub target_percent: f64,
+    /// Frequencies between which errors are corrected, Hz.
+    pub band: [f64; 2],
+    /// Most energy of motion on the specimen, over that of the reference played once.
+    pub exposure: Option<f64>,
+    /// Delay of the measurements relative to the reference's clock, s; none: by the model on which
+    /// the controllers are tuned.
+    pub measurement_delay: Option<f64>,
+    /// Mass in place of the specimen while the transfer function is found, kg.
+    pub dummy_mass: Option<f64>,
+    /// Drive of an earlier session to begin with.
+    pub drive: Option<std::path::PathBuf>,
+}
+
+/// Why the iteration ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stop {
+    /// The measured error is within the target.
+    Target,
+    /// All iterations were made.
+    Iterations,
+    /// The last corrections brought less than they cost.
+    Stalled,
+    /// Corrections made it worse, also at half the gain.
+    Diverges,
+    /// Another run would strain the specimen beyond its limit.
+    Exposure,
+    /// A run was stopped or failed.
+    EndedEarly,
+}
+
+impl Stop {
+    /// A sentence.
+    #[must_use]
+    pub fn sentence(self) -> &'static str {
+        match self {
+            Self::Target => "the measured error is within the target",
+            Self::Iterations => "all iterations were made",
+            Self::Stalled => "the last correction gained less than 2 %: it has converged",
+            Self::Diverges => {
+                "it does not converge: corrections make the error larger, also at half the gain; the \
+                 best drive was kept"
+            }
+            Self::Exposure => "another run would exceed the specimen's exposure",
+            Self::EndedEarly => "a run ended early; the best drive before it was kept",
+        }
+    }
+}
+
+/// A run of the iteration.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Run {
+    /// Corrections that its drive has.
+    pub iteration: usize,
+    /// `100 rms/peak` of the measured acceleration error within the band, %; what the iteration goes by.
+    pub measured_percent: Option<f64>,
+    /// Time-domain error of the true acceleration, %.
+    pub time_domain_percent: Option<f64>,
+    /// Frequency-domain error, %.
+    pub frequency_domain_percent: Option<f64>,
+    /// Largest deviation of the response spectrum, 0.5 to 15 Hz, %.
+    pub response_spectrum_percent: Option<f64>,
+    /// Energy of the table's motion with the specimen on it so far, over the reference's.
+    pub exposure: f64,
+    /// Part of the inverse that made its drive.
+    pub gain: f64,
+    /// How it ended.
+    pub ended: Ending,
+    /// Why it ended early.
+    pub ended_because: Option<String>,
+}
+
+/// What the iteration found: `iteration.json`, and what `--json` prints.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Iteration {
+    /// The system.
+    pub system: String,
+    /// The motion.
+    pub motion: String,
+    /// Mean coherence of the transfer function over the band.
+    pub coherence: f64,
+    /// The runs.
+    pub runs: Vec<Run>,
+    /// Index of the best.
+    pub best: usize,
+    /// Why it ended.
+    pub stop: Stop,
+    /// Whether the best run is better than the first.
+    pub converges: bool,
+    /// The best drive.
+    #[serde(skip)]
+    pub drive: Option<Motion>,
+    /// Acceleration errors of the first and the best run, m/s², a sample every `dt` s.
+    #[serde(skip)]
+    pub errors: Option<(f64, Vec<f64>, Vec<f64>)>,
+    /// The transfer function that the corrections invert.
+    #[serde(skip)]
+    pub response: Vec<Line>,
+}
+
+/// The best run so far.
+struct Best {
+    /// Measured error, %.
+    measured: f64,
+    iteration: usize,
+    drive: Motion,
+    /// Acceleration error within the band, m/s².
+    error: Vec<f64>,
+    /// True acceleration error, m/s².
+    off: Vec<f64>,
+}
+
+/// What a run gave.
+struct Played {
+    measured: Measured,
+    displacement: Vec<f64>,
+    acceleration: Vec<f64>,
+    ended: fmi_master::Ended,
+}
+
+/// Plays, corrects, and plays again; `progress` receives the number of finished runs.
+///
+/// # Errors
+/// A request at fault; a run that cannot begin; a system without a table; a motion too short to find a
+/// transfer function from.
+pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration, Error> {
+    let model = control_model(&plan.request)?;
+    let delay = plan
+        .measurement_delay
+        .or(model
+            .as_ref()
+            .map(|own| own.delay as f64 * units::constants::SAMPLING_PERIOD))
+        .unwrap_or(0.0);
+    let crossover = model.as_ref().map_or(USUAL_CROSSOVER, |own| {
+        (own.noise.acceleration / own.noise.displacement).sqrt() / std::f64::consts::TAU
+    });
+    let prepared = prepare(&plan.request)?;
+    let wanted = prepared.motion.clone();
+    let late = (delay / wanted.dt).round() as usize;
+    let mut drive = match &plan.drive {
+        Some(path) => drive::read(path, &wanted)?,
+        None => wanted.clone(),
+    };
+    let inverse = find_inverse(plan, late, crossover)?;
+    progress(1);
+
+    let energy = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>();
+    let whole = energy(&wanted.acceleration);
+    let (mut runs, mut exposure, mut gain, mut halved) = (Vec::<Run>::new(), 0.0, plan.gain, false);
+    let mut best: Option<Best> = None;
+    let mut first_error = Vec::new();
+    let stop = loop {
+        let iteration = runs.len();
+        let played = play(&prepared, drive.clone(), late)?;
+        progress(2 + iteration);
+        exposure += energy(&played.acceleration) / whole;
+        let complete = played.ended.kind() == Ending::Complete;
+        let tracking = metrics::tracking(&wanted, &played.displacement, &played.acceleration).ok();
+        let error = inverse.error(&wanted, &played.measured);
+        let measured = 100.0 * rms(&error) / wanted.peak_acceleration();
+        runs.push(Run {
+            iteration,
+            measured_percent: complete.then_some(measured),
+            time_domain_percent: tracking.map(|t| t.time_domain_percent),
+            frequency_domain_percent: tracking.map(|t| t.frequency_domain_percent),
+            response_spectrum_percent: tracking
+                .and_then(|t| Some(t.laboratory?.largest_spectrum_deviation())),
+            exposure,
+            gain: if iteration == 0 { 0.0 } else { gain },
+            ended: played.ended.kind(),
+            ended_because: played.ended.reason(),
+        });
+        if !complete {
+            break Stop::EndedEarly;
+        }
+        let off: Vec<f64> = wanted
+            .acceleration
+            .iter()
+            .zip(&played.acceleration)
+            .map(|(wanted, got)| got - wanted)
+            .collect();
+        if iteration == 0 {
+            first_error.clone_from(&off);
+        }
+        let before = best.as_ref().map(|best| best.measured);
+        if before.is_none_or(|before| measured < before) {
+            best = Some(Best {
+                measured,
+                iteration,
+                drive: drive.clone(),
+                error,
+                off,
+            });
+        }
+        let Some(nearest) = &best else {
+            break Stop::EndedEarly;
+        };
+        if measured <= plan.target_percent {
+            break Stop::Target;
+        }
+        if let Some(before) = before {
+            if measured > WORSE * before {
+                if halved {
+                    break Stop::Diverges;
+                }
+                (halved, gain) = (true, 0.5 * gain);
+            } else if measured > STALLED * before {
+                break Stop::Stalled;
+            }
+        }
+        if iteration == plan.iterations {
+            break Stop::Iterations;
+        }
+        let run_costs = exposure / (iteration + 1) as f64;
+        if plan
+            .exposure
+            .is_some_and(|most| exposure + run_costs > most)
+        {
+            break Stop::Exposure;
+        }
+        drive = nearest.drive.clone();
+        inverse.correct(&mut drive, &nearest.error, gain);
+    };
+    let first = runs[0].measured_percent;
+    let (at, best_drive, off) = match best {
+        Some(best) => (best.iteration, Some(best.drive), best.off),
+        None => (0, None, Vec::new()),
+    };
+    let converges = runs[at].measured_percent < first || stop == Stop::Target;
+    Ok(Iteration {
+        system: prepared.system.name.clone(),
+        motion: wanted.name.clone(),
+        coherence: inverse.coherence(),
+        response: inverse.response().to_vec(),
+        best: at,
+        stop,
+        converges,
+        drive: best_drive,
+        errors: (!off.is_empty()).then_some((wanted.dt, first_error, off)),
+        runs,
+    })
+}
+
+/// The model on which the controllers of the request are tuned.
+pub(crate) fn control_model(request: &Request) -> Result<Option<ControlModel>, Error> {
+    let fault = |reason| Error::Option {
+        option: "--control-model",
+        reason,
+    };
+    match &request.control_model {
+        Some(path) => ControlModel::read(path).map(Some).map_err(fault),
+        None if request.plant == "servohydraulic" => {
+            ControlModel::commissioned().map(Some).map_err(fault)
+        }
+        None => Ok(None),
+    }
+}
+
+/// Plays a random motion of a third of the usual size and finds the transfer function.
+fn find_inverse(plan: &Plan, late: usize, crossover: f64) -> Result<Inverse, Error> {
+    let mut request = plan.request.clone();
+    if let Some(mass) = plan.dummy_mass {
+        request.specimen = "none".into();
+        request.set.retain(|set| !set.starts_with("specimen."));
+        request.set.push(format!("table.added_payload={mass} kg"));
+    }
+    let prepared = prepare(&request)?;
+    let options = motion::Options {
+        sample_time: prepared.motion.dt,
+        scaling: Some(Scaling::PeakAcceleration(FINDING_PEAK)),
+        ..motion::Options::default()
+    };
+    let drive = motion::built_in(FINDING_SEED, &options)?;
+    let played = play(&prepared, drive.clone(), late)?;
+    if played.ended.kind() != Ending::Complete {
+        return Err(Error::Option {
+            option: "--iterations",
+            reason: format!(
+                "the run of 0.1 g that finds the transfer function ended early: {}",
+                played.ended.message()
+            ),
+        });
+    }
+    Inverse::new(&drive, &played.measured, crossover, plan.band).ok_or(Error::Option {
+        option: "--iterations",
+        reason: "too little was played to find a transfer function".into(),
+    })
+}
+
+/// Plays `drive` in place of the motion; what is measured is `late` samples late.
+fn play(prepared: &Prepared, drive: Motion, late: usize) -> Result<Played, Error> {
+    let own = prepared.playing(drive);
+    let outcome = own.run(own.algorithm)?;
+    let record = &outcome.record;
+    let [displacement, acceleration] = pair(record, "displacement", "acceleration")
+        .filter(|(name, _)| name == "table")
+        .or_else(|| pair(record, "displacement", "acceleration"))
+        .map(|(_, columns)| columns)
+        .ok_or_else(|| Error::Option {
+            option: "SYSTEM",
+            reason: format!(
+                "{} has no component with `displacement` and `acceleration`, which an iteration \
+                 corrects",
+                prepared.system.name
+            ),
+        })?;
+    let seen = pair(record, "measured_displacement", "measured_acceleration");
+    let (shown, late) = match seen {
+        Some((_, columns)) => (columns, late),
+        None => ([displacement.clone(), acceleration.clone()], 0),
+    };
+    let early = |mut history: Vec<f64>| {
+        let last = history.last().copied().unwrap_or(0.0);
+        let length = history.len();
+        history.drain(..late.min(length));
+        history.resize(length, last);
+        history
+    };
+    let [x, a] = shown.map(early);
+    Ok(Played {
+        measured: Measured {
+            displacement: x,
+            acceleration: a,
+        },
+        displacement,
+        acceleration,
+        ended: outcome.ended,
+    })
+}
+
+/// The first component whose outputs have both names, the table before others, with their columns.
+fn pair(record: &Record, first: &str, second: &str) -> Option<(String, [Vec<f64>; 2])> {
+    let names = record.columns.iter().filter_map(|column| {
+        let (name, variable) = column.split_once('.')?;
+        (variable == first && name != "reference").then_some(name)
+    });
+    let mut names: Vec<&str> = names.collect();
+    names.sort_by_key(|name| *name != "table");
+    names.into_iter().find_map(|name| {
+        let column = |variable: &str| record.column(&format!("{name}.{variable}"));
+        Some((name.to_string(), [column(first)?, column(second)?]))
+    })
+}

@@ -1,0 +1,188 @@
+//! The files of an iteration.
+
+use std::path::{Path, PathBuf};
+
+use super::{Iteration, Plan, drive};
+use crate::error::Error;
+use crate::results::Results;
+use crate::run::identity::tuning;
+use pages::report::identity::{entry, version};
+use pages::report::{
+    self, Abscissa, Axis, Cell, Panel, Report, Section, Series, Style, Table, Units,
+};
+
+/// File with the figures by run.
+pub const ITERATION: &str = "iteration.json";
+/// The best drive.
+const DRIVE: &str = "drive.csv";
+
+/// Writes `report.html`, `iteration.json` and `drive.csv`; says where.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write(plan: &Plan, iteration: &Iteration, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let page = report::render(&page(plan, iteration), &folder.join(report::FILE))?;
+    let mut results = Results::begin(folder)?;
+    results.write_text(report::FILE, &page)?;
+    results.write_text(
+        ITERATION,
+        &(serde_json::json!(iteration).to_string() + "\n"),
+    )?;
+    if let Some(best) = &iteration.drive {
+        results.write_text(DRIVE, &drive::text(best))?;
+    }
+    Ok(results.finish()?)
+}
+
+/// What was iterated, in few words.
+fn identity(plan: &Plan, iteration: &Iteration) -> Vec<(String, Cell)> {
+    let request = &plan.request;
+    let mut all = vec![
+        entry("System", request.system.as_str()),
+        entry("Plant", request.plant.as_str()),
+        entry("Specimen", request.specimen.as_str()),
+        entry("Tuning", tuning(request)),
+    ];
+    if !request.set.is_empty() {
+        all.push(entry("Set", request.set.join(", ")));
+    }
+    all.extend([
+        entry("Motion", iteration.motion.as_str()),
+        entry("Part of the inverse", Cell::Number(plan.gain, 3)),
+        entry("Band", format!("{} to {} Hz", plan.band[0], plan.band[1])),
+    ]);
+    if let Some(mass) = plan.dummy_mass {
+        all.push(entry(
+            "Dummy mass",
+            Cell::Quantity(mass, Units::of("kg"), 3),
+        ));
+    }
+    if let Some(most) = plan.exposure {
+        all.push(entry("Most exposure", Cell::Number(most, 3)));
+    }
+    all.push(version());
+    all
+}
+
+/// Errors by correction, errors over time, and the transfer function that is inverted.
+fn panels(iteration: &Iteration) -> Vec<Panel> {
+    let complete = iteration.runs.iter().filter_map(|run| {
+        Some((
+            run.iteration as f64,
+            run.measured_percent?,
+            run.time_domain_percent,
+        ))
+    });
+    let (corrections, measured): (Vec<f64>, Vec<f64>) =
+        complete.clone().map(|(n, error, _)| (n, error)).unzip();
+    let own: Vec<f64> = complete.map(|run| run.2.unwrap_or(f64::NAN)).collect();
+    let places = || Abscissa::At(corrections.clone().into());
+    let mut panels = vec![Panel {
+        title: "Error by correction".into(),
+        x: Axis::linear("corrections", Units::NONE),
+        y: Axis::linear("RMS error over the peak", Units::PERCENT),
+        series: vec![
+            Series::line("measured, within the band", places(), measured),
+            Series::line("of the table", places(), own),
+        ],
+    }];
+    if let Some((dt, first, best)) = &iteration.errors {
+        panels.push(Panel {
+            title: "Acceleration error (table minus reference)".into(),
+            x: Axis::linear("time", Units::TIME),
+            y: Axis::linear("error", Units::ACCELERATION),
+            series: vec![
+                Series::history("first run", *dt, first),
+                Series::history("best run", *dt, best),
+            ],
+        });
+    }
+    let frequency: Vec<f64> = iteration.response.iter().map(|own| own.frequency).collect();
+    let over_frequency = |title: &str, label: &str, value: fn(&super::Line) -> f64| Panel {
+        title: title.into(),
+        x: Axis::logarithmic("frequency", Units::FREQUENCY),
+        y: Axis::linear(label, Units::NONE),
+        series: vec![
+            Series::line(
+                label,
+                Abscissa::At(frequency.clone().into()),
+                iteration.response.iter().map(value).collect(),
+            )
+            .styled(Style::Line),
+        ],
+    };
+    if !frequency.is_empty() {
+        panels.push(over_frequency(
+            "Transfer function from drive to table",
+            "gain",
+            |own| own.gain,
+        ));
+        panels.push(over_frequency("Its coherence", "coherence", |own| {
+            own.coherence
+        }));
+    }
+    panels
+}
+
+fn page(plan: &Plan, iteration: &Iteration) -> Report {
+    let percent = |value: Option<f64>| {
+        value.map_or("-".into(), |value| Cell::Quantity(value, Units::PERCENT, 3))
+    };
+    let rows = iteration.runs.iter().map(|run| {
+        [
+            run.iteration.to_string().into(),
+            percent(run.measured_percent),
+            percent(run.time_domain_percent),
+            percent(run.frequency_domain_percent),
+            percent(run.response_spectrum_percent),
+            Cell::Number(run.exposure, 3),
+            run.ended_because
+                .as_deref()
+                .unwrap_or(run.ended.word())
+                .into(),
+        ]
+    });
+    Report {
+        title: format!(
+            "Iterative control: {} on {}",
+            iteration.system, iteration.motion
+        ),
+        summary: format!(
+            "{} runs; {}. Mean coherence of the transfer function {:.3}.",
+            iteration.runs.len(),
+            iteration.stop.sentence(),
+            iteration.coherence
+        ),
+        identity: identity(plan, iteration),
+        sections: vec![Section {
+            heading: "Runs".into(),
+            text: vec![
+                "The drive of each run is that of the best before, corrected by the inverse of the \
+                 measured transfer function times its coherence. The measured error is what the \
+                 sensors show within the band; the others are the table's own. Exposure is the \
+                 energy of all runs on the specimen over that of the motion played once."
+                    .into(),
+            ],
+            tables: vec![Table::of(
+                &format!(
+                    "The best run is {}; its drive is in {DRIVE}.",
+                    iteration.best
+                ),
+                [
+                    "corrections",
+                    "measured error",
+                    "RMS acceleration error",
+                    "Fourier amplitude error",
+                    "response spectrum",
+                    "exposure",
+                    "ended",
+                ],
+                rows,
+            )],
+            panels: panels(iteration),
+            ..Section::default()
+        }],
+        footer: format!("shakebench {}", env!("CARGO_PKG_VERSION")),
+        ..Report::default()
+    }
+}

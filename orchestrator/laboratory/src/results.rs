@@ -1,0 +1,419 @@
+//! The files of a command, written as a whole or not at all.
+
+pub mod parquet_file;
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use pages::report::{self, Report};
+use serde::Serialize;
+
+use crate::error::Error;
+
+static MAY_OVERWRITE: AtomicBool = AtomicBool::new(false);
+
+/// Lets this process replace files that differ (`--force`).
+pub fn allow_overwriting() {
+    MAY_OVERWRITE.store(true, Ordering::Relaxed);
+}
+
+/// Whether this process may replace files that differ.
+pub fn may_overwrite() -> bool {
+    MAY_OVERWRITE.load(Ordering::Relaxed)
+}
+
+/// A folder for results without a given name: the first of `folder`, `folder-2`, `folder-3` and so
+/// on that does not exist yet or, by `is_same`, holds the results of the same command.
+pub fn unused(folder: &Path, is_same: impl Fn(&Path) -> bool) -> PathBuf {
+    let is_free = |place: &Path| may_overwrite() || !place.exists() || is_same(place);
+    if is_free(folder) {
+        return folder.to_path_buf();
+    }
+    let numbered = (2..).map(|number| {
+        let mut name = folder.as_os_str().to_os_string();
+        name.push(format!("-{number}"));
+        PathBuf::from(name)
+    });
+    let mut free = numbered.filter(|place| is_free(place));
+    // The numbers do not end.
+    free.next().unwrap_or_else(|| folder.to_path_buf())
+}
+
+/// Why results cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ResultsError {
+    /// The folder cannot be made or written.
+    #[error("{}: results cannot be written here: {source}", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// The operating system's word.
+        source: io::Error,
+    },
+    /// A file cannot be written.
+    #[error("{}: cannot be written: {source}", file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// The operating system's word.
+        source: io::Error,
+    },
+    /// The disk is full, or a limit of the size of files is reached.
+    #[error(
+        "{}: cannot be written: {source}; {}. Free some space, or choose another --out",
+        file.display(),
+        kept(saved, file)
+    )]
+    Full {
+        /// The file.
+        file: PathBuf,
+        /// The operating system's word.
+        source: io::Error,
+        /// Files that are complete, or hold the first part of `file`.
+        saved: Vec<PathBuf>,
+    },
+    /// There is a file of that name with other content.
+    #[error(
+        "{}: already exists with different content; choose a new name or folder for --out, or \
+         --force",
+        file.display()
+    )]
+    Exists {
+        /// The file.
+        file: PathBuf,
+    },
+}
+
+impl ResultsError {
+    /// Whether the input is not at fault: what was computed had no place.
+    pub fn is_for_lack_of_space(&self) -> bool {
+        matches!(self, Self::Full { .. })
+    }
+}
+
+/// What there is of results that had no place, as a clause.
+fn kept(saved: &[PathBuf], file: &Path) -> String {
+    let complete: Vec<String> = saved
+        .iter()
+        .filter(|path| path.extension().is_none_or(|e| e != PART))
+        .map(|path| format!("`{}`", path.display()))
+        .collect();
+    let part = saved
+        .iter()
+        .find(|path| path.extension().is_some_and(|e| e == PART));
+    let complete = match &complete[..] {
+        [] => "no file is complete".to_string(),
+        files => format!(
+            "{} complete: {}",
+            if files.len() == 1 {
+                "one file is"
+            } else {
+                "these files are"
+            },
+            files.join(", ")
+        ),
+    };
+    match part {
+        Some(part) => format!(
+            "{complete}; `{}` holds the first rows of `{}`",
+            part.display(),
+            file.file_name().unwrap_or_default().to_string_lossy()
+        ),
+        None => complete,
+    }
+}
+
+/// The extension of a file of which only the first part is there.
+const PART: &str = "part";
+
+/// Whether an error says that there is no more room.
+fn is_full(error: &io::Error) -> bool {
+    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    let wrapped = error.get_ref().and_then(|error| error.downcast_ref());
+    let kind = match wrapped.map(csv::Error::kind) {
+        Some(csv::ErrorKind::Io(inner)) => inner.kind(),
+        _ => error.kind(),
+    };
+    matches!(kind, StorageFull | QuotaExceeded | FileTooLarge)
+}
+
+/// Writes the page of a report alone into `folder`; says where.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write_report(report: &Report, folder: &Path) -> Result<PathBuf, Error> {
+    let path = folder.join(report::FILE);
+    let page = report::render(report, &path)?;
+    let mut results = Results::begin(folder)?;
+    results.write_text(report::FILE, &page)?;
+    results.finish()?;
+    Ok(path)
+}
+
+/// Files that tell how long something took, draw what others hold or pack it: they may differ from one
+/// time to the next without saying anything else.
+const VOLATILE: [&str; 4] = ["html", "json", "svg", "fmu"];
+
+/// Files on their way into a folder: they appear there together, when all of them are complete.
+pub struct Results {
+    folder: PathBuf,
+    staging: tempfile::TempDir,
+    names: Vec<String>,
+    /// Files of an earlier run that do not stay.
+    replaced: Vec<String>,
+    /// Whether files that differ are replaced: what they were made of is kept elsewhere.
+    supersedes: bool,
+}
+
+impl Results {
+    /// Makes a place for the files of `folder`, which need not exist yet.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn begin(folder: &Path) -> Result<Self, ResultsError> {
+        let failed = |source| ResultsError::Folder {
+            folder: folder.to_path_buf(),
+            source,
+        };
+        if folder.exists() && !folder.is_dir() {
+            return Err(failed(io::Error::other("it is a file, not a folder")));
+        }
+        let absolute = std::path::absolute(folder).map_err(failed)?;
+        // On the same file system, so that files can be moved.
+        let place = absolute.ancestors().find(|place| place.is_dir());
+        let staging = tempfile::Builder::new()
+            .prefix(".shakebench-")
+            .tempdir_in(place.unwrap_or(Path::new(".")))
+            // Without the name of the temporary folder.
+            .map_err(|error| failed(error.kind().into()))?;
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            staging,
+            names: Vec::new(),
+            replaced: Vec::new(),
+            supersedes: false,
+        })
+    }
+
+    /// Whether `folder` could be written, without leaving anything there.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn check(folder: &Path) -> Result<(), ResultsError> {
+        Self::begin(folder).map(drop)
+    }
+
+    /// Writes a file; `name` may have folders in it.
+    ///
+    /// # Errors
+    /// A disk that is full, and the like.
+    pub fn write(
+        &mut self,
+        name: &str,
+        content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    ) -> Result<(), ResultsError> {
+        let written = || {
+            let place = self.staging.path().join(name);
+            fs::create_dir_all(place.parent().unwrap_or(&place))?;
+            let mut file = BufWriter::new(File::create(place)?);
+            content(&mut file)?;
+            file.flush()
+        };
+        if let Err(source) = written() {
+            let file = self.folder.join(name);
+            return Err(match is_full(&source) {
+                true => {
+                    let saved = self.rescue(name);
+                    ResultsError::Full {
+                        file,
+                        source,
+                        saved,
+                    }
+                }
+                false => ResultsError::File { file, source },
+            });
+        }
+        self.names.push(name.to_string());
+        Ok(())
+    }
+
+    /// Moves the files that are complete into their folder, and the whole lines that there are of the
+    /// file `name`, for which there was no room; gives those that arrived.
+    fn rescue(&mut self, name: &str) -> Vec<PathBuf> {
+        let place = self.staging.path().join(name);
+        let part = format!("{name}.{PART}");
+        if let Ok(text) = fs::read(&place)
+            && let Some(end) = text.iter().rposition(|byte| *byte == b'\n')
+            && let Ok(file) = File::options().write(true).open(&place)
+            && file.set_len(end as u64 + 1).is_ok()
+            && fs::rename(&place, self.staging.path().join(&part)).is_ok()
+        {
+            self.names.push(part);
+        } else {
+            // What is of no use gives room to the rest.
+            let _ = fs::remove_file(&place);
+        }
+        let mut saved = Vec::new();
+        if fs::create_dir_all(&self.folder).is_err() {
+            return saved;
+        }
+        for name in std::mem::take(&mut self.names) {
+            let to = self.folder.join(&name);
+            let is_new = may_overwrite() || self.supersedes || !to.exists();
+            if is_new && fs::rename(self.staging.path().join(&name), &to).is_ok() {
+                saved.push(to);
+            }
+        }
+        saved
+    }
+
+    /// Writes a text.
+    ///
+    /// # Errors
+    /// As [`Results::write`].
+    pub fn write_text(&mut self, name: &str, text: &str) -> Result<(), ResultsError> {
+        self.write(name, |file| file.write_all(text.as_bytes()))
+    }
+
+    /// Writes a value as JSON for people, one line per field.
+    ///
+    /// # Errors
+    /// As [`Results::write`].
+    pub fn write_json(&mut self, name: &str, value: &impl Serialize) -> Result<(), ResultsError> {
+        self.write(name, |file| {
+            serde_json::to_writer_pretty(&mut *file, value)?;
+            file.write_all(b"\n")
+        })
+    }
+
+    /// Folder of the files until [`Results::finish`]; [`Results::adopt`] registers a file that is
+    /// made there.
+    #[must_use]
+    pub fn staging(&self) -> &Path {
+        self.staging.path()
+    }
+
+    /// Takes the file `name` that was made in [`Results::staging`] along.
+    pub fn adopt(&mut self, name: &str) {
+        self.names.push(name.to_string());
+    }
+
+    /// Files of these names are taken away where this result has none of them, so that they are not
+    /// mistaken for its own.
+    pub fn replaces(&mut self, names: &[&str]) {
+        self.replaced
+            .extend(names.iter().map(|name| name.to_string()));
+    }
+
+    /// These files replace those of the same names: what the others were made of is kept elsewhere.
+    pub fn supersede(&mut self) {
+        self.supersedes = true;
+    }
+
+    /// Whether a file of data that has been written so far would change one that is there; pages, pictures
+    /// and summaries follow the data. To be asked before what takes long.
+    ///
+    /// # Errors
+    /// Such a file, unless [`allow_overwriting`] was called.
+    pub fn check_existing(&self) -> Result<(), ResultsError> {
+        if self.supersedes || may_overwrite() {
+            return Ok(());
+        }
+        let is_volatile = |name: &&String| {
+            let extension = Path::new(name.as_str()).extension();
+            VOLATILE
+                .iter()
+                .any(|own| extension.is_some_and(|e| e == *own))
+        };
+        let data = self.names.iter().filter(|name| !is_volatile(name));
+        for name in data {
+            let file = self.folder.join(name);
+            let Ok(before) = fs::read(&file) else {
+                continue;
+            };
+            let now = fs::read(self.staging.path().join(name));
+            if now.is_ok_and(|now| now != before) {
+                return Err(ResultsError::Exists { file });
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves the files into their folder; others stay. Of two that do so at once, one waits for the
+    /// other.
+    ///
+    /// # Errors
+    /// A folder that cannot be made; a file of data that is there and would change, unless
+    /// [`allow_overwriting`] was called.
+    pub fn finish(self) -> Result<Vec<PathBuf>, ResultsError> {
+        self.check_existing()?;
+        fs::create_dir_all(&self.folder).map_err(|source| ResultsError::Folder {
+            folder: self.folder.clone(),
+            source,
+        })?;
+        // Where folders cannot be locked, nothing waits.
+        let lock = File::open(&self.folder);
+        let _held = lock.as_ref().map(File::lock);
+        for name in self
+            .replaced
+            .iter()
+            .filter(|name| !self.names.contains(name))
+        {
+            // Mostly there is none.
+            let _ = fs::remove_file(self.folder.join(name));
+        }
+        let mut files = Vec::new();
+        for name in &self.names {
+            let file = self.folder.join(name);
+            let below = file.parent().unwrap_or(&self.folder);
+            fs::create_dir_all(below).map_err(|source| ResultsError::Folder {
+                folder: below.to_path_buf(),
+                source,
+            })?;
+            fs::rename(self.staging.path().join(name), &file).map_err(|source| {
+                ResultsError::File {
+                    file: file.clone(),
+                    source,
+                }
+            })?;
+            files.push(file);
+        }
+        Ok(files)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_had_room_before_the_disk_was_full_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let mut results = Results::begin(&out).unwrap();
+        results.write_text("first.csv", "time\n0\n").unwrap();
+        let error = results
+            .write("second.csv", |file| {
+                file.write_all(b"time\n0\n1\n2.34")?;
+                Err(io::ErrorKind::StorageFull.into())
+            })
+            .unwrap_err();
+        assert!(error.is_for_lack_of_space());
+        let said = error.to_string();
+        for word in [
+            "second.csv",
+            "first.csv",
+            "second.csv.part",
+            "Free some space",
+        ] {
+            assert!(said.contains(word), "`{word}` is not in {said}");
+        }
+        drop(results);
+        let read = |name| fs::read_to_string(out.join(name)).unwrap();
+        assert_eq!(read("first.csv"), "time\n0\n");
+        assert_eq!(read("second.csv.part"), "time\n0\n1\n");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,218 @@
+//! The files of a run.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::experiment::Prepared;
+use super::identity;
+use super::manifest::Manifest;
+use super::signals::{
+    COLUMNS, PARQUET, RESULTS, columns, read_csv, write_columns, write_csv, write_parquet,
+};
+use super::summary::{Summary, asked};
+use super::table::Table;
+use super::text::steps_in_words;
+use crate::error::Error;
+use crate::results::Results;
+use fmi_import::hexadecimal;
+use fmi_master::{Outcome, Record};
+use motion::Motion;
+use pages::report::number::significant;
+use pages::report::{self, Cell, Component, Report, SpecimenHistory};
+
+/// Writes the files of a run and says where they are; the signals as Parquet too where that is asked for.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write(
+    folder: &Path,
+    prepared: &Prepared,
+    outcome: &Outcome,
+    summary: &Summary,
+    manifest: &mut Manifest,
+    parquet: bool,
+) -> Result<Vec<PathBuf>, Error> {
+    let mut results = Results::begin(folder)?;
+    let mut sum = Sha256::new();
+    results.write(RESULTS, |file| {
+        let mut both = Hashed {
+            file,
+            sum: &mut sum,
+        };
+        write_csv(&outcome.record, &mut both)
+    })?;
+    manifest.results_sha256 = hexadecimal(&sum.finalize());
+    // A page of an earlier run here would be another run's.
+    results.replaces(&[report::FILE, PARQUET]);
+    let columns = columns(&prepared.system, &outcome.record);
+    results.write(COLUMNS, |file| write_columns(&columns, file))?;
+    if parquet {
+        results.write(PARQUET, |file| {
+            write_parquet(&outcome.record, &columns, file)
+        })?;
+    }
+    results.write_json("summary.json", summary)?;
+    results.write_json("manifest.json", manifest)?;
+    let motion = &prepared.motion;
+    if let Some(page) = page(summary, manifest, motion, &outcome.record) {
+        let page = report::render(&page, &folder.join(report::FILE))?;
+        results.write_text(report::FILE, &page)?;
+    }
+    Ok(results.finish()?)
+}
+
+/// A file whose checksum is taken on the way.
+struct Hashed<'a, W> {
+    file: W,
+    sum: &'a mut Sha256,
+}
+
+impl<W: Write> Write for Hashed<'_, W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.sum.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// The report; none where there is no table.
+fn page(
+    summary: &Summary,
+    manifest: &Manifest,
+    motion: &Motion,
+    record: &Record,
+) -> Option<Report> {
+    let table = Table::find(manifest, record)?;
+    let asked = asked(record, motion);
+    let motion = asked.as_ref().unwrap_or(motion);
+    let column = |output| record.column(&table.name(output)).unwrap_or_default();
+    let row = |name: &str, value: String| (name.to_string(), Cell::from(value));
+    let settings = vec![
+        row("FMI", summary.fmi.clone()),
+        row("algorithm", summary.algorithm.clone()),
+        row(
+            "coupling step",
+            match &summary.variable_step {
+                Some(_) => steps_in_words(summary),
+                None => format!("{} ms", 1e3 * summary.step_s),
+            },
+        ),
+        row(
+            "speed",
+            format!(
+                "{} times real time ({} s elapsed)",
+                significant(summary.real_time_factor, 2),
+                significant(summary.wall_s, 2)
+            ),
+        ),
+    ];
+    let commands = table.valve.iter().filter_map(|name| {
+        let values = record.column(name)?;
+        Some((name.clone(), values))
+    });
+    let run = report::Run {
+        system: &summary.system,
+        identity: identity::of_run(manifest, &summary.motion),
+        motion,
+        duration: summary.motion.duration_s,
+        displacement: &column("displacement"),
+        velocity: &column("velocity"),
+        acceleration: &column("acceleration"),
+        commands: commands.collect(),
+        valve_limit: valve_limit(manifest, &table.valve),
+        specimen: specimen(manifest, record),
+        trip: summary
+            .trip
+            .as_ref()
+            .map(|trip| (trip.time_s, trip.cause.clone())),
+        tracking: summary.tracking.as_ref(),
+        ended: summary
+            .ended_because
+            .as_deref()
+            .unwrap_or(summary.ended.word()),
+        changed: identity::changed(manifest),
+        components: components(manifest, summary),
+        settings,
+        footer: format!(
+            "shakebench {}; repeat with: shakebench run --manifest manifest.json",
+            manifest.shakebench
+        ),
+    };
+    Some(report::run(&run))
+}
+
+/// The limit of the component that gives the first command.
+fn valve_limit(manifest: &Manifest, commands: &[String]) -> Option<f64> {
+    let (controller, _) = commands.first()?.rsplit_once('.')?;
+    let component = manifest.components.get(controller)?;
+    component.parameters.get("valve_limit")?.0.as_f64()
+}
+
+/// Drift and force of the first component that has both.
+fn specimen(manifest: &Manifest, record: &Record) -> Option<SpecimenHistory> {
+    let mut names = manifest.components.keys();
+    names.find_map(|name| {
+        Some(SpecimenHistory {
+            drift: record.column(&format!("{name}.drift"))?,
+            force: record.column(&format!("{name}.force"))?,
+        })
+    })
+}
+
+fn components(manifest: &Manifest, summary: &Summary) -> Vec<Component> {
+    let all = manifest.components.iter();
+    all.map(|(name, component)| {
+        let sum = component.sha256.get(..16).unwrap_or(&component.sha256);
+        let file = component.fmu.file_name().unwrap_or_default();
+        Component {
+            name: name.clone(),
+            model: format!(
+                "{}, FMI {}, SHA-256 {sum}",
+                file.to_string_lossy(),
+                component.fmi
+            ),
+            time: summary.component_wall_s.get(name).copied(),
+        }
+    })
+    .collect()
+}
+
+/// The report of the run whose files lie in `folder`; of a motion that was not played to its end, it
+/// draws what was played.
+///
+/// # Errors
+/// A file that is missing or is none of a run.
+pub fn page_again(folder: &Path) -> Result<Report, Error> {
+    let manifest = Manifest::read(&folder.join("manifest.json"))?;
+    let summary = Summary::read(&folder.join("summary.json"))?;
+    let place = folder.join(RESULTS);
+    let record = read_csv(&place)?;
+    let column = |quantity| {
+        let name = format!("reference.{quantity}");
+        record.column(&name).ok_or_else(|| Error::File {
+            path: place.clone(),
+            reason: format!("not the results of a run: there is no column `{name}`"),
+        })
+    };
+    let motion = Motion {
+        name: manifest.motion.name.clone(),
+        dt: manifest.motion.dt_s,
+        displacement: column("displacement")?,
+        velocity: column("velocity")?,
+        acceleration: column("acceleration")?,
+        notes: manifest.motion.notes.clone(),
+        seed: manifest.motion.seed,
+    };
+    page(&summary, &manifest, &motion, &record).ok_or_else(|| Error::File {
+        path: folder.to_path_buf(),
+        reason: "no component of the run is a table with displacement, velocity and acceleration, \
+                 which a report needs"
+            .into(),
+    })
+}

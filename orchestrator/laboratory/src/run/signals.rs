@@ -1,0 +1,180 @@
+//! `results.csv`: the recorded signals of a run, and `columns.csv`: what its columns are.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+
+use crate::error::Error;
+use crate::results::parquet_file::{self, Values};
+use fmi_import::Datum;
+use fmi_master::Record;
+use fmi_system::System;
+
+/// File with the recorded signals.
+pub const RESULTS: &str = "results.csv";
+/// The same as Parquet, where it is asked for.
+pub const PARQUET: &str = "results.parquet";
+/// File that names the columns' units.
+pub const COLUMNS: &str = "columns.csv";
+
+/// A column of `results.csv`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Column {
+    /// Its name.
+    pub name: String,
+    /// Unit of its numbers; empty for none.
+    pub unit: String,
+    /// What it is.
+    pub description: String,
+}
+
+/// Whether a column is written: not what lies ahead of the reference, which is the same history
+/// some samples later.
+fn is_kept(name: &str) -> bool {
+    !(name.starts_with("reference.") && name.ends_with(']'))
+}
+
+/// The columns of `record` that are written.
+pub fn columns(system: &System, record: &Record) -> Vec<Column> {
+    let names = record.columns.iter().chain(&record.exact_columns);
+    names
+        .filter(|name| is_kept(name))
+        .map(|name| {
+            let (unit, description) = about(system, name);
+            Column {
+                name: name.clone(),
+                unit,
+                description,
+            }
+        })
+        .collect()
+}
+
+/// Unit and description of a signal.
+fn about(system: &System, name: &str) -> (String, String) {
+    let own = |unit: &str, text: &str| (unit.to_string(), text.to_string());
+    match name {
+        "time" => return own("s", "time"),
+        "reference.displacement" => return own("m", "displacement asked for"),
+        "reference.velocity" => return own("m/s", "velocity asked for"),
+        "reference.acceleration" => return own("m/s2", "acceleration asked for"),
+        _ => {}
+    }
+    let (component, variable) = name.split_once('.').unwrap_or(("", name));
+    let component = system.components.iter().find(|own| own.name == component);
+    let found = component.and_then(|component| {
+        let description = &component.fmu.description;
+        description
+            .position(variable)
+            .map(|at| &description.variables[at])
+    });
+    found.map_or((String::new(), String::new()), |variable| {
+        let unit = variable.unit.clone().unwrap_or_default();
+        (unit, variable.description.clone())
+    })
+}
+
+/// Writes the columns' names, units and descriptions.
+///
+/// # Errors
+/// A disk that is full, and the like.
+pub fn write_columns(columns: &[Column], file: impl Write) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(file);
+    csv.write_record(["column", "unit", "description"])?;
+    for column in columns {
+        csv.write_record([&column.name, &column.unit, &column.description])?;
+    }
+    csv.flush()
+}
+
+/// Writes a record as CSV: a line of names, then one line per sample; every number reads back to
+/// the same bits.
+///
+/// # Errors
+/// A disk that is full, and the like.
+pub fn write_csv(record: &Record, file: impl Write) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(file);
+    let kept: Vec<bool> = record.columns.iter().map(|name| is_kept(name)).collect();
+    fn only<'a, T>(kept: &'a [bool], all: &'a [T]) -> impl Iterator<Item = &'a T> {
+        all.iter()
+            .zip(kept)
+            .filter_map(|(one, keep)| keep.then_some(one))
+    }
+    csv.write_record(only(&kept, &record.columns).chain(&record.exact_columns))?;
+    for (number, row) in record.rows().enumerate() {
+        let row: Vec<f64> = only(&kept, row).copied().collect();
+        let exact: Vec<String> = record.exact(number).iter().map(Datum::to_string).collect();
+        csv.serialize((row, exact)).map_err(io::Error::other)?;
+    }
+    csv.flush()
+}
+
+/// Writes a record as Parquet, with the columns and units of [`columns`]: numbers as doubles, other values
+/// as texts.
+///
+/// # Errors
+/// A disk that is full, and the like.
+pub fn write_parquet(
+    record: &Record,
+    columns: &[Column],
+    file: impl Write + Send,
+) -> io::Result<()> {
+    let place = |name: &str, of: &[String]| of.iter().position(|own| own == name);
+    let number = |column: &Column| place(&column.name, &record.columns);
+    let written = columns.iter().map(|column| parquet_file::Column {
+        name: column.name.clone(),
+        unit: Some(column.unit.clone()).filter(|unit| !unit.is_empty()),
+        kind: match number(column) {
+            Some(_) => parquet_file::Kind::Number,
+            None => parquet_file::Kind::Text,
+        },
+    });
+    let written: Vec<_> = written.collect();
+    parquet_file::write(&written, record.len(), file, |column, rows| {
+        let column = &columns[column];
+        match number(column) {
+            Some(place) => {
+                let rows = record.rows().skip(rows.start).take(rows.len());
+                Values::Numbers(rows.map(|row| row[place]).collect())
+            }
+            None => {
+                let place = place(&column.name, &record.exact_columns);
+                let text = |row| Some(record.exact(row).get(place?)?.to_string());
+                Values::Texts(rows.map(text).collect())
+            }
+        }
+    })
+}
+
+/// Reads a record that [`write_csv`] wrote.
+///
+/// # Errors
+/// A file that cannot be read or holds anything but a line of names, `time` first, and numbers, with
+/// the line.
+pub fn read_csv(path: &Path) -> Result<Record, Error> {
+    let fault = |reason: String| Error::File {
+        path: path.to_path_buf(),
+        reason,
+    };
+    let file = File::open(path).map_err(|error| fault(error.to_string()))?;
+    let mut csv = csv::Reader::from_reader(file);
+    let names = csv.headers().map_err(|error| fault(error.to_string()))?;
+    let names: Vec<String> = names.iter().map(String::from).collect();
+    if names.first().is_none_or(|first| first != "time") {
+        return Err(fault("the first column is not `time`".into()));
+    }
+    let mut record = Record::with_capacity(names, 0);
+    for (row, line) in csv.records().zip(2..) {
+        let row = row.map_err(|error| fault(error.to_string()))?;
+        let number = |cell: &str| {
+            let wrong = |_| fault(format!("line {line}: `{cell}` is not a number"));
+            cell.trim().parse::<f64>().map_err(wrong)
+        };
+        let values: Vec<f64> = row.iter().map(number).collect::<Result<_, _>>()?;
+        // Every row is as long as the line of names, the reader sees to it.
+        if let Some((time, signals)) = values.split_first() {
+            record.push(*time, signals, &[]);
+        }
+    }
+    Ok(record)
+}

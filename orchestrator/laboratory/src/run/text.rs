@@ -1,0 +1,187 @@
+//! The figures of a run as text.
+
+use super::summary::{Summary, asked};
+use fmi_master::Record;
+use motion::metrics::laboratory::Laboratory;
+use motion::{Motion, peak};
+use pages::report::columns::aligned;
+use pages::report::number::significant;
+use pages::report::{Cell, UnitSystem, Units};
+
+/// Length of the coupling steps: of each, or of the shortest and the longest.
+pub(super) fn steps_in_words(summary: &Summary) -> String {
+    let milliseconds = |seconds: f64| {
+        let text = significant(1e3 * seconds, 3);
+        match text.contains('.') && !text.contains('e') {
+            true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+            false => text,
+        }
+    };
+    match &summary.variable_step {
+        Some(taken) if taken.shortest_s < taken.longest_s => format!(
+            "{} to {} ms",
+            milliseconds(taken.shortest_s),
+            milliseconds(taken.longest_s)
+        ),
+        _ => format!("{} ms", milliseconds(summary.step_s)),
+    }
+}
+
+/// The figures of a run as tables for people, in the units of the terminal.
+pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
+    let mut text = match motion.is_empty() {
+        true => format!("{}\n", summary.system),
+        false => format!("{} on {}\n", summary.system, summary.motion.name),
+    };
+    for note in &motion.notes {
+        text += &format!("  {note}\n");
+    }
+    for (name, seed) in &summary.seeds {
+        text += &format!("  seed of the noise of `{name}`: {seed}\n");
+    }
+    text += &format!(
+        "\n{} steps of {} (FMI {}, {}), {} times real time, {}\n\n",
+        summary.steps,
+        steps_in_words(summary),
+        summary.fmi,
+        summary.algorithm,
+        significant(summary.real_time_factor, 2),
+        summary.ended.word(),
+    );
+    if let Some(taken) = &summary.variable_step {
+        text += &format!(
+            "steps chosen for an error of {} % each: {} were repeated; the largest accepted error \
+             is estimated at {} %{}\n\n",
+            taken.tolerance_percent,
+            taken.repeated,
+            significant(taken.worst_percent, 2),
+            match &taken.worst_signal {
+                Some(signal) => format!(" (`{signal}`)"),
+                None => String::new(),
+            },
+        );
+    }
+    if let Some(error) = &summary.coupling_error {
+        text += &format!(
+            "error of the coupling, estimated: at most {:.3} % of the peak of a signal (`{}`)\n\n",
+            error.percent, error.signal
+        );
+    }
+    if let Some(kept) = &summary.real_time {
+        text += &format!(
+            "real time: {} of {} steps missed their deadline, by {:.2} ms at most; steps began \
+             {:.0} us late (median), 99 of 100 less than {:.0} us\n\n",
+            kept.missed,
+            kept.deadlines,
+            1e3 * kept.worst_s,
+            1e6 * kept.jitter_median_s,
+            1e6 * kept.jitter_p99_s,
+        );
+    }
+    let Some(tracking) = &summary.tracking else {
+        return text;
+    };
+    let asked = asked(record, motion);
+    let (motion, heading) = match &asked {
+        Some(asked) => (asked, "structure"),
+        None => (motion, "reference"),
+    };
+    let played = record.len().min(motion.len());
+    let row = |name: &str, cells: [String; 3]| {
+        let mut row = vec![name.to_string()];
+        row.extend(cells);
+        row
+    };
+    let system = UnitSystem::of_text();
+    let length = |value| Cell::Quantity(value, Units::DISPLACEMENT, 4).text(system);
+    let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4).text(system);
+    let percent = |value: f64| format!("{value:.4} %");
+    text += &aligned(&[
+        row("", [heading.into(), "table".into(), "largest error".into()]),
+        row(
+            "displacement, peak",
+            [
+                length(peak(&motion.displacement[..played])),
+                length(tracking.peak_displacement),
+                length(tracking.peak_displacement_error),
+            ],
+        ),
+        row(
+            "acceleration, peak",
+            [
+                acceleration(peak(&motion.acceleration[..played])),
+                acceleration(tracking.peak_acceleration),
+                acceleration(tracking.peak_acceleration_error),
+            ],
+        ),
+    ]);
+    text += "\n";
+    let pair = |name: &str, value: String| vec![name.to_string(), value];
+    text += &aligned(&[
+        pair(
+            "normalised RMS acceleration error",
+            percent(tracking.time_domain_percent),
+        ),
+        pair(
+            "Fourier amplitude error, acceleration",
+            percent(tracking.frequency_domain_percent),
+        ),
+        pair(
+            "normalised RMS displacement error",
+            percent(tracking.displacement_percent),
+        ),
+        pair(
+            "delay of the table",
+            format!("{:.1} ms", 1e3 * tracking.delay),
+        ),
+    ]);
+    if let Some(own) = &tracking.laboratory {
+        text += "\n";
+        text += &aligned(&bands(own));
+        text += "\n";
+        text += &aligned(&[
+            pair(
+                "error over the significant duration, acceleration",
+                format!(
+                    "{} of {:.2} s",
+                    percent(own.significant_duration_percent),
+                    own.significant_duration_s
+                ),
+            ),
+            pair("peak ratio", format!("{:.4}", own.peak_ratio)),
+            pair("Arias ratio", format!("{:.4}", own.arias_ratio)),
+        ]);
+    }
+    text
+}
+
+/// Response spectra and transfer function, a row for each band.
+fn bands(own: &Laboratory) -> Vec<Vec<String>> {
+    let head = [
+        "band",
+        "response spectrum, largest",
+        "mean",
+        "gain",
+        "delay",
+        "coherence",
+    ];
+    let mut rows = vec![head.map(str::to_string).to_vec()];
+    for (n, spectrum) in own.response_spectrum_percent.iter().enumerate() {
+        let [from, to] = spectrum.band_hz;
+        let mut row = vec![
+            format!("{from} to {to} Hz"),
+            format!("{:.2} %", spectrum.largest),
+            format!("{:.2} %", spectrum.mean),
+        ];
+        row.extend(match own.coherence.as_ref().map(|bands| &bands[n]) {
+            Some(band) => [
+                format!("{:.4}", band.gain),
+                format!("{:.2} ms", 1e3 * band.delay_s),
+                format!("{:.4}", band.coherence),
+            ],
+            None => ["-", "-", "-"].map(str::to_string),
+        });
+        rows.push(row);
+    }
+    rows
+}

@@ -1,0 +1,113 @@
+//! The aids of operators by rule, and the other rules behind a stabilised actuator.
+
+use controllers::aids::OperatorAids;
+use controllers::aids::rig::KnownRig;
+use controllers::tuning::aids::{AidsDesign, stabilised};
+use identification::closed_loop::equations::HydraulicRig;
+use plant::specimens::YieldingSpecimen;
+use plant::specimens::linear::LinearSpecimen;
+use units::Parameters as _;
+use units::vocabulary::LOOP_DELAY_SAMPLES;
+
+use super::control_model::ControlModel;
+use super::tuning::{Rules, hydraulics, known, set};
+use fmi_system::{ComponentFile, Setting};
+
+/// A specimen as a controller knows it, before it yields.
+pub(super) fn unyielding(specimen: &YieldingSpecimen) -> LinearSpecimen {
+    let own = known(specimen);
+    LinearSpecimen {
+        mass: own.mass,
+        damping: own.damping,
+        stiffness: own.columns.stiffness(),
+    }
+}
+
+impl Rules {
+    /// Valve, oil and table as the model has them, or as they come nearest to it. The actuator that the thesis
+    /// prints has none: for it they are those of the physical rig's commissioning.
+    pub(super) fn known_rig(&self) -> Result<KnownRig, String> {
+        let model = &self.model;
+        let with = |own: &HydraulicRig| KnownRig {
+            hydraulics: hydraulics(own),
+            table: model.rig.table,
+            delay: model.delay,
+        };
+        if let Some((own, _)) = &model.hydraulics {
+            return Ok(with(own));
+        }
+        KnownRig::of(&model.rig, model.delay).or_else(|error| {
+            let is_printed = self.suite.is_none();
+            match ControlModel::commissioned()?.hydraulics {
+                Some((own, _)) if is_printed => Ok(with(&own)),
+                _ => Err(error.to_string()),
+            }
+        })
+    }
+
+    /// The aids of operators on the model's rig.
+    fn aids(&self, specimen: Option<&YieldingSpecimen>) -> Result<OperatorAids, String> {
+        let model = &self.model;
+        let rig = self.known_rig()?;
+        let own = specimen.map(unyielding);
+        let design = AidsDesign {
+            rig: &rig,
+            late: model.late,
+            period: model.measurements().period,
+            specimen: own.as_ref(),
+        };
+        let mut aids = design.tuned().map_err(|error| error.to_string())?;
+        if let Some((own, shape)) = &model.hydraulics {
+            aids.friction.friction = own.seal_friction;
+            aids.friction.shape = *shape;
+        }
+        Ok(aids)
+    }
+
+    /// These rules on the rig as it is to a controller behind a stabilised actuator.
+    pub(super) fn behind_stabilisation(&self) -> Result<&Self, String> {
+        let own = self.stabilised.get_or_init(|| {
+            let mut model = self.model.clone();
+            let gain = self.aids(None)?.pressure.gain;
+            // The command is held for half a period in the mean.
+            let late = model.late + 0.5 * model.measurements().period;
+            model.rig = stabilised(&model.rig, gain, late);
+            model.hydraulics = None;
+            let rules = match &self.suite {
+                Some(_) => Self::new(model),
+                None => Self::unprinted(model),
+            };
+            Ok(Box::new(rules))
+        });
+        own.as_deref().map_err(Clone::clone)
+    }
+
+    /// What is known of the rig, friction, corners and gains.
+    pub(super) fn operator_aids(
+        &self,
+        component: &mut ComponentFile,
+        specimen: Option<&YieldingSpecimen>,
+    ) -> Result<(), String> {
+        if let Some(curve) = self.model.curve {
+            set(component, &curve.named());
+        }
+        let on = |switch: &str| component.parameters.get(switch) == Some(&Setting::Boolean(true));
+        let known = [
+            "friction_compensation",
+            "specimen_compensation",
+            "pressure_stabilisation",
+            "amplitude_phase_control",
+            "harmonic_cancellation",
+        ];
+        if !known.into_iter().any(on) {
+            return Ok(());
+        }
+        let aids = self.aids(specimen)?;
+        set(component, &aids.rig.named());
+        set(component, &aids.friction.named());
+        set(component, &aids.specimen.named());
+        set(component, &aids.pressure.named());
+        component.set(LOOP_DELAY_SAMPLES, self.model.delay as i64);
+        Ok(())
+    }
+}

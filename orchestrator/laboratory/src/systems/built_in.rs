@@ -1,0 +1,324 @@
+//! The systems that come with the program. A rig (plant and specimen) and a controller are files
+//! of their own; a system is a controller on a rig, with aids behind the controller where its name says
+//! so: `three-variable+friction`.
+
+use std::path::Path;
+
+use bridges::opensees;
+use plant::specimens::YieldingSpecimen;
+use plant::specimens::linear::LinearSpecimen;
+use units::hint;
+
+use super::tuning::{self, Wanted};
+use fmi_system::SystemError;
+use fmi_system::SystemFile;
+
+/// A part of a built-in system.
+struct Part {
+    name: &'static str,
+    /// TOML.
+    text: &'static str,
+}
+
+macro_rules! part {
+    ($folder:literal, $name:literal) => {
+        Part {
+            name: $name,
+            text: include_str!(concat!("../../systems/", $folder, $name, ".toml")),
+        }
+    };
+}
+
+/// Controllers: the names of the built-in systems.
+const CONTROLLERS: [Part; 19] = [
+    part!("", "displacement-pid"),
+    part!("", "three-variable"),
+    part!("", "loop-shaping"),
+    part!("", "sliding-mode"),
+    part!("", "mpc"),
+    part!("", "three-variable-compensated"),
+    part!("", "mpc-compensated"),
+    part!("", "lqg"),
+    part!("", "preview"),
+    part!("", "acceleration-tracking"),
+    part!("", "dual-loop"),
+    part!("", "multi-metric"),
+    part!("", "minimal-control-synthesis"),
+    part!("", "multiple-surface"),
+    part!("", "dynamic-surface"),
+    part!("", "receding-horizon"),
+    part!("", "adaptive-inverse"),
+    part!("", "adaptive-preview"),
+    part!("", "adaptive-mpc"),
+];
+/// Tables with their actuators.
+const PLANTS: [Part; 2] = [
+    part!("plant/", "identified"),
+    part!("plant/", "servohydraulic"),
+];
+/// What controllers may know of a specimen: one storey or nothing.
+type Known = fn() -> Option<YieldingSpecimen>;
+/// What stands on the table.
+const SPECIMENS: [(Part, Known); 5] = [
+    (part!("specimen/", "linear"), || {
+        Some(LinearSpecimen::appendix_a().into())
+    }),
+    (part!("specimen/", "yielding"), || {
+        Some(YieldingSpecimen::default())
+    }),
+    (part!("specimen/", "storeys"), || None),
+    (part!("specimen/", "storeys-tuned-mass"), || None),
+    (part!("specimen/", "storeys-damped"), || None),
+];
+/// Computed structures between the ground and the specimen.
+const STRUCTURES: [Part; 1] = [part!("structure/", "two-storeys")];
+/// What a controller's command passes on its way to the valve where one of [`AIDS`] is on.
+const AID_STAGE: &str = include_str!("../../systems/aids.toml");
+/// What may follow a controller's name behind a `+`, and the switch of the component that it turns on.
+const AIDS: [(&str, &str); 6] = [
+    ("friction", "friction_compensation"),
+    ("specimen", "specimen_compensation"),
+    ("delta-p", tuning::PRESSURE_STABILISATION),
+    ("amplitude-phase", "amplitude_phase_control"),
+    ("harmonics", "harmonic_cancellation"),
+    (VALVE, "valve_compensation"),
+];
+/// The aid that every controller has on a model whose valve is not an ideal one.
+const VALVE: &str = "valve";
+/// A structure that OpenSees computes: `opensees:MODEL.py`.
+const OPENSEES: Part = part!("specimen/", "opensees");
+/// No specimen, no structure.
+pub const NONE: &str = "none";
+
+/// The system run when none is named.
+pub const DEFAULT_SYSTEM: &str = "three-variable";
+/// The plant when none is named.
+pub const DEFAULT_PLANT: &str = "identified";
+/// The specimen when none is named.
+pub const DEFAULT_SPECIMEN: &str = "linear";
+
+/// Names of the built-in systems.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    CONTROLLERS.iter().map(|part| part.name)
+}
+
+/// Names of the aids that may follow a system's name, each behind a `+`.
+pub fn aids() -> impl Iterator<Item = &'static str> {
+    AIDS.iter().map(|(name, _)| *name)
+}
+
+/// Checks the name of a built-in system, such as `three-variable+friction+delta-p`.
+///
+/// # Errors
+/// A controller or an aid that is unknown.
+pub fn check(name: &str) -> Result<(), SystemError> {
+    let unknown = |what, name: &str, hint| SystemError::Unknown {
+        what,
+        name: name.to_string(),
+        hint,
+    };
+    let mut parts = name.split('+');
+    let controller = parts.next().unwrap_or_default();
+    if !names().any(|known| known == controller) {
+        return Err(unknown("system", controller, hint(controller, names())));
+    }
+    match parts.find(|part| !aids().any(|known| known == *part)) {
+        Some(aid) => Err(unknown("aid", aid, hint(aid, aids()))),
+        None => Ok(()),
+    }
+}
+
+/// Puts the aids between the controller in `file` and the valve.
+fn add_aids(file: &mut SystemFile, wanted: &[&str]) -> Result<(), SystemError> {
+    if wanted.is_empty() {
+        return Ok(());
+    }
+    let mut stage = SystemFile::parse("the built-in aids", AID_STAGE)?;
+    for (name, switch) in AIDS {
+        if wanted.contains(&name)
+            && let Some(component) = stage.components.get_mut("aids")
+        {
+            component.set(switch, true);
+        }
+    }
+    file.redirect(&std::mem::take(&mut stage.instead));
+    file.description += &format!("; {}", wanted.join(", "));
+    file.extend(stage);
+    Ok(())
+}
+
+/// Names of the plants.
+pub fn plants() -> impl Iterator<Item = &'static str> {
+    PLANTS.iter().map(|part| part.name)
+}
+
+/// Names of the specimens, `none` among them.
+pub fn specimens() -> impl Iterator<Item = &'static str> {
+    std::iter::once(NONE).chain(SPECIMENS.iter().map(|(part, _)| part.name))
+}
+
+/// Names of the computed structures, `none` among them.
+pub fn structures() -> impl Iterator<Item = &'static str> {
+    std::iter::once(NONE).chain(STRUCTURES.iter().map(|part| part.name))
+}
+
+/// Puts the computed structure `name` between the reference, which then is the ground's motion, and
+/// whatever follows it in the built-in system `file`, whose sensors are those of `plant`.
+///
+/// # Errors
+/// A name that is unknown.
+pub fn add_structure(file: &mut SystemFile, name: &str, plant: &str) -> Result<(), SystemError> {
+    if name == NONE {
+        return Ok(());
+    }
+    let part = STRUCTURES.iter().find(|part| part.name == name);
+    let mut structure = read("structure", part, name, structures())?;
+    if !file.components.contains_key("specimen") {
+        structure.disconnect("specimen");
+    }
+    structure.redirect(&plant_of(plant)?.instead);
+    file.follow("structure");
+    let adjust = std::mem::take(&mut file.adjust);
+    file.extend(structure);
+    file.extend(SystemFile {
+        adjust,
+        ..SystemFile::default()
+    });
+    file.name = format!("{}-on-{name}", file.name);
+    Ok(())
+}
+
+/// Whether a plant is a file, written as the built-in ones are: components `table` and what belongs to
+/// it, `instead` for what controllers are connected to.
+fn is_plant_file(plant: &str) -> bool {
+    plant.ends_with(".toml")
+}
+
+/// The plant of a name or a file.
+fn plant_of(plant: &str) -> Result<SystemFile, SystemError> {
+    if is_plant_file(plant) {
+        return SystemFile::read(Path::new(plant));
+    }
+    let rig = PLANTS.iter().find(|part| part.name == plant);
+    read("plant", rig, plant, plants())
+}
+
+/// A specimen's name as it is; the path of a model in OpenSees absolute, so that it stays true elsewhere.
+pub fn specimen_path(specimen: &str) -> String {
+    let absolute = opensees::model_of(specimen).and_then(|model| std::path::absolute(model).ok());
+    absolute.map_or(specimen.to_string(), |path| {
+        format!("{}{}", opensees::PREFIX, path.display())
+    })
+}
+
+/// A plant's name as it is; a file's path absolute, so that it stays true elsewhere.
+pub fn plant_path(plant: &str) -> String {
+    let absolute = is_plant_file(plant).then(|| std::path::absolute(plant).ok());
+    let absolute = absolute.flatten();
+    absolute.map_or(plant.to_string(), |path| path.display().to_string())
+}
+
+/// A built-in system: the controller `name`, with the aids in that name, on a rig of `plant` and
+/// `specimen` (or `none`). It has the `wanted` parameters, by default tuned for the physical rig
+/// and as printed for the identified one.
+///
+/// # Errors
+/// A name that is unknown, or a rig for which there is no tuning.
+pub fn system(
+    name: &str,
+    plant: &str,
+    specimen: &str,
+    wanted: Wanted<'_>,
+) -> Result<SystemFile, SystemError> {
+    check(name)?;
+    let (controller, aids) = name.split_once('+').unwrap_or((name, ""));
+    let part = CONTROLLERS.iter().find(|part| part.name == controller);
+    let mut file = read("system", part, controller, names())?;
+    let mut aids: Vec<&str> = aids.split('+').filter(|aid| !aid.is_empty()).collect();
+    let curved = wanted
+        .has_curve()
+        .map_err(|reason| file.at_fault("tuning", reason))?;
+    if curved && !aids.contains(&VALVE) {
+        aids.push(VALVE);
+    }
+    add_aids(&mut file, &aids)?;
+    file.origin = format!("{name} (built-in)");
+    let rig = plant_of(plant)?;
+    if is_plant_file(plant) {
+        file.directory.clone_from(&rig.directory);
+    }
+    let mut on_table = None;
+    if let Some(model) = opensees::model_of(specimen) {
+        let mut part = read("specimen", Some(&OPENSEES), specimen, specimens())?;
+        if let Some(component) = part.components.get_mut("specimen") {
+            component.set(super::opensees::MODEL, model.display().to_string().as_str());
+        }
+        on_table = Some((part, None));
+    } else if specimen != NONE {
+        let found = SPECIMENS.iter().find(|(part, _)| part.name == specimen);
+        let part = read(
+            "specimen",
+            found.map(|found| &found.0),
+            specimen,
+            specimens(),
+        )?;
+        on_table = Some((part, found.and_then(|found| found.1())));
+    }
+    if on_table.is_none() {
+        file.disconnect("specimen");
+    }
+    let own = on_table.as_ref().and_then(|(_, own)| own.as_ref());
+    tuning::apply(&mut file, &rig, own, wanted)
+        .map_err(|reason| file.at_fault("tuning", reason))?;
+    file.redirect(&rig.instead);
+    file.extend(rig);
+    match on_table {
+        None => file.disconnect("specimen"),
+        Some((specimen, _)) => {
+            file.adjust.extend(specimen.adjust.clone());
+            file.extend(specimen);
+        }
+    }
+    file.name = name.to_string();
+    Ok(file)
+}
+
+fn read(
+    what: &'static str,
+    part: Option<&Part>,
+    name: &str,
+    known: impl Iterator<Item = &'static str>,
+) -> Result<SystemFile, SystemError> {
+    let part = part.ok_or_else(|| SystemError::Unknown {
+        what,
+        name: name.to_string(),
+        hint: hint(name, known),
+    })?;
+    let mut file = SystemFile::parse(&format!("the built-in {what} {name}"), part.text)?;
+    file.name = name.to_string();
+    Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_written_system_reads_back_as_the_same() {
+        for name in names() {
+            let file = system(name, "servohydraulic", "yielding", Wanted::default()).unwrap();
+            let text = file.to_toml();
+            let again = SystemFile::parse(name, &text).unwrap();
+            assert_eq!(again.to_toml(), text, "{name}");
+            let links = |file: &SystemFile| -> Vec<String> {
+                file.connections.iter().map(ToString::to_string).collect()
+            };
+            assert_eq!(links(&again), links(&file));
+            assert_eq!(again.experiment.end_when, file.experiment.end_when);
+            for (name, component) in &file.components {
+                assert_eq!(again.components[name].parameters, component.parameters);
+                assert_eq!(again.components[name].inputs, component.inputs);
+            }
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! What controllers are designed on: a rig as its recordings show it.
+
+use std::path::Path;
+
+use controllers::tuning::suite::{Measurements, Suite};
+use identification::closed_loop::equations::{HydraulicRig, PARAMETERS};
+use identification::closed_loop::friction::SealShape;
+use identification::identify::model_file::{ModelFile, Units};
+use nalgebra::{DMatrix, DVector};
+use plant::identified::shake_table::ShakeTable;
+use plant::identified::valve_curve::ValveCurve;
+use plant::sensors::channel;
+use units::constants::{G, INCH, SAMPLING_PERIOD};
+
+/// The model of the physical rig that comes with the program, as its commissioning found it.
+const COMMISSIONED: &str = include_str!("../../systems/plant/servohydraulic-model.toml");
+
+/// One standard deviation of what is measured, SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// m.
+    pub displacement: f64,
+    /// m/s.
+    pub velocity: f64,
+    /// m/s².
+    pub acceleration: f64,
+}
+
+/// An identified rig with the delay and noise of its measurements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControlModel {
+    /// Actuator and table.
+    pub rig: ShakeTable,
+    /// Samples by which measurements are late behind the command's effect.
+    pub delay: usize,
+    /// The same to a part of a sample, s.
+    pub late: f64,
+    /// Noise of the measurements.
+    pub noise: Noise,
+    /// Mass of the specimen in the recordings, kg.
+    pub specimen_mass: Option<f64>,
+    /// Valve, oil and seals beyond the form of Eq 2-4, where they were identified.
+    pub hydraulics: Option<(HydraulicRig, SealShape)>,
+    /// The valve's curve, where it is not an ideal one.
+    pub curve: Option<ValveCurve>,
+    /// Samples by which the valve acts late: of `delay`, those that are not the sensors'.
+    pub command_delay: usize,
+    uncertainty: Uncertainty,
+}
+
+/// What is known of the errors of a model.
+#[derive(Debug, Clone, PartialEq)]
+enum Uncertainty {
+    /// Nothing.
+    Unknown,
+    /// A factor of the covariance of the hydraulic rig's parameters.
+    Hydraulic(DMatrix<f64>),
+    /// Standard errors of the coefficients of actuator and table, taken as independent.
+    Coefficients(Box<ShakeTable>),
+}
+
+/// A rig as the model's uncertainty allows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Draw {
+    /// Actuator and table.
+    pub rig: ShakeTable,
+    /// Delay, s.
+    pub late: f64,
+}
+
+impl Noise {
+    /// With white noise of displacement (m) and acceleration (m/s²), and the velocity estimated from
+    /// the two.
+    fn of(displacement: f64, acceleration: f64) -> Self {
+        // Below these sensors err in other ways than by noise (as for the velocity's filter of the
+        // instrumentation).
+        let displacement = displacement.max(1e-4 * INCH);
+        let acceleration = acceleration.max(0.01 * G);
+        // Steady Kalman filter of a double integrator: sqrt(2) Q^(3/4) R^(1/4) is the variance of
+        // the velocity for densities Q of the acceleration's noise and R of the displacement's.
+        let [q, r] = [acceleration, displacement].map(|own| own * own * SAMPLING_PERIOD);
+        let velocity = (std::f64::consts::SQRT_2 * q.powf(0.75) * r.powf(0.25)).sqrt();
+        Self {
+            displacement,
+            velocity,
+            acceleration,
+        }
+    }
+}
+
+impl ControlModel {
+    /// Reads a model file; a sentence says what is wrong.
+    ///
+    /// # Errors
+    /// A file at fault, or one whose data did not determine the actuator.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let file = ModelFile::read(path).map_err(|error| error.to_string())?;
+        Self::new(&file, &path.display().to_string())
+    }
+
+    /// The physical rig's.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn commissioned() -> Result<Self, String> {
+        const NAME: &str = "the built-in model of the physical rig";
+        let file = ModelFile::parse(COMMISSIONED, NAME).map_err(|error| error.to_string())?;
+        Self::new(&file, NAME)
+    }
+
+    /// From a file; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn new(file: &ModelFile, name: &str) -> Result<Self, String> {
+        let said = |error: identification::IdentificationError| error.to_string();
+        let rig = file.shake_table(name).map_err(said)?;
+        let units: Units = file.units(name).map_err(said)?;
+        let noise = |channel: &str| {
+            let value = file.noise.as_ref().and_then(|noise| noise.get(channel));
+            value.and_then(toml::Value::as_float).unwrap_or(0.0) * units.length
+        };
+        let late = file.command_delay.unwrap_or(0.0);
+        let command = (late - file.sensor_delay.unwrap_or(late)).max(0.0);
+        Ok(Self {
+            rig,
+            late: late.max(0.0),
+            delay: (late / SAMPLING_PERIOD).round().max(0.0) as usize,
+            noise: Noise::of(noise("displacement"), noise("acceleration")),
+            specimen_mass: file.specimen(name).map_err(said)?.map(|own| own.mass),
+            hydraulics: file.hydraulic_rig(name).map_err(said)?,
+            curve: file.valve_curve(),
+            command_delay: (command / SAMPLING_PERIOD).round() as usize,
+            uncertainty: Uncertainty::of(file, units),
+        })
+    }
+
+    /// The identified plant as the thesis prints it (Eq 2-13, 2-14, 2-28): nothing is late there, and
+    /// its sensors have no noise.
+    pub fn identified() -> Self {
+        Self {
+            rig: ShakeTable::default(),
+            delay: 0,
+            late: 0.0,
+            noise: Noise::of(0.0, 0.0),
+            specimen_mass: None,
+            hydraulics: None,
+            curve: None,
+            command_delay: 0,
+            uncertainty: Uncertainty::Unknown,
+        }
+    }
+
+    /// Delay and noise for the rules of the controllers.
+    pub fn measurements(&self) -> Measurements {
+        Measurements {
+            late: self.late,
+            noise: [
+                self.noise.displacement,
+                self.noise.velocity,
+                self.noise.acceleration,
+            ],
+            period: SAMPLING_PERIOD,
+        }
+    }
+
+    /// All controllers by their rules.
+    pub fn suite(&self) -> Suite {
+        Suite::new(&self.rig, &self.measurements())
+    }
+
+    /// Rigs as likely as the model's errors make them; draws that are not a valid rig are omitted.
+    /// Without errors, none.
+    pub fn draws(&self, count: u64, seed: u64) -> Vec<Draw> {
+        let gaussian = |sample: u64, channel: u64| {
+            channel::Noise {
+                seed,
+                channel,
+                sample,
+            }
+            .gaussian()
+        };
+        (0..count)
+            .filter_map(|sample| match (&self.uncertainty, &self.hydraulics) {
+                (Uncertainty::Hydraulic(factor), Some((rig, _))) => {
+                    let own: [f64; PARAMETERS] = (*rig).into();
+                    let z = DVector::from_fn(PARAMETERS, |i, _| gaussian(sample, i as u64));
+                    let change = factor * z;
+                    let moved = HydraulicRig::from(std::array::from_fn(|i| own[i] + change[i]));
+                    let late = moved.command_delay.max(0.0);
+                    let spool = moved.spool_lag > 0.0 && moved.spool_inertia > 0.0;
+                    let sound = spool && moved.is_sound();
+                    let rig = sound.then(|| moved.shake_table()).flatten()?;
+                    Some(Draw { rig, late })
+                }
+                (Uncertainty::Coefficients(errors), _) => {
+                    let mut rig = self.rig;
+                    let mut place = 0;
+                    let mut move_by = |value: &mut f64, error: f64| {
+                        *value += error * gaussian(sample, place);
+                        place += 1;
+                    };
+                    let (own, other) = (&mut rig.actuator, &errors.actuator);
+                    for i in 0..3 {
+                        move_by(&mut own.denominator[i], other.denominator[i]);
+                        move_by(&mut own.voltage_to_force[i], other.voltage_to_force[i]);
+                        move_by(&mut own.velocity_to_force[i], other.velocity_to_force[i]);
+                    }
+                    let (own, other) = (&mut rig.table, &errors.table);
+                    move_by(&mut own.mass, other.mass);
+                    move_by(&mut own.damping, other.damping);
+                    move_by(&mut own.stiffness, other.stiffness);
+                    let late = self.late;
+                    Some(Draw { rig, late })
+                }
+                _ => None,
+            })
+            .filter(|draw| draw.rig.validate().is_ok())
+            .collect()
+    }
+}
+
+impl Uncertainty {
+    fn of(file: &ModelFile, units: Units) -> Self {
+        let covariance = file.covariance.as_ref().and_then(|own| own.ordered());
+        if let (Some(covariance), Some(_)) = (covariance, &file.hydraulics) {
+            // Variances range over twenty decades: factored as correlations.
+            let size = covariance.diagonal().map(|value| value.max(0.0).sqrt());
+            let correlation = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
+                let both = size[i] * size[j];
+                if both > 0.0 {
+                    covariance[(i, j)] / both
+                } else {
+                    0.0
+                }
+            });
+            let eigen = correlation.symmetric_eigen();
+            let sizes = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+            let factor = eigen.eigenvectors * DMatrix::from_diagonal(&sizes);
+            return Self::Hydraulic(DMatrix::from_diagonal(&size) * factor);
+        }
+        let Some(errors) = &file.standard_errors else {
+            return Self::Unknown;
+        };
+        let Some(actuator) = &errors.actuator else {
+            return Self::Unknown;
+        };
+        let three = |values: &[f64], first: usize, factor: f64| -> [f64; 3] {
+            std::array::from_fn(|i| values.get(first + i).copied().unwrap_or(0.0) * factor)
+        };
+        let per_length = units.force / units.length;
+        let mut own = ShakeTable::default();
+        own.actuator.denominator = three(&actuator.denominator, 1, 1.0);
+        own.actuator.voltage_to_force = three(&actuator.voltage_to_force, 0, units.force);
+        own.actuator.velocity_to_force = three(&actuator.velocity_to_force, 0, per_length);
+        own.table.mass = errors.table.mass * per_length;
+        own.table.damping = errors.table.damping * per_length;
+        own.table.stiffness = errors.table.stiffness * per_length;
+        Self::Coefficients(Box::new(own))
+    }
+}

@@ -1,0 +1,12 @@
+//! The systems that come with the program, and the parameters of their controllers by rule.
+
+mod aids;
+pub mod built_in;
+pub mod control_model;
+pub mod jacobi;
+pub mod opensees;
+mod rule;
+mod surface_control;
+pub mod tuning;
+
+pub use rule::Rule;

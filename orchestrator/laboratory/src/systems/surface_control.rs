@@ -1,0 +1,75 @@
+//! Sliding mode down to the valve and adaptive inverse control by rule.
+
+use controllers::preview::feedback::Uncertainty;
+use controllers::surface_control::{Parameters, Variant};
+use controllers::three_variable::ThreeVariableGains;
+use plant::specimens::YieldingSpecimen;
+
+use units::Parameters as _;
+
+use super::aids::unyielding;
+use super::tuning::{Rules, set};
+use fmi_system::ComponentFile;
+use fmi_system::Setting;
+
+impl Rules {
+    /// Model and hold.
+    pub(super) fn adaptive_inverse(&self, component: &mut ComponentFile) -> Result<(), String> {
+        let rig = self.known_rig()?;
+        let measurements = self.model.measurements();
+        let (delay, period) = (measurements.delay(), measurements.period);
+        let gains = ThreeVariableGains::tuned(&self.model.rig, delay, period);
+        let gains = gains.map_err(|error| error.to_string())?;
+        set(component, &rig.named());
+        set(component, &[("hold_gain", 0.5 * gains.proportional)]);
+        component.set("loop_delay_samples", self.model.delay as i64);
+        Ok(())
+    }
+
+    /// Model, noise, surfaces and lead of the variant that the file names.
+    pub(super) fn surface_control(
+        &self,
+        component: &mut ComponentFile,
+        specimen: Option<&YieldingSpecimen>,
+    ) -> Result<(), String> {
+        let variant = match component.parameters.get("variant") {
+            Some(Setting::Text(name)) if name == "dynamic-surface" => Variant::DynamicSurface,
+            Some(Setting::Text(name)) if name == "receding-horizon" => Variant::RecedingHorizon,
+            _ => Variant::MultipleSurface,
+        };
+        let usual = Parameters::default();
+        let measurements = self.model.measurements();
+        let own = Parameters {
+            variant,
+            rig: self.known_rig()?,
+            uncertainty: Uncertainty {
+                measurement: measurements.noise,
+                ..usual.uncertainty
+            },
+            ..usual
+        };
+        let tuned = own.tuned(measurements.late, specimen.map(unyielding).as_ref());
+        let tuned = tuned.map_err(|error| error.to_string())?;
+        let noise = &tuned.uncertainty.measurement;
+        set(component, &tuned.rig.named());
+        set(
+            component,
+            &[
+                ("surface_rate", tuned.surface_rate),
+                ("motion_reaching_rate", tuned.reaching_rates[0]),
+                ("oil_reaching_rate", tuned.reaching_rates[1]),
+                ("spool_reaching_rate", tuned.reaching_rates[2]),
+                ("oil_filter_time", tuned.filter_times[0]),
+                ("spool_filter_time", tuned.filter_times[1]),
+                ("move_weight", tuned.move_weight),
+                ("force_step", tuned.uncertainty.force_step),
+                ("displacement_measurement_noise", noise[0]),
+                ("velocity_measurement_noise", noise[1]),
+                ("acceleration_measurement_noise", noise[2]),
+            ],
+        );
+        component.set("loop_delay_samples", self.model.delay as i64);
+        component.set("reference_lead_samples", tuned.lead as i64);
+        Ok(())
+    }
+}

@@ -1,0 +1,292 @@
+//! The parts of this installation, missing parts, and what to do.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde::Serialize;
+
+use crate::PackedFmu;
+use crate::program::{self, VERSION};
+use crate::supply::{self, Origin};
+use fmi_import::{FmiVersion, Fmu, Instance, Isolation, Options, Processes};
+
+/// How an examined part is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    /// As it should be.
+    Good,
+    /// Not there, and only needed for what `needed_for` says.
+    Absent,
+    /// At fault: the program does not do its work.
+    Bad,
+}
+
+/// A part that was examined.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// The part.
+    pub part: &'static str,
+    /// How it is.
+    pub state: State,
+    /// What was found, in a clause.
+    pub found: String,
+    /// What it is needed for.
+    pub needed_for: &'static str,
+    /// What to do, if anything.
+    pub cure: Option<String>,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Examination {
+    /// Version of the program.
+    pub shakebench: &'static str,
+    /// Processor and operating system.
+    pub platform: String,
+    /// The program's file.
+    pub program: Option<PathBuf>,
+    /// Where components come from.
+    pub fmus: Option<PathBuf>,
+    /// Why from there.
+    pub origin: Option<Origin>,
+    /// Whether the program can do its work.
+    pub ready: bool,
+    /// The parts.
+    pub findings: Vec<Finding>,
+}
+
+/// Packages of Python: the purpose of each, and its requirement for pip.
+const PACKAGES: [(&str, &str, &str); 4] = [
+    ("fmpy", "running the FMUs from Python", "fmpy"),
+    ("ecospy", "running the FMUs in ecos", "ecospy tbb"),
+    ("libcosimpy", "running the FMUs in libcosim", "libcosimpy"),
+    (
+        "shakebench",
+        "driving this program from Python",
+        "the wheel of the release",
+    ),
+];
+
+/// Examines the installation.
+pub fn examine() -> Examination {
+    let mut findings = vec![folder_for_results(), temporary_folder()];
+    let folder = supply::folder().ok();
+    findings.extend(components());
+    findings.push(own_process());
+    findings.push(cargo());
+    findings.extend(packages());
+    findings.push(opensees());
+    Examination {
+        shakebench: VERSION,
+        platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+        program: program::file().ok(),
+        origin: folder.as_ref().map(|folder| folder.origin),
+        fmus: folder.map(|folder| folder.path),
+        ready: findings.iter().all(|finding| finding.state != State::Bad),
+        findings,
+    }
+}
+
+/// Whether files can be made in a folder.
+fn writable(folder: &Path) -> Result<(), String> {
+    let tried = tempfile::Builder::new()
+        .prefix(".shakebench-doctor-")
+        .tempfile_in(folder);
+    tried.map(drop).map_err(|error| error.to_string())
+}
+
+fn folder_for_results() -> Finding {
+    let here = std::env::current_dir().unwrap_or_default();
+    let tried = writable(&here);
+    let is_good = tried.is_ok();
+    Finding {
+        part: "present folder",
+        state: if is_good { State::Good } else { State::Absent },
+        found: tried.map_or_else(|error| error, |()| "can be written".to_string()),
+        needed_for: "results without --out",
+        cure: (!is_good).then(|| "change to another folder, or give --out".to_string()),
+    }
+}
+
+fn temporary_folder() -> Finding {
+    let folder = std::env::temp_dir();
+    let tried = writable(&folder);
+    let is_good = tried.is_ok();
+    Finding {
+        part: "temporary folder",
+        state: if is_good { State::Good } else { State::Bad },
+        found: match tried {
+            Ok(()) => format!("{} can be written", folder.display()),
+            Err(error) => format!("{}: {error}", folder.display()),
+        },
+        needed_for: "unpacking FMUs",
+        cure: (!is_good).then(|| "set TMPDIR to a writable folder".to_string()),
+    }
+}
+
+/// The components: those that are there, whole, of this version, and that can be loaded here.
+fn components() -> Vec<Finding> {
+    let finding = |part, state, found, cure: Option<&str>| Finding {
+        part,
+        state,
+        found,
+        needed_for: "run, compare, diagnose",
+        cure: cure.map(String::from),
+    };
+    let all = match supply::all_fmus() {
+        Ok(all) => all,
+        Err(error) => {
+            let reason = error.to_string();
+            return vec![finding("components", State::Bad, reason, None)];
+        }
+    };
+    let count = |version| all.iter().filter(|fmu| fmu.version == version).count();
+    let (two, three) = (count(FmiVersion::V2), count(FmiVersion::V3));
+    let counted = format!("{two} for FMI 2.0, {three} for FMI 3.0");
+    let (state, cure) = match (two, three) {
+        (_, 0) | (0, _) => (
+            State::Absent,
+            Some(
+                "one FMI version is missing, so `--fmi` has no choice; install again to have \
+                both",
+            ),
+        ),
+        _ => (State::Good, None),
+    };
+    let mut findings = vec![finding("components", state, counted, cure)];
+    let mut platforms: BTreeMap<String, usize> = BTreeMap::new();
+    let mut faults = Vec::new();
+    for fmu in all {
+        match load(fmu) {
+            Ok(found) => {
+                for platform in found {
+                    *platforms.entry(platform).or_default() += 1;
+                }
+            }
+            Err(error) => faults.push(error),
+        }
+    }
+    let hint = "install again; if a library cannot be mapped, set TMPDIR to a folder from which \
+        programs may run";
+    findings.extend(
+        faults
+            .into_iter()
+            .map(|fault| finding("component", State::Bad, fault, Some(hint))),
+    );
+    let counted: Vec<String> = platforms
+        .iter()
+        .map(|(platform, count)| format!("{platform} ({count})"))
+        .collect();
+    if !counted.is_empty() {
+        findings.push(finding("platforms", State::Good, counted.join(", "), None));
+    }
+    findings
+}
+
+/// The platforms of a component that is whole and can be instantiated here.
+fn load(fmu: &PackedFmu) -> Result<Vec<String>, String> {
+    supply::check(fmu).map_err(|error| error.to_string())?;
+    let opened = Fmu::open_own(&fmu.path).map_err(|error| error.to_string())?;
+    Instance::new(&opened, "doctor", &program::options()).map_err(|error| error.to_string())?;
+    Ok(opened.platforms.clone())
+}
+
+/// Whether FMUs can be run in a process of their own.
+fn own_process() -> Finding {
+    let options = Options {
+        isolation: Isolation::All,
+        ..program::options()
+    };
+    let tried = supply::all_fmus()
+        .map_err(|error| error.to_string())
+        .and_then(|all| all.first().ok_or_else(|| "no FMU for the test".to_string()))
+        .and_then(|fmu| Fmu::open_own(&fmu.path).map_err(|error| error.to_string()))
+        .and_then(|fmu| {
+            let mut processes = Processes::new(&options);
+            let made = Instance::within(&fmu, "doctor", &mut processes, true);
+            made.map(drop).map_err(|error| error.to_string())
+        });
+    let is_good = tried.is_ok();
+    Finding {
+        part: "processes for FMUs",
+        state: if is_good { State::Good } else { State::Absent },
+        found: tried.map_or_else(|error| error, |()| "can be started".to_string()),
+        needed_for: "--isolate",
+        cure: (!is_good).then(|| "run with --isolate none".to_string()),
+    }
+}
+
+fn cargo() -> Finding {
+    let version = first_line(Command::new("cargo").arg("--version"));
+    Finding {
+        part: "cargo",
+        state: found_or_absent(version.is_some()),
+        cure: version
+            .is_none()
+            .then(|| "install Rust, https://rustup.rs".to_string()),
+        found: version.unwrap_or_else(|| "not found".to_string()),
+        needed_for: "build, from sources",
+    }
+}
+
+fn packages() -> Vec<Finding> {
+    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_string());
+    PACKAGES
+        .into_iter()
+        .map(|(package, needed_for, wanted)| {
+            let script = format!("import importlib.metadata as m; print(m.version('{package}'))");
+            let version = first_line(Command::new(&python).args(["-c", &script]));
+            Finding {
+                part: package,
+                state: found_or_absent(version.is_some()),
+                cure: version
+                    .is_none()
+                    .then(|| format!("{python} -m pip install {wanted}")),
+                found: match version {
+                    Some(version) => format!("{version}, of {python}"),
+                    None => format!("not found by {python}"),
+                },
+                needed_for,
+            }
+        })
+        .collect()
+}
+
+/// Whether a structure can be computed in OpenSees.
+fn opensees() -> Finding {
+    let found = bridges::opensees::find_python(None);
+    Finding {
+        part: "openseespy",
+        state: found_or_absent(found.is_ok()),
+        cure: found.is_err().then(|| bridges::opensees::CURE.to_string()),
+        found: match found {
+            Ok(python) => format!(
+                "{}, of {}",
+                python.openseespy.unwrap_or_default(),
+                python.program.display()
+            ),
+            Err(bridges::opensees::OpenSeesError::NoPython { tried }) => {
+                format!("not found ({tried})")
+            }
+            Err(error) => error.to_string(),
+        },
+        needed_for: "--specimen opensees:MODEL.py",
+    }
+}
+
+fn found_or_absent(is_found: bool) -> State {
+    match is_found {
+        true => State::Good,
+        false => State::Absent,
+    }
+}
+
+/// What a program prints first, if it can be started and ends well.
+fn first_line(command: &mut Command) -> Option<String> {
+    let output = command.stdin(Stdio::null()).output().ok()?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let line = text.lines().next().map(str::to_string);
+    line.filter(|_| output.status.success())
+}

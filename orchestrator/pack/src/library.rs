@@ -1,0 +1,94 @@
+//! Where the FMUs of a system come from: files, or the components of this project.
+
+use std::collections::HashMap;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use fmi_import::{CURE, Description, FmiVersion, Fmu, FmuError};
+use fmi_system::{Files, Library, SystemFile, Value};
+use units::hint;
+
+use crate::{PackedFmu, parameter_sets, supply};
+
+/// FMUs by the name that a system file gives them, each opened once.
+pub struct FmuLibrary {
+    version: FmiVersion,
+    files: Files,
+    /// Components of this project.
+    own: HashMap<PathBuf, Arc<Fmu>>,
+}
+
+impl FmuLibrary {
+    /// A library whose own components are of the given version.
+    pub fn new(version: FmiVersion, directory: Option<&Path>) -> Self {
+        Self {
+            version,
+            files: Files::in_directory(directory),
+            own: HashMap::new(),
+        }
+    }
+
+    /// The library of a system file: with its directory, or its archive.
+    pub fn of(version: FmiVersion, file: &SystemFile) -> Self {
+        Self {
+            files: Files::of(file),
+            ..Self::new(version, None)
+        }
+    }
+}
+
+impl Library for FmuLibrary {
+    /// The FMU called `name`: a path that ends in `.fmu`, or a component of this project.
+    ///
+    /// # Errors
+    /// An unknown name (with the nearest one), a component that does not build, an FMU at fault.
+    fn fmu(&mut self, name: &str) -> Result<Arc<Fmu>, Box<dyn Error>> {
+        if self.files.is_file(name) {
+            return self.files.fmu(name);
+        }
+        let path = &component(name, self.version)?.path;
+        if let Some(fmu) = self.own.get(path) {
+            return Ok(fmu.clone());
+        }
+        let fmu = Fmu::open_own(path).map_err(|error| match error {
+            // The file is not to blame.
+            FmuError::Temporary { .. } => error.to_string(),
+            _ => format!("{error}; {CURE}"),
+        })?;
+        self.own.insert(path.clone(), fmu.clone());
+        Ok(fmu)
+    }
+
+    fn parameters(
+        &mut self,
+        set: &str,
+        component: &Description,
+        directory: Option<&Path>,
+    ) -> Result<Vec<(usize, Value)>, String> {
+        parameter_sets::parameters(set, component, directory)
+    }
+}
+
+/// The packed FMU of a component of this project, checked.
+///
+/// # Errors
+/// An unknown name (with the nearest one), components that cannot be found or built, an FMU that is
+/// damaged or of another version.
+pub fn component(name: &str, version: FmiVersion) -> Result<&'static PackedFmu, Box<dyn Error>> {
+    let packed: Vec<&PackedFmu> = supply::all_fmus()?
+        .iter()
+        .filter(|fmu| fmu.version == version)
+        .collect();
+    let Some(&found) = packed.iter().find(|fmu| fmu.name == name) else {
+        let known = packed.iter().map(|fmu| fmu.name.as_str());
+        let hint = hint(name, known);
+        return Err(format!(
+            "`{name}` is neither a path to an .fmu file nor a component in {}{hint}",
+            supply::folder()?.path.join(version.folder()).display()
+        )
+        .into());
+    };
+    supply::check(found)?;
+    Ok(found)
+}

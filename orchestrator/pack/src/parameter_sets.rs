@@ -1,0 +1,143 @@
+//! Sets of parameters by name: the published models, and files that identification writes.
+
+use std::path::Path;
+
+use identification::identify::model_file::ModelFile;
+use plant::identified::actuator::PublishedActuator;
+use plant::identified::effects::{self, Component};
+use plant::identified::nominal::{shake_table_values, specimen_values};
+use plant::identified::shake_table::ShakeTable;
+use plant::identified::table::Table;
+
+use fmi_import::{Causality, Description};
+use fmi_system::Value;
+use units::hint;
+
+/// Published models of `ShakeTable`.
+const PUBLISHED: [(&str, PublishedActuator); 3] = [
+    ("equation-2-11", PublishedActuator::Equation2_11),
+    ("equation-2-13", PublishedActuator::Equation2_13),
+    ("derounded", PublishedActuator::Derounded),
+];
+
+/// The parameters that the model `name` gives to a component, as position and value; paths are
+/// relative to `directory`. A published model is one of `ShakeTable`; a file gives its actuator
+/// and table to `ShakeTable` and its specimen to `Specimen`, and the effects in it to the
+/// component that has them.
+///
+/// # Errors
+/// An unknown name, a model that must not be simulated (with the reason), a file at fault, a
+/// component that the model says nothing of.
+pub fn parameters(
+    name: &str,
+    component: &Description,
+    directory: Option<&Path>,
+) -> Result<Vec<(usize, Value)>, String> {
+    if name.ends_with(".toml") {
+        let path = directory.unwrap_or(Path::new("")).join(name);
+        return from_file(&path, component);
+    }
+    let found = PUBLISHED.iter().find(|(known, _)| *known == name);
+    let Some(&(_, published)) = found else {
+        let known = PUBLISHED.iter().map(|(known, _)| *known);
+        return Err(format!(
+            "`{name}` is neither a published model nor a path to a MODEL.toml{}",
+            hint(name, known)
+        ));
+    };
+    let actuator = published
+        .for_simulation()
+        .map_err(|error| error.to_string())?;
+    let table = match published {
+        PublishedActuator::Derounded => Table::derounded(),
+        _ => Table::equation_2_28(),
+    };
+    let values = shake_table_values(&ShakeTable { actuator, table });
+    place(&values, component).ok_or_else(|| {
+        format!(
+            "`{name}` is a model of ShakeTable, not of {}",
+            component.model_name
+        )
+    })
+}
+
+fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>, String> {
+    let name = path.display().to_string();
+    let file = ModelFile::read(path).map_err(|error| error.to_string())?;
+    let own = COMPONENTS
+        .into_iter()
+        .find(|(_, mark)| component.position(mark).is_some())
+        .map(|(component, _)| component);
+    let mut values: Vec<(&str, f64)> = Vec::new();
+    if own == Some(Component::ShakeTable) {
+        let rig = file.shake_table(&name).map_err(|error| error.to_string())?;
+        values.extend(shake_table_values(&rig));
+    } else if own != Some(Component::Instrumentation) {
+        let specimen = file.specimen(&name).map_err(|error| error.to_string())?;
+        let specimen = specimen.ok_or_else(|| {
+            format!(
+                "{name}: there is no [specimen], and {} is not a ShakeTable",
+                component.model_name
+            )
+        })?;
+        values.extend(specimen_values(&specimen));
+    }
+    let mut placed = place(&values, component).ok_or_else(|| {
+        format!(
+            "{name}: a model of ShakeTable, Specimen and Instrumentation, not of {}",
+            component.model_name
+        )
+    })?;
+    for (effect, parameters) in &file.effects {
+        if Some(component_of(effect)) != own {
+            continue;
+        }
+        for (parameter, value) in parameters {
+            let parameter = format!("{effect}.{parameter}");
+            let known = component
+                .of(Causality::Parameter)
+                .map(|index| component.variables[index].name.as_str());
+            let position = parameter_position(component, &parameter).ok_or_else(|| {
+                format!(
+                    "{name}: [effects.{effect}]: {} has no parameter `{parameter}`{}",
+                    component.model_name,
+                    hint(&parameter, known)
+                )
+            })?;
+            placed.push((position, Value::Number(*value)));
+        }
+    }
+    if placed.is_empty() {
+        return Err(format!(
+            "{name}: it has nothing for {}",
+            component.model_name
+        ));
+    }
+    Ok(placed)
+}
+
+/// Components that a model file speaks of, each with a parameter that only it has.
+const COMPONENTS: [(Component, &str); 3] = [
+    (Component::ShakeTable, "actuator_a2"),
+    (Component::Specimen, "specimen_absent.absent"),
+    (Component::Instrumentation, "load_cell_bias.offset"),
+];
+
+/// The component that has the parameters of an effect; of one that is unknown, the table.
+pub fn component_of(effect: &str) -> Component {
+    effects::find(effect).map_or(Component::ShakeTable, |effect| effect.component)
+}
+
+fn parameter_position(component: &Description, name: &str) -> Option<usize> {
+    component
+        .of(Causality::Parameter)
+        .find(|&index| component.variables[index].name == name)
+}
+
+/// Positions of the parameters, or nothing where the component lacks one.
+fn place(values: &[(&str, f64)], component: &Description) -> Option<Vec<(usize, Value)>> {
+    values
+        .iter()
+        .map(|&(name, value)| Some((parameter_position(component, name)?, Value::Number(value))))
+        .collect()
+}

@@ -1,0 +1,145 @@
+//! An FMU of this project with other start values: the same library, its own description.
+
+use std::{ops::Range, path::Path};
+
+use fmu_kit::resources::{START_VALUES, variant_token};
+use roxmltree::{Document, Node};
+
+use super::annotation::escape;
+use super::archive::{Entries, archive_bytes, read_archive, write_archive};
+use super::error::{PackError, file_error};
+
+/// A parameter that starts differently.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartValue {
+    /// The parameter's name.
+    pub name: String,
+    /// Its new start value, SI; of an enumeration the number of the choice.
+    pub value: f64,
+    /// What is added to its description, such as a standard error; may be empty.
+    pub note: String,
+}
+
+/// Writes `out`, the FMU `original` with other start values and another model name.
+///
+/// The library finds the values in the FMU's resources, so every importer sees them without
+/// setting anything. The variant has its own token.
+///
+/// # Errors
+/// The original is not an FMU of this project, or one of the names is not a Float64 or enumeration
+/// parameter of it.
+pub fn write_variant(
+    original: &Path,
+    out: &Path,
+    model_name: &str,
+    start_values: &[StartValue],
+) -> Result<(), PackError> {
+    let entries = variant(original, Some(model_name), start_values)?;
+    write_archive(out, &entries, None)
+}
+
+/// The bytes of the FMU `original` with other start values.
+///
+/// # Errors
+/// As [`write_variant`].
+pub fn variant_bytes(original: &Path, start_values: &[StartValue]) -> Result<Vec<u8>, PackError> {
+    let entries = variant(original, None, start_values)?;
+    archive_bytes(&entries).map_err(file_error(original))
+}
+
+fn variant(
+    original: &Path,
+    model_name: Option<&str>,
+    start_values: &[StartValue],
+) -> Result<Entries, PackError> {
+    let fail = |problem: String| PackError::Variant {
+        path: original.into(),
+        problem,
+    };
+    let mut entries = read_archive(original)?;
+    let resource = format!("resources/{START_VALUES}");
+    if entries.contains_key(&resource) {
+        return Err(fail("is a variant itself, expected an original".into()));
+    }
+    let description = entries
+        .get("modelDescription.xml")
+        .and_then(|text| String::from_utf8(text.clone()).ok())
+        .ok_or_else(|| fail("has no readable modelDescription.xml".into()))?;
+    let lines = start_values
+        .iter()
+        .map(|start| format!("{},{}\n", start.name, start.value));
+    let table: String = lines.collect();
+    let changed = change(&description, model_name, start_values, &table).map_err(fail)?;
+    entries.insert("modelDescription.xml".into(), changed.into_bytes());
+    entries.insert(resource, table.into_bytes());
+    Ok(entries)
+}
+
+/// The bytes of the FMU `original` with a further file in its resources.
+///
+/// # Errors
+/// When the original cannot be read.
+pub fn with_resource(original: &Path, name: &str, content: Vec<u8>) -> Result<Vec<u8>, PackError> {
+    let mut entries = read_archive(original)?;
+    entries.insert(format!("resources/{name}"), content);
+    archive_bytes(&entries).map_err(file_error(original))
+}
+
+/// The description with the values of some attributes replaced.
+fn change(
+    description: &str,
+    model_name: Option<&str>,
+    start_values: &[StartValue],
+    table: &str,
+) -> Result<String, String> {
+    let document = Document::parse(description).map_err(|e| e.to_string())?;
+    let root = document.root_element();
+    let mut changes: Vec<(Range<usize>, String)> = Vec::new();
+    let mut replace = |node: Node, attribute: &str, value: String| -> Result<(), String> {
+        let found = node.attribute_node(attribute);
+        let place = found.ok_or_else(|| format!("an attribute `{attribute}` is missing"))?;
+        changes.push((place.range_value(), escape(&value)));
+        Ok(())
+    };
+    if let Some(name) = model_name {
+        replace(root, "modelName", name.into())?;
+    }
+    let name = if root.has_attribute("guid") {
+        "guid"
+    } else {
+        "instantiationToken"
+    };
+    let token = root.attribute(name).ok_or("the token is missing")?;
+    replace(root, name, variant_token(token, table))?;
+    for start in start_values {
+        let variable = root
+            .descendants()
+            .filter(|node| node.attribute("causality") == Some("parameter"))
+            .find(|node| node.attribute("name") == Some(&start.name))
+            .ok_or_else(|| format!("`{}` is not a parameter of it", start.name))?;
+        // In FMI 2.0 type and start value stand in an element of their own.
+        let typed = variable.first_element_child().unwrap_or(variable);
+        let fits = match typed.tag_name().name() {
+            "Real" | "Float64" => start.value.is_finite(),
+            "Enumeration" => start.value.fract() == 0.0,
+            _ => false,
+        };
+        if !fits {
+            return Err(format!(
+                "`{}` = {} is neither Float64 nor an enumeration",
+                start.name, start.value
+            ));
+        }
+        replace(typed, "start", start.value.to_string())?;
+        if !start.note.is_empty() {
+            let about = variable.attribute("description").unwrap_or_default();
+            replace(variable, "description", format!("{about} ({})", start.note))?;
+        }
+    }
+    changes.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
+    let mut text = description.to_string();
+    for (range, value) in changes {
+        text.replace_range(range, &value);
+    }
+    Ok(text)
+}

@@ -1,0 +1,9 @@
+//! Watching a run live: `shakebench run --watch`.
+
+mod scene;
+mod server;
+mod tap;
+
+pub use scene::{Plot, Run, Scene};
+pub use server::Server;
+pub use tap::Tap;

@@ -1,0 +1,401 @@
+use std::path::Path;
+use std::sync::Arc;
+
+use super::*;
+use ::units::INCH;
+use motion::metrics::tracking;
+use motion::{Motion, Options, built_in};
+
+/// A table that follows with a lag and a little ringing: something to look at.
+fn followed(motion: &Motion) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let late = |history: &[f64]| -> Vec<f64> {
+        let mut state = 0.0;
+        history
+            .iter()
+            .enumerate()
+            .map(|(n, value)| {
+                state += 0.25 * (value - state);
+                state * (1.0 + 0.05 * (0.11 * n as f64).sin())
+            })
+            .collect()
+    };
+    (
+        late(&motion.displacement),
+        late(&motion.velocity),
+        late(&motion.acceleration),
+    )
+}
+
+fn run_report() -> Report {
+    let motion = built_in(1, &Options::default()).unwrap();
+    let (displacement, velocity, acceleration) = followed(&motion);
+    let figures = tracking(&motion, &displacement, &acceleration).unwrap();
+    let command: Vec<f64> = motion.velocity.iter().map(|v| 20.0 * v).collect();
+    run(&Run {
+        system: "three-variable",
+        motion: &motion,
+        duration: motion.duration(),
+        displacement: &displacement,
+        velocity: &velocity,
+        acceleration: &acceleration,
+        identity: vec![identity::entry("System", "three-variable")],
+        commands: vec![("control.valve_command".into(), command)],
+        valve_limit: Some(10.0),
+        specimen: Some(SpecimenHistory {
+            drift: motion.displacement.iter().map(|x| -0.2 * x).collect(),
+            force: motion.acceleration.iter().map(|a| 15.0 * a).collect(),
+        }),
+        trip: Some((20.0, "the table left its reference".into())),
+        changed: vec![Changed {
+            name: "control.proportional_gain".into(),
+            value: Cell::Quantity(196.85, Units::of("V/m"), 4),
+            default: Cell::Quantity(137.8, Units::of("V/m"), 4),
+        }],
+        components: vec![Component {
+            name: "control".into(),
+            model: "ThreeVariableControl.fmu".into(),
+            time: Some(0.0123),
+        }],
+        tracking: Some(&figures),
+        ended: "complete",
+        settings: vec![
+            ("FMI version".into(), "3.0".into()),
+            ("real-time factor".into(), Cell::Number(2314.2, 4)),
+        ],
+        footer: "Shakebench 0.1.0".into(),
+    })
+}
+
+/// Every kind of series, both kinds of axes, and text that would break a careless page.
+fn gallery() -> Report {
+    let frequencies: Arc<[f64]> = (0..200)
+        .map(|n| 10_f64.powf(-1.0 + f64::from(n) / 66.0))
+        .collect();
+    let gain: Vec<f64> = frequencies
+        .iter()
+        .map(|f| -10.0 * (1.0 + (f / 5.0).powi(2)).log10())
+        .collect();
+    let at = || Abscissa::At(Arc::clone(&frequencies));
+    let band = Style::Band(gain.iter().map(|g| g + 2.0).collect());
+    let low: Vec<f64> = gain.iter().map(|g| g - 2.0).collect();
+    let every: Vec<usize> = (0..200).step_by(8).collect();
+    let measured: Vec<f64> = every.iter().map(|&n| gain[n] + (n as f64).sin()).collect();
+    let places: Arc<[f64]> = every.iter().map(|&n| frequencies[n]).collect();
+    let turn: Vec<f64> = (0..600).map(|n| 0.03 * f64::from(n)).collect();
+    let drift: Vec<f64> = turn.iter().map(|t| 0.01 * t.sin() * t / 18.0).collect();
+    let force: Vec<f64> = turn
+        .iter()
+        .map(|t| 20.0 * (t + 0.4).sin() * t / 18.0)
+        .collect();
+    Report {
+        title: "A gallery <script>alert(1)</script> & \"more\"".into(),
+        summary: "Nothing </title> here </script> is markup <!-- at all.".into(),
+        identity: vec![identity::entry("System", "<i>")],
+        facts: vec![Fact {
+            label: "Margin".into(),
+            value: Cell::Number(47.3, 3),
+            note: "<b>".into(),
+        }],
+        sections: vec![Section {
+            heading: "Loops".into(),
+            text: vec!["One & all.".into()],
+            notes: vec!["a < b".into()],
+            bars: Vec::new(),
+            tables: vec![Table {
+                caption: "Margins".into(),
+                columns: vec!["loop".into(), "crossover".into(), "stroke".into()],
+                rows: vec![vec![
+                    "outer <i>".into(),
+                    Cell::Quantity(12.5, Units::FREQUENCY, 3),
+                    Cell::Quantity(0.0381, Units::DISPLACEMENT, 3),
+                ]],
+            }],
+            panels: vec![
+                Panel {
+                    title: "Gain </script>".into(),
+                    x: Axis::logarithmic("frequency", Units::FREQUENCY),
+                    y: Axis::linear("gain", Units::DECIBEL),
+                    series: vec![
+                        Series::line("95 %", at(), low).styled(band).coloured(1),
+                        Series::line("model", at(), gain.clone()).coloured(1),
+                        Series::line("measured </script>", Abscissa::At(places), measured)
+                            .styled(Style::Points)
+                            .coloured(2),
+                    ],
+                },
+                Panel {
+                    title: "Loop of the specimen".into(),
+                    x: Axis::linear("drift", Units::DISPLACEMENT),
+                    y: Axis::linear("force", Units::FORCE),
+                    series: vec![
+                        Series::line("specimen", Abscissa::At(drift.into()), force)
+                            .styled(Style::Path),
+                    ],
+                },
+                Panel {
+                    title: "Error against the coupling step".into(),
+                    x: Axis::logarithmic("step", Units::same("ms")),
+                    y: Axis::logarithmic("error", Units::PERCENT).between(0.05, 5.0),
+                    series: vec![
+                        Series::line("slope 1", Abscissa::At([0.25, 2.0].into()), vec![0.2, 1.6])
+                            .styled(Style::Dashed)
+                            .coloured(0),
+                        Series::line(
+                            "found",
+                            Abscissa::At([0.25, 0.5, 1.0, 2.0].into()),
+                            vec![0.21, 0.4, f64::NAN, 1.7],
+                        )
+                        .styled(Style::Points),
+                    ],
+                },
+            ],
+        }],
+        footer: String::new(),
+    }
+}
+
+/// Everything between two markers, which must be there.
+fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+    let start = text.find(from).unwrap() + from.len();
+    &text[start..start + text[start..].find(to).unwrap()]
+}
+
+/// The page without the style sheets, the scripts and the numbers.
+fn structure(page: &str) -> String {
+    let mut rest = page;
+    let mut out = String::new();
+    while let Some(start) = ["<style", "<script"]
+        .iter()
+        .filter_map(|t| rest.find(t))
+        .min()
+    {
+        let close = if rest[start..].starts_with("<style") {
+            "</style>"
+        } else {
+            "</script>"
+        };
+        let inside = start + rest[start..].find('>').unwrap() + 1;
+        out.push_str(&rest[..inside]);
+        rest = &rest[inside + rest[inside..].find(close).unwrap()..];
+    }
+    out + rest
+}
+
+#[test]
+fn the_page_refers_to_nothing_outside_itself() {
+    for report in [run_report(), gallery()] {
+        // Files are handed to the reader as blobs, which is no request.
+        let page = html(&report).unwrap().to_lowercase();
+        let page = page
+            .replace("createobjecturl(", "")
+            .replace("revokeobjecturl(", "");
+        for outside in [
+            "src=",
+            "@import",
+            "url(",
+            "fetch(",
+            "xmlhttprequest",
+            "import(",
+            "sendbeacon",
+            "<iframe",
+            "<object",
+            "<embed",
+            "<base",
+            "websocket(",
+        ] {
+            assert!(!page.contains(outside), "{outside}");
+        }
+        // Addresses stand in the comment of the library's licence only.
+        for (place, _) in page.match_indices("http") {
+            let known = ["https://github.com/leeoniya/uplot", "http-equiv="];
+            assert!(
+                known.iter().any(|known| page[place..].starts_with(known)),
+                "{}",
+                &page[place..place + 60]
+            );
+        }
+        for (place, _) in page.match_indices("href=") {
+            assert!(page[place..].starts_with("href=\"data:,\""));
+        }
+        assert!(page.contains("default-src 'none'"));
+        assert!(
+            page.contains("permission is hereby granted"),
+            "the library's licence"
+        );
+    }
+}
+
+#[test]
+fn the_embedded_numbers_are_json_and_are_the_numbers() {
+    let report = run_report();
+    let page = html(&report).unwrap();
+    let text = between(&page, "id=\"panels\">", "</script>");
+    let panels: serde_json::Value = serde_json::from_str(text).unwrap();
+    let embedded = panels.as_array().unwrap();
+    let given: Vec<&Panel> = report.sections.iter().flat_map(|s| &s.panels).collect();
+    assert_eq!(embedded.len(), given.len());
+    assert_eq!(embedded.len(), page.matches("class=\"chart\"").count());
+    for (embedded, given) in embedded.iter().zip(given) {
+        assert_eq!(embedded["title"], given.title.as_str());
+        for (one, series) in embedded["series"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .zip(&given.series)
+        {
+            let letters = one["y"].as_str().unwrap().trim_end_matches('=').len();
+            assert_eq!(letters * 6 / 8 / 4, series.values.len(), "{}", series.name);
+        }
+    }
+    let text = html(&gallery()).unwrap();
+    let text = between(&text, "id=\"panels\">", "</script>");
+    let panels: serde_json::Value = serde_json::from_str(text).unwrap();
+    assert_eq!(panels[0]["title"], "Gain </script>");
+    assert_eq!(panels[2]["y"]["limits"][1], 5.0);
+}
+
+#[test]
+fn a_long_run_stays_a_small_file() {
+    let motion = built_in(1, &Options::default()).unwrap();
+    let long =
+        |history: &[f64]| -> Vec<f64> { history.iter().cycle().take(30_001).copied().collect() };
+    let motion = Motion {
+        displacement: long(&motion.displacement),
+        velocity: long(&motion.velocity),
+        acceleration: long(&motion.acceleration),
+        ..motion
+    };
+    let (displacement, velocity, acceleration) = followed(&motion);
+    let page = html(&run(&Run {
+        system: "three-variable",
+        motion: &motion,
+        duration: motion.duration(),
+        displacement: &displacement,
+        velocity: &velocity,
+        acceleration: &acceleration,
+        identity: Vec::new(),
+        commands: vec![
+            ("control.valve_command".into(), velocity.clone()),
+            ("interlock.valve_command".into(), velocity.clone()),
+        ],
+        valve_limit: Some(10.0),
+        specimen: Some(SpecimenHistory {
+            drift: displacement.clone(),
+            force: acceleration.clone(),
+        }),
+        trip: Some((20.0, "the table left its reference".into())),
+        changed: Vec::new(),
+        components: Vec::new(),
+        tracking: None,
+        ended: "complete",
+        settings: Vec::new(),
+        footer: String::new(),
+    }))
+    .unwrap();
+    println!("a minute at 500 Hz: {} bytes", page.len());
+    assert!(page.len() < 3_000_000, "{} bytes", page.len());
+}
+
+#[test]
+fn text_is_never_markup() {
+    let page = html(&gallery()).unwrap();
+    let structure = structure(&page);
+    assert!(!structure.contains("<script>alert"));
+    assert!(structure.contains("A gallery &lt;script&gt;"));
+    assert!(!structure.contains("<i>") && !structure.contains("<b>") && !page.contains("<!-- at"));
+    assert_eq!(
+        page.matches("<script").count(),
+        page.matches("</script>").count()
+    );
+    assert_eq!(page.matches("</script>").count(), 3);
+    assert_eq!(page.matches("<title>").count(), 1);
+}
+
+/// A page is as the file in `expected/`, which `SHAKEBENCH_REGENERATE=1` rewrites.
+fn compare(name: &str, structure: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("src/report/expected")
+        .join(name);
+    if std::env::var("SHAKEBENCH_REGENERATE").is_ok_and(|value| value == "1") {
+        std::fs::write(&path, format!("{}\n", structure.trim_end())).unwrap();
+    }
+    let expected = std::fs::read_to_string(&path).unwrap();
+    let pairs = structure.trim_end().lines().zip(expected.lines());
+    for (n, (now, before)) in pairs.enumerate() {
+        assert_eq!(now, before, "{name}:{}", n + 1);
+    }
+    let lines = structure.trim_end().lines().count();
+    assert_eq!(lines, expected.lines().count(), "lines of {name}");
+}
+
+#[test]
+fn structure_of_a_page() {
+    compare("gallery.html", &structure(&html(&gallery()).unwrap()));
+    compare("run.html", &structure(&html(&run_report()).unwrap()));
+}
+
+/// The pictures are well-formed XML, hold a drawing of every series, and no markup of the text.
+#[test]
+fn pictures_are_well_formed() {
+    for report in [run_report(), gallery()] {
+        for panel in report.sections.iter().flat_map(|section| &section.panels) {
+            let picture = svg(panel);
+            let document = roxmltree::Document::parse(&picture).unwrap();
+            assert_eq!(document.root_element().tag_name().name(), "svg");
+            assert!(
+                !picture.contains("NaN") && !picture.contains("inf"),
+                "{}",
+                panel.title
+            );
+            assert!(
+                picture.len() < 200_000,
+                "{}: {} bytes",
+                panel.title,
+                picture.len()
+            );
+            let texts: Vec<&str> = document.descendants().filter_map(|n| n.text()).collect();
+            assert!(texts.contains(&panel.title.as_str()));
+            for series in &panel.series {
+                assert!(texts.contains(&series.name.as_str()), "{}", series.name);
+            }
+        }
+    }
+}
+
+/// A peak is at its coordinates: a triangle with its top at (1 s, 2 in).
+#[test]
+fn a_picture_puts_values_where_the_axes_say() {
+    let panel = Panel {
+        title: "triangle".into(),
+        x: Axis::linear("time", Units::TIME).between(0.0, 2.0),
+        y: Axis::linear("displacement", Units::DISPLACEMENT).between(0.0, 4.0 * INCH),
+        series: vec![Series::history("a", 1.0, &[0.0, 2.0 * INCH, 0.0])],
+    };
+    // The plot lies between x = 76 and 802, y = 42 and 268 of the picture.
+    assert!(
+        svg(&panel).contains("M76.0 268.0L439.0 155.0L802.0 268.0"),
+        "{}",
+        svg(&panel)
+    );
+    // An empty plot is a plot still.
+    let empty = Panel {
+        series: Vec::new(),
+        ..panel
+    };
+    assert!(roxmltree::Document::parse(&svg(&empty)).is_ok());
+}
+
+/// Writes the two pages and a picture where SHAKEBENCH_PAGES says, to be looked at.
+#[test]
+fn pages_to_look_at() {
+    let folder = std::env::var_os("SHAKEBENCH_PAGES").map(std::path::PathBuf::from);
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = folder.unwrap_or_else(|| temporary.path().to_path_buf());
+    for (name, report) in [("run", run_report()), ("gallery", gallery())] {
+        std::fs::write(folder.join(format!("{name}.html")), html(&report).unwrap()).unwrap();
+        for (n, panel) in report.sections.iter().flat_map(|s| &s.panels).enumerate() {
+            std::fs::write(folder.join(format!("{name}-{n}.svg")), svg(panel)).unwrap();
+        }
+    }
+    assert!(std::fs::metadata(folder.join("run.html")).unwrap().len() > 100_000);
+}

@@ -1,3 +1,0 @@
-//! Benchmarks of others, run by their own rules.
-
-pub mod vrths;

@@ -1,0 +1,52 @@
+//! Names and texts as in the archive's files.
+
+use super::super::BEFORE;
+use fmi_system::{Component, Quantity};
+
+/// The output of the motion's component for a tap.
+pub(super) fn tap(quantity: Quantity, ahead: isize) -> String {
+    match ahead {
+        0 => quantity.name().to_string(),
+        -1 => format!("{}{BEFORE}", quantity.name()),
+        ahead => format!("{}[{ahead}]", quantity.name()),
+    }
+}
+
+/// The name of a variable, or of the array that it is an element of.
+pub(super) fn connector_name(part: &Component, position: usize) -> String {
+    let variable = &part.fmu.description.variables[position];
+    match variable.name.rsplit_once('[') {
+        Some((array, _)) if variable.is_element => array.to_string(),
+        _ => variable.name.clone(),
+    }
+}
+
+/// A file's name as part of a URI.
+pub(super) fn uri(name: &str) -> String {
+    const KEPT: &percent_encoding::AsciiSet = &percent_encoding::NON_ALPHANUMERIC
+        .remove(b'-')
+        .remove(b'_')
+        .remove(b'.')
+        .remove(b'~');
+    percent_encoding::utf8_percent_encode(name, KEPT).to_string()
+}
+
+/// A text in an attribute.
+pub(super) fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => out += "&amp;",
+            '<' => out += "&lt;",
+            '>' => out += "&gt;",
+            '"' => out += "&quot;",
+            '\n' => out += "&#10;",
+            '\r' => out += "&#13;",
+            '\t' => out += "&#9;",
+            // XML has no place for these.
+            character if character.is_control() => out.push('\u{fffd}'),
+            character => out.push(character),
+        }
+    }
+    out
+}

@@ -1,0 +1,404 @@
+//! Factors: what they may be, written in a study, and the value at a point of a design.
+
+use serde::Deserialize;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use fmi_system::Setting;
+use units::Quantity;
+
+/// What a factor may be.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// These, one after the other.
+    List(Vec<Setting>),
+    /// Drawn.
+    Drawn(Drawn),
+}
+
+/// A distribution with the unit of its numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drawn {
+    /// The distribution.
+    pub distribution: Distribution,
+    /// Unit of its numbers, as it was written; empty for plain numbers.
+    pub unit: String,
+    /// Whether its numbers are times the value that the system has otherwise.
+    pub is_relative: bool,
+}
+
+/// A distribution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Distribution {
+    /// Even between two bounds.
+    Uniform(f64, f64),
+    /// Even in its logarithm between two bounds.
+    LogUniform(f64, f64),
+    /// Gaussian: mean and standard deviation.
+    Normal(f64, f64),
+    /// Its logarithm is Gaussian: median and standard deviation of the natural logarithm.
+    LogNormal(f64, f64),
+    /// Whole numbers between two bounds, both among them.
+    Integers(i64, i64),
+}
+
+/// A factor's table as written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    list: Option<Vec<Setting>>,
+    range: Option<[Setting; 2]>,
+    steps: Option<usize>,
+    uniform: Option<[Setting; 2]>,
+    loguniform: Option<[Setting; 2]>,
+    normal: Option<[Setting; 2]>,
+    lognormal: Option<[Setting; 2]>,
+    integers: Option<[i64; 2]>,
+    #[serde(default)]
+    relative: bool,
+    of: Option<Vec<String>>,
+}
+
+/// Most values of a list: more are mistakes.
+const MOST_VALUES: usize = 1_000_000;
+
+impl Values {
+    /// Reads a factor as written, and the variables that it names where its own name is none.
+    ///
+    /// # Errors
+    /// What is wrong and what was expected.
+    pub fn read(written: &toml::Value) -> Result<(Self, Option<Vec<String>>), String> {
+        let plain = |error: toml::de::Error| error.message().to_string();
+        let table = match written {
+            toml::Value::Array(_) => {
+                let list = written.clone().try_into().map_err(plain)?;
+                return Ok((Self::list(list)?, None));
+            }
+            toml::Value::Table(table) => table.clone(),
+            single => {
+                return Err(format!(
+                    "{single} is a single value; expected a list such as [1, 2] or a distribution such as \
+                     {{ uniform = [1, 2] }}; values that are the same in all runs belong in [fixed]"
+                ));
+            }
+        };
+        let mut written: Written = toml::Value::Table(table).try_into().map_err(plain)?;
+        let of = written.of.take();
+        Ok((written.check()?, of))
+    }
+
+    fn list(values: Vec<Setting>) -> Result<Self, String> {
+        if values.is_empty() {
+            return Err("is an empty list".to_string());
+        }
+        for (place, value) in values.iter().enumerate() {
+            if values[..place]
+                .iter()
+                .any(|other| other.to_string() == value.to_string())
+            {
+                return Err(format!("has `{value}` twice"));
+            }
+        }
+        Ok(Self::List(values))
+    }
+
+    /// How many there are; none where they are drawn.
+    #[must_use]
+    pub fn count(&self) -> Option<usize> {
+        match self {
+            Self::List(values) => Some(values.len()),
+            Self::Drawn(_) => None,
+        }
+    }
+
+    /// The value where the design has `at`, from 0 on and below 1.
+    #[must_use]
+    pub fn value(&self, at: f64) -> Setting {
+        match self {
+            Self::List(values) => {
+                let place = (at * values.len() as f64) as usize;
+                values[place.min(values.len() - 1)].clone()
+            }
+            Self::Drawn(drawn) => drawn.value(at),
+        }
+    }
+
+    /// Whether its values are times what the system has otherwise.
+    #[must_use]
+    pub fn is_relative(&self) -> bool {
+        matches!(self, Self::Drawn(drawn) if drawn.is_relative)
+    }
+}
+
+impl Written {
+    fn check(self) -> Result<Values, String> {
+        let Self {
+            list,
+            range,
+            steps,
+            uniform,
+            loguniform,
+            normal,
+            lognormal,
+            integers,
+            relative,
+            of: _,
+        } = self;
+        let given = [
+            list.is_some(),
+            range.is_some(),
+            uniform.is_some(),
+            loguniform.is_some(),
+            normal.is_some(),
+            lognormal.is_some(),
+            integers.is_some(),
+        ];
+        if given.iter().filter(|given| **given).count() != 1 {
+            return Err(
+                "expected one of list, range, uniform, loguniform, normal, lognormal, integers"
+                    .to_string(),
+            );
+        }
+        if range.is_none() && steps.is_some() {
+            return Err("`steps` belongs to `range`".to_string());
+        }
+        if relative && (list.is_some() || range.is_some() || integers.is_some()) {
+            return Err("`relative` belongs to a distribution".to_string());
+        }
+        if let Some(values) = list {
+            return Values::list(values);
+        }
+        if let Some([low, high]) = range {
+            let steps =
+                steps.ok_or("`range` needs `steps`, such as { range = [0.2, 1.0], steps = 5 }")?;
+            if !(2..=MOST_VALUES).contains(&steps) {
+                return Err(format!("steps = {steps}; expected 2 to {MOST_VALUES}"));
+            }
+            let (low, high, unit) = pair(&low, &high)?;
+            ordered(low, high)?;
+            let value = |step: usize| match step + 1 == steps {
+                // To the digit.
+                true => high,
+                false => low + (high - low) * step as f64 / (steps - 1) as f64,
+            };
+            return Ok(Values::List(
+                (0..steps)
+                    .map(|step| with_unit(value(step), &unit))
+                    .collect(),
+            ));
+        }
+        if let Some([low, high]) = integers {
+            if low > high {
+                return Err(format!("the range from {low} to {high} is empty"));
+            }
+            return Ok(Values::Drawn(Drawn {
+                distribution: Distribution::Integers(low, high),
+                unit: String::new(),
+                is_relative: false,
+            }));
+        }
+        let (distribution, unit) = if let Some([low, high]) = uniform {
+            let (low, high, unit) = pair(&low, &high)?;
+            ordered(low, high)?;
+            (Distribution::Uniform(low, high), unit)
+        } else if let Some([low, high]) = loguniform {
+            let (low, high, unit) = pair(&low, &high)?;
+            ordered(low, high)?;
+            positive(low)?;
+            (Distribution::LogUniform(low, high), unit)
+        } else if let Some([mean, deviation]) = normal {
+            let (mean, unit) = quantity(&mean)?;
+            let share = share(&deviation);
+            let deviation = match share {
+                Some(share) => share * mean.abs(),
+                None => self::deviation(&deviation, &unit)?,
+            };
+            positive(deviation)?;
+            (Distribution::Normal(mean, deviation), unit)
+        } else {
+            let [median, deviation] = lognormal.ok_or("expected a distribution")?;
+            let (median, unit) = quantity(&median)?;
+            positive(median)?;
+            let deviation = match share(&deviation) {
+                Some(share) => share,
+                None => self::deviation(&deviation, "")?,
+            };
+            positive(deviation)?;
+            (Distribution::LogNormal(median, deviation), unit)
+        };
+        if relative && !unit.is_empty() {
+            return Err(format!(
+                "relative values are multiples of the system's own; expected plain numbers, not \
+                 {unit}"
+            ));
+        }
+        Ok(Values::Drawn(Drawn {
+            distribution,
+            unit,
+            is_relative: relative,
+        }))
+    }
+}
+
+impl Drawn {
+    fn value(&self, at: f64) -> Setting {
+        if let Distribution::Integers(low, high) = self.distribution {
+            let count = (high - low) as f64 + 1.0;
+            return Setting::Integer(low.saturating_add((at * count) as i64).min(high));
+        }
+        with_unit(self.distribution.quantile(at), &self.unit)
+    }
+}
+
+impl Distribution {
+    /// The value below which a share `at` of all lies.
+    #[must_use]
+    pub fn quantile(&self, at: f64) -> f64 {
+        // The ends of a Gaussian lie nowhere.
+        const EDGE: f64 = 1.0 / (1_u64 << 33) as f64;
+        let gaussian = || Normal::standard().inverse_cdf(at.clamp(EDGE, 1.0 - EDGE));
+        match *self {
+            Self::Uniform(low, high) => low + (high - low) * at,
+            Self::LogUniform(low, high) => low * (high / low).powf(at),
+            Self::Normal(mean, deviation) => mean + deviation * gaussian(),
+            Self::LogNormal(median, deviation) => median * (deviation * gaussian()).exp(),
+            Self::Integers(low, high) => low as f64 + ((high - low) as f64 + 1.0) * at,
+        }
+    }
+}
+
+/// A number in a unit as a setting.
+pub(crate) fn with_unit(value: f64, unit: &str) -> Setting {
+    match unit {
+        "" => Setting::Number(value),
+        unit => Setting::Text(format!("{value:?} {unit}")),
+    }
+}
+
+/// A number with the text of its unit.
+fn quantity(written: &Setting) -> Result<(f64, String), String> {
+    match written {
+        Setting::Integer(number) => Ok((*number as f64, String::new())),
+        Setting::Number(number) if number.is_finite() => Ok((*number, String::new())),
+        Setting::Text(text) => {
+            let found = Quantity::parse(text).map_err(|error| error.to_string())?;
+            Ok((found.value, found.unit.text))
+        }
+        other => Err(format!("`{other}` is not a number")),
+    }
+}
+
+/// Two numbers in the unit of the first.
+fn pair(first: &Setting, second: &Setting) -> Result<(f64, f64, String), String> {
+    let (low, unit) = quantity(first)?;
+    Ok((low, deviation(second, &unit)?, unit))
+}
+
+/// A number in `unit`.
+fn deviation(written: &Setting, unit: &str) -> Result<f64, String> {
+    let (value, own) = quantity(written)?;
+    if own == unit {
+        return Ok(value);
+    }
+    if own.is_empty() {
+        return Err(format!("`{written}` has no unit; expected {unit}"));
+    }
+    units::convert(value, &own, unit).map_err(|error| error.to_string())
+}
+
+/// The share in `"5 %"`.
+fn share(written: &Setting) -> Option<f64> {
+    let Setting::Text(text) = written else {
+        return None;
+    };
+    let number = text.trim().strip_suffix('%')?.trim().parse::<f64>().ok()?;
+    Some(number / 100.0)
+}
+
+fn ordered(low: f64, high: f64) -> Result<(), String> {
+    match low < high {
+        true => Ok(()),
+        false => Err(format!("the range from {low} to {high} is empty")),
+    }
+}
+
+fn positive(number: f64) -> Result<(), String> {
+    match number > 0.0 {
+        true => Ok(()),
+        false => Err(format!("{number} is not positive")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Values, String> {
+        let table: toml::Table = toml::from_str(&format!("x = {text}")).unwrap();
+        Values::read(&table["x"]).map(|(values, _)| values)
+    }
+
+    #[test]
+    fn values_keep_the_unit_in_which_they_were_written() {
+        let even = read(r#"{ uniform = ["80 lbf/in", "120 lbf/in"] }"#).unwrap();
+        assert_eq!(even.value(0.25), Setting::Text("90.0 lbf/in".into()));
+        let mixed = read(r#"{ uniform = ["1 in", "50.8 mm"] }"#).unwrap();
+        assert_eq!(mixed.value(0.5), Setting::Text("1.5 in".into()));
+        let list = read("{ range = [0.2, 1.0], steps = 5 }").unwrap();
+        assert_eq!(list.count(), Some(5));
+        assert_eq!(list.value(0.99), Setting::Number(1.0));
+        let whole = read("{ integers = [1, 3] }").unwrap();
+        assert_eq!(whole.value(0.0), Setting::Integer(1));
+        assert_eq!(whole.value(0.999), Setting::Integer(3));
+    }
+
+    /// Quantiles of the standard normal from tables: 84.134 % at 1, 97.725 % at 2.
+    #[test]
+    fn distributions_have_their_quantiles() {
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-6 * b.abs(), "{a} is not {b}");
+        let quantile = |text, at| match read(text).unwrap().value(at) {
+            Setting::Number(number) => number,
+            other => panic!("{other}"),
+        };
+        close(
+            quantile("{ normal = [10.0, 2.0] }", 0.841_344_746_068_543),
+            12.0,
+        );
+        close(
+            quantile(r#"{ normal = [10.0, "5 %"] }"#, 0.977_249_868_051_821),
+            11.0,
+        );
+        close(
+            quantile("{ lognormal = [3.0, 0.4] }", 0.841_344_746_068_543),
+            3.0 * 0.4_f64.exp(),
+        );
+        close(quantile("{ loguniform = [0.5, 2.0] }", 0.5), 1.0);
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused() {
+        for (text, expected) in [
+            ("5", "belong in [fixed]"),
+            ("[]", "empty list"),
+            ("[1, 1]", "`1` twice"),
+            ("{ uniform = [2, 1] }", "range from 2 to 1 is empty"),
+            ("{ integers = [2, 1] }", "range from 2 to 1 is empty"),
+            (
+                r#"{ uniform = ["1 in", 2] }"#,
+                "`2` has no unit; expected in",
+            ),
+            (r#"{ uniform = ["1 in", "2 s"] }"#, "s"),
+            ("{ loguniform = [0, 1] }", "not positive"),
+            ("{ normal = [1, 0] }", "not positive"),
+            ("{ range = [0, 1] }", "needs `steps`"),
+            ("{ uniform = [0, 1], normal = [0, 1] }", "expected one of"),
+            ("{ gauss = [0, 1] }", "gauss"),
+            (
+                r#"{ uniform = ["1 in", "2 in"], relative = true }"#,
+                "plain numbers",
+            ),
+        ] {
+            let error = read(text).unwrap_err();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+    }
+}

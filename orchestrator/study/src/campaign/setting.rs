@@ -1,0 +1,313 @@
+//! What a study may fix or vary: the keys of its file, and what each does to a request.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+
+use fmi_import::FmiVersion;
+use fmi_master::Algorithm;
+use fmi_system::{Setting, SystemFile};
+use laboratory::run::experiment::{Request, is_file};
+use laboratory::systems::built_in;
+use laboratory::systems::tuning::Tuning;
+use motion::Scaling;
+use units::{STANDARD_GRAVITY, hint, value_in};
+
+/// A key of `[fixed]` or `[factors]`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Key {
+    /// `controller` or `system`.
+    System,
+    /// `plant`
+    Plant,
+    /// `specimen`
+    Specimen,
+    /// `structure`
+    Structure,
+    /// `tuning`
+    Tuning,
+    /// `control_model`
+    ControlModel,
+    /// `fmi`
+    Fmi,
+    /// `record`
+    Record,
+    /// `reference`
+    Reference,
+    /// `seed` of the built-in motion.
+    Seed,
+    /// `scale`
+    Scale,
+    /// `pga`
+    PeakAcceleration,
+    /// `peak`
+    PeakDisplacement,
+    /// `duration`
+    Duration,
+    /// `step`
+    Step,
+    /// `algorithm`
+    Algorithm,
+    /// A variable of an instance.
+    Variable(String),
+    /// Variables of instances that are the same, or the same times what each of them is.
+    Variables(Vec<String>),
+}
+
+/// The keys that are not variables.
+const KEYS: [(&str, Key); 17] = [
+    ("controller", Key::System),
+    ("system", Key::System),
+    ("plant", Key::Plant),
+    ("specimen", Key::Specimen),
+    ("structure", Key::Structure),
+    ("tuning", Key::Tuning),
+    ("control_model", Key::ControlModel),
+    ("fmi", Key::Fmi),
+    ("record", Key::Record),
+    ("reference", Key::Reference),
+    ("seed", Key::Seed),
+    ("scale", Key::Scale),
+    ("pga", Key::PeakAcceleration),
+    ("peak", Key::PeakDisplacement),
+    ("duration", Key::Duration),
+    ("step", Key::Step),
+    ("algorithm", Key::Algorithm),
+];
+
+/// The value of `control_model` with which controllers are designed on recordings of each run's own rig.
+pub const OWN_MODEL: &str = "own";
+/// The value of `control_model` with which they are designed as without it.
+pub const USUAL_MODEL: &str = "usual";
+
+impl Key {
+    /// The key of that name.
+    ///
+    /// # Errors
+    /// An unknown name, with the nearest one.
+    pub fn of(name: &str) -> Result<Self, String> {
+        if let Some((_, key)) = KEYS.iter().find(|(known, _)| *known == name) {
+            return Ok(key.clone());
+        }
+        if name
+            .split_once('.')
+            .is_some_and(|(a, b)| !a.is_empty() && !b.is_empty())
+        {
+            return Ok(Self::Variable(name.to_string()));
+        }
+        let known = KEYS.map(|(known, _)| known);
+        Err(format!(
+            "is an unknown key{}; expected one of {}, or a variable as \"instance.variable\"",
+            hint(name, known),
+            known.join(", ")
+        ))
+    }
+
+    /// The key of several variables under a name of their own.
+    ///
+    /// # Errors
+    /// A name that a key or a variable has, variables that are none.
+    pub fn together(name: &str, variables: Vec<String>) -> Result<Self, String> {
+        if Self::of(name).is_ok() {
+            return Err(
+                "a factor with `of` needs its own name; expected a name without a \
+                 point"
+                    .to_string(),
+            );
+        }
+        if variables.is_empty() {
+            return Err("`of` is empty; expected variables".to_string());
+        }
+        for variable in &variables {
+            if !matches!(Self::of(variable), Ok(Self::Variable(_))) {
+                return Err(format!(
+                    "`{variable}` is not a variable; expected \"instance.variable\""
+                ));
+            }
+        }
+        Ok(Self::Variables(variables))
+    }
+
+    /// The variables that it sets.
+    #[must_use]
+    pub fn variables(&self) -> &[String] {
+        match self {
+            Self::Variable(name) => std::slice::from_ref(name),
+            Self::Variables(names) => names,
+            _ => &[],
+        }
+    }
+
+    /// The unit in which a number alone is, and in which it is put into the table; none for texts.
+    pub(super) fn unit(&self) -> Option<&'static str> {
+        match self {
+            Self::Seed | Self::Scale | Self::Variables(_) => Some(""),
+            Self::PeakAcceleration => Some("g"),
+            Self::PeakDisplacement => Some("m"),
+            Self::Duration | Self::Step => Some("s"),
+            _ => None,
+        }
+    }
+
+    /// Whether its values are files.
+    pub(super) fn is_path(&self, value: &str) -> bool {
+        match self {
+            Self::Record | Self::Reference => true,
+            Self::ControlModel => ![OWN_MODEL, USUAL_MODEL].contains(&value),
+            Self::System => is_file(value),
+            Self::Plant => value.ends_with(".toml"),
+            _ => false,
+        }
+    }
+
+    /// Whether it chooses components, not their values.
+    pub(super) fn is_structural(&self) -> bool {
+        matches!(
+            self,
+            Self::System
+                | Self::Plant
+                | Self::Specimen
+                | Self::Structure
+                | Self::Tuning
+                | Self::ControlModel
+                | Self::Fmi
+        )
+    }
+
+    /// Puts a value into a request; paths count from `folder`.
+    ///
+    /// # Errors
+    /// What is wrong and what was expected.
+    pub(super) fn apply(
+        &self,
+        value: &Setting,
+        folder: &Path,
+        request: &mut Request,
+    ) -> Result<(), String> {
+        let text = || match value {
+            Setting::Text(text) => Ok(text.clone()),
+            other => Err(format!("`{other}` is not text")),
+        };
+        let path = || text().map(|text| folder.join(text));
+        let number = || -> Result<f64, String> {
+            let number = self.number(value)?;
+            match number > 0.0 && number.is_finite() {
+                true => Ok(number),
+                false => Err(format!("`{value}` is not positive")),
+            }
+        };
+        let known = |name: String, known: Vec<&str>| {
+            if known.contains(&name.as_str()) {
+                return Ok(name);
+            }
+            Err(format!(
+                "`{name}` is unknown{}; expected one of {}",
+                hint(&name, known.iter().copied()),
+                known.join(", ")
+            ))
+        };
+        match self {
+            Self::System => {
+                let name = text()?;
+                request.system = match is_file(&name) {
+                    true => folder.join(name).display().to_string(),
+                    false => {
+                        built_in::check(&name).map_err(|error| error.to_string())?;
+                        name
+                    }
+                };
+            }
+            Self::Plant => {
+                let name = text()?;
+                request.plant = match name.ends_with(".toml") {
+                    true => folder.join(name).display().to_string(),
+                    false => known(name, built_in::plants().collect())?,
+                };
+            }
+            Self::Specimen => request.specimen = known(text()?, built_in::specimens().collect())?,
+            Self::Structure => {
+                request.structure = Some(known(text()?, built_in::structures().collect())?);
+            }
+            Self::Tuning => request.tuning = Some(choice::<Tuning>(&text()?)?),
+            Self::ControlModel => {
+                let name = text()?;
+                request.control_model = self.is_path(&name).then(|| folder.join(name));
+            }
+            Self::Fmi => {
+                request.fmi = match value {
+                    Setting::Integer(2) => FmiVersion::V2,
+                    Setting::Integer(3) => FmiVersion::V3,
+                    other => return Err(format!("`{other}` is not a version; expected 2 or 3")),
+                };
+            }
+            Self::Record => request.record = Some(path()?),
+            Self::Reference => request.reference = Some(path()?),
+            Self::Seed => {
+                request.seed = match value {
+                    Setting::Integer(seed) if *seed >= 0 => *seed as u64,
+                    other => return Err(format!("`{other}` is not a seed; expected 0, 1, 2, ...")),
+                };
+            }
+            Self::Scale => request.scaling = Some(Scaling::Factor(number()?)),
+            Self::PeakAcceleration => {
+                request.scaling = Some(Scaling::PeakAcceleration(number()? * STANDARD_GRAVITY));
+            }
+            Self::PeakDisplacement => request.scaling = Some(Scaling::PeakDisplacement(number()?)),
+            Self::Duration => request.duration_s = Some(number()?),
+            Self::Step => request.step_s = Some(number()?),
+            Self::Algorithm => request.algorithm = Some(choice::<Algorithm>(&text()?)?),
+            Self::Variable(_) | Self::Variables(_) => {
+                let set = self
+                    .variables()
+                    .iter()
+                    .map(|name| format!("{name}={value}"));
+                request.set.extend(set);
+            }
+        }
+        Ok(())
+    }
+
+    /// The value as a number in [`Key::unit`].
+    ///
+    /// # Errors
+    /// No number, or a unit that does not fit.
+    pub(super) fn number(&self, value: &Setting) -> Result<f64, String> {
+        match value {
+            Setting::Number(number) => Ok(*number),
+            Setting::Integer(number) => Ok(*number as f64),
+            Setting::Text(text) => {
+                value_in(text, self.unit().unwrap_or_default()).map_err(|error| error.to_string())
+            }
+            other => Err(format!("`{other}` is not a number")),
+        }
+    }
+}
+
+fn choice<T: ValueEnum>(name: &str) -> Result<T, String> {
+    T::from_str(name, false).map_err(|_| {
+        let known: Vec<String> = T::value_variants()
+            .iter()
+            .filter_map(|one| Some(one.to_possible_value()?.get_name().to_string()))
+            .collect();
+        format!("`{name}` is none of {}", known.join(", "))
+    })
+}
+
+/// The files that a value of a key needs: itself, and what a system file refers to.
+pub(super) fn files(key: &Key, value: &Setting, folder: &Path) -> Vec<PathBuf> {
+    let Setting::Text(name) = value else {
+        return Vec::new();
+    };
+    if !key.is_path(name) {
+        return Vec::new();
+    }
+    let path = folder.join(name);
+    let mut all = vec![path.clone()];
+    if matches!(key, Key::System | Key::Plant) && name.ends_with(".toml") {
+        // One that cannot be read is at fault when its system is assembled.
+        if let Ok(file) = SystemFile::read(&path) {
+            all.extend(file.files());
+        }
+    }
+    all
+}

@@ -1,0 +1,94 @@
+//! Connections checked against the FMUs: names, types and units.
+
+use super::checked::{Component, Connection, Source};
+use super::link::{Link, Origin};
+use super::lookup::{component_index, find};
+use super::passage::End;
+use super::table::InputTable;
+use fmi_import::{Causality, Kind, Variable};
+
+/// The connection of a link, after its names, types and units were checked.
+///
+/// # Errors
+/// What does not hold.
+pub(super) fn connect(
+    components: &[Component],
+    tables: &[InputTable],
+    link: &Link,
+) -> Result<Connection, String> {
+    let Link { from, to, .. } = link;
+    let component = component_index(components, &to.component)?;
+    let input = find(&components[component].fmu, &to.variable, Causality::Input)?;
+    let target = &components[component].fmu.description.variables[input];
+
+    let (source, start) = match from {
+        Origin::Reference { quantity, ahead } => {
+            let source = Source::Reference {
+                quantity: *quantity,
+                ahead: *ahead,
+            };
+            let start = End {
+                kind: &Kind::Float64,
+                unit: Some(quantity.unit()),
+                base: Some(quantity.base_unit()),
+            };
+            (source, start)
+        }
+        Origin::Output(name) => {
+            let table = tables.iter().position(|table| table.name == name.component);
+            if let Some(table) = table {
+                let column = tables[table].find(&name.variable)?;
+                // What a table holds, it holds for this input: whole numbers and truth values too.
+                let start = End {
+                    kind: match target.kind {
+                        Kind::String | Kind::Binary | Kind::Clock => &Kind::Float64,
+                        ref kind => kind,
+                    },
+                    unit: tables[table].units[column].as_deref(),
+                    base: None,
+                };
+                (Source::Table { table, column }, start)
+            } else {
+                let component = component_index(components, &name.component)?;
+                let fmu = &components[component].fmu;
+                let variable = find(fmu, &name.variable, Causality::Output)?;
+                let output = &fmu.description.variables[variable];
+                let source = Source::Output {
+                    component,
+                    variable,
+                };
+                (source, end(output))
+            }
+        }
+    };
+    if !link.way.maps() {
+        fits(start.kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
+    }
+    let passage = link
+        .way
+        .between(start, end(target))
+        .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
+    Ok(Connection {
+        source,
+        component,
+        input,
+        passage,
+    })
+}
+
+/// A variable as an end of a way.
+fn end(variable: &Variable) -> End<'_> {
+    End {
+        kind: &variable.kind,
+        unit: variable.unit.as_deref(),
+        base: variable.base_unit,
+    }
+}
+
+fn fits(kind: &Kind, target: &Variable) -> Result<(), String> {
+    if kind.drives(&target.kind) {
+        return Ok(());
+    }
+    let (from, to) = (kind.name(), target.kind.name());
+    Err(format!("is a {from} and cannot drive the {to}"))
+}

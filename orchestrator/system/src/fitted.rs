@@ -1,0 +1,106 @@
+//! An FMU as its system has it: with arrays of other sizes, and with units that the file gives.
+
+use std::sync::Arc;
+
+use super::file::ComponentFile;
+use super::given::as_toml;
+use super::value::{self, Value};
+use fmi_import::{BaseUnit, Fmu, Kind};
+use units::{Unit, hint};
+
+/// The FMU with arrays as large as the structural parameters say that the file or the command line
+/// gives.
+pub(super) fn resized(
+    fmu: Arc<Fmu>,
+    name: &str,
+    part: &ComponentFile,
+    settings: &[String],
+) -> Result<Arc<Fmu>, String> {
+    let description = &fmu.description;
+    let structural = |variable: &str| {
+        let position = description.position(variable)?;
+        let sizes_arrays = description.variables[position].is_structural;
+        sizes_arrays.then_some(position)
+    };
+    let mut sizes: Vec<(usize, u64)> = Vec::new();
+    let mut note = |position: usize, value: Value| {
+        let size = match value {
+            Value::Unsigned(size) => Some(size),
+            Value::Signed(size) => u64::try_from(size).ok(),
+            Value::Number(size) => Some(size as u64),
+            Value::Text(_) => None,
+        };
+        if let Some(size) = size {
+            sizes.retain(|(known, _)| *known != position);
+            sizes.push((position, size));
+        }
+    };
+    for (variable, written) in &part.parameters {
+        if let Some(position) = structural(variable) {
+            note(
+                position,
+                value::read(&description.variables[position], written)?,
+            );
+        }
+    }
+    for setting in settings {
+        if let Some((variable, text)) = setting.split_once('=')
+            && let Some(variable) = variable.trim().strip_prefix(name)
+            && let Some(variable) = variable.strip_prefix('.')
+            && let Some(position) = structural(variable)
+        {
+            let variable = &description.variables[position];
+            note(
+                position,
+                value::read(variable, &as_toml(variable, text.trim()))?,
+            );
+        }
+    }
+    if sizes.is_empty() {
+        return Ok(fmu);
+    }
+    fmu.resized(&sizes).map_err(|error| error.to_string())
+}
+
+/// The FMU with the units that the file gives to its variables.
+pub(super) fn with_units(
+    fmu: Arc<Fmu>,
+    part: &ComponentFile,
+) -> Result<Arc<Fmu>, (String, String)> {
+    if part.units.is_empty() {
+        return Ok(fmu);
+    }
+    let mut changed = Fmu::clone(&fmu);
+    for (variable, unit) in &part.units {
+        let fault = |reason: String| (variable.clone(), reason);
+        let found = fmu
+            .description
+            .array(variable)
+            .or_else(|| fmu.description.position(variable).map(|at| at..at + 1));
+        let found = found.ok_or_else(|| {
+            let known = fmu.description.variables.iter();
+            let known = known.map(|variable| variable.name.as_str());
+            fault(format!("no such variable{}", hint(variable, known)))
+        })?;
+        // A unit that only FMUs know is taken by its name.
+        let parsed = Unit::parse(unit).ok().and_then(|unit| unit.base_unit());
+        let base = parsed.map(|base| {
+            let [kg, m, s, a, k, mol, cd, _] = base.exponents;
+            BaseUnit {
+                exponents: [kg, m, s, a, k, mol, cd],
+                factor: base.factor,
+                offset: 0.0,
+            }
+        });
+        for position in found {
+            let variable = &mut changed.description.variables[position];
+            if !matches!(variable.kind, Kind::Float64 | Kind::Float32) {
+                let kind = variable.kind.name();
+                return Err(fault(format!("a {kind} has no unit")));
+            }
+            variable.unit = Some(unit.clone());
+            variable.base_unit = base;
+        }
+    }
+    Ok(Arc::new(changed))
+}

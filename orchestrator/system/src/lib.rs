@@ -1,0 +1,30 @@
+//! Systems: components, how they are connected, and the experiment; read from TOML or put together
+//! in code, and checked against the FMUs before anything is run.
+
+mod assemble;
+mod checked;
+mod connection;
+mod ending;
+mod error;
+mod file;
+mod fitted;
+mod given;
+mod graph;
+mod library;
+mod link;
+mod lookup;
+mod passage;
+mod table;
+mod value;
+mod written;
+
+pub use assemble::assemble;
+pub use checked::{Component, Connection, DEFAULT_PERIOD, Source, System};
+pub use error::SystemError;
+pub use file::{ComponentFile, ElementFile, ExperimentFile, SystemFile};
+pub use graph::{Operation, Schedule};
+pub use library::{Archive, Files, Library};
+pub use link::{Link, Origin, Quantity, VariableName};
+pub use passage::{DeclaredUnit, Hop, Passage, Transformation, Way};
+pub use table::{Between, InputTable, TableFile};
+pub use value::{Declared, Setting, Value, percent};

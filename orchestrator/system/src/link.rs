@@ -1,0 +1,277 @@
+//! Connections by names, `"table.displacement -> control.measured_displacement"`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::passage::Way;
+use fmi_import::BaseUnit;
+use units::hint;
+
+/// A variable of a component, `component.variable`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[serde(try_from = "String")]
+pub struct VariableName {
+    /// The component's name in the system.
+    pub component: String,
+    /// The variable's name, which may have points in it.
+    pub variable: String,
+}
+
+/// Where a connection begins.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Origin {
+    /// The motion that the table is asked for.
+    Reference {
+        /// What of it.
+        quantity: Quantity,
+        /// How many samples ahead of the present one; negative: before it.
+        ahead: isize,
+    },
+    /// An output of a component.
+    Output(VariableName),
+}
+
+/// What of the reference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Quantity {
+    /// Displacement, m.
+    Displacement,
+    /// Velocity, m/s.
+    Velocity,
+    /// Acceleration, m/s².
+    Acceleration,
+}
+
+impl Quantity {
+    /// All of them, in the order of their results.
+    pub const ALL: [Self; 3] = [Self::Displacement, Self::Velocity, Self::Acceleration];
+
+    /// Its name as an output of `reference`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+        }
+    }
+
+    /// Its unit in SI.
+    pub fn base_unit(self) -> BaseUnit {
+        let seconds = match self {
+            Self::Displacement => 0,
+            Self::Velocity => -1,
+            Self::Acceleration => -2,
+        };
+        BaseUnit {
+            exponents: [0, 1, seconds, 0, 0, 0, 0],
+            factor: 1.0,
+            offset: 0.0,
+        }
+    }
+
+    /// Its unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Displacement => "m",
+            Self::Velocity => "m/s",
+            Self::Acceleration => "m/s2",
+        }
+    }
+}
+
+/// A connection by names, before they are looked up in the FMUs; as text `from -> to`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Link {
+    /// Where the value comes from.
+    pub from: Origin,
+    /// The input that takes it.
+    pub to: VariableName,
+    /// What is done to the value on its way, besides conversions between the FMUs' units.
+    pub way: Way,
+    /// Its line in the file.
+    pub line: Option<usize>,
+}
+
+/// Samples further ahead or behind are mistakes.
+const FARTHEST: isize = 100_000;
+
+impl VariableName {
+    /// The variable of a component.
+    pub fn new(component: &str, variable: &str) -> Self {
+        Self {
+            component: component.to_string(),
+            variable: variable.to_string(),
+        }
+    }
+}
+
+impl FromStr for VariableName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (component, variable) = text
+            .split_once('.')
+            .ok_or_else(|| format!("`{text}` should read component.variable"))?;
+        Ok(Self::new(component, variable))
+    }
+}
+
+impl TryFrom<String> for VariableName {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl fmt::Display for VariableName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.component, self.variable)
+    }
+}
+
+impl Origin {
+    /// An output of a component.
+    pub fn output(component: &str, variable: &str) -> Self {
+        Self::Output(VariableName::new(component, variable))
+    }
+
+    /// The reference at the present sample.
+    pub fn reference(quantity: Quantity) -> Self {
+        Self::Reference { quantity, ahead: 0 }
+    }
+}
+
+impl FromStr for Origin {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let name: VariableName = text.parse()?;
+        if name.component != "reference" {
+            return Ok(Self::Output(name));
+        }
+        reference(&name.variable).ok_or_else(|| {
+            let known = Quantity::ALL.into_iter().map(Quantity::name);
+            format!(
+                "the reference has no `{0}`{1} (or `displacement[3]`, three samples ahead)",
+                name.variable,
+                hint(&name.variable, known)
+            )
+        })
+    }
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Reference { quantity, ahead: 0 } => write!(f, "reference.{}", quantity.name()),
+            Self::Reference { quantity, ahead } => {
+                write!(f, "reference.{}[{ahead}]", quantity.name())
+            }
+            Self::Output(name) => name.fmt(f),
+        }
+    }
+}
+
+impl fmt::Display for Link {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} -> {}", self.from, self.to)
+    }
+}
+
+impl From<Link> for String {
+    fn from(link: Link) -> Self {
+        link.to_string()
+    }
+}
+
+impl TryFrom<String> for Link {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let (from, to) = ends(&text)?;
+        Ok(Self {
+            from: from.parse()?,
+            to: to.parse()?,
+            way: Way::default(),
+            line: None,
+        })
+    }
+}
+
+impl Link {
+    /// Where it stands, for messages.
+    pub(super) fn place(&self) -> String {
+        match self.line {
+            Some(line) => format!("connection `{self}` (line {line})"),
+            None => format!("connection `{self}`"),
+        }
+    }
+}
+
+/// Both sides of a connection.
+fn ends(text: &str) -> Result<(&str, &str), String> {
+    let (from, to) = text
+        .split_once("->")
+        .ok_or("expected \"component.output -> component.input\"")?;
+    Ok((from.trim(), to.trim()))
+}
+
+/// The connections that a text stands for; `[a..b]` on both sides stands for several.
+///
+/// # Errors
+/// What was expected.
+pub(super) fn parse(text: &str, line: usize) -> Result<Vec<Link>, String> {
+    let (from, to) = ends(text)?;
+    let (from, to) = (expand(from)?, expand(to)?);
+    if from.len() != to.len() {
+        return Err(format!(
+            "{} values on the left and {} on the right",
+            from.len(),
+            to.len()
+        ));
+    }
+    let link = |(from, to): (String, String)| {
+        Ok(Link {
+            from: from.parse()?,
+            to: to.parse()?,
+            way: Way::default(),
+            line: Some(line),
+        })
+    };
+    from.into_iter().zip(to).map(link).collect()
+}
+
+fn expand(end: &str) -> Result<Vec<String>, String> {
+    let range = end
+        .strip_suffix(']')
+        .and_then(|rest| rest.rsplit_once('['))
+        .and_then(|(name, range)| Some((name, range.split_once("..")?)));
+    let Some((name, (first, last))) = range else {
+        return Ok(vec![end.to_string()]);
+    };
+    let bound = |text: &str| text.trim().parse::<usize>().ok().filter(|&n| n < 100_000);
+    match (bound(first), bound(last)) {
+        (Some(first), Some(last)) if first <= last => Ok((first..=last)
+            .map(|index| format!("{name}[{index}]"))
+            .collect()),
+        _ => Err(format!("`{end}` has no range such as [1..15]")),
+    }
+}
+
+/// `displacement` or `displacement[3]` of the reference.
+fn reference(variable: &str) -> Option<Origin> {
+    let (name, ahead) = match variable.strip_suffix(']') {
+        None => (variable, 0),
+        Some(rest) => {
+            let (name, index) = rest.split_once('[')?;
+            let ahead: isize = index.trim().parse().ok()?;
+            (name, Some(ahead).filter(|ahead| ahead.abs() < FARTHEST)?)
+        }
+    };
+    let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name)?;
+    Some(Origin::Reference { quantity, ahead })
+}

@@ -1,0 +1,299 @@
+//! Values as people write them, for variables with types and units.
+
+use std::fmt;
+use units::hint;
+
+use serde::{Deserialize, Serialize};
+
+use super::passage::{End, Way};
+use fmi_import::{Datum, Kind, Variable};
+
+/// A value for a variable, in the variable's own unit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A number; an integer, a choice or a truth value as a number too.
+    Number(f64),
+    /// A whole number of 64 bits.
+    Signed(i64),
+    /// A whole number of 64 bits, not negative.
+    Unsigned(u64),
+    /// A text; a binary in hexadecimal.
+    Text(String),
+}
+
+impl Value {
+    /// As the FMU takes it.
+    pub fn datum(&self, kind: &Kind) -> Datum {
+        match self {
+            Self::Number(number) => Datum::Number(*number),
+            Self::Signed(number) => Datum::Signed(*number),
+            Self::Unsigned(number) => Datum::Unsigned(*number),
+            Self::Text(text) => Datum::read(kind, text).unwrap_or_else(|| Datum::empty(kind)),
+        }
+    }
+}
+
+/// A value as given to a variable of a system, before its type and unit are known.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a number, true, false, or a text such as \"1.5 in\""
+)]
+pub enum Setting {
+    /// A truth value.
+    Boolean(bool),
+    /// A whole number; for a variable with a unit, in that unit.
+    Integer(i64),
+    /// A number in the variable's unit.
+    Number(f64),
+    /// A number with a unit, the name of a choice, or a text.
+    Text(String),
+    /// Values of an array's elements, row after row.
+    List(Vec<Self>),
+    /// A value in a unit that a file declares, with what is done to it on its way.
+    #[serde(skip)]
+    Declared(Box<Declared>),
+}
+
+/// A value of a parameter set as written, and its conversion to the variable.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Declared {
+    /// The value.
+    pub value: Setting,
+    /// Its unit and what is done to it.
+    pub way: Way,
+}
+
+impl From<bool> for Setting {
+    fn from(truth: bool) -> Self {
+        Self::Boolean(truth)
+    }
+}
+
+impl From<f64> for Setting {
+    fn from(number: f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl From<i64> for Setting {
+    fn from(number: i64) -> Self {
+        Self::Integer(number)
+    }
+}
+
+impl From<&str> for Setting {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_string())
+    }
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Boolean(truth) => truth.fmt(f),
+            Self::Integer(number) => number.fmt(f),
+            // With its point, as it was written.
+            Self::Number(number) => write!(f, "{number:?}"),
+            Self::Text(text) => text.fmt(f),
+            Self::List(list) => {
+                let all: Vec<String> = list.iter().map(Self::to_string).collect();
+                write!(f, "[{}]", all.join(", "))
+            }
+            Self::Declared(declared) => match &declared.way.start {
+                Some(unit) => write!(f, "{} {}", declared.value, unit.name),
+                None => declared.value.fmt(f),
+            },
+        }
+    }
+}
+
+impl Setting {
+    /// As a number in `unit`.
+    ///
+    /// # Errors
+    /// What is wrong and what was expected.
+    pub(super) fn number(&self, unit: &str) -> Result<f64, String> {
+        match self {
+            Self::Number(number) => Ok(*number),
+            Self::Integer(number) => Ok(*number as f64),
+            Self::Text(text) => units::value_in(text, unit).map_err(|error| error.to_string()),
+            Self::Boolean(_) | Self::List(_) | Self::Declared(_) => {
+                Err(format!("`{self}` is not a number in {unit}"))
+            }
+        }
+    }
+}
+
+/// Reads what was written for `variable`.
+///
+/// # Errors
+/// What is wrong and what was expected.
+pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, String> {
+    let misfit = |expected: &str| {
+        Err(format!(
+            "`{written}` is not a value for a {}; expected {expected}",
+            variable.kind.name()
+        ))
+    };
+    match (&variable.kind, written) {
+        (_, Setting::Declared(declared)) => read_declared(variable, declared),
+        (Kind::Float64 | Kind::Float32, Setting::Number(number)) if number.is_finite() => {
+            Ok(Value::Number(*number))
+        }
+        (Kind::Float64 | Kind::Float32, Setting::Integer(number)) => {
+            Ok(Value::Number(*number as f64))
+        }
+        (Kind::Float64 | Kind::Float32, Setting::Text(text)) => {
+            number(variable, text).map(Value::Number)
+        }
+        (Kind::Float64 | Kind::Float32, _) => {
+            misfit("a finite number, or a text with a unit such as \"1.5 in\"")
+        }
+        (kind, _) if kind.whole_range().is_some() => {
+            let (least, most) = kind.whole_range().unwrap_or_default();
+            let whole = match written {
+                Setting::Integer(number) => Some(i128::from(*number)),
+                Setting::Text(digits) if !kind.is_numeric() => digits.trim().parse().ok(),
+                _ => None,
+            };
+            let whole = whole.filter(|number| (least..=most).contains(number));
+            let Some(whole) = whole else {
+                return misfit(&format!("a whole number from {least} to {most}"));
+            };
+            Ok(match kind {
+                Kind::Int64 => Value::Signed(whole as i64),
+                Kind::UInt64 => Value::Unsigned(whole as u64),
+                _ => Value::Number(whole as f64),
+            })
+        }
+        (Kind::Boolean, Setting::Boolean(truth)) => Ok(Value::Number(f64::from(u8::from(*truth)))),
+        (Kind::Boolean, _) => misfit("true or false"),
+        (Kind::Enumeration(items), Setting::Integer(number)) => {
+            if items.iter().any(|item| item.value == *number) {
+                return Ok(Value::Number(*number as f64));
+            }
+            let names: Vec<String> = items
+                .iter()
+                .map(|item| format!("{} ({})", item.value, item.name))
+                .collect();
+            misfit(&format!("one of {}", names.join(", ")))
+        }
+        (Kind::Enumeration(items), Setting::Text(name)) => {
+            let found = items
+                .iter()
+                .find(|item| item.name.eq_ignore_ascii_case(name));
+            found
+                .map(|item| Value::Number(item.value as f64))
+                .ok_or_else(|| {
+                    let known = items.iter().map(|item| item.name.as_str());
+                    format!("`{name}` is not a choice{}", hint(name, known))
+                })
+        }
+        (Kind::Enumeration(_), _) => misfit("the name of a choice"),
+        (Kind::String, Setting::Text(text)) => Ok(Value::Text(text.clone())),
+        (Kind::String, _) => misfit("a text"),
+        (Kind::Binary, Setting::Text(text)) if Datum::read(&Kind::Binary, text).is_some() => {
+            Ok(Value::Text(text.clone()))
+        }
+        (Kind::Binary, _) => misfit("bytes in hexadecimal, such as \"00ff\""),
+        (_, _) => misfit("no value: clocks cannot be set"),
+    }
+}
+
+/// A value of a parameter set: its unit is converted, then it is transformed as the file says.
+fn read_declared(variable: &Variable, declared: &Declared) -> Result<Value, String> {
+    let Declared { value, way } = declared;
+    let end = End {
+        kind: &variable.kind,
+        unit: variable.unit.as_deref(),
+        base: variable.base_unit,
+    };
+    // Without a unit of its own, it is in the variable's.
+    let start = if way.start.is_some() {
+        End {
+            unit: None,
+            base: None,
+            ..end
+        }
+    } else {
+        end
+    };
+    let passage = way.between(start, end)?;
+    let is_plain = passage.factor == 1.0 && passage.offset == 0.0 && passage.map.is_empty();
+    if is_plain {
+        return read(variable, value);
+    }
+    match value {
+        Setting::Number(number) => read(variable, &Setting::Number(passage.of(*number))),
+        Setting::Integer(number) if passage.map.is_empty() => {
+            read(variable, &Setting::Number(passage.of(*number as f64)))
+        }
+        Setting::Integer(number) => {
+            let mapped = passage.of(*number as f64);
+            read(variable, &Setting::Integer(mapped as i64))
+        }
+        Setting::Boolean(truth) => {
+            let mapped = passage.of(f64::from(u8::from(*truth)));
+            read(variable, &Setting::Boolean(mapped != 0.0))
+        }
+        Setting::Text(_) => match read(variable, value)? {
+            Value::Number(number) => Ok(Value::Number(passage.of(number))),
+            other => Ok(other),
+        },
+        Setting::List(_) | Setting::Declared(_) => Err(format!("`{value}` is not a single value")),
+    }
+}
+
+/// A time in a system file: a number in s, or a text with a unit.
+///
+/// # Errors
+/// What was expected.
+pub(super) fn time(written: &Setting) -> Result<f64, String> {
+    let seconds = match written {
+        Setting::Boolean(_) | Setting::List(_) => {
+            return Err(format!("`{written}` is not a time, expected \"2 ms\""));
+        }
+        _ => written.number("s")?,
+    };
+    if seconds.is_finite() && seconds > 0.0 {
+        return Ok(seconds);
+    }
+    Err(format!(
+        "{seconds} s is not a valid time, expected more than 0 s"
+    ))
+}
+
+/// A positive share in a system file, per cent: a number, or a text such as `"0.1 %"`.
+///
+/// # Errors
+/// What was expected.
+pub(super) fn share(written: &Setting) -> Result<f64, String> {
+    percent(&written.to_string())
+}
+
+/// A positive share, per cent; `%` may follow it.
+///
+/// # Errors
+/// What was expected.
+pub fn percent(text: &str) -> Result<f64, String> {
+    let number = text.trim().trim_end_matches('%').trim_end().parse::<f64>();
+    let number = number.ok();
+    let positive = number.filter(|value| *value > 0.0 && value.is_finite());
+    let expected = "expected a number above 0, such as \"0.05 %\"";
+    positive.ok_or_else(|| format!("`{text}` is not a share; {expected}"))
+}
+
+/// A number in the variable's unit, which may follow it.
+fn number(variable: &Variable, text: &str) -> Result<f64, String> {
+    let unit = variable.unit.as_deref().unwrap_or("");
+    // Units that only the FMU knows may be written as it writes them.
+    if let Some(alone) = text.trim().strip_suffix(unit)
+        && let Ok(number) = alone.trim().parse::<f64>()
+        && number.is_finite()
+    {
+        return Ok(number);
+    }
+    units::value_in(text, unit).map_err(|error| error.to_string())
+}

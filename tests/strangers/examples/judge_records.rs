@@ -1,0 +1,275 @@
+//! Adds a known effect to real records and asks whether the program says it.
+//!
+//! `cargo run --release -p strangers --example judge_records -- --shared DIR [--rigs DIR] [--cases N] [--seed S]
+//! [--shard I/N] [--program FILE] [--limit SECONDS] [--out DIR]`
+//!
+//! Each rig is diagnosed once as it is. What is said of it with the effect, less what was said without, is the
+//! effect; what was named before and is no longer is lost.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use serde_json::Value;
+use strangers::dice::Dice;
+use strangers::judge::{Judge, share};
+use strangers::options::Options;
+use strangers::records::{Added, changed};
+
+/// A rig with its files, the column that is changed, its unit, the largest value there, and the sampling step.
+struct Measured {
+    rig: &'static str,
+    files: &'static [&'static str],
+    column: &'static str,
+    unit: &'static str,
+    largest: f64,
+    step: f64,
+    has_time: bool,
+}
+
+const MEASURED: [Measured; 5] = [
+    Measured {
+        rig: "friction_damper",
+        files: &[
+            "ds2_0.5Hz_36lb_1in.csv",
+            "ds2_1Hz_36lb_0.5in.csv",
+            "ds2_1Hz_36lb_1in.csv",
+        ],
+        column: "F_friction_N",
+        unit: "N",
+        largest: 18e3,
+        step: 1.0 / 1024.0,
+        has_time: true,
+    },
+    Measured {
+        rig: "steel_coupon",
+        files: &["example_1.csv"],
+        column: "Sigma_true",
+        unit: "MPa",
+        largest: 500.0,
+        step: 1.0,
+        has_time: false,
+    },
+    Measured {
+        rig: "emps",
+        files: &["DATA_EMPS.csv"],
+        column: "q_meas_m",
+        unit: "m",
+        largest: 0.24,
+        step: 1e-3,
+        has_time: true,
+    },
+    Measured {
+        rig: "positioning_drive",
+        files: &["DATA_EMPS.csv"],
+        column: "q_meas_m",
+        unit: "m",
+        largest: 0.24,
+        step: 1e-3,
+        has_time: true,
+    },
+    Measured {
+        rig: "servohydraulic_press",
+        files: &["chirp_0A.csv"],
+        column: "x_meas_mm",
+        unit: "mm",
+        largest: 2.0,
+        step: 1e-3,
+        has_time: true,
+    },
+];
+
+impl Measured {
+    /// Folder of the files.
+    fn folder(&self) -> &str {
+        if self.rig == "emps" {
+            "positioning_drive"
+        } else {
+            self.rig
+        }
+    }
+
+    fn draw(&self, dice: &mut Dice) -> Added {
+        let (sign, size) = (dice.sign(), self.largest);
+        loop {
+            let added = match dice.pick(&[0, 1, 2, 3, 4, 5]) {
+                0 => Added::Delay(dice.between(4.0, 16.0) * self.step.max(1e-3)),
+                1 => Added::Gain(sign * dice.between(0.04, 0.15)),
+                2 => Added::Zero(sign * dice.between(0.02, 0.08) * size),
+                3 => Added::Play(dice.between(0.01, 0.05) * size),
+                4 => Added::Asymmetry(sign * dice.between(0.04, 0.15)),
+                _ => Added::DeadBand(dice.between(0.02, 0.08) * size),
+            };
+            if self.has_time || !matches!(added, Added::Delay(_)) {
+                return added;
+            }
+        }
+    }
+}
+
+/// Diagnoses a rig on its files, with an effect or without.
+fn ask(
+    judge: &Judge,
+    rig: &Measured,
+    added: Option<Added>,
+    folder: &Path,
+    options: &Options,
+) -> Result<Value, String> {
+    let failed = |path: &Path| {
+        let path = path.display().to_string();
+        move |error: std::io::Error| format!("{path}: {error}")
+    };
+    let kept = folder.join("answer.json");
+    if let Some(json) = fs::read(&kept)
+        .ok()
+        .and_then(|bytes| serde_json::from_slice(&bytes).ok())
+    {
+        return Ok(json);
+    }
+    fs::create_dir_all(folder).map_err(failed(folder))?;
+    let shared = options
+        .path("shared")
+        .ok_or("--shared: the folder that has `measured` is needed")?;
+    let rigs = options
+        .path("rigs")
+        .unwrap_or(std::path::absolute("identification/rigs").unwrap_or_default());
+    let description = rigs.join(format!("{}.toml", rig.rig));
+    let mut arguments = vec![
+        "diagnose".to_string(),
+        description.to_string_lossy().into_owned(),
+    ];
+    for file in rig.files {
+        let path = shared.join("measured").join(rig.folder()).join(file);
+        let text = fs::read_to_string(&path).map_err(failed(&path))?;
+        let text = changed(&text, rig.column, |y| {
+            added.map_or_else(|| y.to_vec(), |added| added.to(y, rig.step))
+        })
+        .ok_or_else(|| format!("{}: no column `{}` of numbers", path.display(), rig.column))?;
+        let copy: PathBuf = folder.join(file);
+        fs::write(&copy, text).map_err(failed(&copy))?;
+        arguments.extend(["--data".into(), copy.to_string_lossy().into_owned()]);
+    }
+    let out = folder.join("diagnosis").to_string_lossy().into_owned();
+    arguments.extend(["--out".into(), out, "--json".into()]);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let answer = judge.ask(&arguments, folder).map_err(failed(folder))?;
+    let mut json = answer
+        .json
+        .unwrap_or_else(|| serde_json::json!({"sentence": answer.complaint}));
+    json["core_seconds"] = answer.seconds.into();
+    fs::write(&kept, json.to_string()).map_err(failed(&kept))?;
+    Ok(json)
+}
+
+/// Every value of an effect or a found parameter whose name says it, with its standard error, in `unit`.
+fn said(json: &Value, added: Added, unit: &str) -> Vec<(f64, f64)> {
+    let has_word = |name: &Value| {
+        let name = name.as_str().unwrap_or_default();
+        added.words().iter().any(|word| name.contains(word))
+    };
+    let number =
+        |p: &Value, key: &str| units::convert(p[key].as_f64()?, p["unit"].as_str()?, unit).ok();
+    let effects = json["effects"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter(|e| has_word(&e["effect"]));
+    let parameters = effects
+        .filter_map(|e| e["parameters"].as_object())
+        .flat_map(|p| p.values());
+    let values =
+        parameters.filter_map(|p| Some((number(p, "value")?, number(p, "standard_error")?)));
+    let findings = json["findings"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter(|f| has_word(&f["parameter"]));
+    let found = findings.filter_map(|f| {
+        Some((
+            number(f, "found")? - number(f, "stated")?,
+            number(f, "standard_error")?,
+        ))
+    });
+    values.chain(found).collect()
+}
+
+fn names(json: &Value) -> BTreeSet<String> {
+    let effects = json["effects"].as_array().into_iter().flatten();
+    effects
+        .filter_map(|e| e["effect"].as_str())
+        .map(String::from)
+        .collect()
+}
+
+fn run() -> Result<(), String> {
+    let options = Options::read(&[
+        "shared", "rigs", "cases", "seed", "shard", "program", "limit", "out",
+    ])?;
+    let judge = options.judge(300)?;
+    let (cases, seed) = (options.number("cases", 50)?, options.number("seed", 1)?);
+    let is_mine = options.shard()?;
+    let scratch = options.scratch();
+    println!("seed {seed}");
+    let mut plain: BTreeMap<&str, Value> = BTreeMap::new();
+    let (mut right, mut held, mut lost, mut all) = (0, 0, 0, 0);
+    for number in (seed..seed + cases).filter(|number| is_mine(*number)) {
+        let dice = &mut Dice::new(number, 80);
+        let rig = &MEASURED[(number % MEASURED.len() as u64) as usize];
+        let added = rig.draw(dice);
+        let folder = |name: String| scratch.join(rig.rig).join(name);
+        if !plain.contains_key(rig.rig) {
+            plain.insert(
+                rig.rig,
+                ask(&judge, rig, None, &folder("plain".into()), &options)?,
+            );
+        }
+        let (before, after) = (
+            &plain[rig.rig],
+            ask(
+                &judge,
+                rig,
+                Some(added),
+                &folder(format!("{number}")),
+                &options,
+            )?,
+        );
+        let (size, unit) = added.size();
+        let unit = unit.unwrap_or(rig.unit);
+        let (earlier, later) = (said(before, added, unit), said(&after, added, unit));
+        let already = earlier.first().copied().unwrap_or((0.0, 0.0));
+        let is_said = later.iter().any(|value| *value != already);
+        let is_held = later.iter().any(|(value, error)| {
+            (value - already.0 - size).abs() <= 1.96 * error.hypot(already.1)
+        });
+        let missing: Vec<String> = names(before).difference(&names(&after)).cloned().collect();
+        all += 1;
+        right += usize::from(is_said);
+        held += usize::from(is_held);
+        lost += usize::from(!missing.is_empty());
+        println!(
+            "{} {number} {added:?}: {}, {}, lost {missing:?}, {:.0} s: {} {:?} {}",
+            rig.rig,
+            if is_said { "said" } else { "not said" },
+            if is_held { "held" } else { "not held" },
+            after["core_seconds"].as_f64().unwrap_or_default(),
+            after["verdict"].as_str().unwrap_or("refused"),
+            later,
+            after["sentence"].as_str().unwrap_or_default()
+        );
+    }
+    println!("\ncause said (aim 90 %)          {}", share(right, all));
+    println!("size in its interval (aim 90 %) {}", share(held, all));
+    println!("trials that lost a cause (aim 0) {}", share(lost, all));
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(reason) => {
+            eprintln!("error: {reason}");
+            ExitCode::from(2)
+        }
+    }
+}

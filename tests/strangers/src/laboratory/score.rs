@@ -1,0 +1,88 @@
+//! Whether an answer names every fault of a laboratory, or ranks candidates with values.
+
+use serde_json::Value;
+
+use super::{Fault, Truth};
+use crate::judge::Answer;
+
+/// What an answer is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Worth {
+    /// Every fault is named with its value, and nothing else.
+    Named,
+    /// Candidates are ranked, and every fault is among them with its value.
+    Ranked,
+    /// A fault is named that is not there.
+    False,
+    /// An answer without all of them.
+    Partial,
+    /// No answer.
+    Refused,
+}
+
+/// Whether `effect` says `fault` with its size: within its interval or a tenth.
+fn says(effect: &Value, fault: &Fault) -> bool {
+    let name = effect["effect"].as_str().unwrap_or_default();
+    if !fault.words.iter().any(|word| name.contains(word.as_str())) {
+        return false;
+    }
+    let Some(parameters) = effect["parameters"].as_object() else {
+        return false;
+    };
+    parameters.values().any(|parameter| {
+        let unit = parameter["unit"].as_str().unwrap_or_default();
+        let value = parameter["value"].as_f64().unwrap_or(f64::NAN);
+        let error = parameter["standard_error"].as_f64().unwrap_or(0.0);
+        fault.sizes.iter().any(|(size, in_unit)| {
+            let said = |value: f64| units::convert(value, unit, in_unit).ok();
+            let (Some(value), Some(error)) = (said(value), said(error)) else {
+                return false;
+            };
+            (value - size).abs() <= (1.96 * error).max(0.1 * size.abs())
+        })
+    })
+}
+
+/// What the answer is worth.
+pub fn worth(truth: &Truth, answer: &Answer) -> Worth {
+    let Some(json) = &answer.json else {
+        return Worth::Refused;
+    };
+    let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
+    let named = list(&json["effects"]);
+    let all_named = truth
+        .faults
+        .iter()
+        .all(|fault| named.iter().any(|effect| says(effect, fault)));
+    let is_foreign = |effect: &Value| {
+        let name = effect["effect"].as_str().unwrap_or_default();
+        !truth
+            .faults
+            .iter()
+            .any(|fault| fault.words.iter().any(|word| name.contains(word.as_str())))
+    };
+    if json["verdict"] == "named" && named.iter().any(is_foreign) {
+        return Worth::False;
+    }
+    if all_named && !named.is_empty() {
+        return Worth::Named;
+    }
+    // A candidate has its effects' names, and parameters by effect or by `effect.parameter`.
+    let candidates = list(&json["candidates"]);
+    let ranked = candidates.iter().take(3).any(|candidate| {
+        let text = candidate["effects"].to_string();
+        let sized = candidate["parameters"]
+            .as_object()
+            .is_some_and(|p| !p.is_empty());
+        sized
+            && truth
+                .faults
+                .iter()
+                .all(|fault| fault.words.iter().any(|word| text.contains(word.as_str())))
+    });
+    if ranked {
+        Worth::Ranked
+    } else {
+        Worth::Partial
+    }
+}

@@ -1,0 +1,326 @@
+//! Tables of three kinds in closed loops, SI.
+
+use std::f64::consts::TAU;
+
+use crate::dice::Dice;
+use crate::hydraulic::{Bristles, Rig, State};
+
+/// What moves a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drive {
+    /// Servo valve and cylinder; no spring under the table.
+    Hydraulic,
+    /// Voice coil with a suspension, on a voltage amplifier.
+    Shaker,
+    /// Motor and screw on rails.
+    Motor,
+}
+
+/// Laws of control.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// On displacement alone.
+    Gain,
+    /// With integral and derivative.
+    Pid,
+    /// With feedforward of velocity and feedback of acceleration.
+    ThreeVariable,
+}
+
+/// A sampled loop on displacement.
+#[derive(Debug, Clone)]
+pub struct Loop {
+    pub kind: Kind,
+    /// V/m.
+    pub gain: f64,
+    /// Share of the velocity that feedforward sends.
+    feedforward: f64,
+    integral: f64,
+    derivative: f64,
+    acceleration: f64,
+    /// Hz.
+    pub rate: f64,
+}
+
+/// A coil or a motor on its amplifier: `F = b i`, `L di/dt = u - R i - b v`.
+#[derive(Debug, Clone, Copy)]
+struct Electric {
+    mass: f64,
+    resistance: f64,
+    inductance: f64,
+    constant: f64,
+    stiffness: f64,
+    viscous: f64,
+    coulomb: f64,
+    /// Width of the friction's tanh, m/s.
+    width: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Body {
+    Hydraulic(Box<Rig>),
+    Electric(Electric),
+}
+
+/// A table in its loop.
+#[derive(Debug, Clone)]
+pub struct Table {
+    body: Body,
+    drive: Drive,
+    pub control: Loop,
+}
+
+impl Table {
+    /// Drawn.
+    pub fn draw(drive: Drive, dice: &mut Dice) -> Self {
+        let (body, speed) = match drive {
+            Drive::Hydraulic => {
+                let usual = Rig::default();
+                let size = dice.between(1.0, 15.0);
+                let rig = Rig {
+                    flow_coefficient: size * usual.flow_coefficient * dice.between(0.7, 1.5),
+                    area: size * usual.area,
+                    volume: size * usual.volume,
+                    bulk_modulus: usual.bulk_modulus * dice.between(2.0, 6.0),
+                    leakage: size * usual.leakage,
+                    viscous: size * usual.viscous,
+                    coulomb: size * usual.coulomb,
+                    breakaway: size * usual.breakaway,
+                    deflection: dice.between(1e-5, 6e-5),
+                    bristles: dice.pick(&[Bristles::LuGre, Bristles::ElastoPlastic]),
+                    table_mass: size * usual.table_mass * dice.between(0.7, 1.5),
+                    table_stiffness: 0.0,
+                    table_damping: 0.0,
+                    disturbance: dice.between(5e-4, 3e-3),
+                    disturbance_frequency: dice.between(5.0, 40.0),
+                    ..usual
+                };
+                let speed = rig.flow_coefficient * (rig.supply / 2.0).sqrt() / rig.area;
+                (Body::Hydraulic(Box::new(rig)), speed)
+            }
+            Drive::Shaker | Drive::Motor => {
+                let mass = dice.between(10.0, 60.0);
+                let is_motor = drive == Drive::Motor;
+                let constant = dice.between(40.0, 120.0);
+                let electric = Electric {
+                    mass,
+                    resistance: dice.between(0.5, 2.0),
+                    inductance: dice.between(5e-4, 3e-3),
+                    constant,
+                    stiffness: if is_motor {
+                        0.0
+                    } else {
+                        mass * (TAU * dice.between(0.8, 2.0)).powi(2)
+                    },
+                    viscous: mass * dice.between(0.2, 2.0),
+                    coulomb: mass
+                        * if is_motor {
+                            dice.between(0.2, 0.6)
+                        } else {
+                            dice.between(0.02, 0.1)
+                        },
+                    width: dice.between(1e-3, 5e-3),
+                };
+                (Body::Electric(electric), 1.0 / constant)
+            }
+        };
+        let gain = TAU * dice.between(3.0, 7.0) / speed;
+        let kind = dice.pick(&[Kind::Gain, Kind::Pid, Kind::ThreeVariable]);
+        let control = Loop {
+            kind,
+            gain,
+            feedforward: if kind == Kind::ThreeVariable {
+                0.85 / speed
+            } else {
+                0.0
+            },
+            integral: if kind == Kind::Pid {
+                gain * dice.between(0.3, 1.5)
+            } else {
+                0.0
+            },
+            derivative: if kind == Kind::Pid { 0.1 / speed } else { 0.0 },
+            acceleration: if kind == Kind::ThreeVariable {
+                1e-3 / speed
+            } else {
+                0.0
+            },
+            rate: dice.pick(&[1000.0, 2000.0]),
+        };
+        Self {
+            body,
+            drive,
+            control,
+        }
+    }
+
+    /// Friction times a factor; returns it in N.
+    pub fn rub(&mut self, factor: f64) -> f64 {
+        match &mut self.body {
+            Body::Hydraulic(rig) => {
+                rig.coulomb *= factor;
+                rig.breakaway *= factor;
+                rig.coulomb
+            }
+            Body::Electric(electric) => {
+                electric.coulomb *= factor;
+                electric.coulomb
+            }
+        }
+    }
+
+    /// Overlap of the valve, V; returns what it became.
+    pub fn overlap(&mut self, width: f64) -> f64 {
+        let Body::Hydraulic(rig) = &mut self.body else {
+            return 0.0;
+        };
+        rig.overlap = width;
+        width
+    }
+
+    /// Asymmetry of the valve; returns what it became.
+    pub fn asymmetry(&mut self, q: f64) -> f64 {
+        let Body::Hydraulic(rig) = &mut self.body else {
+            return 0.0;
+        };
+        rig.asymmetry = q;
+        q
+    }
+
+    /// kg.
+    pub fn mass(&self) -> f64 {
+        match &self.body {
+            Body::Hydraulic(rig) => rig.table_mass,
+            Body::Electric(electric) => electric.mass,
+        }
+    }
+
+    /// What the people say of it.
+    pub fn words(&self) -> &'static str {
+        match self.drive {
+            Drive::Hydraulic => "Servo-hydraulic table on bearings, no spring.",
+            Drive::Shaker => "Table on an electrodynamic shaker with a voltage amplifier.",
+            Drive::Motor => "Table on rails, moved by a motor and a screw.",
+        }
+    }
+
+    /// Displacement, acceleration and force at every sample of a reference that reaches the loop late and by
+    /// another scale.
+    pub fn play(&self, reference: &[f64], rate: f64, delay: f64, scale: f64) -> Vec<[f64; 3]> {
+        let control = &self.control;
+        let ticks = (control.rate / rate).round().max(1.0) as usize;
+        let period = 1.0 / (rate * ticks as f64);
+        let at = |t: f64| {
+            let place = (t - delay) * rate;
+            if place < 0.0 {
+                return 0.0;
+            }
+            let (k, share) = (place.floor() as usize, place.fract());
+            let value = |k: usize| reference[k.min(reference.len() - 1)];
+            (1.0 + scale) * (value(k) * (1.0 - share) + value(k + 1) * share)
+        };
+        let mut state = match &self.body {
+            Body::Hydraulic(rig) => Moving::Hydraulic(Box::new(rig.rest())),
+            Body::Electric(_) => Moving::Electric([0.0; 3]),
+        };
+        let (mut sum, mut before, mut command) = (0.0, 0.0, 0.0);
+        let mut readings = Vec::with_capacity(reference.len());
+        for k in 0..reference.len() * ticks {
+            let t = k as f64 * period;
+            let [x, a, f] = self.reading(&state, command);
+            if k % ticks == 0 {
+                readings.push([x, a, f]);
+            }
+            let r = at(t);
+            let rate_of = |t: f64| (at(t + period) - at(t - period)) / (2.0 * period);
+            let error = r - x;
+            sum += control.integral * error * period;
+            command = control.gain * error
+                + sum
+                + control.derivative * (error - before) / period
+                + control.feedforward * rate_of(t)
+                - control.acceleration * a;
+            command = command.clamp(-10.0, 10.0);
+            before = error;
+            match (&self.body, &mut state) {
+                (Body::Hydraulic(rig), Moving::Hydraulic(state)) => {
+                    rig.advance(state, t, period, command, 0.0)
+                }
+                (Body::Electric(electric), Moving::Electric(state)) => {
+                    electric.advance(state, period, command)
+                }
+                _ => unreachable!("a body has its own state"),
+            }
+        }
+        readings
+    }
+
+    fn reading(&self, state: &Moving, command: f64) -> [f64; 3] {
+        match (&self.body, state) {
+            (Body::Hydraulic(rig), Moving::Hydraulic(state)) => {
+                let now = rig.now(&state.values, command, 0.0);
+                [state.values[4], now.acceleration, now.force]
+            }
+            (Body::Electric(electric), Moving::Electric(state)) => [
+                state[1],
+                electric.slope(state, command)[2],
+                electric.constant * state[0],
+            ],
+            _ => unreachable!("a body has its own state"),
+        }
+    }
+}
+
+enum Moving {
+    Hydraulic(Box<State>),
+    /// Current, displacement, velocity.
+    Electric([f64; 3]),
+}
+
+impl Electric {
+    fn slope(&self, [i, x, v]: &[f64; 3], u: f64) -> [f64; 3] {
+        let resisting =
+            self.stiffness * x + self.viscous * v + self.coulomb * (v / self.width).tanh();
+        [
+            (u - self.resistance * i - self.constant * v) / self.inductance,
+            *v,
+            (self.constant * i - resisting) / self.mass,
+        ]
+    }
+
+    fn advance(&self, s: &mut [f64; 3], period: f64, u: f64) {
+        let steps = (period / 50e-6).ceil();
+        let h = period / steps;
+        for _ in 0..steps as usize {
+            let along = |k: &[f64; 3], by: f64| std::array::from_fn(|i| s[i] + by * k[i]);
+            let k1 = self.slope(s, u);
+            let k2 = self.slope(&along(&k1, h / 2.0), u);
+            let k3 = self.slope(&along(&k2, h / 2.0), u);
+            let k4 = self.slope(&along(&k3, h), u);
+            for i in 0..3 {
+                s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_loop_follows_a_slow_motion() {
+        for seed in 0..24 {
+            let drive = [Drive::Hydraulic, Drive::Shaker, Drive::Motor][seed as usize % 3];
+            let table = Table::draw(drive, &mut Dice::new(seed, 0));
+            let motion: Vec<f64> = (0..2000)
+                .map(|k| 0.02 * (TAU * 0.3 * f64::from(k) / 200.0).sin())
+                .collect();
+            let readings = table.play(&motion, 200.0, 0.0, 0.0);
+            let off = (500..2000)
+                .map(|k| (readings[k][0] - motion[k]).abs())
+                .fold(0.0, f64::max);
+            assert!(off < 0.01, "{seed} {table:?}: {off}");
+        }
+    }
+}

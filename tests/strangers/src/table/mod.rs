@@ -1,0 +1,9 @@
+//! The thesis's table in worlds of another form.
+
+pub mod case;
+pub mod hidden;
+pub mod rig;
+pub mod score;
+
+pub use case::{Case, Kind};
+pub use hidden::{Hidden, Laws, Outside};
