@@ -26,7 +26,7 @@ const UNRELATED: f64 = 0.03;
 pub struct Test {
     /// What was looked at.
     pub what: String,
-    /// Normal deviate under "only noise is left".
+    /// Normal deviate under "only noise is left, as well as it is known": negative where there is less.
     pub deviate: f64,
     /// Where, if it is a channel's error in a band or a part of the record.
     pub place: Option<Place>,
@@ -303,6 +303,16 @@ mod tests {
         assert!(all.len() > 60, "{}", all.len());
         for test in &all {
             assert!(test.deviate < 4.0, "{test:?}");
+        }
+        // Neither more nor less than noise: four deviations of a root mean square over the lines of a band.
+        for place in all.iter().filter_map(|test| test.place.as_ref()) {
+            let values = match place.part {
+                Part::Whole => 4096.0,
+                Part::Band(from, to) => 2.0 * 4096.0 * (to - from),
+                Part::Samples(from, to) => 2.0 * (to - from) as f64,
+            };
+            let off = (place.over_floor - 1.0) * (2.0 * values).sqrt();
+            assert!(off.abs() < 4.0, "{place:?} is off by {off} deviations");
         }
     }
 

@@ -195,7 +195,7 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
         .map_or(low, |place| levels[place]);
     let step = step(values);
     let (mut run, mut start) = (1, 0usize);
-    let (mut clipped, mut almost) = (0, 0);
+    let (mut clipped, mut beside) = (0, 0);
     for k in 1..=values.len() {
         if k < values.len() && values[k] == values[k - 1] {
             run += 1;
@@ -207,10 +207,12 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
             run = 1;
         }
         // A coarse converter repeats itself while the motion rests, and then goes on by a step.
-        let beside = [start.checked_sub(1), Some(k).filter(|k| *k < values.len())];
-        let mut beside = beside.into_iter().flatten();
-        let leaps = beside.any(|place| (values[place] - value).abs() > LEAP * step);
-        if run >= FROZEN_RUN && !is_extreme && leaps {
+        let leaps = || {
+            let neighbours = [start.checked_sub(1), Some(k)].into_iter().flatten();
+            let mut neighbours = neighbours.filter_map(|place| values.get(place));
+            neighbours.any(|neighbour| (neighbour - value).abs() > LEAP * step)
+        };
+        if run >= FROZEN_RUN && !is_extreme && leaps() {
             found.push(format!(
                 "{name}: `{channel}` is frozen at {value:.4e} for {run} samples from sample {start}"
             ));
@@ -221,11 +223,11 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
                 clipped += run;
             }
         } else if run >= CLIPPED_RUN && (value >= next_to_high || value <= next_to_low) {
-            almost += run;
+            beside += run;
         }
         (run, start) = (1, k);
     }
-    if clipped > 2 * (CLIPPED_RUN + almost) && high > low {
+    if clipped > 2 * (CLIPPED_RUN + beside) && high > low {
         found.push(format!(
             "{name}: `{channel}` is clipped, {clipped} readings are at its extremes {low:.4e} and \
              {high:.4e}"
