@@ -80,8 +80,8 @@ fn open_an_overlap_is_found_beside_friction_oil_and_gain() {
         ..Rig::default()
     };
     let (found, error) = found(&rig);
+    println!("{:?} {error}", found.valve);
     let valve = found.valve.as_ref().unwrap();
-    println!("{valve:?} {error}");
     assert_eq!(valve.members[0], Member::Lap);
     assert_eq!(valve.causes()[0], "valve_dead_band");
     let oil = 4.0 * rig.bulk_modulus * rig.area * rig.area / rig.volume;

@@ -29,8 +29,10 @@ const SETTLING: f64 = 3.0;
 const STEP: f64 = 5e-4;
 /// Samples that are replayed of all recordings together, at most.
 const MOST: usize = 60_000;
-/// Length of the blocks whose scatter gives the standard errors, s.
+/// Length of the blocks whose scatter gives the standard errors, s, and how many there are of them at least to a
+/// parameter: else they are shorter.
 const BLOCK: f64 = 2.0;
+const BLOCKS: f64 = 2.0;
 /// Share of the viscous force that the shape of the curve may take for dry friction, or the other way:
 /// valve and seals are not quite what the model's form says.
 pub(super) const MISTAKEN: f64 = 0.02;
@@ -309,8 +311,10 @@ impl Replay<'_> {
         let mut information = DMatrix::zeros(count, count);
         let mut scatter = DMatrix::zeros(count, count);
         let mut blocks = 0;
+        let samples = here.iter().map(Vec::len).sum::<usize>() as f64;
+        let longest = samples / (BLOCKS * count as f64);
         for (number, own) in self.records.iter().enumerate() {
-            let length = (BLOCK / own.recording.period()).max(1.0) as usize;
+            let length = (BLOCK / own.recording.period()).min(longest).max(1.0) as usize;
             let mut from = 0;
             while from < here[number].len() {
                 let to = (from + length).min(here[number].len());
@@ -436,6 +440,8 @@ pub struct Replication {
     /// Root mean square of the error of the acceleration over that of the acceleration, both without the
     /// sensor's noise.
     pub relative_error: f64,
+    /// Root mean square of the acceleration, without the sensor's noise, m/s².
+    pub rms: f64,
     /// Largest error of the acceleration over its peak, with the sensor's noise.
     pub peak_error: f64,
 }
@@ -464,9 +470,10 @@ impl Found {
         let noise = self.noise[1] * self.noise[1];
         let square = |values: &[f64]| recordings::mean_and_deviation(values).1.powi(2) - noise;
         let peak = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let size = square(measured).max(f64::MIN_POSITIVE);
         Some(Replication {
-            relative_error: (square(&errors).max(0.0) / square(measured).max(f64::MIN_POSITIVE))
-                .sqrt(),
+            relative_error: (square(&errors).max(0.0) / size).sqrt(),
+            rms: size.sqrt(),
             peak_error: peak(&errors) / peak(measured),
         })
     }

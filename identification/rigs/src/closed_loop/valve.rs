@@ -12,7 +12,7 @@ use plant::integration::{inner_steps, runge_kutta_4};
 use rayon::prelude::*;
 use recordings::{Channel, Recording, mean_and_deviation};
 
-use super::Found;
+use super::{Found, LEAST_INERTIA};
 use super::equations::{Equations, HydraulicRig, PARAMETERS};
 use super::least_squares::{Coordinate, Optimum, minimise_within};
 use super::replay::{
@@ -25,7 +25,9 @@ const LEAST: f64 = 0.03;
 const SMALLEST: f64 = 5e-3;
 /// Error of the delay, s, that the form of the spool leaves beside its scatter: a quarter of a sample.
 const DELAY_MISTAKEN: f64 = 5e-4;
-/// Standard errors of that gain, from block to block, by which it has to be more than none.
+/// Share of oil stiffness and force rate that is as uncertain: flow goes with the root of the pressure.
+const OIL_MISTAKEN: f64 = 0.01;
+/// Standard errors, from block to block, by which what it takes away has to be more than none.
 const SURE: f64 = 2.5;
 /// Length of such a block, s.
 const BLOCK: f64 = 0.5;
@@ -375,8 +377,17 @@ impl Found {
         let seal = slopes[0].1;
         let mistaken = MISTAKEN * moved.rig.seal_damping * speed(replay.records)?;
         self.covariance[(seal, seal)] += mistaken * mistaken;
+        for (_, oil, own) in &slopes[2..4] {
+            self.covariance[(*oil, *oil)] += (OIL_MISTAKEN * own).powi(2);
+        }
         let delay = slopes[7].1;
-        self.covariance[(delay, delay)] += DELAY_MISTAKEN * DELAY_MISTAKEN;
+        // Without inertia the spool's lag is no more certain than what was taken from it for delay.
+        let exchanged = if moved.rig.spool_inertia <= 1.01 * LEAST_INERTIA {
+            moved.rig.spool_lag
+        } else {
+            0.0
+        };
+        self.covariance[(delay, delay)] += DELAY_MISTAKEN.powi(2) + exchanged.powi(2);
         self.standard_error = std::array::from_fn(|i| self.covariance[(i, i)].max(0.0).sqrt());
         let error = |i: usize| place(i).map_or(0.0, |i| covariance[(i, i)].max(0.0).sqrt());
         let (bias, bias_error) = null(replay, &moved)?;

@@ -8,7 +8,8 @@ use realfft::RealFftPlanner;
 use recordings::IdentificationError;
 
 /// White noise under a smooth signal, one standard deviation, by third differences.
-pub(crate) fn noise_floor(values: &[f64]) -> f64 {
+#[must_use]
+pub fn noise_floor(values: &[f64]) -> f64 {
     let square: f64 = values
         .windows(4)
         .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2))

@@ -2,7 +2,8 @@
 //! and what its sensors showed of them.
 
 use controllers::pid::Pid;
-use identification::data::{Channel, Recording};
+use identification::closed_loop::velocity::noise_floor;
+use identification::data::{Channel, Recording, mean_and_deviation};
 
 use super::Request;
 use crate::error::Error;
@@ -126,8 +127,12 @@ impl Bench {
             ),
         ];
         for (channel, names) in measured {
-            if channel != Channel::SpecimenAcceleration || self.specimen {
-                channels.push((channel, shown(&outcome.record, &names)?));
+            // A rig may carry a specimen that nobody named.
+            let is_named = channel != Channel::SpecimenAcceleration || self.specimen;
+            match shown(&outcome.record, &names) {
+                Ok(values) if is_named || is_lively(&values) => channels.push((channel, values)),
+                Err(error) if is_named => return Err(error),
+                _ => (),
             }
         }
         for (_, values) in &mut channels {
@@ -138,6 +143,12 @@ impl Bench {
             ended: outcome.ended.reason(),
         })
     }
+}
+
+/// Whether there is more in it than noise that is white.
+fn is_lively(values: &[f64]) -> bool {
+    const LIVELY: f64 = 5.0;
+    mean_and_deviation(values).1 > LIVELY * noise_floor(values)
 }
 
 /// The first of the columns that is there.

@@ -98,6 +98,8 @@ pub struct Prediction {
     /// The recorded command replayed on the model: root mean square of the error of the acceleration over the
     /// acceleration's own, both without the sensor's noise, percent.
     pub replayed_percent: Option<f64>,
+    /// Root mean square of what was measured, without the sensor's noise, m/s².
+    pub rms_m_s2: Option<f64>,
 }
 
 /// What the validation says of a model.
@@ -131,7 +133,7 @@ pub struct Commissioned {
     pub growth: Vec<Trial>,
     /// Motions that were not fitted.
     pub predictions: Vec<Prediction>,
-    /// Largest error of the replayed acceleration on a lively motion that was not fitted, percent.
+    /// Error of the replayed acceleration on the lively motions that were not fitted, over their size, percent.
     pub validation_percent: Option<f64>,
     /// What that says of the model.
     pub verdict: Verdict,
@@ -315,14 +317,18 @@ fn names(design: &ModelDesign) -> impl Iterator<Item = &str> {
     robust.map(|own| own.name.as_str()).chain(LEADING)
 }
 
-/// Largest error of the model on a motion that was not fitted and that moves the table quickly: the acceleration
-/// of a slow triangle is friction and noise.
+/// Root mean square of the model's error on the motions that were not fitted and that move the table quickly, over
+/// that of the motions, percent; the acceleration of a slow triangle is friction and noise.
 fn validation(identified: &Identified, predictions: &[Prediction]) -> Option<f64> {
     match &identified.form {
         Form::Hydraulic(_) => {
-            let lively = predictions.iter().filter(|own| own.motion != TRIANGLE);
-            let errors: Option<Vec<f64>> = lively.map(|own| own.replayed_percent).collect();
-            errors?.into_iter().reduce(f64::max)
+            let (mut errors, mut sizes) = (0.0, 0.0);
+            for own in predictions.iter().filter(|own| own.motion != TRIANGLE) {
+                let square = own.rms_m_s2?.powi(2);
+                errors += own.replayed_percent?.powi(2) * square;
+                sizes += square;
+            }
+            (sizes > 0.0).then(|| (errors / sizes).sqrt())
         }
         Form::General(_) => {
             let fit = identified
@@ -521,6 +527,7 @@ fn predict(
         way_size += way * way;
     }
     let count = wanted.len().max(1) as f64;
+    let replayed = found.replication(other);
     Prediction {
         motion: other.name.clone(),
         peak_m_s2: peak,
@@ -528,9 +535,8 @@ fn predict(
         rms_percent: 100.0 * (square / count).sqrt() / peak,
         displacement_percent: 100.0 * (way_square / way_size).sqrt(),
         command_percent: 100.0 * (command_square / command_size).sqrt(),
-        replayed_percent: found
-            .replication(other)
-            .map(|own| 100.0 * own.relative_error),
+        replayed_percent: replayed.map(|own| 100.0 * own.relative_error),
+        rms_m_s2: replayed.map(|own| own.rms),
     }
 }
 

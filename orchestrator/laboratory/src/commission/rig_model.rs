@@ -14,13 +14,15 @@ use crate::error::Error;
 use crate::run::experiment::{self, prepare_file};
 use crate::systems::built_in;
 use crate::systems::tuning::{Rules, Wanted};
-use fmi_system::{ComponentFile, SystemFile};
+use fmi_system::{ComponentFile, SystemFile, VariableName};
 use motion::metrics;
 
 /// Component that a plant's table is.
 const TABLE: &str = "table";
 /// Component that stands on it.
 const SPECIMEN: &str = "specimen";
+/// The built-in one whose numbers recordings tell.
+const LINEAR: &str = "linear";
 
 /// Parameters of the physical table's component with the identified rig's numbers, SI. Area, volume and supply
 /// are those of the built-in one: only what follows from them shows in recordings.
@@ -79,8 +81,7 @@ fn parameters(
     ]
 }
 
-/// `time_domain_percent` of `controller` on the identified rig; none where it is stopped, or where the
-/// rig cannot stand for the recorded one.
+/// `time_domain_percent` of `controller` on the identified rig; none where it is stopped.
 ///
 /// # Errors
 /// A motion at fault.
@@ -90,15 +91,22 @@ pub(super) fn predicted(
     rules: &Rules,
     controller: &str,
 ) -> Result<Option<f64>, Error> {
-    // A specimen inside of the plant has no component that could be replaced.
-    if found.rig.specimen_mass > 0.0 && request.specimen == built_in::NONE {
-        return Ok(None);
-    }
+    // A specimen inside of the plant gets a component of its own.
+    let is_inside = found.rig.specimen_mass > 0.0 && request.specimen == built_in::NONE;
+    let specimen = if is_inside {
+        LINEAR
+    } else {
+        &request.specimen
+    };
     let wanted = Wanted {
         rules: Some(rules),
         ..Wanted::default()
     };
-    let mut file = built_in::system(controller, &request.plant, &request.specimen, wanted)?;
+    let mut file = built_in::system(controller, &request.plant, specimen, wanted)?;
+    if is_inside {
+        let own = VariableName::new(SPECIMEN, "acceleration");
+        file.redirect(&[(VariableName::new(TABLE, "specimen_acceleration"), own)].into());
+    }
     let settings = request.set.iter();
     let others = settings.filter(|own| own.split('.').next().map(str::trim) != Some(TABLE));
     for setting in others {
@@ -107,7 +115,7 @@ pub(super) fn predicted(
     replace(&mut file, found, request.sensor_delay);
     let asked = experiment::Request {
         plant: request.plant.clone(),
-        specimen: request.specimen.clone(),
+        specimen: specimen.to_string(),
         record: request.record.clone(),
         reference: request.reference.clone(),
         duration_s: Some(request.played),
