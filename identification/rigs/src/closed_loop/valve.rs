@@ -6,18 +6,18 @@
 //! none gains more than chance and `LEAST`. What the null leaves uncertain is the scatter between blocks of the
 //! records, widened by how much more is left where nothing was fitted.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector2};
 use plant::identified::valve_curve::ValveCurve;
-use plant::integration::{inner_steps, runge_kutta_4};
 use rayon::prelude::*;
 use recordings::{Channel, Recording, mean_and_deviation};
 
-use super::{Found, LEAST_INERTIA};
 use super::equations::{Equations, HydraulicRig, PARAMETERS};
 use super::least_squares::{Coordinate, Optimum, minimise_within};
 use super::replay::{
     Actuator, CORRECTION, Errors, FITTED, MISTAKEN, OF_CURVE, PART, Replay, coordinates, speed,
 };
+use super::simulation::spool_transition;
+use super::{Found, LEAST_INERTIA};
 
 /// Least part of the squared error that a member of the curve has to take away.
 const LEAST: f64 = 0.03;
@@ -112,24 +112,17 @@ pub(super) fn distortion(
     command: &[f64],
     period: f64,
 ) -> Vec<f64> {
-    const LONGEST: f64 = 5e-4;
     let late = (rig.command_delay / period).max(0.0);
     let (whole, part) = (late.floor() as usize, late.fract());
-    let mut spool = [0.0; 2];
+    let pieces = [(whole + 1, part), (whole, 1.0 - part)]
+        .map(|(back, share)| (back, spool_transition(rig, share * period)));
+    let mut spool = Vector2::zeros();
     let mut all = Vec::with_capacity(command.len());
     for k in 0..command.len() {
-        all.push(curve.opening(spool[0]) - spool[0]);
-        let at = |back: usize| k.checked_sub(back).map_or(0.0, |k| command[k]);
-        for (u, share) in [(at(whole + 1), part), (at(whole), 1.0 - part)] {
-            if share > 0.0 {
-                let count = inner_steps(share * period, LONGEST);
-                let step = share * period / f64::from(count);
-                for _ in 0..count {
-                    spool = runge_kutta_4(&spool, step, |s| {
-                        [s[1], (u - s[0] - rig.spool_lag * s[1]) / rig.spool_inertia]
-                    });
-                }
-            }
+        all.push(curve.opening(spool.x) - spool.x);
+        for (back, transition) in pieces {
+            let u = Vector2::new(k.checked_sub(back).map_or(0.0, |k| command[k]), 0.0);
+            spool = u + transition * (spool - u);
         }
     }
     all

@@ -317,8 +317,8 @@ fn names(design: &ModelDesign) -> impl Iterator<Item = &str> {
     robust.map(|own| own.name.as_str()).chain(LEADING)
 }
 
-/// Root mean square of the model's error on the motions that were not fitted and that move the table quickly, over
-/// that of the motions, percent; the acceleration of a slow triangle is friction and noise.
+/// Root mean square of the model's error on the lively motions that were not fitted, over that of the motions,
+/// percent. The acceleration of a slow triangle is friction and noise.
 fn validation(identified: &Identified, predictions: &[Prediction]) -> Option<f64> {
     match &identified.form {
         Form::Hydraulic(_) => {

@@ -93,11 +93,7 @@ pub(super) fn predicted(
 ) -> Result<Option<f64>, Error> {
     // A specimen inside of the plant gets a component of its own.
     let is_inside = found.rig.specimen_mass > 0.0 && request.specimen == built_in::NONE;
-    let specimen = if is_inside {
-        LINEAR
-    } else {
-        &request.specimen
-    };
+    let specimen = if is_inside { LINEAR } else { &request.specimen };
     let wanted = Wanted {
         rules: Some(rules),
         ..Wanted::default()
