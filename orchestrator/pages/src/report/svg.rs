@@ -144,17 +144,23 @@ impl Scale {
         let decimals = usize::try_from(-(step * 1.000_001).log10().floor() as i32).unwrap_or(0);
         let first = (self.low / step - 1e-9).ceil() as i64;
         let last = (self.high / step + 1e-9).floor() as i64;
-        (first..=last)
-            .map(|n| {
-                let shown = n as f64 * step;
-                let label = if self.logarithmic {
-                    typeset(10_f64.powf(shown), 2)
-                } else {
-                    format!("{shown:.decimals$}").replace('-', "\u{2212}")
-                };
-                (self.place(shown), label)
-            })
-            .collect()
+        let labelled = |digits: usize| -> Vec<(f64, String)> {
+            (first..=last)
+                .map(|n| {
+                    let shown = n as f64 * step;
+                    let label = if self.logarithmic {
+                        typeset(10_f64.powf(shown), digits)
+                    } else {
+                        format!("{shown:.decimals$}").replace('-', "\u{2212}")
+                    };
+                    (self.place(shown), label)
+                })
+                .collect()
+        };
+        // Two digits of a logarithmic scale are not enough where it spans little.
+        let differ = |all: &Vec<(f64, String)>| all.windows(2).all(|two| two[0].1 != two[1].1);
+        let found = (2..=12).map(labelled).find(differ);
+        found.unwrap_or_default()
     }
 }
 
@@ -320,4 +326,36 @@ pub(super) fn escaped(text: &str) -> String {
         .replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_ticks_have_the_same_label() {
+        for (low, high, logarithmic) in [
+            (0.0, 1.0, false),
+            (-0.000_31, 0.000_4, false),
+            (0.1234, 0.1235, false),
+            (0.1234, 0.1235, true),
+            (1000.0, 1000.4, true),
+        ] {
+            let shown = |value: f64| if logarithmic { value.log10() } else { value };
+            let scale = Scale {
+                unit: 1.0,
+                logarithmic,
+                low: shown(low),
+                high: shown(high),
+                from: 0.0,
+                to: 100.0,
+            };
+            let mut labels: Vec<String> = scale.ticks().into_iter().map(|own| own.1).collect();
+            let count = labels.len();
+            labels.sort();
+            labels.dedup();
+            assert!(count >= 3, "{low} {high} {labels:?}");
+            assert_eq!(labels.len(), count, "{low} {high} {labels:?}");
+        }
+    }
 }

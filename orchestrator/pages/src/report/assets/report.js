@@ -77,6 +77,18 @@
     return { data, roles };
   };
 
+  // So many digits that no two ticks have the same label.
+  const labels = (ticks) => {
+    for (let count = 6; ; count++) {
+      const all = ticks.map((tick) => (tick === null ? "" : String(+tick.toPrecision(count))));
+      if (count >= 15 || new Set(all).size === all.length) return all;
+    }
+  };
+
+  // Room for the longest label.
+  const wide = (least) => (_, values) =>
+    Math.max(least, 16 + 7 * Math.max(0, ...(values ?? []).map((label) => label.length)));
+
   // Ticks of a logarithmic axis: decades, 1-2-5 where few decades show, even steps within one.
   const logTicks = (low, high) => {
     if (!(low > 0 && high > low)) return [];
@@ -159,8 +171,8 @@
       ...(which.log && {
         splits: (_, __, low, high) => logTicks(low, high),
         filter: (_, ticks) => ticks,
-        values: (_, ticks) => ticks.map((tick) => String(+tick.toPrecision(6))),
       }),
+      values: (_, ticks) => labels(ticks),
       label: named(which, unit), size, stroke: ink, labelSize: 20, labelFont: "12.5px system-ui, sans-serif",
       font: "12px system-ui, sans-serif", labelGap: 0,
       grid: { stroke: colour("--grid"), width: 1 }, ticks: { stroke: colour("--line"), width: 1, size: 5 },
@@ -178,7 +190,7 @@
       width: printing ? 680 : place.clientWidth, height: height(panel, place.clientWidth),
       scales: { x: scale(panel.x, xUnit), y: scale(panel.y, yUnit) },
       series, bands,
-      axes: [axis(panel.x, xUnit, 34), axis(panel.y, yUnit, panel.y.log ? 64 : 58)],
+      axes: [axis(panel.x, xUnit, 34), axis(panel.y, yUnit, wide(panel.y.log ? 64 : 58))],
       cursor: {
         drag: { x: true, y: false, dist: 4 },
         sync: { key: `${panel.x.label}/${panel.x.log}`, setSeries: false },
