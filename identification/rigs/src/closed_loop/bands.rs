@@ -25,7 +25,9 @@ const POOLED: usize = 2;
 /// One band of an experiment.
 #[derive(Debug, Clone)]
 pub struct Band {
-    /// Angular frequencies of its lines, rad/s.
+    /// Its lines among those of a record's spectrum.
+    pub lines: std::ops::Range<usize>,
+    /// Their angular frequencies, rad/s.
     pub omega: Vec<f64>,
     /// Spectra, `[channel][line]`, each over its channel's scale.
     pub spectra: Vec<Vec<Complex<f64>>>,
@@ -47,7 +49,8 @@ pub struct Bands {
     pub period: f64,
 }
 
-fn spectrum(values: &[f64]) -> Result<Vec<Complex<f64>>, IdentificationError> {
+/// Spectrum of a record about its mean, over the root of its samples.
+pub(super) fn spectrum(values: &[f64]) -> Result<Vec<Complex<f64>>, IdentificationError> {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     let mut input: Vec<f64> = values.iter().map(|v| v - mean).collect();
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(input.len());
@@ -271,6 +274,7 @@ fn band(wanted: &[Vector], all: &[Vector], from: usize, step: f64) -> Option<Ban
         inner(&rest[j], &rest[i]) / freedom
     });
     Some(Band {
+        lines: lines.clone(),
         omega: lines.map(|line| TAU * line as f64 * step).collect(),
         spectra,
         instruments,

@@ -7,6 +7,7 @@
 
 pub mod bands;
 pub mod equations;
+mod fitting;
 pub mod friction;
 mod lateness;
 pub mod least_squares;
@@ -23,8 +24,8 @@ use nalgebra::DMatrix;
 
 use self::bands::Bands;
 use self::equations::{EQUATIONS, Equations, HydraulicRig, PARAMETERS};
+use self::fitting::Fitting;
 use self::friction::{SHAPE, SealShape, Searched};
-use self::least_squares::{Coordinate, Optimum, minimise};
 use self::specimen::SpecimenFit;
 use self::valve::Valve;
 use plant::identified::valve_curve::ValveCurve;
@@ -157,7 +158,9 @@ impl<'a> Channels<'a> {
         let mut opening = nothing.clone();
         if let Some((rig, curve)) = &histories.valve {
             opening = valve::distortion(rig, curve, command, period);
-            let wanted = bands::explained(reference, command, period, band)?;
+            let (mean, _) = mean_and_deviation(command);
+            let mut wanted = bands::explained(reference, command, period, band)?;
+            wanted.iter_mut().for_each(|value| *value += mean);
             instruments.push(valve::distortion(rig, curve, &wanted, period));
         }
         if let Some(shape) = histories.shape {
@@ -235,46 +238,12 @@ pub fn identify(
     for recording in recordings {
         refuse_clipped(recording)?;
     }
-    let channels: Vec<Channels> = recordings
-        .iter()
-        .map(Channels::new)
-        .collect::<Result<_, _>>()?;
-    let specimen = recordings
-        .iter()
-        .all(|r| r.channel(Channel::SpecimenAcceleration).is_some());
-    let with = |histories: Histories| -> Result<Equations, IdentificationError> {
-        let experiments = channels
-            .iter()
-            .map(|c| c.bands(histories, &settings, specimen))
-            .collect::<Result<_, _>>()?;
-        Ok(Equations {
-            experiments,
-            held: None,
-            shape: histories.shape,
-        })
+    let fitting = Fitting::new(recordings, settings)?;
+    let histories = Histories {
+        shape: settings.friction.then_some(fitting.usual_shape()),
+        valve: None,
     };
-    let bands = |shape| with(Histories { shape, valve: None });
-    let root_mean_square = |of: &dyn Fn(&Channels) -> f64| {
-        let sum: f64 = channels.iter().map(|c| of(c).powi(2)).sum();
-        (sum / channels.len().max(1) as f64).sqrt()
-    };
-    let size = |channel: Channel| {
-        root_mean_square(&|c: &Channels| {
-            c.recording
-                .channel(channel)
-                .map_or(0.0, |v| mean_and_deviation(v).1)
-        })
-    };
-    let (way, force) = (size(Channel::Displacement), size(Channel::ActuatorForce));
-
-    let mut shape = SealShape {
-        presliding: 0.01 * way,
-        excess: 0.2,
-        stribeck_velocity: 4e-3,
-        sharpness: 3.0,
-        relaxation: 0.0,
-    };
-    let mut equations = bands(settings.friction.then_some(shape))?;
+    let equations = fitting.equations(histories)?;
     let ratio = start::motion_ratio(&equations.experiments);
     if !(0.6..1.6).contains(&ratio) {
         return Err(IdentificationError::Unstable {
@@ -286,125 +255,27 @@ pub fn identify(
                 .into(),
         });
     }
-    let (table, payloads) = start::table(&equations.experiments, specimen)?;
-    let mut best: Option<Optimum> = None;
-    for rig in start::actuators(&equations.experiments, &table)? {
-        let coordinates = coordinates(&rig, &payloads, force, specimen, settings.friction);
-        if let Some(optimum) = approach(&equations, &coordinates)
-            && best.as_ref().is_none_or(|b| optimum.cost < b.cost)
-        {
-            best = Some(optimum);
-        }
-    }
-    let Some(mut optimum) = best else {
-        return Err(IdentificationError::NotConverged {
-            method: "the fit of the hydraulic rig",
-            reason: "no start value gives a model".into(),
-        });
-    };
+    let (table, payloads) = start::table(&equations.experiments, fitting.specimen)?;
+    let first = fitting.started(equations, histories, &table, &payloads)?;
+    let fit = fitting.with_friction(first);
+    let equations = fit.equations.clone();
+    let mut found = fitting.found(fit);
     if settings.friction {
-        let refit = |shape: SealShape, from: &Optimum, free: bool| {
-            let trial = bands(Some(shape)).ok()?;
-            let rig = HydraulicRig::at(&from.values)?;
-            let mut own = coordinates(
-                &rig,
-                &from.values[PARAMETERS + SHAPE..],
-                force,
-                specimen,
-                true,
-            );
-            for coordinate in &mut own[PARAMETERS..PARAMETERS + SHAPE] {
-                coordinate.free = free;
-            }
-            Some((approach(&trial, &own)?, trial))
-        };
-        for part in [0.002, 0.05] {
-            let trial = SealShape {
-                presliding: part * way,
-                ..shape
+        let lapped = fitting.lapped(&equations, &found.rig);
+        if let (Err(_), Some((rig, _))) = (refuse_nonsense(&found.rig), lapped.first()) {
+            // Lost flow was taken for soft oil: there is a rig only if its valve is found.
+            let mut own = Found {
+                rig: *rig,
+                ..found.clone()
             };
-            if let Some((found, own)) = refit(trial, &optimum, false)
-                && found.cost < optimum.cost
-            {
-                (optimum, equations, shape) = (found, own, trial);
+            own.replay_valve(recordings, &lapped, &fitting);
+            if own.valve.is_some() {
+                found = own;
             }
+        } else {
+            found.replay_friction(recordings, &fitting);
+            found.replay_valve(recordings, &lapped, &fitting);
         }
-        for round in 0..2 {
-            for _ in 0..6 {
-                let Some((found, own)) = refit(shape, &optimum, true) else {
-                    break;
-                };
-                let changes = found.values[PARAMETERS..PARAMETERS + SHAPE].to_vec();
-                (optimum, equations) = (found, own);
-                shape = shape.changed(&changes);
-                if changes.iter().all(|c| c.abs() < 0.03) {
-                    break;
-                }
-            }
-            // As long as the friction's shape was not known spool and delay may have been mistaken.
-            let rivals = lateness::divisions(&optimum.values);
-            if round > 0 || rivals.is_empty() {
-                break;
-            }
-            let own = refit(shape, &optimum, false);
-            let rivals = rivals.iter().filter_map(|rig| {
-                let mut from = optimum.clone();
-                from.values[..PARAMETERS].copy_from_slice(&rig.coordinates());
-                refit(shape, &from, false)
-            });
-            let Some((rival, other)) = rivals.min_by(|a, b| a.0.cost.total_cmp(&b.0.cost)) else {
-                break;
-            };
-            if own.is_some_and(|(own, _)| own.cost <= rival.cost) {
-                break;
-            }
-            (optimum, equations) = (rival, other);
-        }
-    }
-    let rig = HydraulicRig::at(&optimum.values).unwrap_or(table);
-    let mean_squares = equations
-        .mean_squares(&optimum.values)
-        .unwrap_or([f64::NAN; EQUATIONS]);
-    // Where the rig does more than its equations the errors are larger than their noise says.
-    let excess = mean_squares.iter().copied().fold(1.0, f64::max);
-    let slopes = rig.slopes();
-    let covariance = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
-        excess * optimum.covariance[(i, j)] * slopes[i] * slopes[j]
-    });
-    let floor = |channel: Channel| {
-        let own = channels.first().and_then(|c| c.recording.channel(channel));
-        own.map_or(0.0, velocity::noise_floor)
-    };
-    let mut found = Found {
-        rig,
-        standard_error: std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt()),
-        covariance,
-        payloads: optimum.values[PARAMETERS + SHAPE..].to_vec(),
-        shape,
-        valve: None,
-        mean_squares,
-        specimen: specimen.then(|| carried(&channels, &equations)).flatten(),
-        converged: optimum.converged,
-        noise: [
-            Channel::Displacement,
-            Channel::Acceleration,
-            Channel::ActuatorForce,
-            Channel::SpecimenAcceleration,
-            Channel::ValveCommand,
-        ]
-        .map(floor),
-        period: channels.first().map_or(0.0, |c| c.recording.period()),
-        warnings: Vec::new(),
-    };
-    if settings.friction {
-        let again = |shape| bands(Some(shape)).ok();
-        found.replay_friction(recordings, &optimum.values, &again);
-        let refit = |own: &Found| {
-            let equations = with(own.histories()).ok()?;
-            let start = coordinates(&own.rig, &own.payloads, force, specimen, true);
-            Some((approach(&equations, &start)?, equations))
-        };
-        found.replay_valve(recordings, &refit);
     }
     refuse_nonsense(&found.rig)?;
     found.warnings = remarks(&found, recordings);
@@ -524,103 +395,5 @@ fn remarks(found: &Found, recordings: &[Recording]) -> Vec<String> {
              one of the two"
         ));
     }
-    all
-}
-
-/// The specimen of the recordings.
-fn carried(channels: &[Channels], equations: &Equations) -> Option<SpecimenFit> {
-    let [damping, stiffness] = start::specimen(&equations.experiments)?;
-    let of = |channel: Channel| -> Option<Vec<&[f64]>> {
-        channels
-            .iter()
-            .map(|c| c.recording.channel(channel))
-            .collect()
-    };
-    let period = channels.first()?.recording.period();
-    let (base, mass) = (
-        of(Channel::Acceleration)?,
-        of(Channel::SpecimenAcceleration)?,
-    );
-    specimen::fit(&base, &mass, period, damping, stiffness)
-}
-
-/// Fits with the residuals' covariance held where the fit before ended, twice, and then going with
-/// the rig: from far away the latter may fit noise to the signal.
-fn approach(equations: &Equations, coordinates: &[Coordinate]) -> Option<Optimum> {
-    let mut own = coordinates.to_vec();
-    let mut held = equations.clone();
-    for _ in 0..2 {
-        held.held = Some(own.iter().map(|c| c.start).collect());
-        let found = minimise(&held, &own)?;
-        for (coordinate, value) in own.iter_mut().zip(found.values) {
-            coordinate.start = value;
-        }
-    }
-    minimise(equations, &own)
-}
-
-/// The fit's coordinates from `rig`; forces are of the size of `force` (N).
-fn coordinates(
-    rig: &HydraulicRig,
-    payloads: &[f64],
-    force: f64,
-    specimen: bool,
-    friction: bool,
-) -> Vec<Coordinate> {
-    let critical = (rig.oil_stiffness * rig.mass).sqrt();
-    let stiffness = rig.stiffness.abs().max(rig.mass * 10.0);
-    let scale = [
-        1e-3,
-        1e-6,
-        0.1,
-        0.1,
-        0.3,
-        0.1 * critical,
-        0.1 * force,
-        0.1,
-        0.1 * (stiffness * rig.mass).sqrt(),
-        0.1 * stiffness,
-        0.1 * rig.mass,
-        1e-3,
-        1e-3,
-        1e-3,
-        0.01,
-    ];
-    let mut all: Vec<Coordinate> = rig
-        .coordinates()
-        .iter()
-        .zip(scale)
-        .map(|(&start, scale)| Coordinate {
-            start,
-            scale,
-            free: true,
-            bounds: (f64::NEG_INFINITY, f64::INFINITY),
-        })
-        .collect();
-    // Dampings and friction take no negative values.
-    for i in [0, 5, 6, 8, 11] {
-        all[i].bounds.0 = 0.0;
-    }
-    all[1].bounds.0 = LEAST_INERTIA;
-    for coordinate in &mut all {
-        coordinate.start = coordinate.start.max(coordinate.bounds.0);
-    }
-    all[6].free = friction;
-    all[10].free = specimen;
-    all.extend((0..SHAPE).map(|_| Coordinate {
-        start: 0.0,
-        scale: 0.1,
-        free: false,
-        bounds: (-0.5, 0.5),
-    }));
-    // Relaxation, ms.
-    all[PARAMETERS + SHAPE - 1].scale = 0.3;
-    all[PARAMETERS + SHAPE - 1].bounds = (-2.0, 2.0);
-    all.extend(payloads.iter().map(|&start| Coordinate {
-        start,
-        scale: 0.1 * rig.mass,
-        free: true,
-        bounds: (-0.9 * rig.mass, f64::INFINITY),
-    }));
     all
 }

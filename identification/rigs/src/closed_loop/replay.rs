@@ -10,14 +10,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Found;
-use super::LEAST_INERTIA;
-use super::equations::{EQUATIONS, Equations, HydraulicRig, PARAMETERS};
+use super::equations::{EQUATIONS, HydraulicRig, PARAMETERS};
+use super::fitting::Fitting;
 use super::friction::{SHAPE, SealShape, Searched};
 use super::least_squares::{Coordinate, Residuals, minimise};
 use super::simulation::Simulation;
 use super::specimen::SpecimenOverMass;
 use super::velocity::velocity;
+use super::{Found, Histories, LEAST_INERTIA};
 use plant::identified::valve_curve::ValveCurve;
 use recordings::{Channel, Recording};
 
@@ -366,25 +366,17 @@ impl Residuals for Replay<'_> {
     }
 }
 
-/// Looks for the friction with which `rig`, whose Coulomb force is known to `known` of it (one standard
+/// Looks for the friction with which `start`, whose Coulomb force is known to `known` of it (one standard
 /// deviation), replays `records` best. None where there is none, where the
 /// records are too short, or where what was not fitted is not replayed better with it.
-pub fn friction(
-    records: &[Replayed<'_>],
-    rig: HydraulicRig,
-    shape: SealShape,
-    known: f64,
-) -> Option<Friction> {
+fn friction(records: &[Replayed<'_>], start: Actuator, known: f64) -> Option<Friction> {
+    let rig = start.rig;
     if rig.seal_friction <= 0.0 {
         return None;
     }
     let own = Replay {
         records,
-        start: Actuator {
-            rig,
-            shape,
-            curve: ValveCurve::default(),
-        },
+        start,
         weights: [1.0; 2],
         known,
         part: (0.0, PART),
@@ -447,17 +439,22 @@ pub struct Replication {
 }
 
 impl Found {
+    /// What moves its table.
+    pub(super) fn actuator(&self) -> Actuator {
+        Actuator {
+            rig: self.rig,
+            shape: self.shape,
+            curve: self.curve(),
+        }
+    }
+
     /// Replays a recording, with the first payload, under its own command. None where the recording lacks a
     /// channel or the rig runs away.
     pub fn replication(&self, recording: &Recording) -> Option<Replication> {
         let records = self.replayed(std::slice::from_ref(recording))?;
         let replay = Replay {
             records: &records,
-            start: Actuator {
-                rig: self.rig,
-                shape: self.shape,
-                curve: self.curve(),
-            },
+            start: self.actuator(),
             weights: [1.0; 2],
             known: f64::INFINITY,
             part: (0.0, 1.0),
@@ -495,14 +492,9 @@ impl Found {
         Some(replayed.collect())
     }
 
-    /// Takes the friction over with which the rig replays `recordings` better, if the equations at
-    /// `values` still hold with it; `equations` makes them for a shape.
-    pub(super) fn replay_friction(
-        &mut self,
-        recordings: &[Recording],
-        values: &[f64],
-        equations: &dyn Fn(SealShape) -> Option<Equations>,
-    ) {
+    /// Takes the friction over with which the rig replays `recordings` better, if the equations of `fitting`
+    /// still hold with it.
+    pub(super) fn replay_friction(&mut self, recordings: &[Recording], fitting: &Fitting) {
         /// What the equations leave over their noise where they hold, and how much worse it may be.
         const HOLD: f64 = 1.6;
         const WORSE: f64 = 1.2;
@@ -512,7 +504,7 @@ impl Found {
         // Three times what the equations say of it, for their standard error holds for their form of the
         // friction alone.
         let known = 3.0 * self.standard_error[SEAL_FRICTION] / self.rig.seal_friction + 0.03;
-        let Some(own) = friction(&records, self.rig, self.shape, known) else {
+        let Some(own) = friction(&records, self.actuator(), known) else {
             return;
         };
         for (parameter, error) in [SEAL_DAMPING, SEAL_FRICTION]
@@ -526,10 +518,15 @@ impl Found {
             seal_friction: own.coulomb,
             ..self.rig
         };
-        let mut moved = values.to_vec();
-        moved[..PARAMETERS].copy_from_slice(&rig.coordinates());
-        moved[PARAMETERS..PARAMETERS + SHAPE].fill(0.0);
-        let left = equations(own.shape).and_then(|own| own.mean_squares(&moved));
+        let mut moved = rig.coordinates().to_vec();
+        moved.extend([0.0; SHAPE]);
+        moved.extend(&self.payloads);
+        let histories = Histories {
+            shape: Some(own.shape),
+            ..self.histories()
+        };
+        let equations = fitting.equations(histories).ok();
+        let left = equations.and_then(|own| own.mean_squares(&moved));
         if let Some(left) = left
             && own.improvement < 1.0
             && (0..EQUATIONS).all(|i| left[i] < (WORSE * self.mean_squares[i]).max(HOLD))

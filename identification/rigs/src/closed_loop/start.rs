@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::bands::{Band, Bands};
+use super::bands::{self, Band, Bands};
 use super::equations::{ACCELERATION, COMMAND, DISPLACEMENT, FORCE, HydraulicRig, SIGN, SPECIMEN};
 use recordings::IdentificationError;
 
-/// Projection of `weight(s)` times a channel, SI.
+/// Projection of `weight(s)` times a channel, SI, on the reference.
 fn projected(
     band: &Band,
     bands: &Bands,
@@ -139,7 +139,7 @@ pub fn table(
     Ok((rig, masses.collect()))
 }
 
-fn empty() -> HydraulicRig {
+pub(super) fn empty() -> HydraulicRig {
     HydraulicRig {
         spool_lag: 0.0,
         spool_inertia: 0.0,
@@ -195,6 +195,72 @@ pub fn motion_ratio(experiments: &[Bands]) -> f64 {
     ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
+/// Leakages of the grid, 1/s.
+const LEAKAGES: [f64; 4] = [0.1, 1.0, 5.0, 25.0];
+
+/// The rig with each spool and delay of the grid.
+fn spools(rig: &HydraulicRig) -> Vec<HydraulicRig> {
+    let mut all = Vec::new();
+    for frequency in [15.0, 30.0, 60.0, 120.0] {
+        for damping in [0.3, 0.8] {
+            for delay in [0.0, 0.002, 0.005, 0.01] {
+                all.push(HydraulicRig {
+                    spool_lag: 2.0 * damping / (TAU * frequency),
+                    spool_inertia: f64::powi(TAU * frequency, -2),
+                    command_delay: delay,
+                    ..*rig
+                });
+            }
+        }
+    }
+    all
+}
+
+/// The rig of a regression, if its oil pushes.
+fn solved(spool: &HydraulicRig, leakage: f64, solution: &DVector<f64>) -> Option<HydraulicRig> {
+    (solution[0] > 0.0 && solution[1] > 0.0).then(|| HydraulicRig {
+        leakage_rate: leakage,
+        force_rate: solution[0],
+        oil_stiffness: solution[1],
+        seal_damping: solution[2].max(0.0),
+        seal_friction: solution[3].max(0.0),
+        ..*spool
+    })
+}
+
+/// The actuator of the grid that explains the force best behind a valve; `opened` gives the histories of its opening
+/// (V) of each experiment for a spool.
+pub fn behind(
+    experiments: &[Bands],
+    rig: &HydraulicRig,
+    opened: impl Fn(&HydraulicRig) -> Option<Vec<Vec<f64>>>,
+) -> Option<HydraulicRig> {
+    let mut best: Option<(f64, HydraulicRig)> = None;
+    for spool in spools(rig) {
+        let spectra: Vec<_> = opened(&spool)?
+            .iter()
+            .map(|history| bands::spectrum(history).ok())
+            .collect::<Option<_>>()?;
+        let opening = |index: usize, band: &Band| {
+            let lines = band.lines.clone();
+            let own = band.instruments[0].iter().zip(&spectra[index][lines]);
+            own.map(|(q, z)| q.conj() * z).sum()
+        };
+        // What a valve with overlap shuts off does not leak as the largest of them would have it.
+        for leakage in &LEAKAGES[..3] {
+            let Some((solution, left)) = actuator(experiments, *leakage, opening) else {
+                continue;
+            };
+            if let Some(own) = solved(&spool, *leakage, &solution)
+                && best.as_ref().is_none_or(|before| left < before.0)
+            {
+                best = Some((left, own));
+            }
+        }
+    }
+    best.map(|own| own.1)
+}
+
 /// The actuator's start values for spools and leakages on a grid, the best of each delay, best first;
 /// `rig` gives the table. A spool's lag and a delay are alike at low frequencies: the best few of the
 /// whole grid may all have taken the one for the other.
@@ -206,34 +272,21 @@ pub fn actuators(
     rig: &HydraulicRig,
 ) -> Result<Vec<HydraulicRig>, IdentificationError> {
     let mut found: Vec<(f64, HydraulicRig)> = Vec::new();
-    let mut backwards = 0;
-    let mut tried = 0;
+    let (mut backwards, mut tried) = (0, 0);
     let period = experiments.first().map_or(1e-3, |e| e.period);
-    for frequency in [15.0, 30.0, 60.0, 120.0] {
-        for damping in [0.3, 0.8] {
-            for delay in [0.0, 0.002, 0.005, 0.01] {
-                let mut trial = *rig;
-                trial.spool_lag = 2.0 * damping / (TAU * frequency);
-                trial.spool_inertia = (TAU * frequency).powi(-2);
-                trial.command_delay = delay;
-                for leakage in [0.1, 1.0, 5.0, 25.0] {
-                    trial.leakage_rate = leakage;
-                    tried += 1;
-                    let Some((solution, left)) = actuator(experiments, &trial, period) else {
-                        continue;
-                    };
-                    backwards += u32::from(solution[0] < 0.0);
-                    if solution[0] <= 0.0 || solution[1] <= 0.0 {
-                        continue;
-                    }
-                    let mut own = trial;
-                    own.force_rate = solution[0];
-                    own.oil_stiffness = solution[1];
-                    own.seal_damping = solution[2].max(0.0);
-                    own.seal_friction = solution[3].max(0.0);
-                    found.push((left, own));
-                }
-            }
+    for spool in spools(rig) {
+        for leakage in LEAKAGES {
+            tried += 1;
+            let opening = |index: usize, band: &Band| {
+                projected(band, &experiments[index], COMMAND, |s| {
+                    spool.spool(s, period)
+                })
+            };
+            let Some((solution, left)) = actuator(experiments, leakage, opening) else {
+                continue;
+            };
+            backwards += u32::from(solution[0] < 0.0);
+            found.extend(solved(&spool, leakage, &solution).map(|own| (left, own)));
         }
     }
     if found.is_empty() {
@@ -262,19 +315,23 @@ pub fn actuators(
     Ok(best)
 }
 
-/// `F (s + p) = g W u - K s x - c_p (s + p) s x - F_c (s + p) S` with `W`, `p` given: unknowns
-/// `[g, K, c_p, F_c]` and what is left.
-fn actuator(experiments: &[Bands], rig: &HydraulicRig, period: f64) -> Option<(DVector<f64>, f64)> {
+/// Unknowns `[g, K, c_p, F_c]` of `F (s + p) = g o - K s x - c_p (s + p) s x - F_c (s + p) S` with `p` given, and what
+/// is left; `opening` is `o` in a band of an experiment.
+fn actuator(
+    experiments: &[Bands],
+    leakage: f64,
+    opening: impl Fn(usize, &Band) -> Complex<f64>,
+) -> Option<(DVector<f64>, f64)> {
     let friction = experiments
         .iter()
         .all(|bands| bands.scale.get(SIGN).is_some_and(|scale| *scale > 1e-6));
     let mut regression = Regression::new(3 + usize::from(friction));
-    let leak = |s: Complex<f64>| s + rig.leakage_rate;
-    for bands in experiments {
+    let leak = |s: Complex<f64>| s + leakage;
+    for (index, bands) in experiments.iter().enumerate() {
         for band in &bands.bands {
             let force = projected(band, bands, FORCE, leak);
             let mut row = vec![
-                projected(band, bands, COMMAND, |s| rig.spool(s, period)),
+                opening(index, band),
                 -projected(band, bands, DISPLACEMENT, |s| s),
                 -projected(band, bands, DISPLACEMENT, |s| s * leak(s)),
             ];

@@ -1,17 +1,22 @@
 //! What a valve lacks to an ideal one: overlap or underlap, gain lost around null, asymmetry.
 //!
 //! The rig is replayed under its recorded command ([`super::replay`]), and valve, oil and seals are fitted
-//! together. The search begins with an ideal valve. In each round every member that is not in the curve yet
-//! is tried, and the one stays whose refit gains most on the part of the records that was not fitted; it ends when
-//! none gains more than chance and `LEAST`. What the null leaves uncertain is the scatter between blocks of the
-//! records, widened by how much more is left where nothing was fitted.
+//! together. The search begins with an ideal valve, and once more with the best of several overlaps: a fit without one
+//! takes lost flow for soft oil and friction, from where no overlap is found. In each round every member that is not in
+//! the curve yet is tried, and the one stays whose refit gains most on the part of the records that was not fitted; it
+//! ends when none gains more than chance and `LEAST`. What the null leaves uncertain is the scatter between blocks of
+//! the records, widened by how much more is left where nothing was fitted.
+
+use std::cmp::Ordering;
 
 use nalgebra::{DMatrix, Vector2};
 use plant::identified::valve_curve::ValveCurve;
 use rayon::prelude::*;
-use recordings::{Channel, Recording, mean_and_deviation};
+use recordings::{Recording, mean_and_deviation};
 
-use super::equations::{Equations, HydraulicRig, PARAMETERS};
+use super::equations::{HydraulicRig, PARAMETERS};
+use super::fitting::Fitting;
+use super::friction::SealShape;
 use super::least_squares::{Coordinate, Optimum, minimise_within};
 use super::replay::{
     Actuator, CORRECTION, Errors, FITTED, MISTAKEN, OF_CURVE, PART, Replay, coordinates, speed,
@@ -23,10 +28,16 @@ use super::{Found, LEAST_INERTIA};
 const LEAST: f64 = 0.03;
 /// Least overlap over the command (rms), least share lost, least asymmetry: what is smaller is none.
 const SMALLEST: f64 = 5e-3;
+/// Least width of lost gain over the command (rms), and least width over the overlap for it to be one of its own:
+/// a narrower one is how the edges of the overlap leak.
+const NARROWEST: f64 = 0.05;
+const EDGE: f64 = 0.25;
 /// Error of the delay, s, that the form of the spool leaves beside its scatter: a quarter of a sample.
 const DELAY_MISTAKEN: f64 = 5e-4;
 /// Share of oil stiffness and force rate that is as uncertain: flow goes with the root of the pressure.
 const OIL_MISTAKEN: f64 = 0.01;
+/// Share of the overlap that is as uncertain: its edges leak.
+const EDGE_MISTAKEN: f64 = 0.01;
 /// Standard errors, from block to block, by which what it takes away has to be more than none.
 const SURE: f64 = 2.5;
 /// Length of such a block, s.
@@ -101,7 +112,10 @@ impl Valve {
             Member::NullLoss => "reduced_null_gain",
             Member::Asymmetry => "valve_asymmetric_gain",
         };
-        self.members.iter().map(name).collect()
+        let lap = self.members.contains(&Member::Lap);
+        let is_edge = lap && self.curve.null_width < EDGE * self.curve.overlap;
+        let own = |member: &&Member| **member != Member::NullLoss || !is_edge;
+        self.members.iter().filter(own).map(name).collect()
     }
 }
 
@@ -112,6 +126,23 @@ pub(super) fn distortion(
     command: &[f64],
     period: f64,
 ) -> Vec<f64> {
+    let spool = spool(rig, command, period);
+    spool.iter().map(|at| curve.opening(*at) - at).collect()
+}
+
+/// The opening (V) at each sample of `command` (V, every `period` s).
+pub(super) fn opening(
+    rig: &HydraulicRig,
+    curve: &ValveCurve,
+    command: &[f64],
+    period: f64,
+) -> Vec<f64> {
+    let spool = spool(rig, command, period);
+    spool.iter().map(|at| curve.opening(*at)).collect()
+}
+
+/// The position of the spool (V).
+fn spool(rig: &HydraulicRig, command: &[f64], period: f64) -> Vec<f64> {
     let late = (rig.command_delay / period).max(0.0);
     let (whole, part) = (late.floor() as usize, late.fract());
     let pieces = [(whole + 1, part), (whole, 1.0 - part)]
@@ -119,7 +150,7 @@ pub(super) fn distortion(
     let mut spool = Vector2::zeros();
     let mut all = Vec::with_capacity(command.len());
     for k in 0..command.len() {
-        all.push(curve.opening(spool.x) - spool.x);
+        all.push(spool.x);
         for (back, transition) in pieces {
             let u = Vector2::new(k.checked_sub(back).map_or(0.0, |k| command[k]), 0.0);
             spool = u + transition * (spool - u);
@@ -140,6 +171,15 @@ struct Trial {
 impl Trial {
     fn left(&self) -> f64 {
         self.blocks.iter().sum::<f64>() / self.blocks.len().max(1) as f64
+    }
+
+    /// Whether it is taken before `other`: what has fewer members is, unless it leaves more by more than chance.
+    fn goes_before(&self, other: &Self) -> bool {
+        match self.members.len().cmp(&other.members.len()) {
+            Ordering::Less => !other.is_better_than(self),
+            Ordering::Equal => self.left() < other.left(),
+            Ordering::Greater => self.is_better_than(other),
+        }
     }
 
     /// Whether it leaves less than `other` by more than chance.
@@ -201,6 +241,34 @@ impl Search<'_> {
         })
     }
 
+    /// Whether what a member adds to the curve is more than a trifle.
+    fn is_there(&self, own: &Trial, member: Member) -> bool {
+        let curve = self.replay.start.at(&own.fit.values).curve;
+        let size = match member {
+            Member::Lap => curve.overlap.abs() / self.command,
+            Member::NullLoss if curve.null_width < NARROWEST * self.command => 0.0,
+            Member::NullLoss => curve.null_loss,
+            Member::Asymmetry => curve.asymmetry.abs(),
+        };
+        size > SMALLEST
+    }
+
+    /// What a fit says of the actuator, without members that have become trifles, and the others.
+    fn settled(&self, own: &Trial) -> (Actuator, Vec<Member>) {
+        let mut moved = self.replay.start.at(&own.fit.values);
+        let mut members = own.members.clone();
+        members.retain(|member| self.is_there(own, *member));
+        let ideal = ValveCurve::default();
+        for member in own.members.iter().filter(|own| !members.contains(own)) {
+            match member {
+                Member::Lap => moved.curve.overlap = ideal.overlap,
+                Member::NullLoss => moved.curve.null_loss = ideal.null_loss,
+                Member::Asymmetry => moved.curve.asymmetry = ideal.asymmetry,
+            }
+        }
+        (moved, members)
+    }
+
     /// The same values with a seal that is as abrupt as seals are: where the valve lacked something its shape may
     /// have gone to a limit, from which no fit comes back.
     fn with_usual_seals(&self, values: &[f64]) -> Vec<f64> {
@@ -209,6 +277,44 @@ impl Search<'_> {
         own[4] = (4e-3 / known.stribeck_velocity).ln();
         own[5] = (3.0 / known.sharpness).ln();
         own
+    }
+
+    /// The same search from the best of `lapped`, and what it finds.
+    fn behind(
+        &self,
+        lapped: &[(HydraulicRig, ValveCurve)],
+        shape: SealShape,
+    ) -> Option<(Self, Trial)> {
+        let trials = lapped.par_iter().filter_map(|(rig, curve)| {
+            let own = Self {
+                replay: Replay {
+                    start: Actuator {
+                        rig: *rig,
+                        shape,
+                        curve: *curve,
+                    },
+                    ..self.replay
+                },
+                ..*self
+            };
+            let trial = own.fit(&[Member::Lap], &[0.0; FITTED], TRIED)?;
+            Some((own, trial))
+        });
+        let (own, best) = trials.min_by(|a, b| a.1.left().total_cmp(&b.1.left()))?;
+        let best = own.fit(&best.members, &best.fit.values, FITTED_WITHIN)?;
+        let best = own.further(best);
+        Some((own, best))
+    }
+
+    /// `best` with what gains most, as long as something does.
+    fn further(&self, mut best: Trial) -> Trial {
+        while let Some(next) = self.extended(&best) {
+            if !next.is_better_than(&best) {
+                break;
+            }
+            best = next;
+        }
+        best
     }
 
     /// The best fit with one member more.
@@ -222,11 +328,6 @@ impl Search<'_> {
                 all.into_iter().map(move |own| (member, own))
             })
             .collect();
-        let size = |own: &Trial, member: Member| match member {
-            Member::Lap => own.fit.values[OF_CURVE].abs() / self.command,
-            Member::NullLoss => own.fit.values[OF_CURVE + 1],
-            Member::Asymmetry => own.fit.values[OF_CURVE + 3].abs(),
-        };
         let trials = starts.par_iter().filter_map(|(member, own)| {
             let mut members = from.members.clone();
             members.push(*member);
@@ -235,73 +336,77 @@ impl Search<'_> {
                 start[*place] = *value;
             }
             let trial = self.fit(&members, &start, TRIED)?;
-            (size(&trial, *member) > SMALLEST).then_some(trial)
+            self.is_there(&trial, *member).then_some((*member, trial))
         });
-        let best = trials.min_by(|a, b| a.left().total_cmp(&b.left()))?;
-        self.fit(&best.members, &best.fit.values, FITTED_WITHIN)
+        let mut trials: Vec<_> = trials.collect();
+        trials.sort_by(|a, b| a.1.left().total_cmp(&b.1.left()));
+        trials.into_iter().find_map(|(member, trial)| {
+            let found = self.fit(&trial.members, &trial.fit.values, FITTED_WITHIN)?;
+            self.is_there(&found, member).then_some(found)
+        })
     }
 }
 
-/// What an equations' fit gives for a rig: the optimum and its equations.
-type Refit<'a> = dyn Fn(&Found) -> Option<(Optimum, Equations)> + 'a;
-
 impl Found {
-    /// Looks for what the valve lacks to an ideal one, and takes it over where there is something; `refit` fits the
-    /// equations again from a rig.
-    pub(super) fn replay_valve(&mut self, recordings: &[Recording], refit: &Refit) {
+    /// Looks for what the valve lacks to an ideal one, and takes it over where there is something. The search
+    /// begins with this rig, and with `lapped`, rigs behind valves with overlap.
+    pub(super) fn replay_valve(
+        &mut self,
+        recordings: &[Recording],
+        lapped: &[(HydraulicRig, ValveCurve)],
+        fitting: &Fitting,
+    ) {
         let Some(records) = self.replayed(recordings) else {
             return;
         };
-        let sizes = recordings.iter().filter_map(|own| {
-            let values = own.channel(Channel::ValveCommand)?;
-            Some(mean_and_deviation(values).1)
-        });
-        let command = sizes.fold(0.0, f64::max);
-        let start = Actuator {
-            rig: self.rig,
-            shape: self.shape,
-            curve: ValveCurve::default(),
-        };
         let replay = Replay {
             records: &records,
-            start,
+            start: Actuator {
+                curve: fitting.centred(),
+                ..self.actuator()
+            },
             weights: [1.0; 2],
             known: f64::INFINITY,
             part: (0.0, PART),
             step: STEP,
         };
-        let found = search(replay, command);
-        let Some((search, plain, mut best)) = found else {
+        let Some((mut search, plain, mut best)) = search(replay, fitting.command) else {
             return;
         };
+        let mut own = self.clone();
+        if let Some((rival, found)) = search.behind(lapped, fitting.usual_shape())
+            && found.goes_before(&best)
+        {
+            (search, best) = (rival, found);
+        }
         if best.members.is_empty() {
             return;
         }
-        let mut own = self.clone();
-        let mut search = search;
         // What is known of the table by equations that a valve of another form has bent.
-        for _ in 0..2 {
-            own.take(&search.replay.start.at(&best.fit.values), &best.members);
-            let Some((fit, equations)) = refit(&own) else {
+        let mut rounds = 2;
+        while rounds > 0 {
+            rounds -= 1;
+            let (moved, members) = search.settled(&best);
+            own.take(&moved, &members);
+            let Some((fit, equations)) = fitting.refit(&own) else {
                 break;
             };
             let Some(rig) = HydraulicRig::at(&fit.values) else {
                 break;
             };
             own.take_table(&rig, &fit);
-            search.replay.start = Actuator {
-                rig: own.rig,
-                shape: own.shape,
-                curve: own.curve(),
-            };
+            search.replay.start = own.actuator();
             let mut moved = fit.values.clone();
             moved[..PARAMETERS].copy_from_slice(&own.rig.coordinates());
             own.mean_squares = equations.mean_squares(&moved).unwrap_or(own.mean_squares);
             let start = search.with_usual_seals(&[0.0; FITTED]);
-            let Some(next) = search.fit(&best.members, &start, FITTED_WITHIN) else {
+            let Some(next) = search.fit(&members, &start, FITTED_WITHIN) else {
                 break;
             };
             best = next;
+            if search.settled(&best).1 != best.members {
+                rounds = 1;
+            }
         }
         let moved = search.replay.start.at(&best.fit.values);
         own.take(&moved, &best.members);
@@ -385,9 +490,9 @@ impl Found {
         let error = |i: usize| place(i).map_or(0.0, |i| covariance[(i, i)].max(0.0).sqrt());
         let (bias, bias_error) = null(replay, &moved)?;
         let valve = self.valve.as_mut()?;
-        valve.curve.null_bias = bias;
+        valve.curve.null_bias += bias;
         valve.standard_error = ValveCurve {
-            overlap: error(OF_CURVE),
+            overlap: error(OF_CURVE).hypot(EDGE_MISTAKEN * moved.curve.overlap),
             null_loss: error(OF_CURVE + 1),
             null_width: moved.curve.null_width * error(OF_CURVE + 2),
             asymmetry: error(OF_CURVE + 3),
@@ -406,17 +511,12 @@ fn search(replay: Replay<'_>, command: f64) -> Option<(Search<'_>, Trial, Trial)
     let first = search.fit(&[], &[0.0; FITTED], FITTED_WITHIN)?;
     search.replay = search.replay.weighed(&first.fit.values)?;
     let plain = search.fit(&[], &first.fit.values, FITTED_WITHIN)?;
-    let mut best = plain.clone();
-    while let Some(next) = search.extended(&best) {
-        if !next.is_better_than(&best) {
-            break;
-        }
-        best = next;
-    }
+    let best = search.further(plain.clone());
     Some((search, plain, best))
 }
 
-/// Position of the spool at zero command (V) and its standard error: what has to be added to the command so that
+/// Position of the spool at zero command beyond that of the curve (V) and its standard error: what has to be added
+/// to the command so that
 /// the replayed displacement stays at the measured one.
 fn null(replay: &Replay, moved: &Actuator) -> Option<(f64, f64)> {
     let whole = Replay {
