@@ -32,11 +32,11 @@ enum Watched {
 }
 
 /// Asks for the rows that are new until it is asked to stop; returns how often it asked.
-fn reader(address: &str, stop: &AtomicBool) -> usize {
+fn reader(address: &str, token: &str, stop: &AtomicBool) -> usize {
     let (mut from, mut asked) = (0, 0);
     while !stop.load(Ordering::Relaxed) {
         let mut stream = TcpStream::connect(address).unwrap();
-        let request = format!("GET /rows?from={from} HTTP/1.1\r\nHost: {address}\r\n\r\n");
+        let request = format!("GET /{token}/rows?from={from} HTTP/1.1\r\nHost: {address}\r\n\r\n");
         stream.write_all(request.as_bytes()).unwrap();
         let mut answer = String::new();
         stream.read_to_string(&mut answer).unwrap();
@@ -64,9 +64,10 @@ fn run(prepared: &Prepared, watched: Watched) -> f64 {
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let asking = url.as_deref().map(|url| {
-            let address = url.trim_start_matches("http://").trim_end_matches('/');
+            let place = url.trim_start_matches("http://").trim_end_matches('/');
+            let (address, token) = place.split_once('/').unwrap();
             let stop = &stop;
-            scope.spawn(move || reader(address, stop))
+            scope.spawn(move || reader(address, token, stop))
         });
         let begun = Instant::now();
         simulation.run(prepared.samples, Pace::Fastest, &mut |_| {});

@@ -39,7 +39,7 @@ pub(super) struct Fitting<'a> {
     force: f64,
     pub command: f64,
     /// Mean of the command, V: the spool's null has the other sign.
-    pub null: f64,
+    null: f64,
 }
 
 impl<'a> Fitting<'a> {

@@ -37,7 +37,10 @@ pub(super) fn report(own: &Commissioned) -> Report {
         facts.push(Fact {
             label: "Other motions".into(),
             value: Cell::Text(format!("{} %", significant(error, 2))),
-            note: format!("RMS error of the replayed acceleration; the bound is {BOUND} %"),
+            note: format!(
+                "RMS error of the replayed acceleration; the bound is {BOUND} %{}",
+                worst(own)
+            ),
         });
     }
     let mut sections = vec![growth(own), model(own), predicted(own), recordings(own)];
@@ -69,6 +72,21 @@ pub(super) fn report(own: &Commissioned) -> Report {
             own.seed
         ),
     }
+}
+
+/// The motion whose acceleration the model replays worst.
+fn worst(own: &Commissioned) -> String {
+    let replayed = own
+        .predictions
+        .iter()
+        .filter_map(|one| Some((one.replayed_percent?, &one.motion)));
+    let largest = replayed.max_by(|a, b| a.0.total_cmp(&b.0));
+    largest.map_or(String::new(), |(percent, motion)| {
+        format!(
+            "; the worst motion, {motion}: {} %",
+            significant(percent, 2)
+        )
+    })
 }
 
 fn identity(own: &Commissioned) -> Vec<(String, Cell)> {

@@ -1,6 +1,6 @@
 //! The page of a run that goes on, served on the loopback address alone.
 
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -18,20 +18,25 @@ const UPLOT_SCRIPT: &str = include_str!("../report/assets/uPlot.iife.min.js");
 /// Rows of one answer.
 const MOST_ROWS: usize = 5000;
 /// Connections that are answered at a time.
-const MOST_CONNECTIONS: usize = 16;
-/// Longest that a client may take to ask.
-const PATIENCE: Duration = Duration::from_secs(2);
+const MOST_CONNECTIONS: usize = 64;
+/// Longest that a client may take to ask, and to take its answer.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// Longest request, bytes.
+const LONGEST: usize = 16 * 1024;
 /// How long the last rows wait for a client that has asked before.
 const FAREWELL: Duration = Duration::from_secs(3);
 
 /// A running server; it ends when it is dropped.
 pub struct Server {
     address: SocketAddr,
+    /// What an address begins with: other accounts of this machine do not know it.
+    token: Arc<str>,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
 struct Shared {
+    token: Arc<str>,
     scene: String,
     tap: Arc<Tap>,
     stop: AtomicBool,
@@ -46,11 +51,14 @@ impl Server {
     /// Serves the page of `tap` at a port of 127.0.0.1, any free one for 0.
     ///
     /// # Errors
-    /// A port that is taken.
+    /// A port that is taken, or a system that has no random numbers.
     pub fn start(scene: &Scene, tap: Arc<Tap>, port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         let address = listener.local_addr()?;
+        let word = || getrandom::u64().map_err(|error| io::Error::other(error.to_string()));
+        let token: Arc<str> = format!("{:016x}{:016x}", word()?, word()?).into();
         let shared = Arc::new(Shared {
+            token: Arc::clone(&token),
             scene: serde_json::json!(scene).to_string(),
             tap,
             stop: AtomicBool::new(false),
@@ -62,6 +70,7 @@ impl Server {
         let thread = std::thread::spawn(move || listen(&listener, &own));
         Ok(Self {
             address,
+            token,
             shared,
             thread: Some(thread),
         })
@@ -70,7 +79,7 @@ impl Server {
     /// Where the page is.
     #[must_use]
     pub fn url(&self) -> String {
-        format!("http://{}/", self.address)
+        format!("http://{}/{}/", self.address, self.token)
     }
 
     /// Waits until a client that has been watching knows of the end; not long.
@@ -115,37 +124,53 @@ fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
     }
 }
 
-fn answer(stream: &TcpStream, shared: &Shared) -> io::Result<()> {
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
-    let mut lines = BufReader::new(io::Read::take(stream, 16 * 1024)).lines();
-    let request = lines.next().transpose()?.unwrap_or_default();
-    let mut host = String::new();
-    for line in lines {
-        let line = line?;
-        if line.is_empty() {
-            break;
+/// The lines of a request up to the empty one. However slowly it comes: no longer than [`PATIENCE`].
+fn request(mut stream: &TcpStream) -> io::Result<Vec<String>> {
+    let (begun, mut bytes) = (Instant::now(), Vec::new());
+    while !bytes.windows(4).any(|end| end == b"\r\n\r\n") {
+        let left = PATIENCE.saturating_sub(begun.elapsed());
+        if left.is_zero() || bytes.len() > LONGEST {
+            return Err(io::ErrorKind::TimedOut.into());
         }
-        if let Some((name, value)) = line.split_once(':')
-            && name.eq_ignore_ascii_case("host")
-        {
-            host = value.trim().to_string();
+        stream.set_read_timeout(Some(left))?;
+        let mut some = [0; 1024];
+        match stream.read(&mut some)? {
+            0 => return Err(io::ErrorKind::UnexpectedEof.into()),
+            count => bytes.extend(&some[..count]),
         }
     }
-    let mut words = request.split(' ');
+    let text = String::from_utf8_lossy(&bytes);
+    let lines = text.split("\r\n").take_while(|line| !line.is_empty());
+    Ok(lines.map(str::to_string).collect())
+}
+
+fn answer(stream: &TcpStream, shared: &Shared) -> io::Result<()> {
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let lines = request(stream)?;
+    let hosts: Vec<&str> = lines
+        .iter()
+        .filter_map(|line| line.split_once(':'))
+        .filter(|(name, _)| name.eq_ignore_ascii_case("host"))
+        .map(|(_, value)| value.trim())
+        .collect();
+    let mut words = lines.first().map_or("", String::as_str).split(' ');
     let (method, target) = (words.next().unwrap_or(""), words.next().unwrap_or(""));
     // Another name for this address is a page from elsewhere that wants to read the run.
-    let own = stream.local_addr()?.port();
-    let is_own = [format!("127.0.0.1:{own}"), format!("localhost:{own}")].contains(&host);
-    if method != "GET" || !is_own {
+    let port = stream.local_addr()?.port();
+    let own = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
+    let is_own = matches!(hosts[..], [host] if own.iter().any(|own| own == host));
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    let path = path
+        .strip_prefix('/')
+        .and_then(|path| path.strip_prefix(&*shared.token));
+    let Some(path) = path.filter(|_| method == "GET" && is_own) else {
         return reply(
             stream,
             "403 Forbidden",
             "text/plain",
-            "only for this machine",
+            "only at the address that `run --watch` printed",
         );
-    }
-    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    };
     match path {
         "/" => reply(stream, "200 OK", "text/html; charset=utf-8", &page(shared)),
         "/rows" => {
@@ -199,8 +224,6 @@ fn reply(mut stream: &TcpStream, status: &str, kind: &str, body: &str) -> io::Re
 
 #[cfg(test)]
 mod tests {
-    use std::io::Read;
-
     use super::*;
 
     fn ask(server: &Server, request: &str) -> String {
@@ -227,7 +250,9 @@ mod tests {
         let server = Server::start(&scene(), Arc::clone(&tap), 0).unwrap();
         assert!(server.address.ip().is_loopback());
         let host = server.address;
-        let get = |path: &str| format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n");
+        let token = server.token.to_string();
+        let get = |path: &str| format!("GET /{token}{path} HTTP/1.1\r\nHost: {host}\r\n\r\n");
+        assert_eq!(server.url(), format!("http://{host}/{token}/"));
         let page = ask(&server, &get("/"));
         assert!(page.starts_with("HTTP/1.1 200") && page.contains("a \\u003c/script> b"));
         tap.push(0.0, &[7.5]);
@@ -244,13 +269,43 @@ mod tests {
             "{rows}"
         );
         server.farewell();
+        let own = format!("Host: {host}\r\n");
         for other in [
-            "GET / HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n".to_string(),
-            "GET / HTTP/1.1\r\n\r\n".to_string(),
+            get("/").replace(&own, "Host: elsewhere.example\r\n"),
+            get("/").replace(&own, &format!("Host: elsewhere.example\r\n{own}")),
+            get("/").replace(&own, &format!("{own}{own}")),
+            get("/").replace(&own, ""),
             get("/").replace("GET", "POST"),
+            get("/").replace(&token, &"0".repeat(token.len())),
+            get("/rows").replace(&format!("/{token}"), ""),
         ] {
-            assert!(ask(&server, &other).starts_with("HTTP/1.1 403"));
+            let said = ask(&server, &other);
+            assert!(said.starts_with("HTTP/1.1 403"), "{other}: {said}");
         }
         assert!(ask(&server, &get("/etc/passwd")).starts_with("HTTP/1.1 404"));
+    }
+
+    #[test]
+    fn clients_that_never_end_their_request_shut_nobody_out() {
+        let tap = Arc::new(Tap::new(vec![0], 3));
+        let server = Server::start(&scene(), Arc::clone(&tap), 0).unwrap();
+        let other = Server::start(&scene(), tap, 0).unwrap();
+        assert_ne!(server.token, other.token);
+        let host = server.address;
+        let is_cut = || {
+            let mut slow = TcpStream::connect(host).unwrap();
+            (0..1000).any(|_| {
+                std::thread::sleep(Duration::from_millis(20));
+                slow.write_all(b"G").is_err()
+            })
+        };
+        std::thread::scope(|scope| {
+            let all: Vec<_> = (0..MOST_CONNECTIONS + 8)
+                .map(|_| scope.spawn(is_cut))
+                .collect();
+            assert!(all.into_iter().all(|own| own.join().unwrap()));
+        });
+        let get = format!("GET /{}/ HTTP/1.1\r\nHost: {host}\r\n\r\n", server.token);
+        assert!(ask(&server, &get).starts_with("HTTP/1.1 200"));
     }
 }

@@ -92,7 +92,7 @@
   const ask = async () => {
     let answer;
     try {
-      answer = await (await fetch(`/rows?from=${next}`)).json();
+      answer = await (await fetch(`rows?from=${next}`)).json();
     } catch {
       say("ended", "The run is over; its results lie where the command says.");
       return;

@@ -113,7 +113,8 @@ pub struct Lognormal {
     pub curve: Curve,
 }
 
-/// A curve with its 95 % band, pointwise.
+/// A curve with its 95 % band, pointwise. The share grows with intensity, so that each end of the band holds for
+/// all places beside it: the lower end for those above, the upper end for those below.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Curve {
     /// Places.
@@ -136,6 +137,12 @@ impl Curve {
             curve.share.push(share);
             curve.low.push(low);
             curve.high.push(high);
+        }
+        // Far from the runs the ends go their own way: the upper one to 1 where nothing was exceeded.
+        for n in 1..POINTS {
+            curve.low[n] = curve.low[n].max(curve.low[n - 1]);
+            let from_above = POINTS - 1 - n;
+            curve.high[from_above] = curve.high[from_above].min(curve.high[from_above + 1]);
         }
         curve
     }

@@ -254,6 +254,10 @@ fn coverage(runs: usize, motions: usize) -> [f64; 2] {
         studies += 1;
         held[0] += usize::from(own.median_band[0] < 0.5 && 0.5 < own.median_band[1]);
         let curve = &own.curve;
+        for (end, name) in [(&curve.low, "low"), (&curve.high, "high")] {
+            let grows = end.windows(2).all(|pair| pair[0] <= pair[1]);
+            assert!(grows, "seed {seed}: {name} {end:?}");
+        }
         let at = curve.intensity.iter().position(|own| *own >= 0.3).unwrap();
         let truth =
             statrs::function::erf::erfc((0.5 / curve.intensity[at]).ln() / 0.4 / 2f64.sqrt()) / 2.0;
