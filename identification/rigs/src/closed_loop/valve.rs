@@ -31,6 +31,8 @@ const SMALLEST: f64 = 5e-3;
 /// Least width of lost gain over the command (rms), and least width over the overlap for it to be one of its own:
 /// a narrower one is how the edges of the overlap leak.
 const NARROWEST: f64 = 0.05;
+/// Share of the gain lost beside an overlap that is none: the overlap itself may be a little smaller.
+const FAINT: f64 = 0.1;
 const EDGE: f64 = 0.25;
 /// Error of the delay, s, that the form of the spool leaves beside its scatter: a quarter of a sample.
 const DELAY_MISTAKEN: f64 = 5e-4;
@@ -247,6 +249,7 @@ impl Search<'_> {
         let size = match member {
             Member::Lap => curve.overlap.abs() / self.command,
             Member::NullLoss if curve.null_width < NARROWEST * self.command => 0.0,
+            Member::NullLoss if own.members.contains(&Member::Lap) => curve.null_loss - FAINT,
             Member::NullLoss => curve.null_loss,
             Member::Asymmetry => curve.asymmetry.abs(),
         };
