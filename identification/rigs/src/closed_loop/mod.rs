@@ -4,6 +4,8 @@
 //! 2. [`start`]: linear regressions over a grid of spools, leakages and delays.
 //! 3. [`equations`], [`least_squares`]: maximum likelihood with errors in all channels, from
 //!    several starts (Pintelon and Schoukens 2012, Chapters 9 and 12).
+//! 4. [`replay`], [`valve`]: the recorded command on the simulated rig, for the friction and for what the valve lacks
+//!    to an ideal one.
 
 pub mod bands;
 pub mod equations;
