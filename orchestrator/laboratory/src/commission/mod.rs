@@ -273,8 +273,9 @@ pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned
         if let Form::Hydraulic(own) = &identified.form {
             tell("predicting the tracking error");
             let rules = Rules::new(model);
+            let missed = validation_percent.unwrap_or(0.0);
             for name in names(&design) {
-                match rig_model::predicted(request, &own.found, &rules, name) {
+                match rig_model::predicted(request, &own.found, missed, &rules, name) {
                     Ok(found) => {
                         predicted_percent.insert(name.to_string(), found);
                     }
