@@ -528,3 +528,31 @@ pub fn select<M: SimulatedModel>(
         deviations,
     })
 }
+
+/// The best of `proposals`, each a set of effects and a point to begin from: fitted to all of `record`,
+/// ordered by how either half of it predicts the other, and then without the effects that do not pay
+/// there. None where nothing can be fitted.
+pub fn select_jointly<M: SimulatedModel>(
+    model: &M,
+    proposals: &[Point],
+    record: usize,
+    observer: Observer<'_>,
+) -> Option<Simulated> {
+    let mut selection = CrossValidation::new(model, record, observer);
+    let fitted = proposals.iter().filter_map(|start| {
+        observer.tell(|| Progress::Fitting(model.record_name(record).to_owned()));
+        let fitted = settle(model, start, record, TO_THE_END)?;
+        let crossed = selection.crossed(&fitted)?;
+        // Either half counts alike, whatever its size.
+        let left: f64 = crossed.iter().map(|half| squares(half).ln()).sum();
+        left.is_finite().then_some((left, fitted))
+    });
+    let mut best = fitted.min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+    while !best.point.effects.is_empty() {
+        match selection.reduced(&best)? {
+            Some(smaller) => best = smaller,
+            None => break,
+        }
+    }
+    Some(best)
+}

@@ -14,7 +14,9 @@ mod search;
 mod verdict;
 
 pub use adequacy::{Part, Place, Test};
-pub use cross_validation::{Rival, Selected, Simulated, completed, nominal, refit, select};
+pub use cross_validation::{
+    Rival, Selected, Simulated, completed, nominal, refit, select, select_jointly,
+};
 pub use fit::{Fit, Jacobian, evaluate};
 pub use least_squares::WEAK;
 pub use least_squares::{

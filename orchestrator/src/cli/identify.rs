@@ -10,9 +10,8 @@ use identification::identify::identified::RigIdentification;
 use super::progress;
 use laboratory::error::Error;
 use laboratory::identify::{
-    CANDIDATE_COLUMNS, EQUATION_COLUMNS, Form, HydraulicIdentification, ONE_INPUT_COLUMNS,
-    OneInputIdentification, Outcome, PARAMETER_COLUMNS, Parameter, Request, Summary, identify,
-    parameters,
+    EQUATION_COLUMNS, Form, HydraulicIdentification, ONE_INPUT_COLUMNS, OneInputIdentification,
+    Outcome, PARAMETER_COLUMNS, Parameter, Request, Summary, identify, parameters,
 };
 use pages::report::columns::aligned;
 use pages::report::number::significant;
@@ -256,7 +255,7 @@ fn one_input_text(own: &OneInputIdentification, summary: &Summary) -> String {
         text += &format!("  {}\n", pole(own));
     }
     text += &format!("\n{}", table(ONE_INPUT_COLUMNS, own.parameters()));
-    text += &format!("\n{}", table(CANDIDATE_COLUMNS, own.candidates()));
+    text += &format!("\n{}", table(own.candidate_columns(), own.candidates()));
     text += &format!("\n{}\n", own.checked());
     text + &ending(rest, summary)
 }

@@ -1,10 +1,10 @@
 //! Servo-hydraulic actuator in a closed displacement loop: command to displacement.
 //!
 //! Nominal: `τ u' = g r(t - D) + o - u`, `e = u - x`, `z' = i e`, `c = e + z + f u' / K`,
-//! `T w' = K c - w`, `x' = w` (Merritt, Hydraulic Control Systems, 1967: a valve-controlled cylinder
-//! integrates, the loop closes it to one pole). A motor or a shaker on a voltage amplifier in such a loop
-//! has the same form; its mass is part of `T`. The command runs evenly from sample to sample; the
-//! linear equations are solved exactly, and what is not linear by steps.
+//! `T w' = K c - w`, `P² v'' + 2 d P v' + v = w`, `x' = v` (Merritt, Hydraulic Control Systems, 1967: a
+//! valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
+//! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. The command runs
+//! evenly from sample to sample; the linear equations are solved exactly, and what is not linear by steps.
 //!
 //! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
 
@@ -44,8 +44,10 @@ nominal_parameters! {
     feedforward: "1" = 0.0,
     /// i: integral over proportional gain.
     integral: "1/s" = 0.0,
-    /// One over the speed at which what drives the table is at its rail; 0 for none.
-    rail: "s/m" = 0.0,
+    /// P: one over the angular frequency of the mass on the oil, or of a second lag; 0 for none.
+    resonance: "s" = 0.0,
+    /// d: its damping ratio.
+    resonance_damping: "1" = 0.5,
 }
 
 session_parameters! {
@@ -80,7 +82,11 @@ effects! {
     /// Flow falls with speed as the load pressure rises: x' = w / (1 + |w| / s).
     flow_saturation: FlowSaturation {
         compression: size("s/m", 0.01, (0.0, 5.0)),
-    } from [[0.05]];
+    } from [[0.05]], like ["speed_limit"];
+    /// What drives the table is at its rail: |x'| is 1 / r at most.
+    speed_limit: SpeedLimit {
+        slowness: size("s/m", 0.1, (0.0, 50.0)),
+    } from [[1.0], [2.5]], like ["flow_saturation"];
     /// Transducer: y = x (1 + c x).
     sensor_curvature: SensorCurvature {
         curvature: size("1/m", 3e-3, (-0.3, 0.3)),
@@ -106,16 +112,13 @@ impl Equations for ClosedLoopActuator {
     const OUTPUT: Channel = Channel::Displacement;
     const IS_SCALED: bool = true;
     const SCREENED: usize = 8192;
-    const SAID_BY: &'static [(&'static str, &'static str)] = &[
-        ("delay", "command_delay"),
-        ("valve_lag", "loop_lag"),
-        ("flow_saturation", "rail"),
-    ];
+    const SAID_BY: &'static [(&'static str, &'static str)] =
+        &[("delay", "command_delay"), ("valve_lag", "loop_lag")];
     const CAUSES: &'static [&'static str] = &["command_delay", "scale", "offset"];
     // Of a drive that is not known: a motor sticks as a valve with an overlap does.
     const LOOKS_LIKE: &'static [[&'static str; 3]] = &[
-        ["dead_band", "friction", "rail"],
-        ["reduced_null_gain", "friction", "rail"],
+        ["dead_band", "friction", "resonance"],
+        ["reduced_null_gain", "friction", "resonance"],
     ];
 
     fn natural(nominal: &Nominal, channels: Natural) -> Natural {
@@ -150,7 +153,8 @@ impl Equations for ClosedLoopActuator {
             loop_lag,
             feedforward,
             integral,
-            rail,
+            resonance,
+            resonance_damping,
         } = *nominal;
         let Effects {
             delay: Delay { delay },
@@ -163,6 +167,7 @@ impl Equations for ClosedLoopActuator {
                 time_constant: valve,
             },
             flow_saturation: FlowSaturation { compression },
+            speed_limit: SpeedLimit { slowness },
             sensor_curvature: SensorCurvature { curvature },
             free_play: FreePlay { gap },
             shared_disturbance: SharedDisturbance { coupling },
@@ -181,9 +186,11 @@ impl Equations for ClosedLoopActuator {
             loop_lag: valve + loop_lag,
             feedforward,
             integral,
+            resonance,
+            resonance_damping,
         };
-        let fastest = if rail > 0.0 {
-            1.0 / rail
+        let fastest = if slowness > 0.0 {
+            1.0 / slowness
         } else {
             f64::INFINITY
         };
@@ -229,7 +236,7 @@ impl Equations for ClosedLoopActuator {
             flow / (1.0 + compression * flow.abs()) - gain * sent
         };
         let start = scale * first + offset;
-        let mut state = [start, start, 0.0, 0.0];
+        let mut state = [start, start, 0.0, 0.0, 0.0, 0.0];
         let mut shown = state[1];
         for (k, y) in out.iter_mut().enumerate() {
             let x = state[1];
@@ -257,17 +264,21 @@ struct Loop {
     loop_lag: f64,
     feedforward: f64,
     integral: f64,
+    resonance: f64,
+    resonance_damping: f64,
 }
+
+/// Lagging command, displacement, flow, integral of the error, velocity and its rate times `P`.
+type State = [f64; 6];
 
 /// The solution over a step for a command that runs straight and a flow beyond the linear one that does
 /// (exponential time differencing; Cox and Matthews, J. Comput. Phys. 176, 2002): exact for any lag.
 struct Step {
     /// s.
     length: f64,
-    /// Lagging command, displacement, flow, integral of the error, of themselves and of the command, its
-    /// slope, the flow beyond, its slope.
-    rows: [[f64; 8]; 4],
-    /// What the controller sends, of the states, the command and its slope.
+    /// The state after the step of the state before, the command, its slope, the flow beyond and its slope.
+    rows: [[f64; 10]; 6],
+    /// What the controller sends, of the first four states, the command and its slope.
     sent: [f64; 6],
 }
 
@@ -301,27 +312,45 @@ impl Loop {
         };
         let mut sent: [f64; 6] = std::array::from_fn(|i| error[i] + ahead * speed[i]);
         sent[3] += 1.0;
-        let mut a = SMatrix::<f64, 8, 8>::zeros();
+        // Places of the command, its slope, the flow beyond and its slope behind the six states.
+        const INPUT: [usize; 4] = [6, 7, 8, 9];
+        let column = |i: usize| if i < 4 { i } else { INPUT[i - 4] };
+        let mut a = SMatrix::<f64, 10, 10>::zeros();
         let flow: [f64; 7] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| gain * s));
+        let has_resonance = self.resonance > 1e-3 * sample;
+        // What the flow moves: the table itself, or the mass on the oil.
+        let moved = if has_resonance { 5 } else { 1 };
+        let share = if has_resonance {
+            1.0 / self.resonance
+        } else {
+            1.0
+        };
         for i in 0..6 {
             if command_pole > 0.0 {
-                a[(0, i)] = speed[i];
+                a[(0, column(i))] = speed[i];
             }
-            a[(3, i)] = integral * error[i];
+            a[(3, column(i))] = integral * error[i];
         }
         for (i, value) in flow.into_iter().enumerate() {
+            let place = column(i);
             if pole > 0.0 {
-                a[(2, i)] = pole * value;
+                a[(2, place)] = pole * value;
             } else {
-                a[(1, i)] = value;
+                a[(moved, place)] += share * value;
             }
         }
         if pole > 0.0 {
             a[(2, 2)] -= pole;
-            a[(1, 2)] = 1.0;
+            a[(moved, 2)] += share;
         }
-        a[(4, 5)] = 1.0;
+        if has_resonance {
+            a[(1, 4)] = 1.0;
+            a[(4, 5)] = share;
+            a[(5, 4)] -= share;
+            a[(5, 5)] -= 2.0 * self.resonance_damping * share;
+        }
         a[(6, 7)] = 1.0;
+        a[(8, 9)] = 1.0;
         let a = a * length;
         let solution = if a.iter().all(|value| value.is_finite()) {
             a.exp()
@@ -341,21 +370,21 @@ impl Step {
     /// controller sends, where there is one.
     fn advance(
         &self,
-        state: [f64; 4],
+        state: State,
         [begin, end]: [f64; 2],
         beyond: Option<&impl Fn(f64) -> f64>,
-    ) -> [f64; 4] {
+    ) -> State {
         let slope = (end - begin) / self.length;
-        let [u, x, w, z] = state;
-        let after = |more: f64, its_slope: f64| -> [f64; 4] {
-            let all = [u, x, w, z, begin, slope, more, its_slope];
+        let after = |more: f64, its_slope: f64| -> State {
+            let [u, x, w, z, v, rate] = state;
+            let all = [u, x, w, z, v, rate, begin, slope, more, its_slope];
             self.rows
                 .map(|row| row.iter().zip(all).map(|(a, b)| a * b).sum())
         };
         let Some(beyond) = beyond else {
             return after(0.0, 0.0);
         };
-        let sent = |[u, x, w, z]: [f64; 4], command: f64| -> f64 {
+        let sent = |[u, x, w, z, ..]: State, command: f64| -> f64 {
             let all = [u, x, w, z, command, slope];
             self.sent.iter().zip(all).map(|(a, b)| a * b).sum()
         };
@@ -394,7 +423,8 @@ mod tests {
                 loop_lag: 0.0,
                 feedforward: 0.0,
                 integral: 0.0,
-                rail: 0.0,
+                resonance: 0.0,
+                resonance_damping: 0.5,
             };
             let mut out = vec![0.0; n as usize];
             let off = Effects::off().unwrap();
@@ -436,9 +466,13 @@ mod tests {
                 loop_lag: 0.003,
                 feedforward,
                 integral,
-                rail,
+                resonance: 0.0,
+                resonance_damping: 0.5,
             };
-            let off = Effects::off().unwrap();
+            let off = Effects {
+                speed_limit: SpeedLimit { slowness: rail },
+                ..Effects::off().unwrap()
+            };
             let mut out = vec![0.0; n];
             let session = Session::default();
             ClosedLoopActuator.simulate(&recording, &nominal, &off, &session, &mut out);
@@ -471,7 +505,8 @@ mod tests {
                 loop_lag: 0.0,
                 feedforward: 0.0,
                 integral: 0.0,
-                rail: 0.0,
+                resonance: 0.0,
+                resonance_damping: 0.5,
             };
             let effects = Effects {
                 reduced_null_gain: ReducedNullGain {

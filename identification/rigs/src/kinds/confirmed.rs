@@ -166,12 +166,13 @@ struct Fits {
 }
 
 fn fits<M: InParts>(measured: &M, start: &Point) -> Option<Fits> {
+    // What one part hardly shows stays where all data have it.
+    let everything = refit(measured, start, EVERYTHING)?;
     let (first, second) = rayon::join(
-        || refit(measured, start, Part::Fitted as usize),
-        || refit(measured, start, Part::LeftOut as usize),
+        || refit(measured, &everything.0.point, Part::Fitted as usize),
+        || refit(measured, &everything.0.point, Part::LeftOut as usize),
     );
     let (first, second) = (first?, second?);
-    let everything = refit(measured, &first.0.point, EVERYTHING)?;
     let many = measured.blocks() > 2;
     let own = (0..measured.blocks()).into_par_iter();
     let files = own

@@ -6,11 +6,13 @@ use super::cause::{Cause, effect_in_words, joined};
 use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
 use super::measured::Measured;
 use super::named_value::NamedValue;
-use super::parts::{InParts, LOST, Part};
+use super::parts::{EVERYTHING, InParts, LOST, Part};
 use super::{Description, DescriptionError, Measurement};
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::gain_interval;
-use diagnosis::{Observer, Point, Progress, Selected, Verdict, all_errors, completed, select};
+use diagnosis::{
+    Observer, Point, Progress, Selected, Verdict, all_errors, completed, select, select_jointly,
+};
 
 /// Errors on data that were not fitted that still agree with those on fitted ones: at most so many times
 /// these, or this small.
@@ -154,43 +156,40 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             || matches!((known(name), known(other)), (Some(a), Some(b)) if measured.are_alike(a, b))
     };
     let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
-    let only = here.iter().filter(|name| !in_both(name, &there));
-    let not_confirmed: Vec<String> = only
-        .chain(there.iter().filter(|name| !in_both(name, &here)))
-        .cloned()
-        .collect();
-    let mut set_aside: Vec<SetAside> = not_confirmed
+    // Either part proposes; all data together decide by how either part predicts the other.
+    let start = select_jointly(
+        measured,
+        &proposals(measured, [&as_described, &swapped]),
+        EVERYTHING,
+        observer,
+    )?;
+    let mut set_aside: Vec<SetAside> = Vec::new();
+    let mut not_confirmed: Vec<String> = Vec::new();
+    let kept: Vec<String> = start
+        .point
+        .effects
         .iter()
-        .map(|effect| SetAside {
-            effect: effect.clone(),
-            reason: "one part of the data shows it and the other does not".to_owned(),
-        })
+        .map(|(i, _)| measured.name(*i))
         .collect();
-    // Of what both parts ask for, what either part gives a reason against is not named.
-    let index = |name: &str| measured.index(name).unwrap_or(usize::MAX);
-    let mut refused: Vec<Refused> = Vec::new();
-    for (part, others) in [(&as_described, &swapped), (&swapped, &as_described)] {
-        for effect in &part.effects {
-            let other = others
-                .effects
-                .iter()
-                .find(|o| alike(&effect.effect, &o.effect));
-            let Some(other) = other else { continue };
-            let reasons = [effect, other]
-                .into_iter()
-                .filter_map(|one| one.objection.clone());
-            if let Some(reason) = reasons.into_iter().next() {
-                refused.push((index(&effect.effect), reason));
-            }
+    for effect in here.iter().chain(&there) {
+        let known = set_aside.iter().any(|known| known.effect == *effect);
+        if known || in_both(effect, &kept) {
+            continue;
         }
+        let reason = if in_both(effect, &here) && in_both(effect, &there) {
+            "neither part predicts the other better with it"
+        } else {
+            not_confirmed.push(effect.clone());
+            "one part of the data shows it and the other does not"
+        };
+        set_aside.push(SetAside {
+            effect: effect.clone(),
+            reason: reason.to_owned(),
+        });
     }
-    let mut start = as_described.point.clone();
-    start.effects.retain(|(i, _)| {
-        let name = measured.name(*i);
-        in_both(&name, &there) && refused.iter().all(|(known, _)| known != i)
-    });
+    let mut refused: Vec<Refused> = Vec::new();
     let mut findings = Vec::new();
-    let confirmed = confirm(measured, &start, &mut refused, &mut findings)?;
+    let confirmed = confirm(measured, &start.point, &mut refused, &mut findings)?;
     for (i, reason) in refused {
         let effect = measured.name(i);
         if set_aside.iter().all(|known| known.effect != effect) {
@@ -254,6 +253,24 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         as_described,
         swapped,
     })
+}
+
+/// What the two parts ask for, each alone and both together; of effects that cannot be told apart one.
+fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Vec<Point> {
+    let mut all: Vec<Point> = parts.iter().map(|part| part.point.clone()).collect();
+    for (one, other) in [(0, 1), (1, 0)] {
+        let mut both = parts[one].point.clone();
+        let more = parts[other].point.effects.iter();
+        let new = more.filter(|(i, _)| {
+            let mut own = parts[one].point.effects.iter();
+            own.all(|(known, _)| !measured.are_alike(*i, *known))
+        });
+        both.effects.extend(new.cloned());
+        if both.effects.len() > parts[one].point.effects.len() {
+            all.push(both);
+        }
+    }
+    all
 }
 
 fn no_output(description: &Description) -> DescriptionError {

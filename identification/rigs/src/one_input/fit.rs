@@ -20,10 +20,17 @@ const GROWTH: f64 = 5.0;
 const REGRESSIONS: usize = 8;
 
 /// A band with the recording it comes from.
-pub(super) type Own<'a> = (&'a Bands, &'a Band);
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Own<'a> {
+    pub bands: &'a Bands,
+    pub band: &'a Band,
+    /// Deviation of the error, the same for every band of a recording; the noise's own without it.
+    pub even: Option<f64>,
+}
 
 /// `G U - Y` of a band on its instrument, and the deviation that the noise gives it.
-fn error(model: &DelayedTransferFunction, (bands, band): Own) -> (Complex<f64>, f64) {
+fn error(model: &DelayedTransferFunction, own: Own) -> (Complex<f64>, f64) {
+    let Own { bands, band, .. } = own;
     let [u, y] = [bands.scale[0], bands.scale[1]];
     let lines = band.omega.iter().zip(&band.instruments[0]).enumerate();
     let sum = lines
@@ -34,12 +41,16 @@ fn error(model: &DelayedTransferFunction, (bands, band): Own) -> (Complex<f64>, 
         .sum();
     (
         sum,
-        deviation(model.response(band.middle(), bands.period), (bands, band)),
+        deviation(model.response(band.middle(), bands.period), own),
     )
 }
 
-/// Deviation of `g U - Y` by the noise of both.
-fn deviation(g: Complex<f64>, (bands, band): Own) -> f64 {
+/// Deviation of `g U - Y` by the noise of both, or the even one.
+fn deviation(g: Complex<f64>, own: Own) -> f64 {
+    own.even.unwrap_or_else(|| by_noise(g, own))
+}
+
+fn by_noise(g: Complex<f64>, Own { bands, band, .. }: Own) -> f64 {
     let [u, y] = [bands.scale[0], bands.scale[1]];
     let variance = g.norm_sqr() * band.noise[(0, 0)].re * u * u + band.noise[(1, 1)].re * y * y
         - 2.0 * (g * band.noise[(0, 1)]).re * u * y;
@@ -49,14 +60,15 @@ fn deviation(g: Complex<f64>, (bands, band): Own) -> f64 {
 }
 
 /// The response of a band as measured.
-pub(super) fn measured((bands, band): Own) -> Response {
+pub(super) fn measured(own: Own) -> Response {
+    let Own { bands, band, .. } = own;
     let [u, y] = [bands.scale[0], bands.scale[1]];
     let input = band.projected(0) * u;
     let value = band.projected(1) * y / input;
     Response {
         omega: band.middle(),
         value,
-        deviation: deviation(value, (bands, band)) / input.norm(),
+        deviation: by_noise(value, own) / input.norm(),
     }
 }
 
@@ -74,7 +86,7 @@ pub(super) fn relative_error(model: &DelayedTransferFunction, bands: &[Own]) -> 
     let (mut left, mut size) = (0.0, 0.0);
     for own in bands {
         left += error(model, *own).0.norm_sqr();
-        size += (own.1.projected(1) * own.0.scale[1]).norm_sqr();
+        size += (own.band.projected(1) * own.bands.scale[1]).norm_sqr();
     }
     (left / size).sqrt()
 }
@@ -96,7 +108,7 @@ impl Residuals for Fit<'_> {
         let mut all = Vec::with_capacity(2 * self.bands.len());
         for own in self.bands {
             let (sum, _) = error(&model, *own);
-            let middle = weigher.response(own.1.middle(), own.0.period);
+            let middle = weigher.response(own.band.middle(), own.bands.period);
             let whitened = sum * (std::f64::consts::SQRT_2 / deviation(middle, *own));
             all.extend([whitened.re, whitened.im]);
         }
@@ -116,10 +128,14 @@ pub(super) struct Fitted {
 fn lowest(bands: &[Own]) -> f64 {
     let mut powers: Vec<(f64, f64)> = bands
         .iter()
-        .map(|(all, band)| {
-            let power = (band.projected(0) * all.scale[0]).norm_sqr();
-            (band.omega.first().copied().unwrap_or(0.0), power)
-        })
+        .map(
+            |Own {
+                 bands: all, band, ..
+             }| {
+                let power = (band.projected(0) * all.scale[0]).norm_sqr();
+                (band.omega.first().copied().unwrap_or(0.0), power)
+            },
+        )
         .collect();
     powers.sort_by(|a, b| a.0.total_cmp(&b.0));
     let enough = 0.01 * powers.iter().map(|own| own.1).sum::<f64>();
@@ -138,7 +154,7 @@ pub(super) fn fit(structure: Structure, between: Between, bands: &[Own]) -> Opti
     if 2 * bands.len() < 2 * structure.parameters() {
         return None;
     }
-    let middles = bands.iter().map(|own| own.1.middle().ln());
+    let middles = bands.iter().map(|own| own.band.middle().ln());
     let coefficients = Coefficients {
         structure,
         scale: (middles.sum::<f64>() / bands.len() as f64).exp(),
@@ -223,7 +239,9 @@ fn regress(coefficients: &Coefficients, bands: &[Own], delay: f64) -> Option<Vec
         let mut rows = DMatrix::zeros(2 * bands.len(), columns);
         let mut right = DVector::zeros(2 * bands.len());
         for (i, own) in bands.iter().enumerate() {
-            let (all, band) = *own;
+            let Own {
+                bands: all, band, ..
+            } = *own;
             let omega = band.middle();
             let p = Complex::new(0.0, omega / coefficients.scale);
             let shift = DelayedTransferFunction {
@@ -265,8 +283,8 @@ fn regress(coefficients: &Coefficients, bands: &[Own], delay: f64) -> Option<Vec
             return None;
         }
         if round + 1 < REGRESSIONS {
-            for (slot, (_, band)) in denominator.iter_mut().zip(bands) {
-                let p = Complex::new(0.0, band.middle() / coefficients.scale);
+            for (slot, own) in denominator.iter_mut().zip(bands) {
+                let p = Complex::new(0.0, own.band.middle() / coefficients.scale);
                 let own = values[..poles].iter();
                 *slot = own.fold(Complex::new(1.0, 0.0), |sum, c| sum * p + c);
                 if integrates {

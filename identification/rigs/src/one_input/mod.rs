@@ -31,7 +31,8 @@ const CLEAR: f64 = 1.6;
 pub struct Candidate {
     /// The structure.
     pub structure: Structure,
-    /// Mean square of the whitened errors in the bands that were not fitted: one for noise.
+    /// Mean square of the whitened errors in the bands that were not fitted: one for noise; in percent of
+    /// the displacement, squared, where all count evenly.
     pub predicted: f64,
 }
 
@@ -46,6 +47,8 @@ pub struct OneInput {
     pub model: DelayedTransferFunction,
     /// Standard errors of the denominator without its 1, the numerator, and the delay (s).
     pub standard_error: Vec<f64>,
+    /// Whether all frequencies count alike, since no structure is within the noise.
+    pub evenly: bool,
     /// Mean square of the whitened errors that were fitted: one for a rig that obeys the model.
     pub mean_square: f64,
     /// The same for the parts of the recordings that were not fitted.
@@ -154,7 +157,7 @@ fn bands(recording: &Recording, input: Channel) -> Result<Bands, IdentificationE
     if std::ptr::eq(cause, command) {
         // A command explains itself wholly, its noise too: there nothing is told of the rig.
         const STIRRED: f64 = 10.0;
-        let noise = (noise_floor(command) / bands.scale[0]).powi(2);
+        let noise = command_noise(&bands, command);
         let count = bands.bands.len();
         bands.bands.retain(|band| {
             band.projected(0).norm_sqr() > STIRRED * noise * band.omega.len() as f64
@@ -175,10 +178,36 @@ fn bands(recording: &Recording, input: Channel) -> Result<Bands, IdentificationE
     Ok(bands)
 }
 
-fn all(experiments: &[Bands]) -> Vec<Own<'_>> {
+/// Power of a line of the noise on a command that is its own instrument, in units of its scale: what
+/// its fastest changes may be, and no more than what the displacement does not follow in any band.
+fn command_noise(bands: &Bands, command: &[f64]) -> f64 {
+    let fastest = (noise_floor(command) / bands.scale[0]).powi(2);
+    let own = bands.bands.iter().map(|band| {
+        let lines = band.omega.len() as f64;
+        let [power, followed] = [0, 1].map(|i| band.projected(i).norm_sqr() / lines);
+        let noise = band.noise[(1, 1)].re;
+        power * noise / (noise + followed).max(f64::MIN_POSITIVE)
+    });
+    own.fold(fastest, f64::min)
+}
+
+/// The bands, weighed by their noise, or evenly.
+fn all(experiments: &[Bands], evenly: bool) -> Vec<Own<'_>> {
+    let of = |bands: &Bands| {
+        let powers = bands.bands.iter().map(|band| band.projected(1).norm_sqr());
+        let mean = powers.sum::<f64>() / bands.bands.len().max(1) as f64;
+        // Whitened errors are then in percent of the displacement.
+        evenly.then_some(0.01 * bands.scale[1] * mean.sqrt())
+    };
     let own = experiments.iter();
-    own.flat_map(|bands| bands.bands.iter().map(move |band| (bands, band)))
-        .collect()
+    own.flat_map(|bands| {
+        let even = of(bands);
+        bands
+            .bands
+            .iter()
+            .map(move |band| Own { bands, band, even })
+    })
+    .collect()
 }
 
 /// Identifies a rig: orders and check come from the first `part` of each recording and the rest, the
@@ -202,13 +231,23 @@ pub fn identify(recordings: &[Recording], part: f64) -> Result<OneInput, Identif
         all.iter().map(|own| bands(own, input)).collect()
     };
     let experiments = of(&fitted)?;
-    let own = all(&experiments);
-    let (candidates, structure) = choose(between, &own, input == Channel::ValveCommand)?;
+    let mut own = all(&experiments, false);
+    let may_integrate = input == Channel::ValveCommand;
+    let (mut candidates, mut structure) = choose(between, &own, may_integrate)?;
+    // No transfer function is within the noise of a rig with friction. Weights by the noise then let the
+    // bands that hold most of the motion be missed; what simulates best counts them as they are.
+    let best = candidates.iter().map(|own| own.predicted);
+    let evenly = !may_integrate && best.fold(f64::INFINITY, f64::min) > CLEAR;
+    if evenly {
+        own = all(&experiments, true);
+        (candidates, structure) = choose(between, &own, may_integrate)?;
+    }
     let found = fit(structure, between, &own).ok_or_else(no_model)?;
     let unseen = of(&rest)?;
-    let unseen = all(&unseen);
+    let unseen = all(&unseen, false);
+    let by_noise = all(&experiments, false);
     let mean = |all: Vec<f64>| all.iter().sum::<f64>() / (2 * all.len().max(1)) as f64;
-    let mean_square = mean(squares(&found.model, &own));
+    let mean_square = mean(squares(&found.model, &by_noise));
     let rest: Result<Vec<Rest>, _> = rest
         .iter()
         .map(|r| played(&found.model, r, input))
@@ -224,12 +263,16 @@ pub fn identify(recordings: &[Recording], part: f64) -> Result<OneInput, Identif
     let relative_error = relative_error(&found.model, &unseen);
     // What was validated is then fitted to everything there is.
     let everything = of(recordings)?;
-    let everything = all(&everything);
+    let everything = all(&everything, evenly);
     let found = fit(structure, between, &everything).unwrap_or(found);
     let mut one = OneInput {
         input,
         structure,
-        standard_error: standard_errors(&found, mean(squares(&found.model, &everything))),
+        standard_error: standard_errors(
+            &found,
+            mean(squares(&found.model, &everything)).max(if evenly { 0.0 } else { 1.0 }),
+        ),
+        evenly,
         mean_square,
         check,
         relative_error,
@@ -285,12 +328,12 @@ fn choose(
     // The lowest octave, an eighth of the bands at least.
     let lowest = bands
         .iter()
-        .map(|own| own.1.middle())
+        .map(|own| own.band.middle())
         .fold(f64::INFINITY, f64::min);
-    let mut by_frequency: Vec<f64> = bands.iter().map(|own| own.1.middle()).collect();
+    let mut by_frequency: Vec<f64> = bands.iter().map(|own| own.band.middle()).collect();
     by_frequency.sort_by(f64::total_cmp);
     let eighth = by_frequency.get(bands.len() / 8).copied().unwrap_or(lowest);
-    let is_low = |i: usize| bands[i].1.middle() <= eighth.max(2.0 * lowest);
+    let is_low = |i: usize| bands[i].band.middle() <= eighth.max(2.0 * lowest);
     if (0..bands.len()).filter(|i| is_low(*i)).count() * 2 < bands.len() {
         folds.push((part(&|i| !is_low(i)), part(&is_low)));
     }
@@ -334,10 +377,10 @@ fn choose(
     Ok((tried.iter().map(|own| own.0).collect(), structure))
 }
 
-/// Standard errors of the coefficients in `s`, widened where the rig does more than the model.
+/// Standard errors of the coefficients in `s` by the mean square of the whitened errors.
 fn standard_errors(found: &Fitted, mean_square: f64) -> Vec<f64> {
     let covariance: &DMatrix<f64> = &found.optimum.covariance;
-    let excess = mean_square.max(1.0).sqrt();
+    let excess = mean_square.sqrt();
     let structure = found.coefficients.structure;
     let scale = found.coefficients.scale;
     let order = structure.poles + usize::from(structure.integrates);
@@ -469,12 +512,11 @@ fn bias(found: &OneInput, recordings: &[Recording]) -> Option<String> {
     let share = without
         .filter_map(|r| bands(r, found.input).ok().zip(r.channel(found.input)))
         .map(|(bands, command)| {
-            // Of a line: spectra are over the root of the number of samples.
-            let noise = noise_floor(command).powi(2);
+            let noise = command_noise(&bands, command);
             let (mut power, mut lines) = (0.0, 0.0);
             for band in &bands.bands {
                 let own = band.spectra[0].iter().map(|z| z.norm_sqr());
-                power += own.sum::<f64>() * bands.scale[0].powi(2);
+                power += own.sum::<f64>();
                 lines += band.omega.len() as f64;
             }
             noise * lines / power.max(noise * lines)

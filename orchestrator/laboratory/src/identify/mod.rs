@@ -22,7 +22,7 @@ use identification::identify::rig::{self, Options};
 use identification::identify::specimen_file;
 
 pub use hydraulic::{EQUATION_COLUMNS, HydraulicIdentification};
-pub use one_input::{CANDIDATE_COLUMNS, ONE_INPUT_COLUMNS, OneInputIdentification};
+pub use one_input::{ONE_INPUT_COLUMNS, OneInputIdentification};
 pub use parameters::{PARAMETER_COLUMNS, Parameter, parameter_table, parameters};
 pub use summary::Summary;
 

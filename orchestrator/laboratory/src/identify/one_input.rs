@@ -24,13 +24,6 @@ pub struct OneInputIdentification {
 
 /// Columns of [`OneInputIdentification::parameters`].
 pub const ONE_INPUT_COLUMNS: [&str; 4] = ["parameter", "value", "standard error", "unit"];
-/// Columns of [`OneInputIdentification::candidates`].
-pub const CANDIDATE_COLUMNS: [&str; 4] = [
-    "poles",
-    "zeros",
-    "at zero",
-    "residual over noise, not fitted",
-];
 
 impl OneInputIdentification {
     /// Fits the first `part` of `recordings`, which lie in files `data` with these `columns`, and
@@ -85,8 +78,25 @@ impl OneInputIdentification {
         rows
     }
 
+    /// Columns of [`Self::candidates`].
+    pub fn candidate_columns(&self) -> [&'static str; 4] {
+        let last = if self.found.evenly {
+            "error of what was not fitted, %"
+        } else {
+            "residual over noise, not fitted"
+        };
+        ["poles", "zeros", "at zero", last]
+    }
+
     /// Rows of structure and how it predicts bands that it was not fitted to.
     pub fn candidates(&self) -> Vec<[String; 4]> {
+        let predicted = |square: f64| {
+            if self.found.evenly {
+                square.sqrt()
+            } else {
+                square
+            }
+        };
         let rows = self.found.candidates.iter().map(|own| {
             let chosen = if own.structure == self.found.structure {
                 " (chosen)"
@@ -102,7 +112,7 @@ impl OneInputIdentification {
                     "no"
                 }
                 .to_string(),
-                format!("{}{chosen}", significant(own.predicted, 3)),
+                format!("{}{chosen}", significant(predicted(own.predicted), 3)),
             ]
         });
         rows.collect()
@@ -169,7 +179,11 @@ impl OneInputIdentification {
                     panels,
                     tables: vec![
                         Table::of("Parameters", ONE_INPUT_COLUMNS, self.parameters()),
-                        Table::of("Structures tried", CANDIDATE_COLUMNS, self.candidates()),
+                        Table::of(
+                            "Structures tried",
+                            self.candidate_columns(),
+                            self.candidates(),
+                        ),
                     ],
                     ..Section::default()
                 },

@@ -141,7 +141,14 @@ impl Table {
             },
             derivative: if kind == Kind::Pid { 0.1 / speed } else { 0.0 },
             acceleration: if kind == Kind::ThreeVariable {
-                1e-3 / speed
+                // A third of what an electric drive's own lag allows, or a sampled loop rings.
+                let lag = match &body {
+                    Body::Hydraulic(_) => 1e-3,
+                    Body::Electric(e) => {
+                        (0.3 * e.mass * e.resistance / (e.constant * e.constant)).min(1e-3)
+                    }
+                };
+                lag / speed
             } else {
                 0.0
             },

@@ -390,23 +390,20 @@ fn nominal(rig: &dyn Rig, measurement: &Measurement) -> Vec<Start> {
     }
 }
 
+/// One over the angular frequency at which a table's mass swings on the oil: 30 Hz.
+const RESONANCE: f64 = 5.3e-3;
+
 /// The lag of the displacement behind the command is that of loop and delay together.
 fn closed_loop(command: &[f64], one: &RigRecording) -> Vec<Start> {
     let (output, period) = (one.output(), one.period());
     let lag = lag(command, output, (0.5 / period) as usize) * period;
     let gain = (1.0 / lag.max(2.0 * period)).clamp(2.0, 200.0);
     let (_, size) = mean_and_deviation(output);
-    // What is at its rail shows it as the greatest speed.
-    let reach = ((0.03 / period).round() as usize).max(1);
-    let steps = output
-        .windows(reach + 1)
-        .map(|own| (own[reach] - own[0]).abs());
-    let fastest = steps.fold(0.0, f64::max) / (reach as f64 * period);
-    let rail = 1.0 / fastest.max(1e-9);
     vec![
-        ("rail", rail, 0.3 * rail, "s/m"),
         ("loop_gain", gain, 0.5 * gain, "1/s"),
         ("loop_lag", 0.1 / gain, 0.1 / gain, "s"),
+        ("resonance", RESONANCE, RESONANCE, "s"),
+        ("resonance_damping", 0.5, 0.3, "1"),
         ("command_lag", 0.0, 0.0, "s"),
         ("feedforward", 0.1, 0.1, "1"),
         ("integral", 0.1, 0.1, "1/s"),
