@@ -18,7 +18,7 @@ use laboratory::results::{Results, unused};
 use laboratory::run::manifest::Manifest;
 use laboratory::run::page;
 use laboratory::run::summary::Summary;
-use laboratory::serve::{self, Mode, Times, Wanted};
+use laboratory::serve::{self, Mode, Times, Wanted, Watched};
 
 /// How a rig goes through a step of the analysis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -121,6 +121,9 @@ pub struct Arguments {
     /// Coupling step [default: that of the system]
     #[arg(long, value_name = "T")]
     step: Option<String>,
+    /// Show trials, forces and round trips live on a local page at this port (default: any free port)
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
+    watch: Option<u16>,
     /// Folder for the results [default: shakebench-results/SYSTEM-served]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -145,6 +148,14 @@ pub fn execute(arguments: &Arguments, units: Option<&str>) -> Result<ExitCode, E
     });
     Results::check(&folder)?;
     say_what(&service);
+    let n = service.channels().degrees_of_freedom();
+    let mut watched = match arguments.watch {
+        Some(port) => Some(Watched::start(&arguments.system, n, port)?),
+        None => None,
+    };
+    if let Some(watched) = &watched {
+        eprintln!("watch it at {}", watched.url());
+    }
     eprintln!("listening at {} (TCP and UDP)", server.address());
     let mut over = service.serve(
         &server,
@@ -155,7 +166,11 @@ pub fn execute(arguments: &Arguments, units: Option<&str>) -> Result<ExitCode, E
                 eprintln!("{peer} is served over {protocol}")
             }
             Event::TurnedAway { peer, reason } => eprintln!("{peer} was turned away: {reason}"),
-            Event::Step(_) => {}
+            Event::Step(step) => {
+                if let Some(watched) = &mut watched {
+                    watched.step(&step);
+                }
+            }
         },
     )?;
     let (prepared, outcome) = (&over.prepared, &mut over.outcome);
@@ -178,6 +193,9 @@ pub fn execute(arguments: &Arguments, units: Option<&str>) -> Result<ExitCode, E
         for file in files {
             println!("  {}", file.display());
         }
+    }
+    if let Some(watched) = watched {
+        watched.finish(over.summary.ended);
     }
     match &over.summary.reason {
         None => Ok(ExitCode::SUCCESS),

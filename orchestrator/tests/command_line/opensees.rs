@@ -10,6 +10,8 @@ use std::sync::OnceLock;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use bridges::Client;
+use bridges::protocol::{Action, Quantities, Sizes};
 use serde_json::Value;
 
 use super::{shakebench, stderr, stdout};
@@ -45,6 +47,8 @@ pub fn python() -> Option<&'static Path> {
 struct Service {
     child: Child,
     port: u16,
+    /// Address of its live page, where it has one.
+    page: Option<String>,
     said: JoinHandle<String>,
 }
 
@@ -66,11 +70,15 @@ impl Service {
             .unwrap();
         let mut lines = BufReader::new(child.stderr.take().unwrap());
         let mut text = String::new();
+        let mut page = None;
         let port = loop {
             let mut line = String::new();
             let count = lines.read_line(&mut line).unwrap();
             text += &line;
             assert!(count > 0, "it does not listen: {text}");
+            if let Some(url) = line.strip_prefix("watch it at ") {
+                page = Some(url.trim().to_string());
+            }
             if let Some(rest) = line.strip_prefix("listening at 127.0.0.1:") {
                 break rest.split(' ').next().unwrap().parse().unwrap();
             }
@@ -79,7 +87,12 @@ impl Service {
             let _ = lines.read_to_string(&mut text);
             text
         });
-        Self { child, port, said }
+        Self {
+            child,
+            port,
+            page,
+            said,
+        }
     }
 
     /// Exit status, summary and what was said.
@@ -118,6 +131,89 @@ fn remote(port: u16, arguments: &[&str]) -> (bool, Value) {
     let line = said.lines().find(|line| line.starts_with('{'));
     let found = line.and_then(|line| serde_json::from_str(line).ok());
     (output.status.success(), found.unwrap_or(Value::Null))
+}
+
+/// A page's answer to a request for its rows.
+fn rows(page: &str) -> Value {
+    let (host, path) = page
+        .strip_prefix("http://")
+        .unwrap()
+        .split_once('/')
+        .unwrap();
+    let mut stream = TcpStream::connect(host).unwrap();
+    write!(
+        stream,
+        "GET /{path}rows?from=0 HTTP/1.1\r\nHost: {host}\r\n\r\n"
+    )
+    .unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    serde_json::from_str(answer.split_once("\r\n\r\n").unwrap().1).unwrap()
+}
+
+#[test]
+fn a_service_is_watched_step_by_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let system = element(folder.path(), "");
+    let options = [
+        system,
+        "--mode",
+        "ideal",
+        "--watch",
+        "--out",
+        "out",
+        "--units",
+        "m,N",
+        "--interval",
+        "0.01 s",
+    ];
+    let service = Service::start(folder.path(), &options);
+    let page = service.page.clone().unwrap();
+    let one = |trial: bool| Quantities {
+        displacement: usize::from(trial),
+        force: usize::from(!trial),
+        ..Quantities::default()
+    };
+    let sizes = Sizes {
+        trial: one(true),
+        wanted: one(false),
+        length: 64,
+    };
+    let address = ([127, 0, 0, 1], service.port).into();
+    let mut client = Client::connect(address, sizes, Duration::from_secs(10)).unwrap();
+    // 2.8 kip/in.
+    let stiffness = 2.8e3 * 4.448_221_615_260_5 / 0.0254;
+    for trial in [0.5e-3, 1e-3] {
+        client.send(Action::SetTrial, &[trial]).unwrap();
+        let force = client.ask(Action::GetForce).unwrap()[0];
+        assert!((force / (stiffness * trial) - 1.0).abs() < 1e-9, "{force}");
+    }
+    client.send(Action::Commit, &[]).unwrap();
+    let limit = Instant::now() + Duration::from_secs(10);
+    let shown = loop {
+        let shown = rows(&page);
+        if shown["rows"][0].is_array() {
+            break shown;
+        }
+        assert!(Instant::now() < limit, "{shown}");
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    let row: Vec<f64> = serde_json::from_value(shown["rows"][0].clone()).unwrap();
+    let [_, step, trials, round_trip, trial, measured, force] = row[..] else {
+        panic!("{row:?}");
+    };
+    assert_eq!((step, trials), (1.0, 2.0));
+    assert!(round_trip > 0.0 && round_trip < 10.0, "{round_trip}");
+    assert!((trial - 1e-3).abs() < 1e-9 && (measured - 1e-3).abs() < 1e-9);
+    assert!((force / (stiffness * 1e-3) - 1.0).abs() < 1e-6, "{force}");
+    client.send(Action::End, &[]).unwrap();
+    let limit = Instant::now() + Duration::from_secs(10);
+    while rows(&page)["ended"] != "complete" {
+        assert!(Instant::now() < limit, "it does not end");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let (status, summary, said) = service.end();
+    assert_eq!((status, &summary["steps"]), (0, &Value::from(1)), "{said}");
 }
 
 const YIELDING: &str = ", yield_force = \"1.5 kip\", hardening = 0.02";

@@ -3,6 +3,7 @@
 mod bench;
 mod channels;
 mod journal;
+mod watched;
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -16,6 +17,7 @@ use serde::Serialize;
 pub use bench::Bench;
 pub use channels::{Channel, Channels, Command};
 pub use journal::{EXCHANGES, Journal};
+pub use watched::Watched;
 
 use crate::error::Error;
 use crate::run::experiment::{Motions, Prepared, Request, prepare_shared, system_file};

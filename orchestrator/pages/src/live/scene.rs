@@ -11,10 +11,12 @@ use fmi_system::System;
 pub struct Scene {
     /// Heading.
     pub title: String,
-    /// Length of the run, s.
-    pub duration: f64,
+    /// Length of the run, s; none where nobody knows it.
+    pub duration: Option<f64>,
     /// Plots, top to bottom.
     pub plots: Vec<Plot>,
+    /// Column of the number of steps that a client committed, where one is served.
+    pub step: Option<usize>,
     /// Column of the interlock's state, counted with the time as column 0.
     pub tripped: Option<usize>,
     /// Column of its cause, with the words by number.
@@ -118,8 +120,9 @@ impl Scene {
         let cause = column("interlock.trip_cause").zip(causes(run.system));
         let scene = Self {
             title: format!("{} on {}", run.system.name, run.motion),
-            duration: run.duration,
+            duration: Some(run.duration),
             plots,
+            step: None,
             tripped,
             cause,
         };

@@ -168,7 +168,7 @@ fn answer(stream: &TcpStream, shared: &Shared) -> io::Result<()> {
             stream,
             "403 Forbidden",
             "text/plain",
-            "only at the address that `run --watch` printed",
+            "only at the address that --watch printed",
         );
     };
     match path {
@@ -237,8 +237,9 @@ mod tests {
     fn scene() -> Scene {
         Scene {
             title: "a </script> b".into(),
-            duration: 1.0,
+            duration: Some(1.0),
             plots: Vec::new(),
+            step: None,
             tripped: None,
             cause: None,
         }

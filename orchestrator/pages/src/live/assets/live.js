@@ -80,10 +80,12 @@
     }
     next += rows.length;
     const last = rows[rows.length - 1];
-    const words = `${time.toFixed(2)} of ${scene.duration.toFixed(2)} s`;
+    const words = `${time.toFixed(2)} ${scene.duration == null ? "" : `of ${scene.duration.toFixed(2)} `}s`;
     if (scene.tripped != null && last[scene.tripped] !== 0) {
       const cause = scene.cause && scene.cause[1].find(([number]) => number === last[scene.cause[0]]);
       say("tripped", `Interlock tripped${cause ? `: ${cause[1]}` : ""} (${words})`);
+    } else if (scene.step != null) {
+      say("running", `Serving a client: step ${last[scene.step]} committed at ${words}`);
     } else {
       say("running", scene.tripped == null ? `Running, without an interlock: ${words}` : `Running, interlock armed: ${words}`);
     }
