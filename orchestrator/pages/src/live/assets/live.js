@@ -46,7 +46,7 @@
         })),
         ...limits.map((_, n) => ({ label: n ? "lower limit" : "limit", stroke: colour("--series-6"), width: 1, dash: [6, 4], show: false })),
       ],
-      axes: [axis("time [s]", 34), axis(`[${plot.unit[0]}]`, 58)],
+      axes: [axis("time [s]", 34), axis(plot.unit[0] && `[${plot.unit[0]}]`, 58)],
     }, data, place);
     return { plot, place, chart, data, limits, value, largest: 0 };
   });
@@ -69,7 +69,7 @@
     for (const own of plots) {
       const old = own.data[0].findIndex((t) => t >= time - WINDOW - 1);
       if (old > 2000) own.data.forEach((column) => column.splice(0, old));
-      own.value.textContent = `${(own.largest / own.plot.unit[1]).toPrecision(3)} ${own.plot.unit[0]}`;
+      own.value.textContent = `${Number((own.largest / own.plot.unit[1]).toPrecision(3))} ${own.plot.unit[0]}`;
       // A limit is drawn where it matters: near it.
       own.limits.forEach((limit, n) => {
         const series = 1 + own.plot.signals.length + n;
