@@ -19,7 +19,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "all")]
     fmi: Versions,
     /// Folder for fmi2/NAME.fmu and fmi3/NAME.fmu [default: target/fmus]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Merge the FMUs of these folders instead of building: one archive with all their platforms
     #[arg(
@@ -43,6 +43,9 @@ pub struct Arguments {
     /// Write the licences of all linked code to this file, without packing
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fmi", "out", "libraries", "revision"])]
     notices: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
 }
 
 fn libraries(text: &str) -> Result<(Platform, PathBuf), String> {
@@ -99,9 +102,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             arguments.smallest,
         )?
     } else {
-        eprintln!("building the components (the first time takes a minute)...");
+        note!("building the components (the first time takes a minute)...");
         pack::build_fmus(&out, versions)?
     };
+    if arguments.json {
+        let fmus = packed.iter().map(|fmu| {
+            serde_json::json!({"name": fmu.name, "fmi": fmu.version.to_string(), "file": fmu.path})
+        });
+        println!("{}", serde_json::json!({"fmus": fmus.collect::<Vec<_>>()}));
+        return Ok(ExitCode::SUCCESS);
+    }
     for fmu in packed {
         println!("{}", fmu.path.display());
     }

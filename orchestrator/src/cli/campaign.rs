@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use super::interrupt;
+use super::{interrupt, progress};
 use laboratory::error::Error;
 use laboratory::results::{Results, unused};
 use pages::report::columns::aligned;
@@ -23,7 +22,7 @@ pub struct Arguments {
     /// one they were designed for
     study: PathBuf,
     /// Folder for runs.parquet, runs.csv and report.html [default: shakebench-results/STUDY]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Run the I-th of N parts of the study; without this, the parts in the folder are collected
     #[arg(long, value_name = "I/N")]
@@ -82,12 +81,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         unused(&Path::new("shakebench-results").join(name), is_same)
     });
     Results::check(&folder)?;
-    let bar = ProgressBar::hidden();
-    let style = ProgressStyle::with_template("{bar:40} {pos} of {len} runs, {eta} left");
-    // A template that cannot be read leaves the plain bar.
-    if let Ok(style) = style {
-        bar.set_style(style);
-    }
+    let bar = progress::hidden_bar("{bar:40} {pos} of {len} runs, {eta} left");
     let asked = interrupt::heed();
     let how = Plan {
         folder: folder.clone(),
@@ -98,10 +92,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let bench = Bench::new(&study);
     let carried = carry_out(&bench, &how, asked, &|Progress { done, of }| {
         is_shown.call_once(|| {
-            bar.set_length(of);
+            progress::show(&bar, of as usize);
             bar.set_position(done);
             bar.reset_eta();
-            bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
         });
         bar.set_position(done);
     });

@@ -62,7 +62,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
     /// Folder for recordings, model, systems and report
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
     /// Print one JSON object
     #[arg(long)]

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::figures;
 use laboratory::design::{self, LoopName, Options, Synthesis, model};
 use laboratory::error::Error;
 use laboratory::results::unused;
@@ -17,7 +18,8 @@ use units::INCH;
 #[command(after_help = "Examples:\n  \
     shakebench design\n  \
     shakebench design --loop loop-shaping-synthesis --crossover 50 --json\n  \
-    shakebench design --model MODEL.toml")]
+    shakebench design --model MODEL.toml\n  \
+    shakebench design --figures 3-7,3-10               # the thesis's figures of loops")]
 pub struct Arguments {
     /// One loop: displacement-pid, force-pid, loop-shaping, loop-shaping-synthesis,
     /// three-variable or sliding-mode [default: all]
@@ -45,8 +47,13 @@ pub struct Arguments {
     /// Specimen on the table: none, linear [default: none]
     #[arg(long, value_name = "NAME")]
     specimen: Option<String>,
+    /// Draw these figures of the thesis instead, such as 3-7,3-10 [default: all figures of models and loops]
+    #[arg(long, value_name = "N-N", num_args = 0.., value_delimiter = ',', conflicts_with_all = [
+        "only", "crossover", "model", "specimen",
+    ])]
+    figures: Option<Vec<String>>,
     /// Folder for report.html [default: shakebench-results/design]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
@@ -59,6 +66,10 @@ pub struct Arguments {
 /// An unknown name, a crossover for which there is no controller, or a report that cannot be
 /// written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if let Some(only) = &arguments.figures {
+        let kind = figures::Kind::Loops;
+        return figures::draw(only, kind, None, arguments.out.as_deref(), arguments.json);
+    }
     if let Some(path) = &arguments.model {
         return on_model(arguments, path);
     }

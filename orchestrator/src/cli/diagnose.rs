@@ -77,7 +77,7 @@ pub struct Arguments {
     periodic: bool,
     /// Folder for report, JSON and extended model [default: shakebench-results/diagnosis-NAME], or file
     /// for a prediction [default: prediction.csv]
-    #[arg(long, value_name = "DIR|FILE")]
+    #[arg(short, long, value_name = "DIR|FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
@@ -86,9 +86,6 @@ pub struct Arguments {
     /// candidates then
     #[arg(long, value_name = "T", default_value = "10 min")]
     time_limit: String,
-    /// Print each attempt to standard error
-    #[arg(long)]
-    verbose: bool,
 }
 
 /// Diagnoses, writes the files and prints what was found; or does what `--template` and `--model` ask
@@ -166,16 +163,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     });
     let bar = progress::spinner("reading");
     let tell = |event: &Progress| {
-        if arguments.verbose {
+        if progress::is_verbose() {
             eprintln!("{event}");
         } else {
             let words = event.to_string();
             bar.set_message(words.lines().next().unwrap_or_default().to_string());
         }
     };
-    if arguments.verbose {
-        bar.finish_and_clear();
-    }
     let columns = arguments.columns.as_deref();
     let deadline = Deadline::after(limit);
     let observer = Observer::new(&tell).until(&deadline);

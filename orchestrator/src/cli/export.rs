@@ -50,6 +50,9 @@ pub struct Arguments {
     /// Length of the motion in the archive, such as "10 s"
     #[arg(long, value_name = "T")]
     duration: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
 }
 
 /// Version of FMI of an archive's components.
@@ -84,9 +87,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             });
         };
         write_model(model, fmi, out)?;
-        eprintln!("note: files that the model reads are not included, and it needs openseespy");
-        println!("{}", out.display());
-        return Ok(ExitCode::SUCCESS);
+        let note = "files that the model reads are not included, and it needs openseespy";
+        return Ok(exported(arguments, out, &[note.to_string()]));
     }
     let request = Request {
         fmi,
@@ -121,9 +123,18 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if motion.is_none() {
         notes.push("the system does not use a motion, so the archive has none".to_string());
     }
-    for note in notes {
-        eprintln!("note: {note}");
+    Ok(exported(arguments, ssp, &notes))
+}
+
+/// Prints what was written.
+fn exported(arguments: &Arguments, file: &Path, notes: &[String]) -> ExitCode {
+    if arguments.json {
+        println!("{}", serde_json::json!({"file": file, "notes": notes}));
+        return ExitCode::SUCCESS;
     }
-    println!("{}", ssp.display());
-    Ok(ExitCode::SUCCESS)
+    for note in notes {
+        note!("note: {note}");
+    }
+    println!("{}", file.display());
+    ExitCode::SUCCESS
 }

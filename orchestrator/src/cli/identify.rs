@@ -30,7 +30,7 @@ pub struct Arguments {
     #[arg(value_name = "DATA.csv", required = true)]
     data: Vec<PathBuf>,
     /// Output file of the model; a report with plots is written next to it
-    #[arg(long, value_name = "MODEL.toml")]
+    #[arg(short, long, value_name = "MODEL.toml")]
     out: PathBuf,
     /// Part of each recording that is fitted; the rest validates the model
     #[arg(long, value_name = "PART", default_value_t = 0.75)]

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use serde_json::json;
 
 use fmi_import::{Causality, FmiVersion, Fmu};
 use fmi_ssp as ssp;
@@ -27,7 +28,13 @@ pub struct Arguments {
     /// A component's name, an .fmu, a system (.toml, .ssp or built-in), or a motion (.AT2, .csv)
     #[arg(value_name = "FILE")]
     file: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
 }
+
+/// What a file holds, for people and for programs.
+type Content = (String, serde_json::Value);
 
 /// Prints what a file holds.
 ///
@@ -37,7 +44,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let path = &arguments.file;
     let name = path.to_string_lossy();
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let text = match extension.as_deref() {
+    let (text, json) = match extension.as_deref() {
         Some("fmu") => fmu(&*Fmu::open(path)?),
         Some("toml") => system(&SystemFile::read(path)?)?,
         _ if ssp::is_ssp(&name) => system(&ssp::read(&name)?)?,
@@ -74,11 +81,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             });
         }
     };
-    print!("{text}");
+    match arguments.json {
+        true => println!("{json}"),
+        false => print!("{text}"),
+    }
     Ok(ExitCode::SUCCESS)
 }
 
-fn fmu(fmu: &Fmu) -> String {
+fn fmu(fmu: &Fmu) -> Content {
     let d = &fmu.description;
     let yes = |truth| if truth { "yes" } else { "no" };
     let mut text = format!("{}: {}\n", d.model_name, d.about);
@@ -129,10 +139,37 @@ fn fmu(fmu: &Fmu) -> String {
     for remark in &d.remarks {
         text += &format!("\nremark: {remark}\n");
     }
-    text
+    let variables = d.variables.iter().map(|v| {
+        json!({
+            "name": v.name,
+            "causality": format!("{:?}", v.causality).to_lowercase(),
+            "type": v.kind.name(),
+            "start": v.start,
+            "unit": v.unit,
+            "description": v.description,
+            "depends_on": v.dependencies.iter().map(|&on| &d.variables[on].name).collect::<Vec<_>>(),
+        })
+    });
+    let json = json!({
+        "kind": "fmu",
+        "name": d.model_name,
+        "description": d.about,
+        "fmi": d.version,
+        "token": d.token,
+        "generation_tool": d.generation_tool,
+        "platforms": fmu.platforms,
+        "model_exchange": d.offers_model_exchange,
+        "saves_state": d.saves_state,
+        "writes_state": d.writes_state,
+        "preferred_step_s": d.preferred_step,
+        "sha256": fmu.sha256,
+        "variables": variables.collect::<Vec<_>>(),
+        "remarks": d.remarks,
+    });
+    (text, json)
 }
 
-fn system(file: &SystemFile) -> Result<String, Error> {
+fn system(file: &SystemFile) -> Result<Content, Error> {
     let mut library = FmuLibrary::of(FmiVersion::V3, file);
     let system = assemble(file, &[], &mut library)?;
     let mut text = format!("{}: {}\n\ncomponents\n", system.name, system.description);
@@ -155,7 +192,25 @@ fn system(file: &SystemFile) -> Result<String, Error> {
         text += &format!("  {}. {}\n", number + 1, words(&system, operation));
     }
     text += "  then the continuous components step\n";
-    Ok(text)
+    let components = system.components.iter().map(|component| {
+        json!({
+            "name": component.name,
+            "model": component.fmu.description.model_name,
+            "period_s": component.period,
+        })
+    });
+    let connections = system
+        .links()
+        .map(|link| json!({"from": link.from.to_string(), "to": link.to.to_string()}));
+    let json = json!({
+        "kind": "system",
+        "name": system.name,
+        "description": system.description,
+        "components": components.collect::<Vec<_>>(),
+        "connections": connections.collect::<Vec<_>>(),
+        "notes": system.notes,
+    });
+    Ok((text, json))
 }
 
 fn words(system: &System, operation: &Operation) -> String {
@@ -174,7 +229,7 @@ fn words(system: &System, operation: &Operation) -> String {
     }
 }
 
-fn motion(path: &Path) -> Result<String, Error> {
+fn motion(path: &Path) -> Result<Content, Error> {
     let options = motion::Options::default();
     let playable = match motion::read_record(path) {
         Ok(_) => motion::load(path, &options)?,
@@ -195,5 +250,16 @@ fn motion(path: &Path) -> Result<String, Error> {
         shown(playable.peak_velocity(), Units::VELOCITY),
         shown(playable.peak_displacement(), Units::DISPLACEMENT),
     );
-    Ok(text)
+    let json = json!({
+        "kind": "motion",
+        "name": playable.name,
+        "notes": playable.notes,
+        "duration_s": playable.duration(),
+        "samples": playable.len(),
+        "step_s": playable.dt,
+        "peak_acceleration_m_s2": playable.peak_acceleration(),
+        "peak_velocity_m_s": playable.peak_velocity(),
+        "peak_displacement_m": playable.peak_displacement(),
+    });
+    Ok((text, json))
 }

@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use indicatif::ProgressBar;
 
 use super::motion::MotionArguments;
 use super::quantity::{band, if_given};
 use super::rig::RigArguments;
-use super::run;
+use super::{print_files, progress, run};
 use laboratory::error::Error;
+use laboratory::iteration::circle::{self, Circle};
+use laboratory::iteration::on_model::Search;
 use laboratory::iteration::{self, Iteration, Plan};
 use laboratory::results::{Results, unused};
 use pages::report::columns::aligned;
@@ -20,11 +21,20 @@ use pages::report::columns::aligned;
 #[command(after_help = "Examples:\n  \
     shakebench iterate three-variable --plant servohydraulic --specimen yielding --record NGA/RSN1633_MANJIL_ABBAR--L.AT2\n  \
     shakebench iterate mpc --plant servohydraulic --dummy-mass \"25 lbm\" --exposure 3\n  \
-    shakebench iterate three-variable --drive shakebench-results/iteration-three-variable-synthetic-1/drive.csv --iterations 0")]
+    shakebench iterate three-variable --drive shakebench-results/iteration-three-variable-synthetic-1/drive.csv --iterations 0\n\n\
+    Of a diagnosed rig, on its extended model and without a run:\n  \
+    shakebench diagnose my-case --out results\n  \
+    shakebench iterate my-case --model results/extended_model.toml --pga 0.15")]
 pub struct Arguments {
-    /// Built-in system or .toml file [default: three-variable]
-    #[arg(value_name = "SYSTEM")]
+    /// Built-in system or .toml file [default: three-variable]; with --model, the case of the diagnosis, a folder
+    /// with nominal.toml, which states the control law
+    #[arg(value_name = "SYSTEM|CASE")]
     system: Option<String>,
+    /// Compute the drive on this extended model from `shakebench diagnose`, instead of from runs
+    #[arg(long, value_name = "MODEL.toml", requires = "system", conflicts_with_all = [
+        "plant", "specimen", "tuning", "control_model", "set", "gain", "target", "exposure", "measurement_delay", "dummy_mass", "drive",
+    ])]
+    model: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
     #[command(flatten)]
@@ -32,17 +42,17 @@ pub struct Arguments {
     /// Parameter, such as control.valve_limit="5 V"; repeatable
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
-    /// Largest number of corrections
-    #[arg(long, default_value_t = 3)]
-    iterations: usize,
+    /// Largest number of corrections [default: 3; with --model 20]
+    #[arg(long, value_name = "N", alias = "corrections")]
+    iterations: Option<usize>,
     /// Fraction of the inverse that a correction applies, above 0 and at most 1
     #[arg(long, default_value_t = 0.8)]
     gain: f64,
     /// Measured error at which to stop, %
     #[arg(long, value_name = "PERCENT", default_value_t = 0.3)]
     target: f64,
-    /// Lowest and highest corrected frequency, Hz
-    #[arg(long, value_names = ["LOW", "HIGH"], num_args = 2, default_values_t = [0.3, 20.0])]
+    /// Lowest and highest corrected frequency, Hz [default: 0.3 20; with --model 0.1 30]
+    #[arg(long, value_names = ["LOW", "HIGH"], num_args = 2)]
     band: Vec<f64>,
     /// Limit of the motion energy on the specimen, relative to one run [default: none]
     #[arg(long, value_name = "TIMES")]
@@ -57,8 +67,9 @@ pub struct Arguments {
     /// Initial drive: the drive.csv of an earlier iteration
     #[arg(long, value_name = "FILE")]
     drive: Option<PathBuf>,
-    /// Folder for drive.csv, iteration.json and report.html [default: shakebench-results/iteration-SYSTEM-MOTION]
-    #[arg(long, value_name = "DIR")]
+    /// Folder for drive.csv, iteration.json and report.html; with --model for drive.csv and drive.json [default:
+    /// shakebench-results/iteration-SYSTEM-MOTION or drive-CASE-MOTION]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
@@ -70,11 +81,14 @@ pub struct Arguments {
 /// # Errors
 /// Input at fault; nothing is written then.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if let (Some(case), Some(model)) = (&arguments.system, &arguments.model) {
+        return on_model(arguments, case, model);
+    }
     let plan = plan(arguments)?;
     if let Some(folder) = &arguments.out {
         Results::check(folder)?;
     }
-    let bar = ProgressBar::new(plan.iterations as u64 + 2);
+    let bar = progress::bar(plan.iterations + 2, "{bar:40} {pos} of {len} runs");
     let found = iteration::iterate(&plan, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
     let found = found?;
@@ -88,10 +102,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         println!("{}", serde_json::json!(found));
     } else {
         print!("{}", text(&found));
-        println!("\nwritten:");
-        for file in files {
-            println!("  {}", file.display());
-        }
+        println!();
+        print_files(&files);
     }
     if found.stop == iteration::Stop::EndedEarly {
         let reason = found
@@ -107,13 +119,54 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Computes the drive of a diagnosed rig on its extended model and writes it.
+fn on_model(arguments: &Arguments, case: &str, model: &Path) -> Result<ExitCode, Error> {
+    if let Some(folder) = &arguments.out {
+        Results::check(folder)?;
+    }
+    let usual = Search::default();
+    let plan = circle::Plan {
+        case: PathBuf::from(case),
+        model: model.to_path_buf(),
+        record: arguments.motion.record.clone(),
+        reference: arguments.motion.reference.clone(),
+        scaling: arguments.motion.scaling()?,
+        seed: arguments.motion.seed(),
+        search: Search {
+            corrections: arguments.iterations.unwrap_or(usual.corrections),
+            band: match arguments.band.as_slice() {
+                [] => usual.band,
+                given => band(given)?,
+            },
+        },
+    };
+    let found = circle::close(&plan)?;
+    let folder = arguments.out.clone().unwrap_or_else(|| {
+        let name = format!("drive-{}-{}", found.case, found.motion);
+        let name = name.replace(['/', '\\', ' '], "-");
+        unused(&Path::new("shakebench-results").join(name), |_| false)
+    });
+    let files = circle::write(&found, &folder)?;
+    if arguments.json {
+        println!("{}", serde_json::json!(found));
+    } else {
+        print!("{}", text_on_model(&found));
+        println!();
+        print_files(&files);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
 fn plan(arguments: &Arguments) -> Result<Plan, Error> {
     let fault = |option, reason: String| Err(Error::Option { option, reason });
     let gain = arguments.gain;
     if !(gain > 0.0 && gain <= 1.0) {
         return fault("--gain", format!("{gain} is not above 0 and at most 1"));
     }
-    let band = band(&arguments.band)?;
+    let band = match arguments.band.as_slice() {
+        [] => [0.3, 20.0],
+        given => band(given)?,
+    };
     if !arguments.target.is_finite() || arguments.target < 0.0 {
         return fault(
             "--target",
@@ -139,7 +192,7 @@ fn plan(arguments: &Arguments) -> Result<Plan, Error> {
             arguments.rig.clone(),
             arguments.set.clone(),
         ))?,
-        iterations: arguments.iterations,
+        iterations: arguments.iterations.unwrap_or(3),
         gain,
         target_percent: arguments.target,
         band,
@@ -181,5 +234,34 @@ fn text(found: &Iteration) -> String {
         found.coherence,
         aligned(&rows),
         found.stop.sentence()
+    )
+}
+
+fn text_on_model(found: &Circle) -> String {
+    let head = ["drive", "RMS error", "spectrum", "largest command"];
+    let mut rows = vec![head.map(str::to_string).to_vec()];
+    for (name, expected) in found.expected() {
+        rows.push(vec![
+            name.to_string(),
+            format!("{:.3} %", expected.time_domain_percent),
+            expected
+                .response_spectrum_percent
+                .map_or("-".into(), |value| format!("{value:.3} %")),
+            format!("{:.2} V", expected.peak_command_v),
+        ]);
+    }
+    let named = match found.effects.as_slice() {
+        [] => "which has no effect".to_string(),
+        some => format!("with {}", some.join(", ")),
+    };
+    let warnings: String = found
+        .warnings
+        .iter()
+        .map(|line| format!("warning: {line}\n"))
+        .collect();
+    format!(
+        "{} on the extended model, {named}\n\n{}\n{warnings}",
+        found.motion,
+        aligned(&rows)
     )
 }

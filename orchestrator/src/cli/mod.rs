@@ -12,17 +12,23 @@ macro_rules! eprintln {
     () => { $crate::cli::terminal::err(format_args!("")) };
     ($($text:tt)*) => { $crate::cli::terminal::err(format_args!($($text)*)) };
 }
+/// A line on standard error, unless `--quiet` was given.
+macro_rules! note {
+    ($($text:tt)*) => {
+        if !$crate::cli::progress::is_quiet() {
+            $crate::cli::terminal::err(format_args!($($text)*));
+        }
+    };
+}
 
 pub mod benchmark;
 pub mod build;
 pub mod campaign;
 pub mod commission;
 pub mod compare;
-pub mod compare_runs;
 pub mod design;
 pub mod diagnose;
 pub mod doctor;
-pub mod drive;
 pub mod export;
 pub mod figures;
 pub mod identify;
@@ -45,13 +51,14 @@ pub mod validate;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use fmi_import::{FmiVersion, isolation};
 use laboratory::error;
 use laboratory::results;
 use pack::supply;
 use pages::report::UnitSystem;
+use progress::Detail;
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -74,6 +81,12 @@ pub struct Cli {
     /// Replace existing result files that differ
     #[arg(long, global = true)]
     force: bool,
+    /// No progress and no notes on standard error
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Each step of the progress as a line on standard error
+    #[arg(short, long, global = true)]
+    verbose: bool,
     /// Folder of the components' FMUs [default: the program's folder, or built from the workspace]
     #[arg(long, global = true, value_name = "DIR")]
     fmus: Option<PathBuf>,
@@ -110,10 +123,9 @@ enum Command {
     Campaign(campaign::Arguments),
     /// Record, identify and validate a rig, and design its controllers
     Commission(commission::Arguments),
-    /// Compare controllers on records, with the thesis's tables
-    Compare(compare::Arguments),
-    /// Compare finished runs
-    CompareRuns(compare_runs::Arguments),
+    /// Compare systems on motions, or finished runs
+    #[command(alias = "compare-runs")]
+    Compare(Box<compare::Arguments>),
     /// Generate shell completions
     #[command(
         after_help = "Example:\n  shakebench completions bash > ~/.local/share/bash-completion/completions/shakebench"
@@ -126,19 +138,19 @@ enum Command {
     Design(design::Arguments),
     /// Find what a model gets wrong, from records of the rig
     Diagnose(diagnose::Arguments),
-    /// Reproduce the figures of the thesis
+    /// Draw the figures of the thesis
+    #[command(hide = true)]
     Figures(figures::Arguments),
     /// Check the installation
     Doctor(doctor::Arguments),
-    /// Compute the drive of a diagnosed rig for a motion, on its extended model
-    Drive(drive::Arguments),
     /// Export a system with its components as an SSP archive
     Export(export::Arguments),
     /// Identify a rig's parameters from measured data
     Identify(identify::Arguments),
     /// Show the content of an FMU, a system or a motion file
     Info(info::Arguments),
-    /// Correct the drive from run to run until the table follows the motion
+    /// Correct the drive from run to run, or on a model, until the table follows the motion
+    #[command(alias = "drive")]
     Iterate(Box<iterate::Arguments>),
     /// Make a motion for a required response spectrum, run it, and search resonances
     Qualify(Box<qualify::Arguments>),
@@ -162,10 +174,64 @@ enum Command {
     Validate(validate::Arguments),
 }
 
+/// The commands as the help shows them.
+const GROUPS: [(&str, &[&str]); 6] = [
+    (
+        "Run a test",
+        &["run", "compare", "iterate", "qualify", "trs", "report"],
+    ),
+    (
+        "Know your rig",
+        &["identify", "diagnose", "commission", "serve"],
+    ),
+    ("Design", &["design"]),
+    ("Studies", &["campaign", "tune", "benchmark"]),
+    ("FMUs", &["build", "info", "export", "validate"]),
+    ("The installation", &["doctor", "completions", "help"]),
+];
+
+/// The command line, with its commands in groups.
+fn program() -> clap::Command {
+    let mut program = Cli::command();
+    program.build();
+    let mut groups = String::new();
+    for (heading, names) in GROUPS {
+        groups += &format!("{heading}:\n");
+        for command in names
+            .iter()
+            .filter_map(|name| program.find_subcommand(name))
+        {
+            let about = command.get_about().map(ToString::to_string);
+            groups += &format!(
+                "  {:<12} {}\n",
+                command.get_name(),
+                about.unwrap_or_default()
+            );
+        }
+        groups.push('\n');
+    }
+    Cli::command().help_template(format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{groups}Options:\n{{options}}{{after-help}}"
+    ))
+}
+
+/// Prints where files were written.
+fn print_files(files: &[PathBuf]) {
+    println!("written:");
+    for file in files {
+        println!("  {}", file.display());
+    }
+}
+
 /// Reads the command line, does what it says and gives the exit status.
 pub fn main() -> ExitCode {
     interrupt::survive_full_disks();
-    let cli = Cli::parse();
+    let cli = Cli::from_arg_matches(&program().get_matches()).unwrap_or_else(|error| error.exit());
+    progress::choose(match (cli.quiet, cli.verbose) {
+        (true, _) => Detail::Quiet,
+        (_, true) => Detail::Verbose,
+        _ => Detail::Usual,
+    });
     let is_service = matches!(cli.command, Some(Command::Serve(_)));
     let (units, client_units) = match cli.units {
         Some(GivenUnits::Client(units)) if is_service => (None, Some(units)),
@@ -189,13 +255,11 @@ pub fn main() -> ExitCode {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments, units, cli.force),
         Some(Command::Build(arguments)) => build::execute(&arguments),
-        Some(Command::Drive(arguments)) => drive::execute(&arguments),
         Some(Command::Campaign(arguments)) => campaign::execute(&arguments),
         Some(Command::Commission(arguments)) => commission::execute(&arguments),
         Some(Command::Compare(arguments)) => compare::execute(&arguments),
-        Some(Command::CompareRuns(arguments)) => compare_runs::execute(&arguments),
         Some(Command::Completions { shell }) => {
-            let mut words = Cli::command();
+            let mut words = program();
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut words, "shakebench", &mut script);
             print!("{}", String::from_utf8_lossy(&script));
@@ -255,11 +319,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_command_is_in_one_group_of_the_help() {
+        let mut program = program();
+        program.build();
+        let shown = program.get_subcommands().filter(|one| !one.is_hide_set());
+        for name in shown.map(clap::Command::get_name) {
+            let groups = GROUPS.iter().filter(|(_, names)| names.contains(&name));
+            assert_eq!(groups.count(), 1, "groups that hold `{name}`");
+        }
+        let listed: usize = GROUPS.iter().map(|(_, names)| names.len()).sum();
+        let shown = program.get_subcommands().filter(|one| !one.is_hide_set());
+        assert_eq!(
+            listed,
+            shown.count(),
+            "a group lists a command that does not exist"
+        );
+    }
+
+    #[test]
     fn every_option_stands_in_the_book() {
         let page = include_str!("../../../docs/settings.md");
         let elsewhere = ["help", "version", "json"];
         let mut missing = Vec::new();
-        let program = Cli::command();
+        let program = program();
         for command in program.get_subcommands().filter(|one| !one.is_hide_set()) {
             for option in command.get_arguments().filter_map(clap::Arg::get_long) {
                 let stands = [format!("--{option}`"), format!("--{option} ")];

@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use indicatif::ProgressBar;
 
 use super::motion::MotionArguments;
 use super::rig::RigArguments;
-use super::run;
+use super::{progress, run};
 use laboratory::error::Error;
 use laboratory::qualify::{self, Plan, Qualification};
 use laboratory::results::{Results, unused};
@@ -73,7 +72,7 @@ pub struct Arguments {
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set_after: Vec<String>,
     /// Folder for motions, rounds and report [default: shakebench-results/qualification-RULE]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
@@ -89,11 +88,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if let Some(folder) = &arguments.out {
         Results::check(folder)?;
     }
-    let bar = ProgressBar::new_spinner();
-    let found = qualify::qualify(&plan, &mut |what| {
-        bar.set_message(what.to_string());
-        bar.tick();
-    });
+    let bar = progress::spinner("qualifying");
+    let found = qualify::qualify(&plan, &mut |what| progress::say(&bar, what.to_string()));
     bar.finish_and_clear();
     let mut found = found?;
     let folder = arguments.out.clone().unwrap_or_else(|| {
@@ -109,10 +105,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         println!("{}", serde_json::json!(found));
     } else {
         print!("{}", text(&found));
-        println!("\nwritten:");
-        files
-            .iter()
-            .for_each(|file| println!("  {}", file.display()));
+        println!();
+        super::print_files(&files);
     }
     for warning in &found.warnings {
         eprintln!("warning: {warning}");

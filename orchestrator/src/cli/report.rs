@@ -74,7 +74,7 @@ fn made_by(folder: &Path) -> Option<&'static str> {
         ("tuned.json", "shakebench tune STUDY.toml --out DIR"),
         ("commission.json", "shakebench commission --out DIR"),
         (iteration::ITERATION, "shakebench iterate SYSTEM --out DIR"),
-        ("runs.json", "shakebench compare-runs A B --out DIR"),
+        ("runs.json", "shakebench compare A B --out DIR"),
     ]
     .into_iter()
     .find(|(file, _)| folder.join(file).is_file())

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::OneVersion;
 use super::interrupt;
 use super::motion::MotionArguments;
 use super::quantity::{at_least_one, if_given, percent, positive};
 use super::rig::RigArguments;
+use super::{print_files, progress};
 use fmi_import::{Isolation, Options, Trace};
 use fmi_master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Simulation};
 use laboratory::error::Error;
@@ -96,7 +96,7 @@ pub struct Arguments {
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
     watch: Option<u16>,
     /// Folder for the results [default: shakebench-results/SYSTEM-MOTION]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
@@ -225,7 +225,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Some(port) => Some(watch(&prepared, &mut simulation, port)?),
         None => None,
     };
-    let bar = progress_bar(*samples);
+    let bar = progress::bar(*samples, "{bar:40} {percent} %, {eta} left");
     let pace = if arguments.real_time || arguments.watch.is_some() {
         Pace::RealTime
     } else {
@@ -270,10 +270,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         println!("{}", serde_json::json!(summary));
     } else {
         print!("{}", text(&summary, &outcome.record, motion));
-        println!("\nwritten:");
-        for file in files {
-            println!("  {}", file.display());
-        }
+        println!();
+        print_files(&files);
     }
     if let Some((server, tap)) = live {
         tap.finish(&outcome.ended.message());
@@ -286,11 +284,11 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             differences.iter().for_each(|line| eprintln!("  {line}"));
             return Ok(ExitCode::from(1));
         }
-        eprintln!("the run was repeated to the bit");
+        note!("the run was repeated to the bit");
     }
     if outcome.ended.is_regular() {
         if let Ended::Terminated { .. } = outcome.ended {
-            eprintln!("note: {}", outcome.ended.message());
+            note!("note: {}", outcome.ended.message());
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -452,15 +450,6 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
     })
 }
 
-fn absolute(path: &Path) -> PathBuf {
+pub(super) fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
-}
-
-fn progress_bar(samples: usize) -> ProgressBar {
-    let bar = ProgressBar::new(samples as u64);
-    // A template that cannot be read leaves the plain bar.
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent} %, {eta} left") {
-        bar.set_style(style);
-    }
-    bar
 }

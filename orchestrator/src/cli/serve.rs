@@ -125,7 +125,7 @@ pub struct Arguments {
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
     watch: Option<u16>,
     /// Folder for the results [default: shakebench-results/SYSTEM-served]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
@@ -189,10 +189,8 @@ pub fn execute(arguments: &Arguments, units: Option<&str>) -> Result<ExitCode, E
         println!("{}", serde_json::json!(over.summary));
     } else {
         print!("{}", text_of(&over.summary));
-        println!("\nwritten:");
-        for file in files {
-            println!("  {}", file.display());
-        }
+        println!();
+        super::print_files(&files);
     }
     if let Some(watched) = watched {
         watched.finish(over.summary.ended);

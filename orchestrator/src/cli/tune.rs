@@ -22,7 +22,7 @@ pub struct Arguments {
     /// The study, with a table [tune]
     study: PathBuf,
     /// Folder for tuned.toml, tuned.json and report.html [default: shakebench-results/STUDY-tuned]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
@@ -46,11 +46,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let count = std::cell::Cell::new(0);
     let tuned = tune(&study, asked, &|trial| {
         count.set(count.get() + 1);
-        bar.set_message(format!(
-            "{} sets tried, the last {:.3}",
-            count.get(),
-            trial.score.quantile
-        ));
+        let (count, last) = (count.get(), trial.score.quantile);
+        progress::say(&bar, format!("{count} sets tried, the last {last:.3}"));
     });
     bar.finish_and_clear();
     let tuned = tuned?;

@@ -115,9 +115,13 @@ fn pages_are_drawn_whole_and_tell_the_figures_of_their_files() {
         &[&lost[..], &["--out", "lost"]].concat(),
         1,
     );
-    done(folder, &["compare-runs", "mpc", "lost", "--out", "runs"], 0);
+    done(folder, &["compare", "mpc", "lost", "--out", "runs"], 0);
     done(folder, &["design", "--out", "design"], 0);
-    done(folder, &["figures", "--out", "figures"], 0);
+    done(
+        folder,
+        &["design", "--figures", "3-7,5-5", "--out", "figures"],
+        0,
+    );
     let study = "[study]\nruns = 24\ncross = [\"controller\"]\n\
         [fixed]\nspecimen = \"yielding\"\nplant = \"servohydraulic\"\nduration = \"8 s\"\n\
         [factors]\ncontroller = [\"three-variable\", \"mpc\"]\nseed = [1, 2, 3]\n\

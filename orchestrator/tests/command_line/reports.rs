@@ -78,6 +78,71 @@ fn the_report_of_a_comparison_is_the_same_again() {
 }
 
 #[test]
+fn finished_runs_and_systems_are_compared_on_one_motion() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        let said = done(folder, &[arguments, &["--json", "-q"]].concat());
+        serde_json::from_str(&said).unwrap()
+    };
+    let run = ["run", "three-variable", "--seed", "3", "--duration", "1 s"];
+    json(&[&run[..], &["--set", "control.valve_limit=5 V", "-o", "a"]].concat());
+    let found = json(&["compare", "a", "displacement-pid", "-o", "both"]);
+    let runs = found["runs"].as_array().unwrap();
+    let of = |n: usize, key: &str| runs[n][key].as_str().unwrap();
+    assert_eq!(of(0, "label"), "a");
+    assert_eq!(of(1, "system"), "displacement-pid");
+    assert_eq!(of(1, "motion"), "synthetic-3");
+    // The controllers are different models: no row for each of their parameters.
+    let rows = found["differences"].as_array().unwrap();
+    let what: Vec<&str> = rows
+        .iter()
+        .map(|row| row["what"].as_str().unwrap())
+        .collect();
+    assert!(what.contains(&"control"), "{what:?}");
+    assert!(
+        what.iter().all(|row| !row.starts_with("control.")),
+        "{what:?}"
+    );
+
+    // The same run by the former word, and of systems alone with a parameter of one of them.
+    let again = json(&["compare-runs", "a", "both/displacement-pid", "-o", "again"]);
+    assert_eq!(again["runs"][1]["tracking"], runs[1]["tracking"]);
+    let systems = [
+        "compare",
+        "displacement-pid",
+        "three-variable",
+        "--seed",
+        "3",
+    ];
+    let more = [
+        "--duration",
+        "1 s",
+        "--set",
+        "control.valve_limit=5 V",
+        "-o",
+        "c",
+    ];
+    let rows = json(&[&systems[..], &more].concat());
+    let error = |row: &serde_json::Value| row["time_domain_percent"].as_f64().unwrap();
+    assert_eq!(
+        error(&rows["rows"][1]),
+        error(&runs[0]["tracking"]),
+        "the limit was not set"
+    );
+
+    let refused = |arguments: &[&str], word: &str| {
+        let output = shakebench(folder, arguments);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(stderr(&output).contains(word), "{}", stderr(&output));
+    };
+    refused(&["compare", "a", "both", "--seed", "4"], "--seed");
+    refused(&["compare", "a"], "one run");
+    refused(&["compare", "a", "nothing"], "nothing");
+    refused(&["compare", "mpc", "--set", "other.x=1"], "other.x=1");
+}
+
+#[test]
 fn folders_and_files_at_fault_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -8,6 +8,6 @@ mod tables;
 mod thesis;
 
 pub use page::{COMPARISON, page_again, write};
-pub use play::{Plan, Played, Progress, compare};
+pub use play::{Plan, Played, Progress, compare, labels, request};
 pub use result::{Comparison, History, Median, Row};
 pub use tables::{ErrorTable, tables};

@@ -7,25 +7,21 @@ use rayon::prelude::*;
 
 use super::result::{Comparison, History, Row};
 use crate::error::Error;
-use crate::run::experiment::{Request, prepare};
-use crate::systems::tuning::Tuning;
+use crate::run::experiment::{Request, is_file, prepare, system_file};
+use crate::run::table::Table;
+use fmi_system::Link;
 use motion::{metrics, peak};
 
 /// What is compared on which rig.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// Built-in systems.
-    pub controllers: Vec<String>,
+    /// Built-in systems, and paths of files.
+    pub systems: Vec<String>,
     /// What is played.
     pub motions: Vec<Played>,
-    /// Plant of the systems.
-    pub plant: String,
-    /// Specimen of the systems.
-    pub specimen: String,
-    /// Parameters of the controllers; none: by the plant.
-    pub tuning: Option<Tuning>,
-    /// Model file on which they are tuned.
-    pub control_model: Option<PathBuf>,
+    /// Everything else of the runs: the rig, the length and the parameters, each for the systems that
+    /// have its component.
+    pub base: Request,
 }
 
 /// What is played.
@@ -49,9 +45,22 @@ pub struct Progress {
 }
 
 impl Played {
+    /// What a request plays.
+    pub fn of(request: &Request) -> Self {
+        match (&request.record, &request.reference) {
+            (Some(path), _) => Self::Record(path.clone()),
+            (None, Some(path)) => Self::Reference(path.clone()),
+            (None, None) => Self::Seed(request.seed),
+        }
+    }
+
     /// `base` with this motion.
     pub fn request(&self, base: &Request) -> Request {
-        let mut own = base.clone();
+        let mut own = Request {
+            record: None,
+            reference: None,
+            ..base.clone()
+        };
         match self {
             Self::Record(path) => own.record = Some(path.clone()),
             Self::Reference(path) => own.reference = Some(path.clone()),
@@ -91,20 +100,26 @@ impl Played {
 /// # Errors
 /// Unknown names, or a motion at fault: nothing is run then.
 pub fn compare(plan: &Plan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Comparison, Error> {
-    let requests: Vec<Request> = plan
-        .controllers
-        .iter()
-        .flat_map(|controller| {
-            plan.motions
-                .iter()
-                .map(|motion| request(plan, controller, motion))
-        })
-        .collect();
+    let mut requests = Vec::new();
+    for system in &plan.systems {
+        for motion in &plan.motions {
+            requests.push(request(&plan.base, system, motion)?);
+        }
+    }
+    for set in &plan.base.set {
+        if requests.iter().all(|own| !own.set.contains(set)) {
+            return Err(Error::Option {
+                option: "--set",
+                reason: format!("`{set}`: none of the systems has this component"),
+            });
+        }
+    }
     let motions = plan.motions.len().max(1);
     // One system assembled first builds the components once, and finds faults before the runs.
     for request in requests.iter().step_by(motions) {
         prepare(request)?;
     }
+    let labels = labels(&plan.systems);
     let done = AtomicUsize::new(0);
     let tell = |done| {
         progress(Progress {
@@ -117,28 +132,81 @@ pub fn compare(plan: &Plan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Comp
         .par_iter()
         .enumerate()
         .map(|(place, request)| {
-            let row = run(request, place.is_multiple_of(motions));
+            let label = &labels[place / motions];
+            let row = run(request, label, place.is_multiple_of(motions));
             tell(1 + done.fetch_add(1, Ordering::Relaxed));
             row
         })
         .collect();
-    Ok(Comparison::new(&plan.plant, &plan.specimen, rows?))
+    let of_rig = |text: &str| match plan.systems.iter().all(|system| is_file(system)) {
+        true => "of each file".to_string(),
+        false => text.to_string(),
+    };
+    let base = &plan.base;
+    Ok(Comparison::new(
+        &of_rig(&base.plant),
+        &of_rig(&base.specimen),
+        rows?,
+    ))
 }
 
-fn request(plan: &Plan, controller: &str, played: &Played) -> Request {
-    played.request(&Request {
-        plant: plan.plant.clone(),
-        specimen: plan.specimen.clone(),
-        tuning: plan.tuning,
-        control_model: plan.control_model.clone(),
-        ..Request::built_in(controller)
-    })
+/// `base` of this system on this motion, with the parameters of the components that the system has.
+///
+/// # Errors
+/// A system that cannot be read.
+pub fn request(base: &Request, system: &str, played: &Played) -> Result<Request, Error> {
+    let mut request = Request {
+        system: system.to_string(),
+        ..played.request(base)
+    };
+    if !request.set.is_empty() {
+        let file = system_file(&request, None)?;
+        request.set.retain(|set| {
+            let name = set.split('=').next().unwrap_or(set).trim();
+            let component = name.split('.').next().unwrap_or(name);
+            file.components.contains_key(component)
+        });
+    }
+    Ok(request)
 }
 
-fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {
+/// Names of systems in a comparison: of a file that without its ending, with its folder or its whole path where
+/// another system has the same name.
+pub fn labels(systems: &[String]) -> Vec<String> {
+    let names = |system: &String| {
+        let path = Path::new(system);
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let folder = path.parent().and_then(Path::file_name).unwrap_or_default();
+        match is_file(system) {
+            true => [
+                stem.to_string(),
+                format!("{}-{stem}", folder.to_string_lossy()),
+                system.clone(),
+            ],
+            false => [system.clone(), system.clone(), system.clone()],
+        }
+    };
+    let all: Vec<[String; 3]> = systems.iter().map(names).collect();
+    let is_only = |name: &String, level: usize| {
+        let same = all.iter().filter(|other| other[level] == *name);
+        same.count() == 1
+    };
+    let label = |own: &[String; 3]| {
+        let mut levels = own.iter().enumerate();
+        let found = levels.find(|(level, name)| is_only(name, *level));
+        found.map_or(&own[2], |(_, name)| name).clone()
+    };
+    all.iter().map(label).collect()
+}
+
+fn run(request: &Request, label: &str, keep_history: bool) -> Result<Row, Error> {
     let prepared = prepare(request)?;
     let outcome = prepared.run(prepared.algorithm)?;
-    let column = |name: &str| outcome.record.column(&format!("table.{name}"));
+    let system = &prepared.system;
+    let names = system.components.iter().map(|own| own.name.as_str());
+    let links: Vec<Link> = system.links().collect();
+    let table = Table::among(names, &links, &outcome.record);
+    let column = |name: &str| outcome.record.column(&table.as_ref()?.name(name));
     let motion = &prepared.motion;
     let histories = column("displacement").zip(column("acceleration"));
     let tracking = histories
@@ -157,7 +225,7 @@ fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {
     });
     Ok(Row {
         record: prepared.motion.name.clone(),
-        controller: request.system.clone(),
+        controller: label.to_string(),
         time_domain_percent: tracking.map(|t| t.time_domain_percent),
         frequency_domain_percent: tracking.map(|t| t.frequency_domain_percent),
         response_spectrum_percent: tracking
@@ -170,4 +238,25 @@ fn run(request: &Request, keep_history: bool) -> Result<Row, Error> {
         ended_s: outcome.ended.time(),
         history,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_one_name_are_told_apart_by_their_folders() {
+        let named =
+            |systems: &[&str]| labels(&systems.iter().map(|s| s.to_string()).collect::<Vec<_>>());
+        assert_eq!(named(&["mpc", "/rigs/a/lqg.toml"]), ["mpc", "lqg"]);
+        assert_eq!(
+            named(&["/rigs/a/mpc.toml", "/rigs/b/mpc.toml"]),
+            ["a-mpc", "b-mpc"]
+        );
+        assert_eq!(
+            named(&["/x/a/mpc.toml", "/y/a/mpc.toml"]),
+            ["/x/a/mpc.toml", "/y/a/mpc.toml"]
+        );
+        assert_eq!(named(&["mpc", "/rigs/a/mpc.toml"]), ["mpc", "a-mpc"]);
+    }
 }

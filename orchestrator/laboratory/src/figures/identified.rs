@@ -165,7 +165,7 @@ pub(super) fn figures() -> Result<Vec<Figure>, Error> {
 /// Simulation of the part that was not fitted by the identified models.
 fn fits(run: &Run) -> Result<Vec<Figure>, Error> {
     let fault = |error: std::io::Error| Error::Option {
-        option: "figures",
+        option: "--figures",
         reason: error.to_string(),
     };
     let folder = tempfile::tempdir().map_err(fault)?;

@@ -1,4 +1,4 @@
-//! The thesis's figures, drawn with what this program computes: `shakebench figures`.
+//! The thesis's figures, drawn with what this program computes.
 
 mod identified;
 mod tracking;
@@ -27,6 +27,20 @@ pub const NUMBERS: [&str; 14] = [
     "5-6",
 ];
 
+/// Numbers of the figures of models and loops.
+pub fn of_loops() -> impl Iterator<Item = &'static str> {
+    NUMBERS.into_iter().filter(|number| !is_of_runs(number))
+}
+
+/// Numbers of the figures of tables under control.
+pub fn of_runs() -> impl Iterator<Item = &'static str> {
+    NUMBERS.into_iter().filter(|number| is_of_runs(number))
+}
+
+fn is_of_runs(number: &str) -> bool {
+    tracking::ALL.iter().any(|(own, _)| *own == number)
+}
+
 /// Draws the figures with these numbers (all for none) on a record, the built-in motion where none
 /// is given; `progress` receives each number before it is drawn.
 ///
@@ -39,7 +53,7 @@ pub fn figures(
 ) -> Result<Vec<Figure>, Error> {
     if let Some(wrong) = only.iter().find(|own| !NUMBERS.contains(&own.as_str())) {
         return Err(Error::Option {
-            option: "--figure",
+            option: "--figures",
             reason: format!(
                 "there is no figure `{wrong}`; expected some of {}",
                 NUMBERS.join(", ")
@@ -61,7 +75,7 @@ pub fn figures(
     {
         progress("3-3 to 3-10");
         let fault = |error: controllers::ModelError| Error::Option {
-            option: "figures",
+            option: "--figures",
             reason: error.to_string(),
         };
         let design = design::design(&design::Options::default()).map_err(fault)?;

@@ -12,3 +12,21 @@ pub mod signals;
 pub mod summary;
 pub mod table;
 pub mod text;
+
+use std::path::{Path, PathBuf};
+
+use crate::error::Error;
+
+/// Runs a system as fast as it goes and writes the files of the run into `folder`; says where.
+///
+/// # Errors
+/// Whatever is at fault in the request, or a folder that cannot be written. A run that ends early is not an error:
+/// its summary says so.
+pub fn perform(request: &experiment::Request, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let prepared = experiment::prepare(request)?;
+    let outcome = prepared.run(prepared.algorithm)?;
+    let plan = (prepared.algorithm, prepared.step, prepared.samples);
+    let mut manifest = manifest::Manifest::new(request, &prepared.system, &prepared.motion, plan);
+    let summary = summary::Summary::new(&prepared, &outcome, &manifest);
+    page::write(folder, &prepared, &outcome, &summary, &mut manifest, false)
+}

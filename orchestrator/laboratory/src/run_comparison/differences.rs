@@ -18,7 +18,8 @@ pub struct Difference {
     pub values: Vec<String>,
 }
 
-/// All differences: settings first, then parameters.
+/// All differences: settings first, then parameters of components that are of the same model in every run; those of
+/// others have nothing to be compared with.
 pub(super) fn of(manifests: &[&Manifest]) -> Vec<Difference> {
     let mut found = Vec::new();
     let mut compare = |what: &str, value: &dyn Fn(&Manifest) -> String| {
@@ -53,7 +54,14 @@ pub(super) fn of(manifests: &[&Manifest]) -> Vec<Difference> {
                 format!("{}, FMI {}, {}", c.model, c.fmi, short(&c.sha256))
             })
         });
-        let all = manifests.iter().filter_map(|m| m.components.get(name));
+        let all: Vec<_> = manifests
+            .iter()
+            .filter_map(|m| m.components.get(name))
+            .collect();
+        if all.len() < manifests.len() || all.iter().any(|c| c.model != all[0].model) {
+            continue;
+        }
+        let all = all.into_iter();
         let parameters: BTreeSet<&String> = all.flat_map(|c| c.parameters.keys()).collect();
         for parameter in parameters {
             compare(&format!("{name}.{parameter}"), &|m| {

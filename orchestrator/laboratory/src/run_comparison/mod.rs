@@ -62,17 +62,15 @@ struct Files {
 /// # Errors
 /// A folder that holds no run, a file of one at fault, fewer than two runs.
 pub fn read(folders: &[PathBuf]) -> Result<RunComparison, Error> {
-    let mut runs = Vec::new();
-    for folder in folders {
-        for place in runs_in(folder)? {
-            runs.push(read_one(&place)?);
-        }
-    }
+    let places = find(folders)?;
+    let runs: Result<Vec<ComparedRun>, Error> =
+        places.iter().map(|place| read_one(place)).collect();
+    let mut runs = runs?;
     if runs.len() < 2 {
         return Err(Error::Option {
-            option: "compare-runs",
-            reason: "this is one run; expected two or more folders of runs, or one that contains \
-                several"
+            option: "compare",
+            reason: "this is one run; expected two or more folders of runs, one that contains \
+                several, or a system to run beside it, such as three-variable"
                 .into(),
         });
     }
@@ -80,6 +78,16 @@ pub fn read(folders: &[PathBuf]) -> Result<RunComparison, Error> {
     let manifests: Vec<&Manifest> = runs.iter().map(|run| &run.files.manifest).collect();
     let differences = differences::of(&manifests);
     Ok(RunComparison { runs, differences })
+}
+
+/// The folders of the runs in these folders.
+///
+/// # Errors
+/// A folder that holds no run.
+pub fn find(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
+    let found: Result<Vec<Vec<PathBuf>>, Error> =
+        folders.iter().map(|folder| runs_in(folder)).collect();
+    Ok(found?.concat())
 }
 
 fn has_run(folder: &Path) -> bool {
