@@ -531,7 +531,7 @@ pub fn select<M: SimulatedModel>(
 
 /// The best of `proposals`, each a set of effects and a point to begin from: fitted to all of `record`,
 /// ordered by how either half of it predicts the other, and then without the effects that do not pay
-/// there. None where nothing can be fitted.
+/// there; the nominal model where none can be fitted to the halves. None where that cannot be either.
 pub fn select_jointly<M: SimulatedModel>(
     model: &M,
     proposals: &[Point],
@@ -543,15 +543,17 @@ pub fn select_jointly<M: SimulatedModel>(
         observer.tell(|| Progress::Fitting(model.record_name(record).to_owned()));
         let fitted = settle(model, start, record, TO_THE_END)?;
         let crossed = selection.crossed(&fitted)?;
-        // Either half counts alike, whatever its size.
+        // Either half counts alike, whatever its size; a model of data without noise may leave nothing.
         let left: f64 = crossed.iter().map(|half| squares(half).ln()).sum();
-        left.is_finite().then_some((left, fitted))
+        (!left.is_nan()).then_some((left, fitted))
     });
-    let mut best = fitted.min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+    let Some((_, mut best)) = fitted.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+        return nominal(model, record);
+    };
     while !best.point.effects.is_empty() {
-        match selection.reduced(&best)? {
-            Some(smaller) => best = smaller,
-            None => break,
+        match selection.reduced(&best) {
+            Some(Some(smaller)) => best = smaller,
+            _ => break,
         }
     }
     Some(best)
