@@ -24,8 +24,8 @@ use sha2::{Digest, Sha256};
 
 pub use datum::Datum;
 pub use description::{
-    BaseUnit, Causality, Description, FmiVersion, InputClock, Interface, Item, Kind, Ticks,
-    Variability, Variable,
+    BaseUnit, Causality, Description, Flow, FmiVersion, InputClock, Interface, Item, Kind,
+    MatchingRule, Member, Terminal, Ticks, Variability, Variable,
 };
 pub use error::{CallError, FmuError};
 pub use instance::{Instance, Progress, State};
@@ -54,6 +54,11 @@ pub struct Fmu {
     pub is_own: bool,
     /// Platforms it has binaries for, as its folders are named.
     pub platforms: Vec<String>,
+    /// Relative error that it is asked to keep, where one is asked for: by its own solver, or by the one
+    /// that steps it in model exchange.
+    pub tolerance: Option<f64>,
+    /// Structural parameters that were given, by value reference.
+    sizes: HashMap<u32, u64>,
     /// Where the file is, which may be called by another path.
     file: PathBuf,
     unpacked: Arc<folder::Folder>,
@@ -104,7 +109,7 @@ impl Fmu {
         let unpacked = archive::unpack(archive::FMU, path, &bytes)?;
         let description = {
             let _alone = PARSER.lock().unwrap_or_else(PoisonError::into_inner);
-            description::read(path, unpacked.path(), &HashMap::new())?
+            description::read(path, unpacked.path(), &HashMap::new(), false)?
         };
         let platforms = archive::platforms(unpacked.path());
         Ok(Self {
@@ -113,6 +118,8 @@ impl Fmu {
             description,
             sha256: digest(&bytes),
             is_own: false,
+            tolerance: None,
+            sizes: HashMap::new(),
             platforms,
             unpacked: Arc::new(unpacked),
         })
@@ -129,9 +136,31 @@ impl Fmu {
             .iter()
             .map(|&(position, size)| (variables[position].reference, size))
             .collect();
+        let is_exchange = self.description.interface == Interface::ModelExchange;
+        self.described(sizes, is_exchange)
+    }
+
+    /// The same FMU, stepped by the program's own solver and not by itself.
+    ///
+    /// # Errors
+    /// It does not offer model exchange.
+    pub fn for_model_exchange(&self) -> Result<Arc<Self>, FmuError> {
+        let fmu = self.described(self.sizes.clone(), true)?;
+        if fmu.description.interface == Interface::ModelExchange {
+            return Ok(fmu);
+        }
+        Err(FmuError::Description {
+            fmu: self.path.clone(),
+            reason: "it does not offer model exchange".to_string(),
+        })
+    }
+
+    fn described(&self, sizes: HashMap<u32, u64>, exchange: bool) -> Result<Arc<Self>, FmuError> {
         let _alone = PARSER.lock().unwrap_or_else(PoisonError::into_inner);
+        let unpacked = self.unpacked.path();
         Ok(Arc::new(Self {
-            description: description::read(&self.path, self.unpacked.path(), &sizes)?,
+            description: description::read(&self.path, unpacked, &sizes, exchange)?,
+            sizes,
             ..self.clone()
         }))
     }

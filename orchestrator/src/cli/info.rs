@@ -136,6 +136,20 @@ fn fmu(fmu: &Fmu) -> Content {
             text += &format!("\n{heading}\n{}", last_left(rows));
         }
     }
+    if !d.terminals.is_empty() {
+        let rows = d.terminals.iter().map(|terminal| {
+            let members = terminal.members.iter();
+            let members: Vec<String> = members
+                .map(|member| format!("{} = {}", member.name, member.variable))
+                .collect();
+            vec![
+                format!("  {}", terminal.name),
+                terminal.kind.clone().unwrap_or_default(),
+                members.join(", "),
+            ]
+        });
+        text += &format!("\nterminals\n{}", last_left(rows.collect()));
+    }
     for remark in &d.remarks {
         text += &format!("\nremark: {remark}\n");
     }

@@ -9,12 +9,13 @@ use super::connection::connect;
 use super::ending::{end, stop};
 use super::error::SystemError;
 use super::file::{ComponentFile, SystemFile};
-use super::fitted::{resized, with_units};
+use super::fitted::{resized, stepped, with_units};
 use super::given::{put, set, values};
 use super::library::Library;
 use super::link::{Link, Origin, VariableName};
 use super::lookup::{find, find_settable};
 use super::table::InputTable;
+use super::terminals;
 use super::value;
 use fmi_import::{Causality, Fmu, Variability};
 use units::hint;
@@ -65,10 +66,16 @@ pub fn assemble(
     }
     let mut connections = Vec::new();
     let mut driven: HashMap<(usize, usize), &Link> = HashMap::new();
-    let links = file.connections.iter();
-    let links: Vec<Link> = links
-        .flat_map(|link| whole_arrays(&components, link))
-        .collect();
+    let mut links: Vec<Link> = Vec::new();
+    for link in &file.connections {
+        let members = terminals::members(&components, link);
+        let members = members.map_err(|reason| file.fault(&link.place(), reason))?;
+        links.extend(
+            members
+                .iter()
+                .flat_map(|link| whole_arrays(&components, link)),
+        );
+    }
     for link in &links {
         let wrong = |reason| file.fault(&link.place(), reason);
         let connection = connect(&components, &tables, link).map_err(wrong)?;
@@ -182,6 +189,8 @@ fn component(
     notes: &mut Vec<String>,
 ) -> Result<Component, SystemError> {
     let at = |place: &str, reason| file.fault(&format!("components.{name}{place}"), reason);
+    let fmu = stepped(fmu, name, part, settings)
+        .map_err(|(key, reason)| at(&format!(".{key}"), reason))?;
     let fmu = resized(fmu, name, part, settings).map_err(|reason| at("", reason))?;
     let fmu = with_units(fmu, part)
         .map_err(|(variable, reason)| at(&format!(".units.{variable}"), reason))?;

@@ -186,6 +186,16 @@ impl WrittenLink {
     }
 }
 
+/// How an FMU that offers both is stepped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stepping {
+    /// By itself.
+    CoSimulation,
+    /// By the program's solver.
+    ModelExchange,
+}
+
 /// A component in a system file.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -200,6 +210,12 @@ pub struct ComponentFile {
     /// Name of the rule by which its parameters are made, for programs that have such rules.
     #[serde(default)]
     pub tuning: Option<String>,
+    /// How it is stepped, where the FMU offers both: by itself (the default) or by the program's solver.
+    #[serde(default)]
+    pub interface: Option<Stepping>,
+    /// Relative error of its steps that it, or the solver, is asked for.
+    #[serde(default)]
+    pub tolerance: Option<f64>,
     /// Sampling period; it makes the component a sampled one.
     #[serde(default)]
     pub period: Option<Setting>,

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::file::ComponentFile;
+use super::file::{ComponentFile, Stepping};
 use super::given::as_toml;
 use super::value::{self, Value};
-use fmi_import::{BaseUnit, Fmu, Kind};
+use fmi_import::{BaseUnit, Fmu, Interface, Kind};
 use units::{Unit, hint};
 
 /// The FMU with arrays as large as the structural parameters say that the file or the command line
@@ -60,6 +60,72 @@ pub(super) fn resized(
         return Ok(fmu);
     }
     fmu.resized(&sizes).map_err(|error| error.to_string())
+}
+
+/// Names that `--set component.NAME=VALUE` gives to how a component is stepped, unless they are variables
+/// of it.
+const STEPPING: [&str; 2] = ["interface", "tolerance"];
+
+/// Whether a setting of the command line is about how the FMU is stepped.
+pub(super) fn is_stepping(fmu: &Fmu, variable: &str) -> bool {
+    STEPPING.contains(&variable) && fmu.description.position(variable).is_none()
+}
+
+/// The FMU for the interface, and with the tolerance, that the file or the command line asks for. Faults
+/// come with the key that they belong to.
+pub(super) fn stepped(
+    fmu: Arc<Fmu>,
+    name: &str,
+    part: &ComponentFile,
+    settings: &[String],
+) -> Result<Arc<Fmu>, (&'static str, String)> {
+    let set = |key: &str| {
+        let found = settings.iter().rev().find_map(|setting| {
+            let (variable, text) = setting.split_once('=')?;
+            let variable = variable.trim().strip_prefix(name)?.strip_prefix('.')?;
+            (variable == key).then(|| text.trim().to_string())
+        });
+        found.filter(|_| is_stepping(&fmu, key))
+    };
+    let interface = match set("interface").as_deref() {
+        Some("model-exchange") => Some(Stepping::ModelExchange),
+        Some("co-simulation") => Some(Stepping::CoSimulation),
+        Some(other) => {
+            let reason = format!("`{other}`: expected `co-simulation` or `model-exchange`");
+            return Err(("interface", reason));
+        }
+        None => part.interface,
+    };
+    let tolerance = match set("tolerance") {
+        Some(text) => Some(text.parse().map_err(|_| {
+            let reason = format!("`{text}`: expected a number between 1e-12 and 0.01");
+            ("tolerance", reason)
+        })?),
+        None => part.tolerance,
+    };
+    if let Some(tolerance) = tolerance
+        && !(1e-12..=1e-2).contains(&tolerance)
+    {
+        let reason = format!("{tolerance}: expected a number between 1e-12 and 0.01");
+        return Err(("tolerance", reason));
+    }
+    let offered = fmu.description.interface;
+    let fmu = match interface {
+        Some(Stepping::ModelExchange) => fmu
+            .for_model_exchange()
+            .map_err(|error| ("interface", error.to_string()))?,
+        Some(Stepping::CoSimulation) if offered == Interface::ModelExchange => {
+            let reason = "it offers model exchange only; remove this line".to_string();
+            return Err(("interface", reason));
+        }
+        _ => fmu,
+    };
+    if tolerance.is_none() {
+        return Ok(fmu);
+    }
+    let mut changed = Fmu::clone(&fmu);
+    changed.tolerance = tolerance;
+    Ok(Arc::new(changed))
 }
 
 /// The FMU with the units that the file gives to its variables.

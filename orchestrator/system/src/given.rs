@@ -42,6 +42,9 @@ pub(super) fn set(
     let index = component_index(components, &component)?;
     let part = &mut components[index];
     let fmu = part.fmu.clone();
+    if super::fitted::is_stepping(&fmu, variable) {
+        return Ok(());
+    }
     if variable == "model" && fmu.description.variable(variable).is_none() {
         let set = library.parameters(text.trim(), &fmu.description, None)?;
         for (position, value) in set {

@@ -15,13 +15,14 @@ mod link;
 mod lookup;
 mod passage;
 mod table;
+mod terminals;
 mod value;
 mod written;
 
 pub use assemble::assemble;
 pub use checked::{Component, Connection, DEFAULT_PERIOD, Source, System};
 pub use error::SystemError;
-pub use file::{ComponentFile, ElementFile, ExperimentFile, SystemFile};
+pub use file::{ComponentFile, ElementFile, ExperimentFile, Stepping, SystemFile};
 pub use graph::{Operation, Schedule};
 pub use library::{Archive, Files, Library};
 pub use link::{Link, Origin, Quantity, VariableName};

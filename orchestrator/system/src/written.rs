@@ -2,7 +2,7 @@
 
 use toml::{Table, Value};
 
-use super::file::{ComponentFile, SystemFile};
+use super::file::{ComponentFile, Stepping, SystemFile};
 use super::value::Setting;
 
 impl Setting {
@@ -94,6 +94,16 @@ fn written(component: &ComponentFile) -> Table {
     own.insert("fmu".into(), Value::String(component.fmu.clone()));
     if let Some(model) = &component.model {
         own.insert("model".into(), Value::String(model.clone()));
+    }
+    if let Some(interface) = component.interface {
+        let name = match interface {
+            Stepping::CoSimulation => "co-simulation",
+            Stepping::ModelExchange => "model-exchange",
+        };
+        own.insert("interface".into(), Value::String(name.to_string()));
+    }
+    if let Some(tolerance) = component.tolerance {
+        own.insert("tolerance".into(), Value::Float(tolerance));
     }
     if let Some(period) = &component.period {
         own.insert("period".into(), period.to_toml());

@@ -10,8 +10,8 @@ use super::{
     default_stop, preferred_step,
 };
 
-/// Reads the text.
-pub(super) fn read(text: &str) -> Result<Description, String> {
+/// Reads the text; `exchange`: model exchange goes before co-simulation.
+pub(super) fn read(text: &str, exchange: bool) -> Result<Description, String> {
     let file = fmi2::ModelDescription::from_string(text).map_err(|error| error.to_string())?;
     let types: HashMap<&str, &fmi2::SimpleType> = file
         .typeDefinitions
@@ -119,8 +119,10 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
         .into_iter()
         .map(|problem| problem.message)
         .collect();
-    let steps = file.coSimulation.as_ref();
+    let wants_exchange = exchange;
     let exchange = file.modelExchange.as_ref();
+    let steps = file.coSimulation.as_ref();
+    let steps = steps.filter(|_| !wants_exchange || exchange.is_none());
     let Some(model_identifier) = steps
         .map(|it| &it.modelIdentifier)
         .or(exchange.map(|it| &it.modelIdentifier))
@@ -157,6 +159,8 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
         offers_model_exchange: exchange.is_some(),
         event_indicators: file.numberOfEventIndicators as usize,
         states: file.derivatives.len(),
+        terminals: Vec::new(),
+        state_pairs: state_pairs(&file).unwrap_or_default(),
         preferred_step: preferred_step(file.defaultExperiment.as_ref()),
         default_stop: default_stop(file.defaultExperiment.as_ref()),
         remarks,
@@ -168,4 +172,19 @@ pub(super) fn read(text: &str) -> Result<Description, String> {
         positions: HashMap::new(),
         arrays: HashMap::new(),
     })
+}
+
+/// States and their derivatives; none where one is not told.
+fn state_pairs(file: &fmi2::ModelDescription) -> Option<Vec<(u32, u32)>> {
+    // Counted from 1 by position.
+    let variable = |index: u32| file.modelVariables.get((index as usize).checked_sub(1)?);
+    let pair = |unknown: &fmi2::Unknown| {
+        let rate = variable(unknown.index)?;
+        let fmi2::VariableType::Real { derivative, .. } = &rate.variableType else {
+            return None;
+        };
+        let state = variable((*derivative)?)?;
+        Some((state.valueReference, rate.valueReference))
+    };
+    file.derivatives.iter().map(pair).collect()
 }

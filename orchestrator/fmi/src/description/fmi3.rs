@@ -10,8 +10,9 @@ use super::{
     Variability, Variable, default_stop, preferred_step,
 };
 
-/// Reads the text; structural parameters take the values in `sizes`, if given.
-pub(super) fn read(text: &str, sizes: &Sizes) -> Result<Description, String> {
+/// Reads the text; structural parameters take the values in `sizes`, if given. `exchange`: model exchange
+/// goes before co-simulation.
+pub(super) fn read(text: &str, sizes: &Sizes, exchange: bool) -> Result<Description, String> {
     let file = fmi3::ModelDescription::from_string(text).map_err(|error| error.to_string())?;
     let types: HashMap<&str, &fmi3::TypeDefinition> = file
         .typeDefinitions
@@ -89,8 +90,10 @@ pub(super) fn read(text: &str, sizes: &Sizes) -> Result<Description, String> {
         .into_iter()
         .map(|problem| problem.message)
         .collect();
-    let steps = file.coSimulation.as_ref();
+    let wants_exchange = exchange;
     let exchange = file.modelExchange.as_ref();
+    let steps = file.coSimulation.as_ref();
+    let steps = steps.filter(|_| !wants_exchange || exchange.is_none());
     let scheduled = file.scheduledExecution.as_ref();
     let identifier = steps
         .map(|it| &it.modelIdentifier)
@@ -135,6 +138,8 @@ pub(super) fn read(text: &str, sizes: &Sizes) -> Result<Description, String> {
         input_clocks: input_clocks(&file.modelVariables),
         event_indicators: file.eventIndicators.len(),
         states: file.derivatives.len(),
+        terminals: Vec::new(),
+        state_pairs: state_pairs(&file).unwrap_or_default(),
         preferred_step: preferred_step(file.defaultExperiment.as_ref()),
         default_stop: default_stop(file.defaultExperiment.as_ref()),
         remarks,
@@ -146,6 +151,23 @@ pub(super) fn read(text: &str, sizes: &Sizes) -> Result<Description, String> {
         positions: HashMap::new(),
         arrays: HashMap::new(),
     })
+}
+
+/// States and their derivatives, all of them scalar Float64; none where one is not.
+fn state_pairs(file: &fmi3::ModelDescription) -> Option<Vec<(u32, u32)>> {
+    let variables: HashMap<u32, &fmi3::ModelVariable> = file
+        .modelVariables
+        .iter()
+        .map(|variable| (variable.valueReference, variable))
+        .collect();
+    let pair = |unknown: &fmi3::Unknown| {
+        let derivative = variables.get(&unknown.valueReference)?;
+        let state = derivative.variableType.derivative()?;
+        let is_scalar = derivative.dimensions.is_empty();
+        let is_real = matches!(derivative.variableType, fmi3::VariableType::Float64 { .. });
+        (is_scalar && is_real).then_some((state, unknown.valueReference))
+    };
+    file.derivatives.iter().map(pair).collect()
 }
 
 /// Clocks that are inputs, those of the highest priority (the lowest number) first.

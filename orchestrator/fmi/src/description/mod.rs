@@ -5,6 +5,7 @@ mod fmi2;
 mod fmi3;
 mod kind;
 mod structure;
+mod terminal;
 
 use std::collections::HashMap;
 use std::fmt;
@@ -16,6 +17,7 @@ use std::sync::Arc;
 pub use clock::{InputClock, Ticks};
 pub use kind::{Item, Kind};
 pub use structure::BaseUnit;
+pub use terminal::{Flow, MatchingRule, Member, Terminal};
 
 use super::FmuError;
 
@@ -177,6 +179,9 @@ pub struct Description {
     pub offers_model_exchange: bool,
     /// Continuous states, as far as the description tells (arrays count once).
     pub states: usize,
+    /// Value references of each scalar state and its derivative; empty where the description does not
+    /// tell them all.
+    pub state_pairs: Vec<(u32, u32)>,
     /// Event indicators, as far as the description tells.
     pub event_indicators: usize,
     /// Step size that it would like, s.
@@ -189,6 +194,8 @@ pub struct Description {
     pub internal_step: Option<f64>,
     /// The variables, in the order of the file.
     pub variables: Vec<Variable>,
+    /// Groups of variables that are connected as a whole.
+    pub terminals: Vec<Terminal>,
     /// Clocks that the master has to tick (FMI 3.0), those of the highest priority first.
     pub input_clocks: Vec<InputClock>,
     /// What the file does against the standard without being unusable.
@@ -202,6 +209,11 @@ impl Description {
     /// Positions of the elements of an array.
     pub fn array(&self, name: &str) -> Option<Range<usize>> {
         self.arrays.get(name).cloned()
+    }
+
+    /// The terminal of that name.
+    pub fn terminal(&self, name: &str) -> Option<&Terminal> {
+        self.terminals.iter().find(|terminal| terminal.name == name)
     }
 
     /// The position of the variable of that name.
@@ -239,7 +251,13 @@ impl Description {
 pub(super) type Sizes = HashMap<u32, u64>;
 
 /// Reads `modelDescription.xml` in the unpacked FMU, with arrays of the given sizes.
-pub(super) fn read(fmu: &Path, unpacked: &Path, sizes: &Sizes) -> Result<Description, FmuError> {
+/// Where `exchange` is true and it offers model exchange, it is described as an FMU for that.
+pub(super) fn read(
+    fmu: &Path,
+    unpacked: &Path,
+    sizes: &Sizes,
+    exchange: bool,
+) -> Result<Description, FmuError> {
     let wrong = |reason: String| FmuError::Description {
         fmu: fmu.to_path_buf(),
         reason,
@@ -263,8 +281,10 @@ pub(super) fn read(fmu: &Path, unpacked: &Path, sizes: &Sizes) -> Result<Descrip
                 "the attribute fmiVersion is missing, expected \"2.0\" or \"3.0\"".to_string(),
             ));
         }
-        Some("2.0") => fmi2::read(&text).map_err(wrong)?,
-        Some(version) if version.starts_with("3.") => fmi3::read(&text, sizes).map_err(wrong)?,
+        Some("2.0") => fmi2::read(&text, exchange).map_err(wrong)?,
+        Some(version) if version.starts_with("3.") => {
+            fmi3::read(&text, sizes, exchange).map_err(wrong)?
+        }
         Some(version) => {
             return Err(wrong(format!(
                 "fmiVersion is \"{version}\", expected \"2.0\" or \"3.0\""
@@ -281,6 +301,13 @@ pub(super) fn read(fmu: &Path, unpacked: &Path, sizes: &Sizes) -> Result<Descrip
             "the modelIdentifier `{name}` is not a C identifier (letters, digits and `_`), so it \
              cannot name a library"
         )));
+    }
+    match terminal::read(unpacked) {
+        Ok(terminals) => description.terminals = terminals,
+        Err(reason) => {
+            let remark = format!("terminalsAndIcons.xml cannot be read: {reason}");
+            description.remarks.push(remark);
+        }
     }
     structure::name(&mut description, root).map_err(wrong)?;
     Ok(description)

@@ -95,6 +95,10 @@ impl Instance {
             Interface::ModelExchange => Mode::ModelExchange {
                 states: description.states,
                 indicators: description.event_indicators,
+                pairs: match description.directional_derivatives {
+                    true => description.state_pairs.clone(),
+                    false => Vec::new(),
+                },
             },
             Interface::ScheduledExecution => {
                 let reason = "it supports only scheduled execution: a real-time scheduler must \
@@ -208,8 +212,9 @@ impl Instance {
     pub fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
         self.time = start;
         let mut call = Call::plain(Function::EnterInitializationMode);
-        call.numbers = [start, stop, 0.0];
+        call.numbers = [start, stop, self.fmu.tolerance.unwrap_or(0.0)];
         call.flags[0] = true;
+        call.flags[1] = self.fmu.tolerance.is_some();
         if self.version() == FmiVersion::V2 {
             call.function = Function::SetupExperiment;
             self.call(&mut call)?;

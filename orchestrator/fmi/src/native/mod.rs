@@ -11,7 +11,6 @@ mod fmi2;
 mod fmi3;
 mod library;
 pub(super) mod printing;
-mod solver_state;
 mod state;
 
 use std::ffi::{CString, c_char, c_void};
@@ -30,7 +29,7 @@ pub(super) trait Sink: Send + Sync {
 }
 
 /// What an instance is made as.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Mode {
     /// It steps itself.
     CoSimulation {
@@ -43,6 +42,8 @@ pub(super) enum Mode {
         states: usize,
         /// Event indicators (FMI 2.0).
         indicators: usize,
+        /// Value references of states and their derivatives, where it gives directional derivatives.
+        pairs: Vec<(u32, u32)>,
     },
 }
 
@@ -79,11 +80,16 @@ pub(super) fn instantiate(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Box<dyn 
     };
     leave();
     let endpoint = endpoint?;
-    Ok(match setup.mode {
+    Ok(match &setup.mode {
         Mode::CoSimulation { .. } => endpoint,
-        Mode::ModelExchange { states, indicators } => {
+        Mode::ModelExchange {
+            states,
+            indicators,
+            pairs,
+        } => {
             let counts = setup.version == FmiVersion::V3;
-            Box::new(exchange::Stepped::new(endpoint, counts, states, indicators))
+            let sizes = (*states, *indicators);
+            Box::new(exchange::Stepped::new(endpoint, counts, sizes, pairs))
         }
     })
 }

@@ -442,7 +442,31 @@ fn rest_step(request: &Request, file: &SystemFile, system: &System) -> Result<f6
     let parts = system.components.iter();
     let wishes = parts.filter_map(|part| part.period.or(part.fmu.description.preferred_step));
     let least = wishes.reduce(f64::min);
+    if let (None, [part], []) = (least, &system.components[..], &system.connections[..])
+        && !part.fmu.is_own
+    {
+        let duration = match request.duration_s.or(file.duration()?) {
+            Some(duration) => duration,
+            None => natural_end(system)?,
+        };
+        return Ok(step_alone(duration));
+    }
     Ok(least.unwrap_or(USUAL_STEP))
+}
+
+/// Time between rows of an FMU alone, to which nothing else is coupled: 1, 2 or 5 times a power of ten, so
+/// that a long run has some thousand rows.
+fn step_alone(duration: f64) -> f64 {
+    /// Rows at least.
+    const ROWS: f64 = 5000.0;
+    let wanted = duration / ROWS;
+    if !wanted.is_finite() || wanted <= USUAL_STEP {
+        return USUAL_STEP;
+    }
+    let power = 10_f64.powf(wanted.log10().floor());
+    let digits = [5.0, 2.0, 1.0].into_iter();
+    let digit = digits.filter(|digit| digit * power <= wanted * (1.0 + 1e-9));
+    digit.fold(power, |most, digit| most.max(digit * power))
 }
 
 /// How long a system without a motion runs by default, s: to the end of its input tables,

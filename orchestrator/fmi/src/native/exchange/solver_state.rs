@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::super::call::{Call, Endpoint, Function, Lost, Values};
+use super::super::super::call::{Call, Endpoint, Function, Lost, Values};
 
 /// What a solver knows between two steps.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -17,13 +17,22 @@ pub(super) struct SolverState {
     pub is_running: bool,
     /// Whether inputs were set since the last step.
     pub inputs_changed: bool,
+    /// Whether the implicit method is used.
+    pub is_stiff: bool,
+    /// Steps after which the other method would have done better.
+    pub limited: u32,
+    /// Steps since the last of these.
+    pub others: u32,
+    /// The Jacobian that the implicit method uses, column after column; empty where it needs a new one.
+    pub jacobian: Vec<f64>,
 }
 
 /// Numbers before the states in a solver's bytes.
-const HEAD: usize = 6;
+const HEAD: usize = 10;
 
 impl SolverState {
-    /// As numbers: how many states and indicators, flags, next event, step, states, indicators.
+    /// As numbers: how many states, indicators and entries of the Jacobian, flags, next event, step, counts,
+    /// states, indicators, Jacobian.
     fn numbers(&self) -> Vec<f64> {
         let flag = |is: bool| if is { 1.0 } else { 0.0 };
         let mut all = vec![
@@ -33,31 +42,52 @@ impl SolverState {
             flag(self.inputs_changed),
             self.next_event.unwrap_or(f64::NAN),
             self.step,
+            self.jacobian.len() as f64,
+            flag(self.is_stiff),
+            f64::from(self.limited),
+            f64::from(self.others),
         ];
         all.extend(&self.states);
         all.extend(&self.indicators);
+        all.extend(&self.jacobian);
         all
     }
 
     /// From numbers, with how many of them it took.
     fn of_numbers(all: &[f64]) -> Option<(Self, usize)> {
-        let [states, indicators, running, changed, next, step] = *all.first_chunk::<HEAD>()?;
+        let [
+            states,
+            indicators,
+            running,
+            changed,
+            next,
+            step,
+            entries,
+            stiff,
+            limited,
+            others,
+        ] = *all.first_chunk::<HEAD>()?;
         let (states, indicators) = (states as usize, indicators as usize);
         let end = HEAD.checked_add(states)?;
-        let last = end.checked_add(indicators)?;
+        let middle = end.checked_add(indicators)?;
+        let last = middle.checked_add(entries as usize)?;
         let state = Self {
             states: all.get(HEAD..end)?.to_vec(),
-            indicators: all.get(end..last)?.to_vec(),
+            indicators: all.get(end..middle)?.to_vec(),
             next_event: (!next.is_nan()).then_some(next),
             step,
             is_running: running != 0.0,
             inputs_changed: changed != 0.0,
+            is_stiff: stiff != 0.0,
+            limited: limited as u32,
+            others: others as u32,
+            jacobian: all.get(middle..last)?.to_vec(),
         };
         Some((state, last))
     }
 
     fn size(&self) -> usize {
-        8 * (HEAD + self.states.len() + self.indicators.len())
+        8 * (HEAD + self.states.len() + self.indicators.len() + self.jacobian.len())
     }
 }
 
@@ -189,10 +219,14 @@ mod tests {
                 step: 1e-3,
                 is_running: true,
                 inputs_changed: false,
+                is_stiff: true,
+                limited: 3,
+                others: 1,
+                jacobian: vec![0.5; 9],
             };
             let numbers = state.numbers();
             assert_eq!(8 * numbers.len(), state.size());
-            assert_eq!(SolverState::of_numbers(&numbers), Some((state, 10)));
+            assert_eq!(SolverState::of_numbers(&numbers), Some((state, 23)));
         }
     }
 
@@ -200,7 +234,7 @@ mod tests {
     fn bytes_of_something_else_are_refused() {
         assert_eq!(SolverState::of_numbers(&[1.0; 5]), None);
         assert_eq!(
-            SolverState::of_numbers(&[1e300, 2.0, 0.0, 0.0, 0.0, 0.0]),
+            SolverState::of_numbers(&[1e300, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
             None
         );
     }
