@@ -208,6 +208,54 @@ fn model_exchange_agrees_with_cvode() {
     }
 }
 
+/// Runs an FMU that steps itself, too, by the solver; the values of an output.
+fn by_the_solver(name: &str, output: &str, settings: &[&str], step: f64, rows: usize) -> Vec<f64> {
+    let fmu = foreign("fmi3", name).unwrap();
+    let system = format!("{}interface = \"model-exchange\"\n", alone(&fmu));
+    let begun = std::time::Instant::now();
+    let outcome = run(&system, settings, step, rows);
+    println!("{name}: {:?}", begun.elapsed());
+    assert!(outcome.ended.is_regular(), "{}", outcome.ended.message());
+    outcome.record.column(&format!("it.{output}")).unwrap()
+}
+
+#[needs::shared("foreign-fmus")]
+#[test]
+fn stiff_models_agree_with_scipy_s_radau() {
+    // Robertson's reaction over 10,000 s.
+    let script = "from scipy.integrate import solve_ivp\n\
+        def f(t, y):\n  \
+          slow = -0.04*y[0] + 1e4*y[1]*(1 - y[0] - y[1])\n  \
+          return [slow, -slow - 3e7*y[1]**2]\n\
+        times = [10.0 * k for k in range(1, 1000)]\n\
+        got = solve_ivp(f, [0, 1e4], [1, 0], method='Radau', rtol=1e-9, atol=1e-14, t_eval=times)\n\
+        for value in got.y[0]: print(repr(float(value)))\n";
+    let output = python::python().args(["-c", script]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    let reference: Vec<f64> = text.lines().map(|line| line.parse().unwrap()).collect();
+    let values = by_the_solver("Roberts", "y1", &[], 10.0, 1000);
+    assert_eq!(values.len(), 1 + reference.len());
+    let pairs = values[1..].iter().zip(&reference);
+    let largest = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("Roberts: {largest:e}");
+    assert!(largest < 1e-6, "{largest:e}");
+    // Van der Pol's oscillator, which jumps at 807,000 s; by SciPy's Radau with rtol 1e-11 and atol 1e-14.
+    let values = by_the_solver("VanDerPol", "x0", &["it.mu=1e6"], 2e4, 82);
+    for (row, expected) in [
+        (20, 1.693209005119728),
+        (40, 1.083892946675993),
+        (50, -1.8633839229607099),
+        (60, -1.6994006675043591),
+        (80, -1.119268647778863),
+    ] {
+        let error = (values[row] - expected).abs();
+        println!("VanDerPol: {error:e}");
+        assert!(error < 1e-6, "row {row}: {error:e}");
+    }
+}
+
 #[needs::shared("foreign-fmus")]
 #[test]
 fn model_exchange_goes_on_from_a_checkpoint_to_the_bit() {

@@ -115,14 +115,23 @@ fn kept(saved: &[PathBuf], file: &Path) -> String {
             files.join(", ")
         ),
     };
-    match part {
+    let rows = match part {
         Some(part) => format!(
-            "{complete}; `{}` holds the first rows of `{}`",
+            "; `{}` holds the first rows of `{}`",
             part.display(),
             file.file_name().unwrap_or_default().to_string_lossy()
         ),
-        None => complete,
-    }
+        None => String::new(),
+    };
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let resumed = match crate::run::checkpoint::is_there(folder) {
+        true => format!(
+            "; `shakebench run --resume {}` continues from the last checkpoint",
+            folder.display()
+        ),
+        false => String::new(),
+    };
+    format!("{complete}{rows}{resumed}")
 }
 
 /// The extension of a file of which only the first part is there.
@@ -392,6 +401,8 @@ mod tests {
     fn what_had_room_before_the_disk_was_full_is_kept() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("out");
+        fs::create_dir_all(out.join("checkpoint")).unwrap();
+        fs::write(out.join("checkpoint/state"), "").unwrap();
         let mut results = Results::begin(&out).unwrap();
         results.write_text("first.csv", "time\n0\n").unwrap();
         let error = results
@@ -406,6 +417,7 @@ mod tests {
             "second.csv",
             "first.csv",
             "second.csv.part",
+            "run --resume",
             "Free some space",
         ] {
             assert!(said.contains(word), "`{word}` is not in {said}");

@@ -151,6 +151,26 @@ fn processes_that_an_fmu_leaves_behind_hold_nobody_up_and_end_with_it() {
     assert_eq!(marked.count(), 0);
 }
 
+/// 146 libraries: every way to misbehave in a step, and nine of them in seven other functions.
+#[test]
+#[ignore = "slow: a minute, most of which it waits"]
+fn no_fmu_hangs_or_ends_the_program_whatever_it_does_and_wherever() {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let script = script.join("../tests/importers/hostile/breadth.py");
+    let output = Command::new("python3")
+        .arg(script)
+        .arg(env!("CARGO_BIN_EXE_shakebench"))
+        .output()
+        .expect("Python");
+    assert!(
+        output.status.success(),
+        "{}{}",
+        stdout(&output),
+        stderr(&output)
+    );
+    assert!(stdout(&output).contains("146 libraries, 0 faults"));
+}
+
 #[test]
 fn an_fmu_cannot_take_the_program_along_by_the_memory_they_share() {
     survives("TRUNCATES", &[]);

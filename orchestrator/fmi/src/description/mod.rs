@@ -285,6 +285,13 @@ pub(super) fn read(
         Some(version) if version.starts_with("3.") => {
             fmi3::read(&text, sizes, exchange).map_err(wrong)?
         }
+        Some("1.0") => {
+            let tool = root.attribute("generationTool");
+            return Err(wrong(format!(
+                "FMI 1.0 is not supported; export the model again for FMI 2.0 or 3.0 from {}",
+                tool.map_or("its tool".to_string(), |tool| format!("`{tool}`"))
+            )));
+        }
         Some(version) => {
             return Err(wrong(format!(
                 "fmiVersion is \"{version}\", expected \"2.0\" or \"3.0\""

@@ -36,12 +36,18 @@ pub(super) fn kill(process: u32, mark: &Mark) {
         // group has the number for as long as a member lives.
         unsafe { libc::kill(-group, libc::SIGKILL) };
     }
-    // A process that forks meanwhile is found the next time.
-    for _ in 0..5 {
+    // A process that forks and ends during a look, as daemons do at their beginning, is found by the next.
+    let mut is_quiet = false;
+    for _ in 0..10 {
         let marked = marked(mark);
         if marked.is_empty() {
-            return;
+            if is_quiet {
+                return;
+            }
+            is_quiet = true;
+            continue;
         }
+        is_quiet = false;
         for process in marked {
             // SAFETY: it sends a signal to a process that bears the mark.
             unsafe { libc::kill(process, libc::SIGKILL) };
