@@ -33,6 +33,12 @@ pub enum DiagnosisError {
          apply only to the description of a rig (.toml)"
     )]
     DataOfACase,
+    /// Effects of the user's own were given with a case.
+    #[error(
+        "effects of your own apply to the kinds of rigs, whose description is a .toml file or is guessed \
+         from data files, and not to a case of a table with its nominal.toml"
+    )]
+    EffectsOfACase,
     /// A map of columns names a channel that no case has.
     #[error(
         "{}: `{channel}` is not a channel of a case, which has {}{}",
@@ -100,6 +106,21 @@ pub enum Diagnosis<'a> {
 }
 
 impl Subject {
+    /// The same with the effects of the file `effects` beside those of its kind.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or that does not fit the kind, by line; a case.
+    pub fn with_effects(self, effects: &Path) -> Result<Self, DiagnosisError> {
+        match self {
+            Self::Rig(rig) => {
+                let (description, measurement) = *rig;
+                let description = description.with_effects(effects)?;
+                Ok(Self::Rig(Box::new((description, measurement))))
+            }
+            Self::Case(_) => Err(DiagnosisError::EffectsOfACase),
+        }
+    }
+
     /// Reads the description of a rig where `path` ends in `.toml`, with `data` in place of the files
     /// that it names if there are any; a case folder elsewhere. The file `columns` may name the columns
     /// otherwise.

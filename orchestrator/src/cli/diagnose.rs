@@ -12,7 +12,7 @@ use identification::diagnosis::engine::{Deadline, Observer, Progress};
 use super::progress;
 use fmi_import::Isolation;
 use identification::diagnosis::rigs::guess::Guess;
-use laboratory::diagnosis::{diagnose, diagnose_files, files, foreign, model, template, text};
+use laboratory::diagnosis::{diagnose_files, diagnose_with, files, foreign, model, template, text};
 use laboratory::error::Error;
 use laboratory::results::unused;
 
@@ -22,6 +22,7 @@ use laboratory::results::unused;
     shakebench diagnose motion_1.csv motion_2.csv --out results\n  \
     shakebench diagnose cases/dev-03 --out results/dev-03 --json\n  \
     shakebench diagnose identification/rigs/positioning_drive.toml --out results\n  \
+    shakebench diagnose rig.toml --effects mine.toml\n  \
     shakebench diagnose --template oscillator > rig.toml\n  \
     shakebench diagnose --model results/extended_model.toml --validate later.csv\n  \
     shakebench diagnose --model results/extended_model.toml --predict input.csv --out prediction.csv\n  \
@@ -42,6 +43,10 @@ pub struct Arguments {
     /// unit = "mm" }`; replaces the usual names or the description's
     #[arg(long, value_name = "MAP.toml")]
     columns: Option<PathBuf>,
+    /// Effects of your own to search beside those of the kind: expressions at its input, its output or inside
+    /// of it, each with parameters and a sentence
+    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["model", "fmu", "template"])]
+    effects: Option<PathBuf>,
     /// Print a commented description to fill in: table, actuator, drive, axis, hysteretic device, material,
     /// oscillator, damper or transfer system; with --fmu, `map`
     #[arg(long, value_name = "KIND", conflicts_with_all = ["cases", "model", "data"])]
@@ -171,6 +176,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
     };
     let columns = arguments.columns.as_deref();
+    let effects = arguments.effects.as_deref();
     let deadline = Deadline::after(limit);
     let observer = Observer::new(&tell).until(&deadline);
     let report = match &arguments.fmu {
@@ -183,9 +189,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 .cloned()
                 .collect();
             let tell = |guess: &Guess| bar.suspend(|| show(guess, arguments.json));
-            diagnose_files(&files, columns, &folder, &tell, observer)
+            diagnose_files(&files, columns, effects, &folder, &tell, observer)
         }
-        None => diagnose(case, &arguments.data, columns, &folder, observer),
+        None => diagnose_with(case, &arguments.data, columns, effects, &folder, observer),
     };
     bar.finish_and_clear();
     let report = report?;

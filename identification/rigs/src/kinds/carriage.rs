@@ -3,6 +3,7 @@
 //! `M v' = G u - F_v v - F_c sgn v - o` (Janot, Gautier and Brunot, Data set and reference models of
 //! EMPS, 2019), and the effects that such axes have. The voltage is held from sample to sample.
 
+use super::hypotheses::Inside;
 use super::table::{effects, shape, size};
 
 /// Steps of a sample.
@@ -129,6 +130,11 @@ impl<'a> Carriage<'a> {
 
     /// Moves through the sample in which the voltage `u` is held.
     pub fn advance(&mut self, u: f64) {
+        self.advance_with(u, 0.0, &mut Inside::default());
+    }
+
+    /// As [`Self::advance`] from `time` (s), with forces on what moves.
+    pub fn advance_with(&mut self, u: f64, time: f64, inside: &mut Inside<'_>) {
         let Mechanics {
             mass,
             viscous,
@@ -184,6 +190,11 @@ impl<'a> Carriage<'a> {
             let wanted = force_gain * (until * older + (1.0 - until) * newer);
             self.force = keep * self.force + (1.0 - keep) * wanted;
             let mut drive = self.force - offset;
+            let time = time + step as f64 * h;
+            if !inside.has_no_force() {
+                inside.begin(h, time, self.position, self.speed);
+                drive += inside.force(0.0, time, self.position, self.speed);
+            }
             if cosine != 0.0 || sine != 0.0 {
                 let angle = std::f64::consts::TAU * (self.position - self.screw_shift) / period;
                 drive -= cosine * angle.cos() + sine * angle.sin();
@@ -211,6 +222,7 @@ impl<'a> Carriage<'a> {
                 0.0
             };
             self.position += h * self.speed;
+            inside.end(h, time, self.position, self.speed);
         }
         self.now += 1;
     }

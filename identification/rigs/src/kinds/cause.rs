@@ -121,6 +121,27 @@ fn plain(value: f64, half: f64) -> String {
     }
 }
 
+/// An effect of the user's own by its `sentence`, in which `{parameter}` is replaced by the value with its
+/// interval; parameters that it does not hold follow in parentheses.
+pub(super) fn in_own_words(sentence: &str, values: &[NamedValue]) -> String {
+    let mut text = sentence.trim().trim_end_matches('.').to_owned();
+    let mut rest = Vec::new();
+    for p in values {
+        let place = format!("{{{}}}", p.name);
+        let own = measure(p.value, p.standard_error, &p.unit);
+        if text.contains(&place) {
+            text = text.replace(&place, &own);
+        } else {
+            rest.push(format!("{} {own}", p.name.replace('_', " ")));
+        }
+    }
+    if rest.is_empty() {
+        text
+    } else {
+        format!("{text} ({})", rest.join(", "))
+    }
+}
+
 /// Parts of a sentence, joined.
 pub(super) fn joined(parts: &[String]) -> String {
     match parts {

@@ -8,8 +8,11 @@
 //!
 //! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
 
+use std::cell::Cell;
+
 use nalgebra::SMatrix;
 
+use super::hypotheses::Inside;
 use super::sensors::accelerometer_scale;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Cause, Equations, Natural, RigRecording};
@@ -112,6 +115,7 @@ impl Equations for ClosedLoopActuator {
     const OUTPUT: Channel = Channel::Displacement;
     const IS_SCALED: bool = true;
     const SCREENED: usize = 8192;
+    const PLACES: &'static [&'static str] = &["valve"];
     const SAID_BY: &'static [(&'static str, &'static str)] =
         &[("delay", "command_delay"), ("valve_lag", "loop_lag")];
     const CAUSES: &'static [&'static str] = &["command_delay", "scale", "offset"];
@@ -142,6 +146,19 @@ impl Equations for ClosedLoopActuator {
         nominal: &Nominal,
         effects: &Effects,
         session: &Session,
+        out: &mut [f64],
+    ) {
+        let mut inside = Inside::default();
+        self.simulate_with(recording, nominal, effects, session, &mut inside, out);
+    }
+
+    fn simulate_with(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        effects: &Effects,
+        session: &Session,
+        inside: &mut Inside<'_>,
         out: &mut [f64],
     ) {
         let Nominal {
@@ -196,6 +213,7 @@ impl Equations for ClosedLoopActuator {
         };
         let has_effect =
             dead_band != 0.0 || null.reduction != 0.0 || asymmetry != 0.0 || compression != 0.0;
+        let has_effect = has_effect || !inside.valves.is_empty();
         let is_linear = !has_effect && fastest == f64::INFINITY;
         // A step ends where the delayed command bends.
         let bend = delay - delay.floor();
@@ -221,15 +239,17 @@ impl Equations for ClosedLoopActuator {
             let after = (before + 1).min(last);
             scale * (loop_input[before] * (1.0 - share) + loop_input[after] * share) + offset
         };
+        let now = Cell::new(0.0);
         // What the flow is beyond that of the linear loop.
         let beyond = |sent: f64| {
             if !has_effect {
                 let flow = gain * sent;
                 return flow.min(fastest).max(-fastest) - flow;
             }
-            let mut open = (sent.abs() - dead_band).max(0.0).copysign(sent);
+            let passed = inside.valve(now.get(), sent);
+            let mut open = (passed.abs() - dead_band).max(0.0).copysign(passed);
             if null.reduction != 0.0 {
-                open -= null.reduction * null.width * (sent / null.width).tanh();
+                open -= null.reduction * null.width * (passed / null.width).tanh();
             }
             let flow = gain * (open + asymmetry * open.abs());
             let flow = flow.min(fastest).max(-fastest);
@@ -249,6 +269,7 @@ impl Equations for ClosedLoopActuator {
             for (from, step, steps) in &parts {
                 for part in 0..*steps {
                     let begin = k as f64 + from + part as f64 * step.length / sample;
+                    now.set(begin * sample);
                     let ends = [at(begin), at(begin + step.length / sample)];
                     state = step.advance(state, ends, (!is_linear).then_some(&beyond));
                 }

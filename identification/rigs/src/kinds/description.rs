@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
+use super::hypotheses::{self, Hypotheses};
 use super::{KINDS, Rig, like, of_kind};
 use recordings::DataError;
 use units::convert;
@@ -35,12 +36,18 @@ pub struct Description {
     /// Where a rig without a restoring force is restarted.
     #[serde(default)]
     pub windows: Option<Windows>,
+    /// Effects of the user's own, beside those of the kind.
+    #[serde(default)]
+    pub hypotheses: Hypotheses,
     /// Other results of an identification, which a diagnosis does not use.
     #[serde(default)]
     pub transfer_function: Option<IgnoredAny>,
     /// Where the description stands.
     #[serde(skip)]
     pub path: PathBuf,
+    /// Where its hypotheses do, if not in the description.
+    #[serde(skip)]
+    pub hypotheses_path: Option<PathBuf>,
 }
 
 /// A column of the data.
@@ -238,11 +245,37 @@ impl Description {
         Ok((quantity.value * factor, quantity.plus_minus * factor))
     }
 
-    /// The rig's equations.
+    /// The same with the effects of the file `effects` beside its own.
     ///
     /// # Errors
-    /// An unknown kind.
+    /// A file that cannot be read; an effect that does not fit the kind, or whose name is taken; by line.
+    pub fn with_effects(mut self, effects: &Path) -> Result<Self, DescriptionError> {
+        for (name, own) in hypotheses::read(effects)? {
+            if self.hypotheses.insert(name.clone(), own).is_some() {
+                return Err(DescriptionError::Description {
+                    path: effects.to_owned(),
+                    what: format!(
+                        "`{name}` is in {} already: choose another name",
+                        self.path.display()
+                    ),
+                });
+            }
+        }
+        self.hypotheses_path = Some(effects.to_owned());
+        self.rig()?;
+        Ok(self)
+    }
+
+    /// The rig's equations, with the effects of the user's own.
+    ///
+    /// # Errors
+    /// An unknown kind; an effect that does not fit it.
     pub fn rig(&self) -> Result<&'static dyn Rig, DescriptionError> {
+        let path = self.hypotheses_path.as_deref().unwrap_or(&self.path);
+        hypotheses::extended(self.base()?, &self.hypotheses, path)
+    }
+
+    fn base(&self) -> Result<&'static dyn Rig, DescriptionError> {
         of_kind(&self.kind)
             .or_else(|| like(&self.kind))
             .ok_or_else(|| {

@@ -1,8 +1,10 @@
 //! The diagnosis of a rig on real data.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
-use super::cause::{Cause, effect_in_words, joined};
+use super::cause::{Cause, effect_in_words, in_own_words, joined};
 use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
 use super::measured::Measured;
 use super::named_value::NamedValue;
@@ -98,6 +100,9 @@ pub struct RigDiagnosis {
     /// Parameters that differ between parts of the data or from what was stated.
     #[serde(default)]
     pub findings: Vec<String>,
+    /// Sentences of the effects that are the user's own.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub sentences: BTreeMap<String, String>,
     /// The model with the named effects alone.
     pub confirmed: Confirmed,
     /// Share of the squared error on the held-out data that the confirmed model leaves.
@@ -129,6 +134,10 @@ pub fn diagnose(
     found
         .findings
         .extend(measured.notes(&found.confirmed.point));
+    let own = description.hypotheses.iter();
+    found.sentences = own
+        .map(|(name, own)| (name.clone(), own.sentence.clone()))
+        .collect();
     Ok(found)
 }
 
@@ -248,6 +257,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         set_aside,
         causes,
         findings,
+        sentences: BTreeMap::new(),
         unexplained: (confirmed.error / as_described.nominal_error).powi(2),
         confirmed,
         as_described,
@@ -356,7 +366,10 @@ impl RigDiagnosis {
         let listed = |names: &[String]| names.join(", ").replace('_', " ");
         let effects = self.confirmed.effects.iter();
         let with_values: Vec<String> = effects
-            .map(|(name, values)| effect_in_words(name, values))
+            .map(|(name, values)| match self.sentences.get(name) {
+                Some(sentence) => in_own_words(sentence, values),
+                None => effect_in_words(name, values),
+            })
             .collect();
         let shown = joined(&with_values);
         let part = &self.as_described;

@@ -9,6 +9,7 @@ use super::description::{
     Column, Description, DescriptionError, LeftOut, Quantity, Windows, listed,
 };
 use super::diagnosis::RigDiagnosis;
+use super::hypotheses::Hypotheses;
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts};
@@ -42,6 +43,9 @@ pub struct ExtendedRig {
     /// The effects' parameters.
     #[serde(default)]
     pub effects: BTreeMap<String, BTreeMap<String, Quantity>>,
+    /// Those of the effects that are the user's own, as they were written.
+    #[serde(default, skip_serializing_if = "Hypotheses::is_empty")]
+    pub hypotheses: Hypotheses,
     /// What a file has for itself, such as the zero of a transducer: the mean of the files that were
     /// fitted.
     #[serde(default)]
@@ -161,6 +165,14 @@ impl ExtendedRig {
             effects: effects
                 .map(|(effect, values)| (effect.clone(), quantities(values)))
                 .collect(),
+            hypotheses: {
+                let all = description.hypotheses.iter();
+                let is_found =
+                    |name: &&String| confirmed.effects.iter().any(|(own, _)| own == *name);
+                all.filter(|(name, _)| is_found(name))
+                    .map(|(name, own)| (name.clone(), own.clone()))
+                    .collect()
+            },
             session,
             path: PathBuf::new(),
         })
@@ -190,6 +202,7 @@ impl ExtendedRig {
             refitted: nominal.clone(),
             nominal,
             effects: BTreeMap::new(),
+            hypotheses: description.hypotheses.clone(),
             session: BTreeMap::new(),
             path: description.path.clone(),
         })
@@ -253,6 +266,8 @@ impl ExtendedRig {
             nominal,
             left_out: LeftOut::SecondHalf(true),
             windows: self.windows.clone(),
+            hypotheses: self.hypotheses.clone(),
+            hypotheses_path: None,
             transfer_function: None,
             path: self.path.clone(),
         }

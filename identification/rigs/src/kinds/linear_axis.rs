@@ -5,6 +5,7 @@
 //! restarts wherever the recording states it, from the known positions.
 
 use super::carriage::{Carriage, Effects, Mechanics, ripple_starts, start_speed};
+use super::hypotheses::Inside;
 use super::table::{nominal_parameters, session_parameters};
 use super::{Equations, RigRecording};
 use recordings::Channel;
@@ -52,6 +53,7 @@ impl Equations for LinearAxis {
     const OUTPUT: Channel = POSITION;
     const BEGINS_ANEW: bool = true;
     const SCREENED: usize = 8192;
+    const PLACES: &'static [&'static str] = &["force"];
 
     fn simulate(
         &self,
@@ -59,6 +61,19 @@ impl Equations for LinearAxis {
         nominal: &Nominal,
         effects: &Effects,
         session: &Session,
+        out: &mut [f64],
+    ) {
+        let mut inside = Inside::default();
+        self.simulate_with(recording, nominal, effects, session, &mut inside, out);
+    }
+
+    fn simulate_with(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        effects: &Effects,
+        session: &Session,
+        inside: &mut Inside<'_>,
         out: &mut [f64],
     ) {
         let (voltage, measured) = (recording.input(MOTOR_VOLTAGE), recording.output());
@@ -76,6 +91,7 @@ impl Equations for LinearAxis {
             carriage.screw_shift = session.screw_shift;
             carriage
         };
+        let time = |sample: usize| sample as f64 * recording.period();
         let count = out.len().min(voltage.len());
         let mut ends = recording.begins.iter().skip(1).map(|begin| begin.at);
         for begin in &recording.begins {
@@ -95,9 +111,10 @@ impl Equations for LinearAxis {
             for _ in 0..PASSES * usize::from(known.len() > 2) {
                 let mut carriage = carriage(at, state);
                 let mut errors = Vec::with_capacity(known.len());
-                for (y, u) in known.iter().zip(&voltage[at..]) {
+                inside.restart(time(at), state.0, state.1);
+                for (k, (y, u)) in known.iter().zip(&voltage[at..]).enumerate() {
                     errors.push(y - carriage.position);
-                    carriage.advance(*u);
+                    carriage.advance_with(*u, time(at + k), inside);
                 }
                 let slope = start_speed(&errors, recording.period());
                 let mean = errors.iter().sum::<f64>() / errors.len() as f64;
@@ -105,9 +122,10 @@ impl Equations for LinearAxis {
                 state = (state.0 + mean - slope * middle, state.1 + slope);
             }
             let mut carriage = carriage(at, state);
-            for (y, u) in out[at..end].iter_mut().zip(&voltage[at..]) {
+            inside.restart(time(at), state.0, state.1);
+            for (k, (y, u)) in out[at..end].iter_mut().zip(&voltage[at..]).enumerate() {
                 *y = carriage.position;
-                carriage.advance(*u);
+                carriage.advance_with(*u, time(at + k), inside);
             }
         }
     }

@@ -16,6 +16,7 @@ mod diagnosis;
 mod extended;
 pub mod foreign;
 pub mod guess;
+pub mod hypotheses;
 mod hysteretic_device;
 mod linear_axis;
 mod measured;
@@ -49,6 +50,7 @@ pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole
 pub use template::template;
 pub use transfer_system::TransferSystemRig;
 
+use hypotheses::Inside;
 use recordings::Channel;
 
 /// A quantity by name and SI unit.
@@ -89,6 +91,9 @@ pub trait Equations: Sync {
     /// Effects that another cause looks like as long as a nominal parameter is uncertain: effect, cause,
     /// parameter.
     const LOOKS_LIKE: &'static [[&'static str; 3]] = &[];
+    /// Places inside of the equations at which a user's own effect may act, beside its inputs and its output:
+    /// `force` on what moves, `valve` on what the controller sends.
+    const PLACES: &'static [&'static str] = &[];
 
     /// Output for the inputs of `recording` alone.
     fn simulate(
@@ -99,6 +104,19 @@ pub trait Equations: Sync {
         session: &Self::Session,
         out: &mut [f64],
     );
+
+    /// As [`Self::simulate`], with what acts `inside` at [`Self::PLACES`].
+    fn simulate_with(
+        &self,
+        recording: &RigRecording,
+        nominal: &Self::Nominal,
+        effects: &Self::Effects,
+        session: &Self::Session,
+        _inside: &mut Inside<'_>,
+        out: &mut [f64],
+    ) {
+        self.simulate(recording, nominal, effects, session, out);
+    }
 
     /// Natural units, from those of the channels.
     fn natural(_nominal: &Self::Nominal, channels: Natural) -> Natural {
@@ -211,8 +229,20 @@ pub trait Rig: Sync {
     /// As [`Equations::contradictions`].
     fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause>;
 
+    /// As [`Equations::PLACES`].
+    fn places(&self) -> &'static [&'static str];
+
     /// Output for the inputs of `recording` alone, SI; not a number where a count is wrong.
     fn simulate(&self, recording: &RigRecording, values: &Values, out: &mut [f64]);
+
+    /// As [`Self::simulate`], with what acts `inside`.
+    fn simulate_with(
+        &self,
+        recording: &RigRecording,
+        values: &Values,
+        inside: &mut Inside<'_>,
+        out: &mut [f64],
+    );
 }
 
 /// A model from which a fit begins, SI.
@@ -343,14 +373,30 @@ impl<E: Equations> Rig for E {
         Equations::contradictions(self, recordings)
     }
 
+    fn places(&self) -> &'static [&'static str] {
+        E::PLACES
+    }
+
     fn simulate(&self, recording: &RigRecording, values: &Values, out: &mut [f64]) {
+        Rig::simulate_with(self, recording, values, &mut Inside::default(), out);
+    }
+
+    fn simulate_with(
+        &self,
+        recording: &RigRecording,
+        values: &Values,
+        inside: &mut Inside<'_>,
+        out: &mut [f64],
+    ) {
         match (
             E::Nominal::from_values(&values.nominal),
             E::Effects::from_values(&values.effects),
             E::Session::from_values(&values.session),
         ) {
             (Some(nominal), Some(effects), Some(session)) => {
-                Equations::simulate(self, recording, &nominal, &effects, &session, out);
+                Equations::simulate_with(
+                    self, recording, &nominal, &effects, &session, inside, out,
+                );
             }
             _ => out.fill(f64::NAN),
         }

@@ -9,6 +9,7 @@
 
 use std::f64::consts::PI;
 
+use super::hypotheses::Inside;
 use super::restoring_force::read_off;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Begun, Equations, Natural, RigRecording};
@@ -156,7 +157,8 @@ impl<'a> Law<'a> {
         }
     }
 
-    fn slope(&self, s: &State, force: f64) -> State {
+    /// Rates of the state under `force` before it lags, and what is `added` on the mass.
+    fn slope(&self, s: &State, force: f64, added: f64) -> State {
         let (n, e) = (self.nominal, self.effects);
         let [y, v, z, lagging, seen, y2, v2] = *s;
         let mut slope = [0.0; 7];
@@ -208,12 +210,18 @@ impl<'a> Law<'a> {
             slope[4] = (y - seen) / e.sensor_lag.time_constant;
         }
         slope[0] = v;
-        slope[1] = (force + n.offset - resisting) / (n.mass - mass);
+        slope[1] = (force + added + n.offset - resisting) / (n.mass - mass);
         slope
     }
 
     /// One step of the classical Runge-Kutta method.
-    fn step(&self, s: &State, h: f64, forces: [f64; 3]) -> State {
+    fn step(
+        &self,
+        s: &State,
+        h: f64,
+        forces: [f64; 3],
+        mut added: impl FnMut(f64, &State) -> f64,
+    ) -> State {
         let ahead = |by: f64, slope: &State| {
             let mut next = *s;
             for (n, d) in next.iter_mut().zip(slope) {
@@ -221,10 +229,12 @@ impl<'a> Law<'a> {
             }
             next
         };
-        let a = self.slope(s, forces[0]);
-        let b = self.slope(&ahead(0.5 * h, &a), forces[1]);
-        let c = self.slope(&ahead(0.5 * h, &b), forces[1]);
-        let d = self.slope(&ahead(h, &c), forces[2]);
+        let mut slope =
+            |by: f64, state: State, force: f64| self.slope(&state, force, added(by, &state));
+        let a = slope(0.0, *s, forces[0]);
+        let b = slope(0.5 * h, ahead(0.5 * h, &a), forces[1]);
+        let c = slope(0.5 * h, ahead(0.5 * h, &b), forces[1]);
+        let d = slope(h, ahead(h, &c), forces[2]);
         let mut next = *s;
         for i in 0..next.len() {
             next[i] += h / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]);
@@ -242,6 +252,7 @@ impl Equations for Oscillator {
     const OUTPUT: Channel = Channel::Displacement;
     const IS_SCALED: bool = true;
     const SCREENED: usize = 8192;
+    const PLACES: &'static [&'static str] = &["force"];
 
     fn natural(nominal: &Nominal, channels: Natural) -> Natural {
         Natural {
@@ -274,6 +285,19 @@ impl Equations for Oscillator {
         nominal: &Nominal,
         effects: &Effects,
         session: &Session,
+        out: &mut [f64],
+    ) {
+        let mut inside = Inside::default();
+        self.simulate_with(recording, nominal, effects, session, &mut inside, out);
+    }
+
+    fn simulate_with(
+        &self,
+        recording: &RigRecording,
+        nominal: &Nominal,
+        effects: &Effects,
+        session: &Session,
+        inside: &mut Inside<'_>,
         out: &mut [f64],
     ) {
         let between = recording.between_samples(FORCE);
@@ -346,7 +370,8 @@ impl Equations for Oscillator {
             };
             y + session.zero
         };
-        let pass = |state: &mut State, samples: usize, out: &mut [f64]| {
+        let mut pass = |state: &mut State, samples: usize, out: &mut [f64]| {
+            inside.restart(0.0, state[0], state[1]);
             for k in 0..samples {
                 if let Some(y) = out.get_mut(k) {
                     *y = shown(state);
@@ -360,7 +385,16 @@ impl Equations for Oscillator {
                             * (at_stair(between, k)
                                 - at_stair(between, (place + 2 * stride) / PLACES));
                     }
-                    *state = law.step(state, h, forces);
+                    if inside.has_no_force() {
+                        *state = law.step(state, h, forces, |_, _| 0.0);
+                        continue;
+                    }
+                    let time = (k * steps + i) as f64 * h;
+                    inside.begin(h, time, state[0], state[1]);
+                    *state = law.step(state, h, forces, |ahead, at| {
+                        inside.force(ahead, time + ahead, at[0], at[1])
+                    });
+                    inside.end(h, time, state[0], state[1]);
                 }
             }
         };

@@ -140,6 +140,26 @@ impl RigRecording {
         self.begins = begins;
     }
 
+    /// The same with another signal in the place of an input's; `inputs` are the rig's. None where their
+    /// numbers of samples differ.
+    pub fn with_input(
+        &self,
+        channel: Channel,
+        values: Vec<f64>,
+        inputs: &[Channel],
+    ) -> Option<Self> {
+        let mut recording = self.recording.clone();
+        recording.replace(channel, values).ok()?;
+        let changed = Self::new(recording, inputs, self.output);
+        Some(Self {
+            left_out: self.left_out.clone(),
+            begins: self.begins.clone(),
+            is_given: self.is_given.clone(),
+            is_periodic: self.is_periodic,
+            ..changed
+        })
+    }
+
     /// Puts another output in the place of the measured one.
     ///
     /// # Errors

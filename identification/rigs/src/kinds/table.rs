@@ -13,6 +13,8 @@ pub struct Effect {
     pub off: Vec<f64>,
     /// What it is.
     pub about: &'static str,
+    /// Whether its parameters are in units of their own, whatever the units of the table are.
+    pub is_in_own_units: bool,
 }
 
 /// A struct of nominal parameters, made by `nominal_parameters!`.
@@ -100,6 +102,9 @@ impl Effect {
     /// The same effect where its table was in natural units.
     #[must_use]
     pub fn scaled(mut self, natural: &Natural) -> Self {
+        if self.is_in_own_units {
+            return self;
+        }
         let parameters = self.candidate.parameters.iter_mut();
         for (i, (parameter, off)) in parameters.zip(&mut self.off).enumerate() {
             let unit = natural.unit(parameter.unit);
@@ -179,6 +184,7 @@ pub fn effect<const N: usize>(
         },
         off: parameters.iter().map(|(_, entry)| entry.off).collect(),
         about: about.trim(),
+        is_in_own_units: false,
     }
 }
 

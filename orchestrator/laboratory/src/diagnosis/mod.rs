@@ -52,13 +52,40 @@ pub fn diagnose(
     folder: &Path,
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
+    diagnose_with(subject, data, columns, None, folder, observer)
+}
+
+/// As [`diagnose`], with the effects of the file `effects` beside those of the kind.
+///
+/// # Errors
+/// As [`diagnose`]; effects that do not fit the kind, by line.
+pub fn diagnose_with(
+    subject: &Path,
+    data: &[PathBuf],
+    columns: Option<&Path>,
+    effects: Option<&Path>,
+    folder: &Path,
+    observer: Observer<'_>,
+) -> Result<DiagnosisReport, Error> {
     let begun = Instant::now();
     Results::check(folder)?;
     let read = Subject::read(subject, data, columns).map_err(|error| fault(subject, error))?;
+    let read = with_effects(read, effects, subject)?;
     of_subject(subject, &read, None, folder, observer, begun)
 }
 
-/// As [`diagnose`], of `files` without a description: what is guessed of them is handed to `tell` and written as
+fn with_effects(
+    subject: Subject,
+    effects: Option<&Path>,
+    path: &Path,
+) -> Result<Subject, Error> {
+    match effects {
+        Some(effects) => subject.with_effects(effects).map_err(|error| fault(path, error)),
+        None => Ok(subject),
+    }
+}
+
+/// As [`diagnose_with`], of `files` without a description: what is guessed of them is handed to `tell` and written as
 /// [`DESCRIPTION`].
 ///
 /// # Errors
@@ -66,6 +93,7 @@ pub fn diagnose(
 pub fn diagnose_files(
     files: &[PathBuf],
     columns: Option<&Path>,
+    effects: Option<&Path>,
     folder: &Path,
     tell: &dyn Fn(&Guess),
     observer: Observer<'_>,
@@ -76,6 +104,7 @@ pub fn diagnose_files(
     let guess = guess(files, columns).map_err(|error| fault(first, error.into()))?;
     tell(&guess);
     let subject = Subject::Rig(Box::new((guess.description, guess.measurement)));
+    let subject = with_effects(subject, effects, first)?;
     of_subject(first, &subject, Some(&guess.text), folder, observer, begun)
 }
 
@@ -182,6 +211,10 @@ fn fault(subject: &Path, error: DiagnosisError) -> Error {
         }
         DiagnosisError::Rig(DescriptionError::Data(error))
         | DiagnosisError::Case(CaseError::Data(error)) => error.into(),
+        DiagnosisError::EffectsOfACase => Error::Option {
+            option: "--effects",
+            reason: error.to_string(),
+        },
         DiagnosisError::DataOfACase => Error::Option {
             option: "--data",
             reason: error.to_string(),
