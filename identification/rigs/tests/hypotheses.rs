@@ -89,7 +89,7 @@ pitch = { start = [5, 7], range = [3, 12], unit = "mm" }
     assert!(without.confirmed.error > 3.0 * found.confirmed.error);
     let sentence = found.sentence();
     assert!(
-        sentence.contains("magnets along the rail hold the mass with 8.0"),
+        sentence.contains("shows that magnets along the rail hold the mass with 8.0"),
         "{sentence}"
     );
     // The model alone says what the effect is: neither description nor file of effects is there any more.

@@ -9,9 +9,11 @@ use super::motion::MotionArguments;
 use super::quantity::{band, if_given};
 use super::rig::RigArguments;
 use super::{print_files, progress, run};
+use identification::diagnosis::called;
 use laboratory::error::Error;
 use laboratory::iteration::circle::{self, Circle};
 use laboratory::iteration::on_model::Search;
+use laboratory::iteration::replay::{self, Replay};
 use laboratory::iteration::{self, Iteration, Plan};
 use laboratory::results::{Results, unused};
 use pages::report::columns::aligned;
@@ -24,7 +26,9 @@ use pages::report::columns::aligned;
     shakebench iterate three-variable --drive shakebench-results/iteration-three-variable-synthetic-1/drive.csv --iterations 0\n\n\
     Of a diagnosed rig, on its extended model and without a run:\n  \
     shakebench diagnose my-case --out results\n  \
-    shakebench iterate my-case --model results/extended_model.toml --pga 0.15")]
+    shakebench iterate my-case --model results/extended_model.toml --pga 0.15\n\n\
+    Of a laboratory's recorded rounds, without a system of ours:\n  \
+    shakebench iterate --replay round_0.csv round_1.csv --command-limit \"10 V\" --out next")]
 pub struct Arguments {
     /// Built-in system or .toml file [default: three-variable]; with --model, the case of the diagnosis, a folder
     /// with nominal.toml, which states the control law
@@ -67,6 +71,20 @@ pub struct Arguments {
     /// Initial drive: the drive.csv of an earlier iteration
     #[arg(long, value_name = "FILE")]
     drive: Option<PathBuf>,
+    /// Recorded rounds in their order, with the drive that was played (`reference`) and the measured displacement:
+    /// the next drive and its predicted error, without a run
+    #[arg(long, value_name = "ROUND.csv", num_args = 1.., conflicts_with_all = [
+        "model", "record", "plant", "specimen", "tuning", "control_model", "set", "iterations", "target", "exposure",
+        "measurement_delay", "dummy_mass", "drive",
+    ])]
+    replay: Vec<PathBuf>,
+    /// Names of the columns of the rounds, one per line: `channel = "header"` or `channel = { column = "header",
+    /// unit = "mm" }`
+    #[arg(long, value_name = "MAP.toml", requires = "replay")]
+    columns: Option<PathBuf>,
+    /// Rail of the recorded command, such as "10 V" [default: where the record stays at its largest value]
+    #[arg(long, value_name = "U", requires = "replay")]
+    command_limit: Option<String>,
     /// Folder for drive.csv, iteration.json and report.html; with --model for drive.csv and drive.json [default:
     /// shakebench-results/iteration-SYSTEM-MOTION or drive-CASE-MOTION]
     #[arg(short, long, value_name = "DIR")]
@@ -81,6 +99,9 @@ pub struct Arguments {
 /// # Errors
 /// Input at fault; nothing is written then.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if !arguments.replay.is_empty() {
+        return replayed(arguments);
+    }
     if let (Some(case), Some(model)) = (&arguments.system, &arguments.model) {
         return on_model(arguments, case, model);
     }
@@ -117,6 +138,57 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return Ok(ExitCode::from(1));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Computes the next drive of recorded rounds and writes it.
+fn replayed(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if let Some(folder) = &arguments.out {
+        Results::check(folder)?;
+    }
+    let columns = arguments.columns.as_deref().map(called).transpose();
+    let columns = columns.map_err(|error| Error::Option {
+        option: "--columns",
+        reason: error.to_string(),
+    })?;
+    let gain = part(arguments.gain)?;
+    let found = replay::replay(&replay::Plan {
+        rig: arguments.system.clone(),
+        rounds: arguments.replay.clone(),
+        columns: columns.unwrap_or_default(),
+        wanted: arguments.motion.reference.clone(),
+        scale: arguments.motion.scale,
+        band: match arguments.band.as_slice() {
+            [] => [0.1, 30.0],
+            given => band(given)?,
+        },
+        gain,
+        limit: if_given("--command-limit", &arguments.command_limit, "V")?,
+    })?;
+    let folder = arguments.out.clone().unwrap_or_else(|| {
+        let name = arguments.replay.first().and_then(|path| path.file_stem());
+        let name = format!("replay-{}", name.unwrap_or_default().to_string_lossy());
+        unused(&Path::new("shakebench-results").join(name), |_| false)
+    });
+    let files = replay::write(&found, &folder)?;
+    if arguments.json {
+        println!("{}", serde_json::json!(found));
+    } else {
+        print!("{}", text_of_rounds(&found));
+        println!();
+        print_files(&files);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A part of the inverse.
+fn part(gain: f64) -> Result<f64, Error> {
+    if gain > 0.0 && gain <= 1.0 {
+        return Ok(gain);
+    }
+    Err(Error::Option {
+        option: "--gain",
+        reason: format!("{gain} is not above 0 and at most 1"),
+    })
 }
 
 /// Computes the drive of a diagnosed rig on its extended model and writes it.
@@ -159,10 +231,7 @@ fn on_model(arguments: &Arguments, case: &str, model: &Path) -> Result<ExitCode,
 
 fn plan(arguments: &Arguments) -> Result<Plan, Error> {
     let fault = |option, reason: String| Err(Error::Option { option, reason });
-    let gain = arguments.gain;
-    if !(gain > 0.0 && gain <= 1.0) {
-        return fault("--gain", format!("{gain} is not above 0 and at most 1"));
-    }
+    let gain = part(arguments.gain)?;
     let band = match arguments.band.as_slice() {
         [] => [0.3, 20.0],
         given => band(given)?,
@@ -234,6 +303,56 @@ fn text(found: &Iteration) -> String {
         found.coherence,
         aligned(&rows),
         found.stop.sentence()
+    )
+}
+
+fn text_of_rounds(found: &Replay) -> String {
+    let head = [
+        "round",
+        "error",
+        "delay",
+        "beyond linear",
+        "predicted",
+        "missed",
+        "largest command",
+    ];
+    let mut rows = vec![head.map(str::to_string).to_vec()];
+    let none = || "-".to_string();
+    let volts = |value: Option<f64>| value.map_or_else(none, |value| format!("{value:.2} V"));
+    for (n, round) in found.rounds.iter().enumerate() {
+        let check = n.checked_sub(1).and_then(|place| found.checks.get(place));
+        let percent = |value: f64| format!("{value:.2} %");
+        rows.push(vec![
+            round.file.display().to_string(),
+            percent(round.error_percent),
+            format!("{:.1} ms", 1e3 * round.delay_s),
+            percent(round.unexplained_percent),
+            check.map_or_else(none, |own| percent(own.predicted_percent)),
+            check.map_or_else(none, |own| percent(own.displacement_percent)),
+            volts(round.peak_command),
+        ]);
+    }
+    let next = &found.next;
+    let limit = next
+        .limited_by
+        .as_ref()
+        .map_or_else(String::new, |why| format!("; limited by {why}"));
+    let command = match next.peak_command {
+        Some(volts) => format!(", largest command {volts:.2} V"),
+        None => String::new(),
+    };
+    format!(
+        "next drive: predicted error {:.2} % ({:.2} % if the rig were linear), {:.2} of the correction of {}, {:.2} \
+         to {:.2} Hz{command}{limit}\n\nwanted: {}; mean coherence {:.3}\n{}",
+        next.predicted_percent,
+        next.linear_percent,
+        next.gain,
+        next.corrected.display(),
+        next.band_hz[0],
+        next.band_hz[1],
+        found.wanted,
+        found.coherence,
+        aligned(&rows),
     )
 }
 

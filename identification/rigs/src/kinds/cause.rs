@@ -122,7 +122,7 @@ fn plain(value: f64, half: f64) -> String {
 }
 
 /// An effect of the user's own by its `sentence`, in which `{parameter}` is replaced by the value with its
-/// interval; parameters that it does not hold follow in parentheses.
+/// interval; parameters that it does not hold follow in parentheses. It follows "shows".
 pub(super) fn in_own_words(sentence: &str, values: &[NamedValue]) -> String {
     let mut text = sentence.trim().trim_end_matches('.').to_owned();
     let mut rest = Vec::new();
@@ -136,9 +136,9 @@ pub(super) fn in_own_words(sentence: &str, values: &[NamedValue]) -> String {
         }
     }
     if rest.is_empty() {
-        text
+        format!("that {text}")
     } else {
-        format!("{text} ({})", rest.join(", "))
+        format!("that {text} ({})", rest.join(", "))
     }
 }
 

@@ -74,13 +74,11 @@ pub fn diagnose_with(
     of_subject(subject, &read, None, folder, observer, begun)
 }
 
-fn with_effects(
-    subject: Subject,
-    effects: Option<&Path>,
-    path: &Path,
-) -> Result<Subject, Error> {
+fn with_effects(subject: Subject, effects: Option<&Path>, path: &Path) -> Result<Subject, Error> {
     match effects {
-        Some(effects) => subject.with_effects(effects).map_err(|error| fault(path, error)),
+        Some(effects) => subject
+            .with_effects(effects)
+            .map_err(|error| fault(path, error)),
         None => Ok(subject),
     }
 }

@@ -55,7 +55,107 @@ pub struct Inverse {
     band: [f64; 2],
 }
 
+/// The transfer function from a drive to what it moves, over lines of a constant distance.
+#[derive(Debug, Clone)]
+pub struct Response {
+    /// Line distance, Hz.
+    step: f64,
+    gain: Vec<Complex64>,
+    coherence: Vec<f64>,
+}
+
+impl Response {
+    /// From pairs of drive and response with a sample every `dt` s; none for one shorter than two segments.
+    #[must_use]
+    pub fn new(pairs: &[[&[f64]; 2]], dt: f64) -> Option<Self> {
+        let length = (SEGMENT / dt) as usize;
+        let all = pairs.iter().map(|pair| Spectra::new(pair, dt, length));
+        let all = all.collect::<Result<Vec<_>, _>>().ok()?;
+        let frequency = &all.first()?.frequency;
+        let (mut gain, mut coherence) = (Vec::new(), Vec::new());
+        for k in 0..frequency.len() {
+            let power = |channel| all.iter().map(|own| own.power(channel, k)).sum::<f64>();
+            let cross: Complex64 = all.iter().map(|own| own.cross(1, 0, k)).sum();
+            let (input, output) = (power(0), power(1));
+            gain.push(cross / input.max(f64::MIN_POSITIVE));
+            coherence.push(cross.norm_sqr() / (input * output).max(f64::MIN_POSITIVE));
+        }
+        // The mean is taken from every segment: what is steady follows as the slowest line does.
+        gain[0] = Complex64::new(gain.get(1)?.re, 0.0);
+        coherence[0] = *coherence.get(1)?;
+        Some(Self {
+            step: *frequency.get(1)?,
+            gain,
+            coherence,
+        })
+    }
+
+    fn at(&self, frequency: f64) -> Complex64 {
+        let place = frequency / self.step;
+        let (k, part) = (place as usize, place.fract());
+        match (self.gain.get(k), self.gain.get(k + 1)) {
+            (Some(low), Some(high)) => low * (1.0 - part) + high * part,
+            (Some(last), None) => *last,
+            _ => Complex64::new(0.0, 0.0),
+        }
+    }
+
+    /// The response to `drive`, a sample every `dt` s.
+    #[must_use]
+    pub fn of(&self, drive: &[f64], dt: f64) -> Vec<f64> {
+        let length = padded(drive.len(), dt);
+        let step = 1.0 / (length as f64 * dt);
+        let lines = spectrum(drive, length).into_iter().enumerate();
+        let lines = lines.map(|(k, line)| line * self.at(k as f64 * step));
+        let mut history = from_spectrum(lines.collect(), length);
+        history.truncate(drive.len());
+        history
+    }
+}
+
 impl Inverse {
+    /// Of the response of displacements alone, within `band` where their coherence is at least `coherent`.
+    #[must_use]
+    pub fn of(response: &Response, band: [f64; 2], coherent: f64) -> Self {
+        let mut shown = Vec::new();
+        let all = response.gain.iter().zip(&response.coherence).enumerate();
+        let lines = all.map(|(k, (gain, &coherence))| {
+            let frequency = k as f64 * response.step;
+            if (band[0]..=band[1]).contains(&frequency) {
+                shown.push(Line {
+                    frequency,
+                    gain: gain.norm(),
+                    coherence,
+                });
+            }
+            if coherence < coherent {
+                return Complex64::new(0.0, 0.0);
+            }
+            let size = gain.norm().max(1.0 / MOST_GAIN);
+            coherence * gain.conj() / (size * gain.norm().max(f64::MIN_POSITIVE))
+        });
+        Self {
+            step: response.step,
+            lines: lines.collect(),
+            crossover: f64::INFINITY,
+            band,
+            response: shown,
+        }
+        .within_band()
+    }
+
+    /// The lowest and the highest frequency that are corrected, Hz.
+    #[must_use]
+    pub fn corrected_band(&self) -> [f64; 2] {
+        let is_corrected = |line: &&Line| {
+            let k = (line.frequency / self.step).round() as usize;
+            self.lines.get(k).is_some_and(|line| line.norm() > 0.0)
+        };
+        let mut all = self.response.iter().filter(is_corrected);
+        let first = all.next().map_or(f64::NAN, |line| line.frequency);
+        [first, all.next_back().map_or(first, |line| line.frequency)]
+    }
+
     /// From a run of `drive`; none for one shorter than two segments.
     #[must_use]
     pub fn new(
@@ -206,7 +306,7 @@ impl Inverse {
                     line * s.powi(power)
                 }
             });
-            inverse(lines.collect(), length)
+            from_spectrum(lines.collect(), length)
         };
         let (x, v, a) = (history(-2), history(-1), history(0));
         for n in 0..samples {
@@ -237,7 +337,7 @@ fn joined(
         let omega = TAU * frequency;
         (-omega * omega * below * x + (1.0 - below) * a) * inside(frequency, band)
     });
-    let mut history = inverse(lines.collect(), length);
+    let mut history = from_spectrum(lines.collect(), length);
     history.truncate(samples);
     history
 }
@@ -256,11 +356,12 @@ fn inside(frequency: f64, [low, high]: [f64; 2]) -> f64 {
     (1.0 - 2.0 * beyond).max(0.0)
 }
 
-fn padded(samples: usize, dt: f64) -> usize {
+pub(super) fn padded(samples: usize, dt: f64) -> usize {
     (samples + (QUIET / dt) as usize).next_multiple_of(1000)
 }
 
-fn inverse(mut lines: Vec<Complex64>, length: usize) -> Vec<f64> {
+/// A history from its spectrum.
+pub(super) fn from_spectrum(mut lines: Vec<Complex64>, length: usize) -> Vec<f64> {
     let plan = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
     let mut history = plan.make_output_vec();
     // The first and the last line of a real history are real.

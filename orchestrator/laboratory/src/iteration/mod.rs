@@ -6,6 +6,7 @@ mod correction;
 mod drive;
 pub mod on_model;
 mod page;
+pub mod replay;
 
 use serde::{Deserialize, Serialize};
 

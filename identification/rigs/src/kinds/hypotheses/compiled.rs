@@ -139,7 +139,7 @@ fn place(at: &str, rig: &dyn Rig) -> Result<Place, String> {
     found.map(|(_, place)| *place).ok_or_else(|| {
         let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
         format!(
-            "`{at}` is not a place of a {}: expected {}",
+            "`{at}` is not a place of the kind {}: expected {}",
             rig.kind(),
             listed(&names)
         )
@@ -155,7 +155,7 @@ impl Compiled {
         let known = rig.effects();
         if known.iter().any(|effect| effect.candidate.effect == name) {
             let what = format!(
-                "a {} has an effect of this name: choose another",
+                "the kind {} has an effect of this name: choose another",
                 rig.kind()
             );
             return wrong("", name, what);

@@ -296,7 +296,7 @@ a = { start = 0.01, range = [0, 0.1], unit = "s" }
         (
             "at = \"input\"",
             "at = \"specimen\"",
-            "line 3, `mine.at`: `specimen` is not a place of a closed_loop_actuator: expected `input`, `output`, `valve` or `command`",
+            "line 3, `mine.at`: `specimen` is not a place of the kind closed_loop_actuator: expected `input`, `output`, `valve` or `command`",
         ),
         (
             "a * du",
@@ -336,7 +336,7 @@ a = { start = 0.01, range = [0, 0.1], unit = "s" }
         (
             "[mine]",
             "[dead_band]",
-            "line 2, `dead_band`: `dead_band` a closed_loop_actuator has an effect of this name",
+            "line 2, `dead_band`: `dead_band` the kind closed_loop_actuator has an effect of this name",
         ),
         (
             "[mine.parameters]",
