@@ -8,6 +8,7 @@ pub mod error;
 pub mod identified;
 pub mod integration;
 pub mod linear;
+pub mod platform;
 pub mod sensors;
 pub mod servo_hydraulic;
 pub mod signal_path;

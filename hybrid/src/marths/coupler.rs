@@ -86,15 +86,26 @@ impl Coupler {
     /// The motion that strokes (m) give, worked back as the published program does: the rotation from
     /// the strokes' difference, the translation from the first stroke. Exact to 4e-8 m over the
     /// benchmark's range where the pins are symmetric.
-    #[must_use]
-    pub fn motion(&self, strokes: Pair) -> JointMotion {
+    ///
+    /// # Errors
+    /// Strokes whose difference is larger than that of the lever arms: no rotation gives them.
+    pub fn motion(&self, strokes: Pair) -> Result<JointMotion, ModelError> {
         let [lower, upper] = self.levers();
         let sine = (strokes[0] - strokes[1]) / (upper - lower);
-        let turned = (self.direction[0] + sine).cos() - self.direction[0].cos();
-        JointMotion {
-            translation: strokes[0] - self.distance[0] * turned,
-            rotation: sine.clamp(-1.0, 1.0).asin(),
+        // Not a number is refused, too.
+        if !(sine.abs() <= 1.0) {
+            return Err(ModelError::Parameter {
+                name: "stroke difference",
+                value: strokes[0] - strokes[1],
+                expected: "at most the difference of the lever arms, m: no rotation of the coupler \
+                           gives a larger one",
+            });
         }
+        let turned = (self.direction[0] + sine).cos() - self.direction[0].cos();
+        Ok(JointMotion {
+            translation: strokes[0] - self.distance[0] * turned,
+            rotation: sine.asin(),
+        })
     }
 }
 
@@ -110,7 +121,7 @@ mod tests {
                 translation,
                 rotation,
             };
-            let back = coupler.motion(coupler.strokes(motion));
+            let back = coupler.motion(coupler.strokes(motion)).unwrap();
             assert!((back.translation - translation).abs() < 4e-8);
             assert!((back.rotation - rotation).abs() < 1e-12);
         }
@@ -128,6 +139,15 @@ mod tests {
         for (stroke, (along, across)) in strokes.iter().zip([(0.3, -0.1), (0.2, 0.15)]) {
             let moved = along * rotation.cos() - across * rotation.sin() + translation;
             assert!((stroke - (moved - along)).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn strokes_that_no_rotation_gives_are_refused() {
+        let coupler = Coupler::default();
+        for strokes in [[0.2, -0.1], [f64::NAN, 0.0]] {
+            let error = coupler.motion(strokes).unwrap_err().to_string();
+            assert!(error.contains("stroke difference"), "{error}");
         }
     }
 

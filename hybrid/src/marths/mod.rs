@@ -27,7 +27,7 @@ mod structure;
 pub use self::plant::{ColumnDynamics, Plant, PlantParameters, Volts};
 pub use coupler::{Coupler, JointMotion};
 pub use newmark::Newmark;
-pub use perturbation::{Deviation, PERTURBED, corners};
+pub use perturbation::{COVERING, Deviation, PERTURBED, corners, covering_corners};
 pub use sensors::{NOISE, independent_noise, published_noise};
 pub use specimen::{InterfaceForce, Specimen};
 pub use structure::{Freedom, Structure};

@@ -7,7 +7,7 @@ use super::{Freedom, PERIOD, Structure};
 
 /// A structure in motion. A step is made in two halves: [`Newmark::propose`] without the force on its
 /// interface, [`Newmark::accept`] with it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Newmark {
     mass: Vec<f64>,
     loaded: Vec<f64>,

@@ -73,6 +73,36 @@ pub fn corners(by: f64) -> impl Iterator<Item = [f64; 9]> {
     (0..512u32).map(move |n| std::array::from_fn(|i| if n >> i & 1 == 1 { by } else { -by }))
 }
 
+/// Number of [`covering_corners`].
+pub const COVERING: usize = 32;
+
+/// Corners of the perturbations that cover the box: the nine values so many standard deviations to either side, each of the
+/// four static gains `off` (relative) to either side, and every command a sample late. They are a fraction of the 8192
+/// corners in which any three of the thirteen have all eight combinations of signs equally often: each sign is the product
+/// of an odd number of five basic ones (G. E. P. Box and J. S. Hunter, Technometrics 3, 1961).
+#[must_use]
+pub fn covering_corners(
+    nominal: &PlantParameters,
+    by: f64,
+    off: f64,
+) -> [PlantParameters; COVERING] {
+    let odd: Vec<u32> = (1..32u32)
+        .filter(|word| word.count_ones() % 2 == 1)
+        .collect();
+    std::array::from_fn(|run| {
+        let sign = |factor: usize| match (odd[factor] & run as u32).count_ones() % 2 {
+            0 => 1.0,
+            _ => -1.0,
+        };
+        let mut plant = Deviation::default().moved(nominal, std::array::from_fn(|i| by * sign(i)));
+        for (i, gain) in plant.static_gain.iter_mut().flatten().enumerate() {
+            *gain *= 1.0 + off * sign(9 + i);
+        }
+        plant.delay = plant.delay.map(|samples| samples + 1);
+        plant
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,6 +120,49 @@ mod tests {
         let square = draws.iter().map(|z| z * z).sum::<f64>() / 4000.0;
         assert!((square.sqrt() - 0.06).abs() < 0.003);
         assert_eq!(corners(3.0).count(), 512);
+    }
+
+    #[test]
+    fn covering_corners_have_every_three_signs_equally_often() {
+        let nominal = PlantParameters::default();
+        let corners = covering_corners(&nominal, 3.0, 0.05);
+        let signs = |plant: &PlantParameters| -> Vec<bool> {
+            let (p, n) = (plant, &nominal);
+            let of = [
+                (p.first_zeros[0], n.first_zeros[0]),
+                (p.first_zeros[1], n.first_zeros[1]),
+                (p.columns[0].poles[0], n.columns[0].poles[0]),
+                (p.columns[0].poles[1], n.columns[0].poles[1]),
+                (p.columns[0].decay, n.columns[0].decay),
+                (p.second_zeros[0], n.second_zeros[0]),
+                (p.columns[1].poles[0], n.columns[1].poles[0]),
+                (p.columns[1].poles[1], n.columns[1].poles[1]),
+                (p.second_zeros[1], n.second_zeros[1]),
+                (p.static_gain[0][0], n.static_gain[0][0]),
+                (p.static_gain[0][1], n.static_gain[0][1]),
+                (p.static_gain[1][0], n.static_gain[1][0]),
+                (p.static_gain[1][1], n.static_gain[1][1]),
+            ];
+            of.iter().map(|(moved, nominal)| moved > nominal).collect()
+        };
+        let rows: Vec<Vec<bool>> = corners.iter().map(signs).collect();
+        for (a, b, c) in
+            (0..13).flat_map(|a| (0..a).flat_map(move |b| (0..b).map(move |c| (a, b, c))))
+        {
+            for word in 0..8u8 {
+                let wanted = [word & 1 > 0, word & 2 > 0, word & 4 > 0];
+                let count = rows
+                    .iter()
+                    .filter(|row| [row[a], row[b], row[c]] == wanted)
+                    .count();
+                assert_eq!(count, COVERING / 8, "{a} {b} {c}");
+            }
+        }
+        assert!(
+            corners
+                .iter()
+                .all(|plant| plant.delay == [1; 2] && plant.validate().is_ok())
+        );
     }
 
     #[test]

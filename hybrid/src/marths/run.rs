@@ -51,6 +51,20 @@ pub struct Histories {
     pub fed: [Vec<f64>; 2],
     /// The numerical substructure.
     pub motions: Motions,
+    /// How the run ended.
+    pub ending: Ending,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Ending {
+    /// With the ground motion.
+    #[default]
+    Complete,
+    /// A stroke, target or command went beyond 0.1 m.
+    RanAway,
+    /// The strokes fed back had a difference that no rotation of the coupler gives.
+    OutOfReach,
 }
 
 impl Histories {
@@ -89,13 +103,17 @@ pub fn run(setting: &Setting<'_>, law: &mut dyn Law) -> Result<Histories, ModelE
     for (ground, noise) in setting.ground.iter().zip(setting.noise) {
         let stroke = plant.strokes();
         let measured = [0, 1].map(|i| stroke[i] + noise[i]);
-        let fed = coupler.motion(law.feedback(measured));
+        let Ok(fed) = coupler.motion(law.feedback(measured)) else {
+            histories.ending = Ending::OutOfReach;
+            break;
+        };
         structure.propose(*ground);
         structure.accept(specimen.step(fed).by_freedom());
         let target = coupler.strokes(held(&structure));
         let command = law.step(target, measured);
         let all = [target, stroke, command].into_iter().flatten();
         if !all.into_iter().all(|value| value.abs() < RUNAWAY) {
+            histories.ending = Ending::RanAway;
             break;
         }
         record(&mut histories.motions, |freedom| {
@@ -207,7 +225,7 @@ fn solve(
         let back = coupler.motion(coupler.strokes(JointMotion {
             translation: moved[0],
             rotation: moved[1],
-        }));
+        }))?;
         fed = Vector2::new(back.translation, back.rotation);
         way = fed - moved;
     }
@@ -218,15 +236,7 @@ fn solve(
 }
 
 fn record(to: &mut Motions, displacement: impl Fn(Freedom) -> f64) {
-    let freedoms = [
-        (Freedom::Interface, 1.0),
-        (Freedom::InterfaceRotation, -1.0),
-        (Freedom::Storey2, 1.0),
-        (Freedom::Rotation2, 1.0),
-        (Freedom::Storey3, 1.0),
-        (Freedom::Rotation3, 1.0),
-    ];
-    for (history, (freedom, sign)) in to.iter_mut().zip(freedoms) {
+    for (history, (freedom, sign)) in to.iter_mut().zip(Freedom::COMPARED) {
         history.push(sign * displacement(freedom));
     }
 }

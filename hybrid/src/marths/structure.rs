@@ -24,6 +24,19 @@ pub enum Freedom {
     OtherRotation = 28,
 }
 
+impl Freedom {
+    /// Motion that the criteria compare, with the sign that turns it to the coupler's axes: the interface's translation
+    /// and rotation, then translation and rotation of storeys 2 and 3.
+    pub const COMPARED: [(Self, f64); 6] = [
+        (Self::Interface, 1.0),
+        (Self::InterfaceRotation, -1.0),
+        (Self::Storey2, 1.0),
+        (Self::Rotation2, 1.0),
+        (Self::Storey3, 1.0),
+        (Self::Rotation3, 1.0),
+    ];
+}
+
 /// Number of freedoms.
 const FREEDOMS: usize = 29;
 

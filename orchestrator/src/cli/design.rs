@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::figures;
+use super::{figures, multivariable};
 use laboratory::design::{self, LoopName, Options, Synthesis, model};
 use laboratory::error::Error;
 use laboratory::results::unused;
@@ -71,6 +71,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return figures::draw(only, kind, None, arguments.out.as_deref(), arguments.json);
     }
     if let Some(path) = &arguments.model {
+        if multivariable::is_model(path) {
+            return multivariable::designed(path, arguments.json);
+        }
         return on_model(arguments, path);
     }
     let fault = |option| move |reason| Error::Option { option, reason };

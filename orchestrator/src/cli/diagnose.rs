@@ -9,7 +9,7 @@ use clap::Args;
 use identification::diagnosis::DiagnosisReport;
 use identification::diagnosis::engine::{Deadline, Observer, Progress};
 
-use super::progress;
+use super::{multivariable, progress};
 use fmi_import::Isolation;
 use identification::diagnosis::rigs::guess::Guess;
 use laboratory::diagnosis::{diagnose_files, diagnose_with, files, foreign, model, template, text};
@@ -48,7 +48,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["model", "fmu", "template"])]
     effects: Option<PathBuf>,
     /// Print a commented description to fill in: table, actuator, drive, axis, hysteretic device, material,
-    /// oscillator, damper or transfer system; with --fmu, `map`
+    /// oscillator, damper, transfer system or two actuators; with --fmu, `map`
     #[arg(long, value_name = "KIND", conflicts_with_all = ["cases", "model", "data"])]
     template: Option<String>,
     /// Extended model from a diagnosis of a table, a rig or an FMU; nothing is fitted
@@ -108,7 +108,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                     reason: format!("`{kind}` with --fmu: expected `map`"),
                 });
             }
-            None => template(kind)?,
+            None => match multivariable::template(kind) {
+                Some(text) => text.into(),
+                None => template(kind)?,
+            },
         };
         print!("{text}");
         return Ok(ExitCode::SUCCESS);
@@ -123,6 +126,17 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 --model with it"
                 .into(),
         });
+    }
+    if let (None, [case]) = (&arguments.fmu, arguments.cases.as_slice())
+        && multivariable::is_description(case)
+    {
+        return multivariable::diagnosed(
+            case,
+            &arguments.data,
+            arguments.columns.as_deref(),
+            arguments.out.as_deref(),
+            arguments.json,
+        );
     }
     let is_data = |path: &PathBuf| {
         path.is_file() && path.extension().is_none_or(|extension| extension != "toml")

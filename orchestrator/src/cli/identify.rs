@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 use identification::identify::identified::RigIdentification;
 
-use super::progress;
+use super::{multivariable, progress};
 use laboratory::error::Error;
 use laboratory::identify::{
     EQUATION_COLUMNS, Form, HydraulicIdentification, ONE_INPUT_COLUMNS, OneInputIdentification,
@@ -24,7 +24,8 @@ use pages::report::number::significant;
     on the table, specimen_acceleration; each header cell is `name [unit]` or `name (unit)`, parted\n\
     by comma, semicolon or tab. A bare table alone does not determine the actuator: measure with a\n\
     specimen or two payloads. Of a rig of which command and displacement alone are recorded, a\n\
-    transfer function is found: valve_command (V) or reference (m), and displacement.")]
+    transfer function is found: valve_command (V) or reference (m), and displacement.\n\n\
+    Of several actuators that move one body: time, command_1, command_2, stroke_1, stroke_2.")]
 pub struct Arguments {
     /// Recordings of one rig
     #[arg(value_name = "DATA.csv", required = true)]
@@ -62,6 +63,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         });
     }
     check_place(arguments)?;
+    if multivariable::has_several(&arguments.data, arguments.columns.as_deref()) {
+        let columns = arguments.columns.as_deref();
+        return multivariable::identified(
+            &arguments.data,
+            columns,
+            arguments.fit_part,
+            &arguments.out,
+            arguments.json,
+        );
+    }
     let bar = progress::spinner("identifying");
     let identified = identify(&Request {
         data: arguments.data.clone(),

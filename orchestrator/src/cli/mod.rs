@@ -36,6 +36,7 @@ pub mod info;
 mod interrupt;
 pub mod iterate;
 mod motion;
+mod multivariable;
 mod progress;
 pub mod qualify;
 mod quantity;

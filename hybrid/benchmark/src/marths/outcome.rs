@@ -18,14 +18,26 @@ pub struct Outcome {
     pub controllers: Scores,
     /// Motions that were run.
     pub motions: Vec<String>,
-    /// Perturbed plants besides the nominal one.
-    pub perturbed: u32,
+    /// Plants that were run, in words.
+    pub plants: String,
     /// Seed of plants and noise.
     pub seed: u64,
     /// What the reader should know.
     pub notes: Vec<String>,
     /// Time on the clock, s.
     pub wall_s: f64,
+}
+
+/// Controllers whose strokes left the set that the coupler reaches.
+fn out_of_reach(scores: &Scores) -> Vec<String> {
+    let of = scores.iter().filter(|(_, score)| score.out_of_reach > 0);
+    of.map(|(name, score)| {
+        format!(
+            "{name}: {} of {} runs ended with strokes that no rotation of the coupler gives",
+            score.out_of_reach, score.runs
+        )
+    })
+    .collect()
 }
 
 /// What the tables show.
@@ -51,12 +63,12 @@ impl Outcome {
         let (nominal, controllers) = study.run(done)?;
         let names = study.motions.iter().map(|motion| motion.name.clone());
         Ok(Self {
+            notes: out_of_reach(&controllers),
             nominal,
             controllers,
             motions: names.collect(),
-            perturbed: study.perturbed,
+            plants: study.plants.to_string(),
             seed: study.seed,
-            notes: Vec::new(),
             wall_s: start.elapsed().as_secs_f64(),
         })
     }
@@ -123,10 +135,9 @@ impl Outcome {
         }
         let _ = writeln!(
             text,
-            "Motions {}; nominal plant and {} perturbed (seed {}). Mean/largest: J1 in ms, the \
-             others in %.",
+            "Motions {}; {} (seed {}). Mean/largest: J1 in ms, the others in %.",
             self.motions.join(", "),
-            self.perturbed,
+            self.plants,
             self.seed
         );
         for (class, title) in self.classes() {

@@ -8,9 +8,9 @@ use super::outcome::Outcome;
 #[must_use]
 pub fn report(outcome: &Outcome) -> Report {
     let summary = format!(
-        "Motions {}; nominal plant and {} perturbed; seed {}.",
+        "Motions {}; {}; seed {}.",
         outcome.motions.join(", "),
-        outcome.perturbed,
+        outcome.plants,
         outcome.seed
     );
     let sections = outcome.classes().into_iter().map(|(class, title)| Section {

@@ -4,8 +4,11 @@ use std::collections::BTreeMap;
 
 use hybrid::marths::criteria::{COLUMNS, COUNT, criteria};
 use hybrid::marths::laws::Class;
-use hybrid::marths::run::{Histories, Motions, Setting, perfect, reference, run};
-use hybrid::marths::{Deviation, Pair, PlantParameters, Volts, independent_noise, published_noise};
+use hybrid::marths::run::{Ending, Histories, Motions, Setting, perfect, reference, run};
+use hybrid::marths::{
+    COVERING, Deviation, Pair, PlantParameters, Volts, covering_corners, independent_noise,
+    published_noise,
+};
 use plant::ModelError;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -21,6 +24,47 @@ pub struct Motion {
     pub ground: Vec<f64>,
 }
 
+/// Plants that the controllers are run on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Plants {
+    /// The nominal plant and so many perturbed ones.
+    Drawn(u32),
+    /// Corners that cover the perturbations at three standard deviations, with static gains 5 % off and commands a sample
+    /// late.
+    Corners,
+}
+
+/// Distance of the corners, standard deviations, and what their static gains are off by.
+const CORNER: (f64, f64) = (3.0, 0.05);
+
+impl std::fmt::Display for Plants {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Drawn(perturbed) => write!(to, "nominal plant and {perturbed} perturbed"),
+            Self::Corners => write!(to, "{COVERING} corners at {} standard deviations", CORNER.0),
+        }
+    }
+}
+
+impl Plants {
+    fn count(self) -> usize {
+        match self {
+            Self::Drawn(perturbed) => perturbed as usize + 1,
+            Self::Corners => COVERING,
+        }
+    }
+
+    /// The plant of a number; of drawn ones 0 is the nominal plant.
+    fn plant(self, seed: u64, number: usize) -> PlantParameters {
+        let nominal = PlantParameters::default();
+        match self {
+            Self::Drawn(_) if number == 0 => nominal,
+            Self::Drawn(_) => Deviation::default().draw(&nominal, seed, number as u64),
+            Self::Corners => covering_corners(&nominal, CORNER.0, CORNER.1)[number],
+        }
+    }
+}
+
 /// What a study varies.
 #[derive(Clone)]
 pub struct Study {
@@ -28,8 +72,8 @@ pub struct Study {
     pub motions: Vec<Motion>,
     /// Controllers.
     pub controllers: Vec<Entry>,
-    /// Perturbed plants besides the nominal one.
-    pub perturbed: u32,
+    /// Plants.
+    pub plants: Plants,
     /// Seed of plants and noise.
     pub seed: u64,
 }
@@ -42,10 +86,12 @@ pub type Named = BTreeMap<&'static str, f64>;
 pub struct RunScore {
     /// Name of the motion.
     pub motion: String,
-    /// Number of the plant, 0 being the nominal one.
+    /// Number of the plant; of drawn ones 0 is the nominal plant.
     pub plant: usize,
     /// The criteria; none where the run was unstable.
     pub criteria: Option<[f64; COUNT]>,
+    /// How the run ended.
+    pub ending: Ending,
     /// Largest command, V.
     pub peak_volts: f64,
 }
@@ -59,6 +105,8 @@ pub struct ControllerScore {
     pub runs: usize,
     /// How many of them were unstable; mean and largest leave those out.
     pub unstable: usize,
+    /// How many of those ended with strokes that no rotation of the coupler gives.
+    pub out_of_reach: usize,
     /// Mean of each criterion.
     pub mean: Named,
     /// Largest magnitude of each criterion.
@@ -115,6 +163,7 @@ impl Scene<'_> {
             motion: self.motion.name.clone(),
             plant: number,
             criteria: stable.then(|| criteria(&histories, &self.reference, &self.perfect)),
+            ending: histories.ending,
             peak_volts,
         })
     }
@@ -124,7 +173,7 @@ impl Study {
     /// Number of plants that each motion is run on.
     #[must_use]
     pub fn jobs(&self) -> usize {
-        (self.perturbed as usize + 2) * self.motions.len()
+        (self.plants.count() + 1) * self.motions.len()
     }
 
     /// Runs everything; `done` is called after each run of all controllers on one plant.
@@ -151,7 +200,7 @@ impl Study {
         let jobs: Vec<(&Scene<'_>, Option<usize>)> = scenes
             .iter()
             .flat_map(|scene| {
-                let plants = 0..=self.perturbed as usize;
+                let plants = 0..self.plants.count();
                 std::iter::once(None)
                     .chain(plants.map(Some))
                     .map(move |job| (scene, job))
@@ -166,7 +215,7 @@ impl Study {
                     Some(number) => {
                         let stream = scene.place << 32 | *number as u64;
                         (
-                            self.plant(&nominal, *number),
+                            self.plants.plant(self.seed, *number),
                             independent_noise(self.seed, stream, samples),
                         )
                     }
@@ -197,13 +246,6 @@ impl Study {
         }
         Ok((published, all))
     }
-
-    fn plant(&self, nominal: &PlantParameters, number: usize) -> PlantParameters {
-        match number {
-            0 => *nominal,
-            number => Deviation::default().draw(nominal, self.seed, number as u64),
-        }
-    }
 }
 
 impl ControllerScore {
@@ -217,6 +259,10 @@ impl ControllerScore {
             class,
             runs: all.len(),
             unstable: all.len() - stable.len(),
+            out_of_reach: all
+                .iter()
+                .filter(|run| run.ending == Ending::OutOfReach)
+                .count(),
             mean: each(&|i| stable.iter().map(|c| c[i]).sum::<f64>() / stable.len() as f64),
             max: each(&|i| stable.iter().map(|c| c[i].abs()).fold(f64::NAN, f64::max)),
             peak_volts: all.iter().map(|run| run.peak_volts).fold(0.0, f64::max),

@@ -19,7 +19,7 @@ const TERMS: usize = 3;
 pub const LONGEST: usize = 24;
 
 /// What a predictive law is made of.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PredictiveDesign {
     /// The plant that is believed at the start.
     pub plant: PlantParameters,
@@ -51,7 +51,16 @@ impl Default for PredictiveDesign {
     }
 }
 
+impl PredictiveDesign {
+    /// The estimator of the law, at rest.
+    #[must_use]
+    pub fn estimator(&self) -> Estimator {
+        Estimator::new(self.plant, &Prior::default(), 0.01)
+    }
+}
+
 /// A predictive law in motion.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Predictive {
     design: PredictiveDesign,
     estimator: Estimator,
@@ -75,7 +84,7 @@ impl Predictive {
         }
         Ok(Self {
             targets: [Extrapolation::new(design.order, design.window, 0.0)?; 2],
-            estimator: Estimator::new(design.plant, &Prior::default(), 0.01),
+            estimator: design.estimator(),
             range: Volts::default().range(),
             design,
         })
