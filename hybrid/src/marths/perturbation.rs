@@ -78,7 +78,7 @@ pub const COVERING: usize = 32;
 
 /// Corners of the perturbations that cover the box: the nine values so many standard deviations to either side, each of the
 /// four static gains `off` (relative) to either side, and every command a sample late. They are a fraction of the 8192
-/// corners in which any three of the thirteen have all eight combinations of signs equally often: each sign is the product
+/// corners in which any three of the thirteen have all eight combinations of signs equally often. Each sign is the product
 /// of an odd number of five basic ones (G. E. P. Box and J. S. Hunter, Technometrics 3, 1961).
 #[must_use]
 pub fn covering_corners(

@@ -177,7 +177,7 @@ fn check_pins(place: &str, pins: &Pins, model: &Model) -> Result<(), Error> {
 
 /// Mean square over noise of a channel above which the model does not explain it.
 const EXPLAINED: f64 = 1.3;
-/// Share of the excess that a fault must explain, of what is left and of what was there at first.
+/// Share that a fault must explain of the present excess, and of the excess of the model without faults.
 const SHARE: f64 = 0.3;
 const SHARE_AT_FIRST: f64 = 0.02;
 /// Most faults.

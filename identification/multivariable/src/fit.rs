@@ -29,6 +29,8 @@ pub(crate) struct Fitted {
 /// Step of differences, relative for poles, in samples for delays.
 const STEP: f64 = 1e-5;
 const SLOWEST: f64 = 1e-3;
+/// Information of a number, over the largest, below which it is at its bound.
+const AT_BOUND: f64 = 1e-9;
 /// Longest delay, samples.
 const LONGEST: f64 = 200.0;
 
@@ -326,11 +328,13 @@ pub(crate) fn with_covariance(recording: &Recording, mut fitted: Fitted) -> Opti
             }
         }
     }
-    // A number at its bound changes nothing: it is held, with no variance.
-    let held: Vec<bool> = information
-        .diagonal()
-        .iter()
-        .map(|value| !(*value > 0.0))
+    // A number at its bound changes nothing but rounding: it is held, with no variance.
+    let most = (0..count).map(|i| information[(i, i)]).fold(0.0, f64::max);
+    let held: Vec<bool> = (0..information.nrows())
+        .map(|i| {
+            let least = if i < count { AT_BOUND * most } else { 0.0 };
+            information[(i, i)].partial_cmp(&least) != Some(std::cmp::Ordering::Greater)
+        })
         .collect();
     let size = information
         .diagonal()

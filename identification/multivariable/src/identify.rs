@@ -156,7 +156,7 @@ fn starts(recording: &Recording, order: usize) -> Vec<Shape> {
     starts
 }
 
-/// Geometric mean of what is left of the strokes where only free motion and offsets are fitted anew.
+/// Geometric mean of the strokes' residuals if only the linear coefficients are fitted again.
 fn prediction_error(rest: &Recording, shape: &Shape) -> Option<f64> {
     let fitted = improve(rest, shape, 0)?;
     Some((0.5 * product(&fitted.square) / rest.strokes.len() as f64).exp())

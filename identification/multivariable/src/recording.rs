@@ -84,7 +84,7 @@ impl Recording {
     /// Reads `time`, `command_1`, `stroke_1`, and so on; `translation` and `rotation` of the joint if they are there.
     ///
     /// # Errors
-    /// A column that is missing, a unit of another dimension, cells that are no numbers, uneven time, with file and line.
+    /// A column that is missing, a unit of another dimension, cells without a number, uneven time, with file and line.
     pub fn read(file: &Path) -> Result<Self, Error> {
         Self::read_called(file, &Names::new())
     }
