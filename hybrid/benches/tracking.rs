@@ -1,8 +1,8 @@
 //! One step of every tracking law of hybrid simulation, timed step by step in a closed loop on
-//! the nominal plant.
+//! the nominal plant, of one actuator and of two.
 //!
 //! ```text
-//! cargo bench -p controllers --bench tracking
+//! cargo bench -p hybrid --bench tracking
 //! ```
 //!
 //! A tenth of the benchmark's period is 24.4 us.
@@ -56,8 +56,60 @@ fn laws() -> Result<Vec<(&'static str, Law)>, Box<dyn Error>> {
     ])
 }
 
+/// The laws for two actuators, on their nominal plant with the benchmark's noise.
+fn two_actuators() -> Result<(), Box<dyn Error>> {
+    use hybrid::marths::laws::{
+        DecentralisedAdaptive, Law as Tracking, Predictive, PredictiveDesign,
+    };
+    use hybrid::marths::{Plant, PlantParameters, RATE, independent_noise};
+    let noise = independent_noise(1, 0, STEPS);
+    let adaptive = PredictiveDesign::default();
+    let fixed = PredictiveDesign {
+        adaptive: false,
+        ..adaptive
+    };
+    let make = |name: &str| -> Result<Box<dyn Tracking>, Box<dyn Error>> {
+        Ok(match name {
+            "rodeac" => Box::new(DecentralisedAdaptive::default()),
+            "predictive" => Box::new(Predictive::new(fixed)?),
+            _ => Box::new(Predictive::new(adaptive)?),
+        })
+    };
+    for name in ["rodeac", "predictive", "adaptive-predictive"] {
+        let mut times = vec![u128::MAX; STEPS];
+        for _ in 0..REPEATS {
+            let mut law = make(name)?;
+            let mut plant = Plant::new(PlantParameters::default())?;
+            for (k, (time, noise)) in times.iter_mut().zip(&noise).enumerate() {
+                let t = k as f64 / RATE;
+                let target = [2e-3 * (14.0 * t).sin(), 3e-3 * (14.0 * t).cos()];
+                let stroke = plant.strokes();
+                let measured = [stroke[0] + noise[0], stroke[1] + noise[1]];
+                let start = Instant::now();
+                law.feedback(std::hint::black_box(measured));
+                let command =
+                    std::hint::black_box(law.step(std::hint::black_box(target), measured));
+                *time = start.elapsed().as_nanos().min(*time);
+                plant.step(command);
+            }
+        }
+        print(name, &mut times);
+    }
+    Ok(())
+}
+
+fn print(name: &str, times: &mut [u128]) {
+    times.sort_unstable();
+    println!(
+        "{name:20} {:>7}  {:>7}  {:>8}",
+        times[STEPS / 2],
+        times[STEPS * 999 / 1000],
+        times[STEPS - 1]
+    );
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
-    println!("law                 median   99.9 %   longest  (ns, {STEPS} steps)");
+    println!("law                  median   99.9 %   longest  (ns, {STEPS} steps)");
     for (name, mut law) in laws()? {
         let parameters = TransferSystemParameters::default();
         let specimen = [
@@ -85,13 +137,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 part.step(input.force, [ground; 3]);
             }
         }
-        times.sort_unstable();
-        println!(
-            "{name:18} {:>7}  {:>7}  {:>8}",
-            times[STEPS / 2],
-            times[STEPS * 999 / 1000],
-            times[STEPS - 1]
-        );
+        print(name, &mut times);
     }
-    Ok(())
+    two_actuators()
 }

@@ -150,3 +150,79 @@ fn the_loop_in_fmpy_is_the_run_without_fmi() {
         near("target 2", &through[2], &native.target[1]);
     }
 }
+
+/// Normalised error of a displacement, percent.
+fn error(wanted: &[f64], got: &[f64]) -> f64 {
+    let square = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>();
+    let left = square(&mut wanted.iter().zip(got).map(|(a, b)| a - b));
+    100.0 * (left / square(&mut wanted.iter().copied())).sqrt()
+}
+
+/// Without eccentricity each axis has the error of its own run; the eccentric payload changes it.
+#[test]
+fn the_axes_of_a_biaxial_table_are_coupled_by_the_eccentricity_alone() {
+    let place = tempfile::tempdir().unwrap();
+    let alone = |seed: u64| {
+        let request = Request {
+            plant: "servohydraulic".into(),
+            seed,
+            duration_s: Some(15.0),
+            ..Request::built_in("three-variable")
+        };
+        let prepared = prepare(&request).unwrap();
+        prepared.run(prepared.algorithm).unwrap().record
+    };
+    let (x, y) = (alone(1), alone(2));
+    fs::create_dir(place.path().join("y")).unwrap();
+    let names = [
+        "time",
+        "reference.displacement",
+        "reference.velocity",
+        "reference.acceleration",
+    ];
+    let columns = names.map(|name| y.column(name).unwrap());
+    let mut text = names.join(",");
+    for k in 0..columns[0].len() {
+        text += "\n";
+        text += &columns
+            .iter()
+            .map(|column| column[k].to_string())
+            .collect::<Vec<_>>()
+            .join(",");
+    }
+    fs::write(place.path().join("y/results.csv"), text).unwrap();
+    let system = place.path().join("biaxial.toml");
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../systems/biaxial.toml");
+    fs::copy(shipped, &system).unwrap();
+    let both = |eccentricity: &str| {
+        let request = Request {
+            duration_s: Some(15.0),
+            set: vec![
+                format!("payload.eccentricity_x={eccentricity}"),
+                format!("payload.eccentricity_y={eccentricity}"),
+            ],
+            ..Request::built_in(system.to_str().unwrap())
+        };
+        let prepared = prepare(&request).unwrap();
+        let record = prepared.run(prepared.algorithm).unwrap().record;
+        [("x", &x), ("y", &y)].map(|(axis, own)| {
+            let wanted = own.column("reference.displacement").unwrap();
+            let moved = record
+                .column(&format!("table_{axis}.displacement"))
+                .unwrap();
+            [
+                error(&wanted, &own.column("table.displacement").unwrap()),
+                error(&wanted, &moved),
+            ]
+        })
+    };
+    let (centred, eccentric) = (both("0 in"), both("4 in"));
+    for ([alone, together], [_, coupled]) in centred.into_iter().zip(eccentric) {
+        println!("alone {alone:.3} %, centred {together:.3} %, eccentric {coupled:.3} %");
+        assert!((together / alone - 1.0).abs() < 0.1, "{alone} {together}");
+        assert!(
+            (coupled / together - 1.0).abs() > 1e-3,
+            "{together} {coupled}"
+        );
+    }
+}
