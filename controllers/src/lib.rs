@@ -18,6 +18,7 @@ pub mod pid;
 pub mod prediction_over_delay;
 pub mod preview;
 pub mod robustness;
+pub mod sensor_vote;
 pub mod sliding_mode;
 pub mod surface_control;
 pub mod synthesis;

@@ -4,6 +4,8 @@
 //! model, a specimen or an actuator from needless damage; whoever works at a rig is protected by
 //! the emergency stop, the pressure-off valve and the fence, none of which may depend on it.
 
+mod load;
+mod stop;
 #[cfg(test)]
 mod tests;
 mod trip;
@@ -13,14 +15,18 @@ use units::constants::{G, INCH, LBF, STROKE};
 
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};
+use load::Load;
+use stop::SoftStop;
 pub use trip::Trip;
 
 /// Limits and timings of the interlock, and its memory.
 ///
-/// On a trip the valve command runs from its last value to zero along a straight line within
-/// [`ramp_time`](Self::ramp_time); cause and time are latched until a reset, after which the
-/// controller's command is faded in over the same time. A trip at sample k means a valve at null
-/// from sample k + ramp_time/h on.
+/// On a trip the command of the table's velocity falls to zero along half a cosine, so long that the
+/// table decelerates by no more than the motion has asked for, within
+/// [`stop_time`](Self::stop_time) and the stroke; the rest of the last command falls within
+/// [`ramp_time`](Self::ramp_time). Cause and time are latched until a reset, after which the
+/// controller's command is faded in over the ramp time. A trip at sample k means a valve at null
+/// from sample k + stop_time/h on.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct Interlock {
     /// Largest displacement, measured or predicted, m.
@@ -63,9 +69,26 @@ pub struct Interlock {
     /// Longest time in saturation, s.
     #[parameter("s", positive)]
     pub saturation_time: f64,
-    /// Time from a trip to the valve at null, s.
+    /// Shortest time from a trip to the valve at null, s.
     #[parameter("s", positive)]
     pub ramp_time: f64,
+    /// Longest time from a trip to the valve at null, s.
+    #[parameter("s", positive)]
+    pub stop_time: f64,
+    /// Largest deceleration of a stop where the time allows, m/s2.
+    ///
+    /// Less while the reference has asked for less.
+    #[parameter("m/s2" => "g", positive)]
+    pub stop_acceleration: f64,
+    /// Share of a limit from which on there is a warning, 0 for none.
+    #[parameter(min = 0.0, max = 1.0, non_negative)]
+    pub warning_level: f64,
+    /// Rigid mass that moves, without a specimen whose acceleration is measured, 0 for no check, kg.
+    #[parameter("kg" => "lbf.s2/in", min = 0.0, non_negative)]
+    pub moving_mass: f64,
+    /// How much the measured mass may exceed the stated one, as its share.
+    #[parameter(positive)]
+    pub mass_tolerance: f64,
     /// Time until the valve answers, allowed for in the stopping distance, s.
     #[parameter("s", non_negative)]
     pub reaction_time: f64,
@@ -130,8 +153,10 @@ pub struct InterlockMemory {
     pub trip_time: f64,
     /// What goes to the valve, V.
     pub command: f64,
-    /// Change of the command per second while ramping down, V/s.
-    ramp: f64,
+    /// What is near its limit now, or was noticed and did not trip.
+    pub warning: Trip,
+    stop: SoftStop,
+    load: Load,
     /// Weight of the controller's command, 0 after a reset and 1 in service.
     fade: f64,
     /// Whether there was a sample.
@@ -177,6 +202,10 @@ pub struct InterlockInput {
     pub supply_flow: f64,
     /// A number that the controller changes at every sample.
     pub heartbeat: i32,
+    /// Whether the accelerometer and the displacement contradict each other.
+    pub sensors_disagree: bool,
+    /// Whether the displacement jumped where the acceleration did not.
+    pub displacement_jumped: bool,
     /// The operator's stop.
     pub stop: bool,
     /// A rising edge ends a trip whose cause is gone.
@@ -203,6 +232,11 @@ impl Interlock {
             saturation_level: 0.99 * VALVE_LIMIT,
             saturation_time: 0.1,
             ramp_time: 0.02,
+            stop_time: 0.3,
+            stop_acceleration: 0.25 * G,
+            warning_level: 0.9,
+            moving_mass: 0.0,
+            mass_tolerance: 1.5,
             reaction_time: 0.008,
             stale_samples: 10,
             stale_travel: 0.02 * INCH,
@@ -222,7 +256,7 @@ impl Interlock {
     }
 
     /// Where the table would come to rest if the interlock tripped now (m): through the reaction
-    /// time at full velocity, then with the flow going to zero along the ramp.
+    /// time at full velocity, then with the flow going to zero within the ramp time.
     pub fn stopping_position(&self, motion: &Motion) -> f64 {
         motion.displacement + motion.velocity * (self.reaction_time + 0.5 * self.ramp_time)
     }
@@ -291,11 +325,11 @@ impl Interlock {
         (m.range[0] - x).max(x - m.range[1])
     }
 
-    /// Whether the controller's command changes faster than any motion asks for.
-    fn chatters(&mut self, request: f64, period: f64) -> bool {
+    /// How fast the controller's command changes, as a share of the limit.
+    fn activity(&mut self, request: f64, period: f64) -> f64 {
         let m = &mut self.memory;
         if !request.is_finite() {
-            return false;
+            return 0.0;
         }
         if !m.started {
             m.requests = [request; SMOOTHED];
@@ -309,17 +343,17 @@ impl Interlock {
             *mean += weight * (way.abs() / period - *mean);
         }
         let [itself, smoothed] = m.activity;
-        smoothed > self.activity_limit || itself > SMOOTHED as f64 * self.activity_limit
+        smoothed.max(itself / SMOOTHED as f64) / self.activity_limit
     }
 
-    /// Whether more has flowed out of the supply for a while than the pump can give for long.
-    fn drains_the_supply(&mut self, flow: f64, period: f64) -> bool {
+    /// What has flowed out of the supply for a while, as a share of what the pump can give for long.
+    fn mean_flow(&mut self, flow: f64, period: f64) -> f64 {
         if self.flow_limit == 0.0 || !flow.is_finite() {
-            return false;
+            return 0.0;
         }
         let m = &mut self.memory;
         m.flow += period / (period + self.flow_time) * (flow - m.flow);
-        m.flow > self.flow_limit
+        m.flow / self.flow_limit
     }
 
     fn misses_beats(&mut self, heartbeat: i32) -> bool {
@@ -336,7 +370,8 @@ impl Interlock {
         m.beats_missed >= self.heartbeat_samples
     }
 
-    fn cause(&mut self, input: &InterlockInput, period: f64) -> Trip {
+    /// The checks of this sample in their order: how much of each limit is used, 1 being all of it.
+    fn checks(&mut self, input: &InterlockInput, period: f64) -> [(f64, Trip); 18] {
         let y = &input.measured;
         let numbers = [
             input.valve_command,
@@ -349,54 +384,74 @@ impl Interlock {
             input.supply_pressure,
             input.supply_flow,
         ];
+        let whole = |holds: bool| if holds { f64::INFINITY } else { 0.0 };
         // Each check keeps a count, so all run at every sample.
         let stale = self.counts_stale(input);
         let silent = self.misses_beats(input.heartbeat);
         let lost = self.misses_the_specimen(input, period);
         let error = self.tracking_error(input, period);
-        let chatters = self.chatters(input.valve_command, period);
-        let drains = self.drains_the_supply(input.supply_flow, period);
+        let activity = self.activity(input.valve_command, period);
+        let flow = self.mean_flow(input.supply_flow, period);
+        let (stated, tolerance) = (self.moving_mass, self.mass_tolerance);
         let m = &mut self.memory;
+        let heavy = stated > 0.0 && m.load.exceeds(input, stated, tolerance);
         if input.valve_command.abs() >= self.saturation_level {
             m.saturated += period;
         } else {
             m.saturated = 0.0;
         }
-        let saturated = m.saturated > self.saturation_time + 1e-9;
+        let saturated = m.saturated / (self.saturation_time + 1e-9);
         m.started = true;
-        let checks = [
-            (numbers.iter().any(|n| !n.is_finite()), Trip::NotFinite),
-            (input.stop, Trip::Stop),
-            (stale, Trip::Stale),
-            (silent, Trip::Heartbeat),
+        let pressure = match self.pressure_limit > 0.0 {
+            true => self.pressure_limit / input.supply_pressure.max(f64::MIN_POSITIVE),
+            false => 0.0,
+        };
+        [
             (
-                self.pressure_limit > 0.0 && input.supply_pressure < self.pressure_limit,
-                Trip::Pressure,
+                whole(numbers.iter().any(|n| !n.is_finite())),
+                Trip::NotFinite,
             ),
-            (drains, Trip::Flow),
+            (whole(input.stop), Trip::Stop),
+            (whole(stale), Trip::Stale),
+            (whole(silent), Trip::Heartbeat),
+            (whole(input.displacement_jumped), Trip::DisplacementJump),
+            (whole(input.sensors_disagree), Trip::SensorsDisagree),
+            (pressure, Trip::Pressure),
+            (flow, Trip::Flow),
             (
-                y.displacement.abs() > self.displacement_limit,
+                y.displacement.abs() / self.displacement_limit,
                 Trip::Displacement,
             ),
             (
-                self.stopping_position(y).abs() > self.displacement_limit,
+                self.stopping_position(y).abs() / self.displacement_limit,
                 Trip::StoppingDistance,
             ),
-            (y.velocity.abs() > self.velocity_limit, Trip::Velocity),
+            (y.velocity.abs() / self.velocity_limit, Trip::Velocity),
             (
-                y.acceleration.abs() > self.acceleration_limit,
+                y.acceleration.abs() / self.acceleration_limit,
                 Trip::Acceleration,
             ),
-            (input.measured_force.abs() > self.force_limit, Trip::Force),
-            (chatters, Trip::Activity),
-            (error > self.tracking_limit, Trip::TrackingError),
+            (input.measured_force.abs() / self.force_limit, Trip::Force),
+            (whole(heavy), Trip::Mass),
+            (activity, Trip::Activity),
+            (error / self.tracking_limit, Trip::TrackingError),
             (saturated, Trip::Saturation),
-            (lost, Trip::SpecimenLost),
-        ];
-        checks
-            .into_iter()
-            .find_map(|(holds, trip)| holds.then_some(trip))
-            .unwrap_or_default()
+            (whole(lost), Trip::SpecimenLost),
+        ]
+    }
+
+    /// The cause to trip, and what is near its limit.
+    fn cause(&mut self, input: &InterlockInput, period: f64) -> (Trip, Trip) {
+        let checks = self.checks(input, period);
+        let over = |level: f64| {
+            let mut found = checks.iter();
+            found.find_map(|(used, trip)| (*used > level).then_some(*trip))
+        };
+        let near = match self.warning_level > 0.0 {
+            true => over(self.warning_level),
+            false => None,
+        };
+        (over(1.0).unwrap_or_default(), near.unwrap_or_default())
     }
 }
 
@@ -416,25 +471,26 @@ impl Controller for Interlock {
     }
 
     fn step(&mut self, input: &InterlockInput, period: f64) -> f64 {
-        let cause = self.cause(input, period);
+        let (cause, near) = self.cause(input, period);
+        let limits = *self;
         let pressed = input.reset && !self.memory.reset_was_held;
         let ramp_time = self.ramp_time.max(period);
         let m = &mut self.memory;
         m.reset_was_held = input.reset;
+        m.warning = near;
         if m.trip != Trip::None && pressed && cause == Trip::None && m.command == 0.0 {
             (m.trip, m.trip_time, m.fade) = (Trip::None, 0.0, 0.0);
         }
         if m.trip == Trip::None && cause != Trip::None {
             (m.trip, m.trip_time) = (cause, m.time);
-            m.ramp = m.command.abs() / ramp_time;
+            m.stop.begin(m.command, &limits, period);
         }
         if m.trip == Trip::None {
+            m.stop.learn(input, m.command, period);
             m.command = m.fade * input.valve_command;
             m.fade = (m.fade + period / ramp_time).min(1.0);
         } else {
-            // One part in 1e9 less would leave a crumb of rounding after the last step.
-            let step = m.ramp * period * (1.0 + 1e-9);
-            m.command -= m.command.clamp(-step, step);
+            m.command = m.stop.command(ramp_time, period);
         }
         m.time += period;
         m.command

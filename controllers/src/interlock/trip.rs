@@ -38,11 +38,17 @@ pub enum Trip {
     Pressure = 14,
     /// More flows out of the supply than the pump can give for long.
     Flow = 15,
+    /// The accelerometer and the displacement contradict each other.
+    SensorsDisagree = 16,
+    /// The displacement jumped where the acceleration did not.
+    DisplacementJump = 17,
+    /// The moving mass is far above the stated one.
+    Mass = 18,
 }
 
 impl Trip {
     /// All causes, in the order of their numbers.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 19] = [
         Self::None,
         Self::NotFinite,
         Self::Stale,
@@ -59,6 +65,9 @@ impl Trip {
         Self::Activity,
         Self::Pressure,
         Self::Flow,
+        Self::SensorsDisagree,
+        Self::DisplacementJump,
+        Self::Mass,
     ];
 
     /// Its short name.
@@ -80,6 +89,9 @@ impl Trip {
             Self::Activity => "activity",
             Self::Pressure => "pressure",
             Self::Flow => "flow",
+            Self::SensorsDisagree => "sensors-disagree",
+            Self::DisplacementJump => "displacement-jump",
+            Self::Mass => "mass",
         }
     }
 
@@ -102,6 +114,27 @@ impl Trip {
             Self::Activity => "the valve command chatters or the loop oscillates",
             Self::Pressure => "the supply's pressure is below its limit",
             Self::Flow => "the flow out of the supply is beyond its limit",
+            Self::SensorsDisagree => "the accelerometer contradicts the displacement",
+            Self::DisplacementJump => "the displacement jumps where the acceleration does not",
+            Self::Mass => "the moving mass is far above the stated one",
+        }
+    }
+
+    /// What a warning of it says.
+    pub const fn warning(self) -> &'static str {
+        match self {
+            Self::None => "nothing is near its limit",
+            Self::Displacement => "the displacement is near its limit",
+            Self::StoppingDistance => "the stopping distance is near the displacement limit",
+            Self::Velocity => "the velocity is near its limit",
+            Self::Acceleration => "the acceleration is near its limit",
+            Self::Force => "the force is near its limit",
+            Self::TrackingError => "the displacement is nearly too far from the reference",
+            Self::Saturation => "the valve command was saturated for nearly too long",
+            Self::Activity => "the valve command nearly chatters or the loop nearly oscillates",
+            Self::Pressure => "the supply's pressure is near its limit",
+            Self::Flow => "the flow out of the supply is near its limit",
+            other => other.words(),
         }
     }
 }

@@ -1,6 +1,8 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! Sensors of the rig as an FMU.
 
+use controllers::sensor_vote::{Doubt, SensorVote, VoteInput, Voted};
+use controllers::{Controller, Motion};
 use fmu_kit::{
     Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Terminal, Variable,
 };
@@ -12,6 +14,29 @@ use plant::sensors::instrumentation::{
 };
 use serde::{Deserialize, Serialize};
 
+/// What is in doubt, by the numbers of [`Doubt`].
+const DOUBTS: Enumeration = Enumeration {
+    name: "SensorDoubt",
+    items: &{
+        let mut items = [Item {
+            name: "",
+            value: 0,
+            description: "",
+        }; Doubt::ALL.len()];
+        let mut i = 0;
+        while i < items.len() {
+            let doubt = Doubt::ALL[i];
+            items[i] = Item {
+                name: doubt.name(),
+                value: doubt as i32,
+                description: doubt.words(),
+            };
+            i += 1;
+        }
+        items
+    },
+};
+
 /// Between the true motion and what the controllers are told of it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Instrumentation {
@@ -22,6 +47,11 @@ pub struct Instrumentation {
     motion: TrueMotion,
     measured: Measured,
     valid: bool,
+    votes: bool,
+    vote: SensorVote,
+    voted: Voted,
+    doubt: i32,
+    replaced_samples: i32,
     velocity_estimate: i32,
     fault: i32,
     fault_channel: i32,
@@ -59,6 +89,17 @@ const FAULTS: Enumeration = Enumeration {
         item("none", 0, "No fault"),
         item("frozen", 1, "The sensor repeats its last reading"),
         item("not_a_number", 2, "The sensor gives no number"),
+        item("reversed", 3, "The sensor's reading has another sign"),
+        item(
+            "offset",
+            4,
+            "The sensor's reading is off by fault_size; for one sample, a spike",
+        ),
+        item(
+            "dropped",
+            5,
+            "All sensors repeat their last reading at a share fault_size of the samples",
+        ),
     ],
 };
 
@@ -82,6 +123,11 @@ impl Default for Instrumentation {
             motion: TrueMotion::default(),
             measured: Measured::default(),
             valid: true,
+            votes: false,
+            vote: SensorVote::default(),
+            voted: Voted::default(),
+            doubt: 0,
+            replaced_samples: 0,
             velocity_estimate: 0,
             fault: 0,
             fault_channel: 0,
@@ -341,7 +387,7 @@ impl Component for Instrumentation {
             input("actuator_force", s.motion.actuator_force, "Force of the actuator", "N" => "lbf").nominal(400.0);
             input("specimen_acceleration", s.motion.specimen_acceleration, "Absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
             output("measured_displacement", s.measured.displacement, "Displacement of the table, as measured", "m" => "in")
-                .discrete().nominal(0.0381).depends_on(&["displacement"], Dependent);
+                .discrete().nominal(0.0381).depends_on(&["displacement", "acceleration"], Dependent);
             output("measured_velocity", s.measured.velocity, "Velocity of the table, as measured", "m/s" => "in/s")
                 .discrete().nominal(0.5).depends_on(&["displacement", "velocity", "acceleration"], Dependent);
             output("measured_acceleration", s.measured.acceleration, "Absolute acceleration of the table, as measured", "m/s2" => "g")
@@ -351,6 +397,10 @@ impl Component for Instrumentation {
             output("measured_specimen_acceleration", s.measured.specimen_acceleration, "Absolute acceleration of the specimen, as measured", "m/s2" => "g")
                 .discrete().nominal(10.0).depends_on(&["specimen_acceleration"], Dependent);
             output("measurement_valid", s.valid, "Whether all readings are numbers; those that are not keep their last value");
+            output("sensors_disagree", s.voted.disagree, "Whether accelerometer and displacement contradict each other; by the vote");
+            output("displacement_jumped", s.voted.jumped, "Whether the displacement jumped for longer than the bridge time; by the vote");
+            output("warning", s.doubt, "What is in doubt now; by the vote").choices(DOUBTS);
+            output("replaced_samples", s.replaced_samples, "Samples that the vote replaced");
         };
         for channel in CHANNELS {
             variables.extend(channel.parameters());
@@ -361,6 +411,12 @@ impl Component for Instrumentation {
             parameter("velocity_lag", s.sensors.velocity_lag, "Lag of the differentiated velocity", "s").min(0.0);
             parameter("seed", s.seed, "Seed of the noise").min(0.0);
             parameter("fault_time", s.sensors.fault_time, "When the fault occurs", "s");
+            parameter("fault_duration", s.sensors.fault_duration, "How long the fault lasts, 0 for good", "s").min(0.0);
+            parameter("fault_size", s.sensors.fault_size, "Size of an offset in the channel's SI unit, or share of dropped samples");
+        });
+        variables.extend(fmu_kit::table! { Self, s:
+            parameter("voting", s.votes, "Whether displacement and acceleration are compared and wrong samples replaced");
+            group(s.vote).prefixed("vote.");
         });
         variables.extend([
             Variable::choice("velocity_estimate", ESTIMATES, |s: &mut Self| {
@@ -386,7 +442,10 @@ impl Component for Instrumentation {
         self.sensors.fault = match self.fault {
             0 => SensorFault::None,
             1 => SensorFault::Frozen,
-            _ => SensorFault::NotANumber,
+            2 => SensorFault::NotANumber,
+            3 => SensorFault::Reversed,
+            4 => SensorFault::Offset,
+            _ => SensorFault::Dropped,
         };
         self.sensors.fault_channel = self.fault_channel.unsigned_abs() as usize;
         self.sensors.seed = u64::from(self.seed.cast_unsigned());
@@ -394,6 +453,10 @@ impl Component for Instrumentation {
         self.state = InstrumentationState::default();
         self.measured = Measured::default();
         self.valid = true;
+        self.vote.validate()?;
+        self.vote.reset();
+        self.voted = Voted::default();
+        (self.doubt, self.replaced_samples) = (0, 0);
         Ok(())
     }
 
@@ -419,6 +482,29 @@ impl Component for Instrumentation {
             specimen_acceleration: keep(reading.specimen_acceleration, held.specimen_acceleration),
         };
         self.valid = valid;
+        if self.votes {
+            self.voted = self.vote.step(
+                &VoteInput {
+                    measured: Motion {
+                        displacement: self.measured.displacement,
+                        velocity: self.measured.velocity,
+                        acceleration: self.measured.acceleration,
+                    },
+                    measured_force: self.measured.actuator_force,
+                    valid,
+                },
+                step_size,
+            );
+            self.measured.displacement = self.voted.motion.displacement;
+            self.measured.velocity = self.voted.motion.velocity;
+            self.measured.acceleration = self.voted.motion.acceleration;
+            self.measured.actuator_force = self.voted.force;
+            self.valid = self.voted.valid;
+            self.doubt = self.voted.doubt as i32;
+            if !matches!(self.voted.doubt, Doubt::None | Doubt::Disagreement) {
+                self.replaced_samples = self.replaced_samples.saturating_add(1);
+            }
+        }
         Ok(())
     }
 }

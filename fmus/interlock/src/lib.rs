@@ -8,30 +8,39 @@ use fmu_kit::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Why it tripped, by the numbers of [`Trip`].
+/// Causes by the numbers of [`Trip`], in the words of a trip or of a warning.
+const fn causes(warn: bool) -> [Item; Trip::ALL.len()] {
+    let mut items = [Item {
+        name: "",
+        value: 0,
+        description: "",
+    }; Trip::ALL.len()];
+    let mut i = 0;
+    while i < items.len() {
+        let cause = Trip::ALL[i];
+        items[i] = Item {
+            name: cause.name(),
+            value: cause as i32,
+            description: if warn { cause.warning() } else { cause.words() },
+        };
+        i += 1;
+    }
+    items
+}
+
+/// Why it tripped.
 const CAUSES: Enumeration = Enumeration {
     name: "TripCause",
-    items: &{
-        let mut items = [Item {
-            name: "",
-            value: 0,
-            description: "",
-        }; Trip::ALL.len()];
-        let mut i = 0;
-        while i < items.len() {
-            let cause = Trip::ALL[i];
-            items[i] = Item {
-                name: cause.name(),
-                value: cause as i32,
-                description: cause.words(),
-            };
-            i += 1;
-        }
-        items
-    },
+    items: &causes(false),
 };
 
-/// Passes the controller's command on to the valve, or brings the valve to null.
+/// What it warns of.
+const WARNINGS: Enumeration = Enumeration {
+    name: "TripWarning",
+    items: &causes(true),
+};
+
+/// Passes the controller's command on to the valve, or stops the table softly.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Interlock {
     law: Law,
@@ -43,11 +52,14 @@ pub struct Interlock {
     supply_pressure: f64,
     supply_flow: f64,
     measurement_valid: bool,
+    sensors_disagree: bool,
+    displacement_jumped: bool,
     heartbeat: i32,
     stop: bool,
     reset: bool,
     tripped: bool,
     trip_cause: i32,
+    warning: i32,
 }
 
 impl Default for Interlock {
@@ -62,11 +74,14 @@ impl Default for Interlock {
             supply_pressure: 0.0,
             supply_flow: 0.0,
             measurement_valid: true,
+            sensors_disagree: false,
+            displacement_jumped: false,
             heartbeat: 0,
             stop: false,
             reset: false,
             tripped: false,
             trip_cause: 0,
+            warning: 0,
         }
     }
 }
@@ -114,6 +129,8 @@ impl Component for Interlock {
             input("supply_pressure", s.supply_pressure, "Pressure of the supply; unused without a limit of it", "Pa" => "psi").nominal(2e7);
             input("supply_flow", s.supply_flow, "Flow out of the supply; unused without a limit of it", "m3/s" => "in3/s").nominal(2e-4);
             input("measurement_valid", s.measurement_valid, "Whether all measurements are numbers");
+            input("sensors_disagree", s.sensors_disagree, "Whether accelerometer and displacement contradict each other");
+            input("displacement_jumped", s.displacement_jumped, "Whether the displacement jumped where the acceleration did not");
             input("heartbeat", s.heartbeat, "A number that the controller changes at every sample");
             input("stop", s.stop, "The operator's stop");
             input("reset", s.reset, "A rising edge ends a trip whose cause is gone");
@@ -121,6 +138,7 @@ impl Component for Interlock {
                 .discrete().nominal(10.0).depends_on_inputs(Dependent);
             output("tripped", s.tripped, "Whether the interlock has tripped");
             output("trip_cause", s.trip_cause, "Why it tripped").choices(CAUSES);
+            output("warning", s.warning, "What is near its limit now").choices(WARNINGS);
             output("trip_time", s.law.memory.trip_time, "When it tripped, 0 if it did not", "s").discrete();
             group(s.law);
         }
@@ -129,7 +147,7 @@ impl Component for Interlock {
     fn initialize(&mut self) -> ComponentResult {
         self.law.validate()?;
         self.law.reset();
-        (self.tripped, self.trip_cause) = (false, 0);
+        (self.tripped, self.trip_cause, self.warning) = (false, 0, 0);
         Ok(())
     }
 
@@ -149,6 +167,8 @@ impl Component for Interlock {
                 specimen_acceleration: self.specimen_acceleration,
                 supply_pressure: self.supply_pressure,
                 supply_flow: self.supply_flow,
+                sensors_disagree: self.sensors_disagree,
+                displacement_jumped: self.displacement_jumped,
                 heartbeat: self.heartbeat,
                 stop: self.stop,
                 reset: self.reset,
@@ -157,6 +177,7 @@ impl Component for Interlock {
         );
         self.tripped = self.law.memory.trip != Trip::None;
         self.trip_cause = self.law.memory.trip as i32;
+        self.warning = self.law.memory.warning as i32;
         Ok(())
     }
 }

@@ -166,3 +166,38 @@ fn what_cannot_be_commissioned_or_designed_is_refused() {
     assert!((reached / 25.0 - 1.0).abs() < 0.1, "{reached}");
     assert!(Path::new(json["report"].as_str().unwrap()).ends_with("report.html"));
 }
+
+#[test]
+fn the_system_file_of_mpc_holds_every_sample_of_shift_and_gives_the_same_run() {
+    use laboratory::systems::tuning::Wanted;
+    let folder = tempfile::tempdir().unwrap();
+    let wanted = Wanted::default();
+    let file = built_in::system("mpc", "servohydraulic", "yielding", wanted).unwrap();
+    let text = file.to_toml();
+    // The rig's measurements are a sample late, so the reference that they are compared with is too.
+    for quantity in ["displacement", "velocity", "acceleration"] {
+        for link in [
+            format!("\"reference.{quantity}[-1] -> mpc.reference_{quantity}\""),
+            format!("\"reference.{quantity} -> mpc.reference_{quantity}[1]\""),
+        ] {
+            assert!(text.contains(&link), "{link} is not in\n{text}");
+        }
+    }
+    std::fs::write(folder.path().join("own.toml"), text).unwrap();
+    let short = ["--duration", "6s", "--json", "--out"];
+    let own = ["run", "own.toml"];
+    let usual = [
+        "run",
+        "mpc",
+        "--plant",
+        "servohydraulic",
+        "--specimen",
+        "yielding",
+    ];
+    let checksum = |arguments: &[&str], out: &str| {
+        let output = shakebench(folder.path(), &[arguments, &short, &[out]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        std::fs::read(folder.path().join(out).join("results.csv")).unwrap()
+    };
+    assert!(checksum(&own, "own") == checksum(&usual, "usual"));
+}

@@ -12,6 +12,7 @@ mod commissioning;
 mod contract;
 mod diagnosis;
 mod failures;
+mod fault_table;
 mod figures;
 mod hostile;
 mod installation;

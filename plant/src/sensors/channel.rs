@@ -72,14 +72,20 @@ impl Noise {
     /// A value of the standard normal distribution: Box and Muller's method on two outputs of
     /// SplitMix64 (Steele, Lea and Flood 2014).
     pub fn gaussian(&self) -> f64 {
-        let key = mix(mix(self.seed) ^ mix(self.channel.wrapping_add(0x5EED)));
         let counter = self.sample.wrapping_mul(2);
-        let uniform = |n: u64| {
-            let bits = mix(key.wrapping_add(n.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
-            ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-        };
-        let (radius, angle) = (uniform(counter), uniform(counter.wrapping_add(1)));
+        let (radius, angle) = (self.drawn(counter), self.drawn(counter.wrapping_add(1)));
         (-2.0 * radius.ln()).sqrt() * (TAU * angle).cos()
+    }
+
+    /// A value between 0 and 1, all equally likely.
+    pub fn uniform(&self) -> f64 {
+        self.drawn(self.sample.wrapping_mul(2))
+    }
+
+    fn drawn(&self, counter: u64) -> f64 {
+        let key = mix(mix(self.seed) ^ mix(self.channel.wrapping_add(0x5EED)));
+        let bits = mix(key.wrapping_add(counter.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
+        ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
 }
 

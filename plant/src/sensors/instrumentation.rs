@@ -62,6 +62,12 @@ pub enum SensorFault {
     Frozen,
     /// It gives no number.
     NotANumber,
+    /// Its reading has another sign.
+    Reversed,
+    /// Its reading is off by the fault's size: for the duration of a sample a spike, else an offset.
+    Offset,
+    /// All channels repeat their last reading at a share of the samples, drawn from the seed.
+    Dropped,
 }
 
 /// The channels of the rig, in the order of their faults' numbers.
@@ -101,6 +107,10 @@ pub struct Instrumentation {
     pub fault_channel: usize,
     /// When it fails, s.
     pub fault_time: f64,
+    /// How long it fails, 0 for good, s.
+    pub fault_duration: f64,
+    /// Size of an offset, in the channel's SI unit; share of dropped samples.
+    pub fault_size: f64,
 }
 
 impl Default for Instrumentation {
@@ -118,6 +128,8 @@ impl Default for Instrumentation {
             fault: SensorFault::None,
             fault_channel: 0,
             fault_time: 0.0,
+            fault_duration: 0.0,
+            fault_size: 0.0,
         }
     }
 }
@@ -187,6 +199,8 @@ impl Instrumentation {
         ModelError::require_finite("accelerometer_tilt", self.accelerometer_tilt)?;
         ModelError::require_non_negative("delay", self.delay)?;
         ModelError::require_finite("fault_time", self.fault_time)?;
+        ModelError::require_non_negative("fault_duration", self.fault_duration)?;
+        ModelError::require_finite("fault_size", self.fault_size)?;
         if self.fault_channel >= CHANNELS.len() {
             return Err(ModelError::Parameter {
                 name: "fault_channel",
@@ -261,8 +275,16 @@ impl Instrumentation {
             &self.actuator_force,
             &self.specimen_acceleration,
         ];
+        let since = time - self.fault_time + 1e-9;
+        let fails = since >= 0.0 && (self.fault_duration == 0.0 || since < self.fault_duration);
+        let lost = Noise {
+            seed: self.seed,
+            channel: CHANNELS.len() as u64,
+            sample: state.samples,
+        };
+        let drops = fails && lost.uniform() < self.fault_size;
         for (i, channel) in channels.into_iter().enumerate() {
-            let failed = i == self.fault_channel && time >= self.fault_time - 1e-9;
+            let failed = i == self.fault_channel && fails;
             let noise = Noise {
                 seed: self.seed,
                 channel: i as u64,
@@ -279,27 +301,36 @@ impl Instrumentation {
             state.reading[i] = match self.fault {
                 SensorFault::Frozen if failed && !first => state.reading[i],
                 SensorFault::NotANumber if failed => f64::NAN,
+                SensorFault::Reversed if failed => -reading,
+                SensorFault::Offset if failed => reading + self.fault_size,
+                SensorFault::Dropped if drops && !first => state.reading[i],
                 _ => reading,
             };
         }
         let [x, a, force, specimen] = state.reading;
+        // Readings that are not numbers do not reach the estimate of the velocity for good.
+        let [last_x, last_a] = state.previous;
+        let (known_x, known_a) = (
+            if x.is_finite() { x } else { last_x },
+            if a.is_finite() { a } else { last_a },
+        );
         if first {
-            state.estimate = [x, 0.0, 0.0];
-            state.previous = [x, a];
+            state.estimate = [known_x, 0.0, 0.0];
+            state.previous = [known_x, known_a];
         }
         let velocity = match self.velocity_estimate {
             VelocityEstimate::Differentiated => {
-                let rate = (x - state.previous[0]) / period;
+                let rate = (known_x - state.previous[0]) / period;
                 let weight = period / (period + self.velocity_lag);
                 state.estimate[1] += weight * (rate - state.estimate[1]);
                 state.estimate[1]
             }
             VelocityEstimate::Kalman => {
                 let [at, v, bias] = state.estimate;
-                let mean = 0.5 * (a + state.previous[1]) - bias;
+                let mean = 0.5 * (known_a + state.previous[1]) - bias;
                 let moved = if first { 0.0 } else { period };
                 let predicted = at + moved * v + 0.5 * moved * moved * mean;
-                let off = x - predicted;
+                let off = if x.is_finite() { x - predicted } else { 0.0 };
                 let [g0, g1, g2] = filter.gain;
                 state.estimate = [
                     predicted + g0 * off,
@@ -312,7 +343,7 @@ impl Instrumentation {
                 .velocity_delay
                 .delayed(motion.velocity, self.delay / period),
         };
-        state.previous = [x, a];
+        state.previous = [known_x, known_a];
         state.samples += 1;
         Measured {
             displacement: x,

@@ -181,3 +181,42 @@ fn faults_strike_one_channel_at_their_time() {
         }
     }
 }
+
+#[test]
+fn a_fault_may_end_and_has_a_size() {
+    let healthy = shake(&Instrumentation::laboratory(1), 200);
+    let with = |fault: SensorFault, size: f64, duration: f64| {
+        let sensors = Instrumentation {
+            fault,
+            fault_channel: 1,
+            fault_time: 0.1,
+            fault_duration: duration,
+            fault_size: size,
+            ..Instrumentation::laboratory(1)
+        };
+        shake(&sensors, 200)
+    };
+    let spike = with(SensorFault::Offset, 3.0, PERIOD);
+    let reversed = with(SensorFault::Reversed, 0.0, 0.1);
+    let dropped = with(SensorFault::Dropped, 0.3, 0.0);
+    let mut repeats = 0;
+    for k in 0..200 {
+        let expected = healthy[k].1.acceleration;
+        let off = if k == 50 { 3.0 } else { 0.0 };
+        assert!((spike[k].1.acceleration - expected - off).abs() < 1e-12);
+        let sign = if (50..100).contains(&k) { -1.0 } else { 1.0 };
+        assert_eq!(reversed[k].1.acceleration, sign * expected, "{k}");
+        let lost = k > 50 && dropped[k].1.acceleration == dropped[k - 1].1.acceleration;
+        repeats += usize::from(lost);
+        if !lost {
+            assert_eq!(dropped[k].1.displacement, healthy[k].1.displacement);
+        }
+    }
+    // 45 of 150 in the mean, with a standard deviation of 5.6.
+    assert!((28..62).contains(&repeats), "{repeats}");
+    // A reading that is not a number does not stay in the velocity.
+    let lost = with(SensorFault::NotANumber, 0.0, PERIOD);
+    assert!(lost[50].1.acceleration.is_nan());
+    let off = |k: usize| (lost[k].1.velocity - healthy[k].1.velocity).abs();
+    assert!((0..200).all(|k| off(k) < 1e-3));
+}

@@ -1,4 +1,4 @@
-//! Faults injected into the physical rig: the valve is brought to null within the stated time.
+//! Faults injected into the physical rig: the interlock trips within the stated time and stops the table softly.
 
 use acceptance::native_rig::{Injected, NativeRig, NativeRun, PERIOD};
 use controllers::interlock::Trip;
@@ -8,6 +8,8 @@ use units::constants::{INCH, STROKE};
 
 /// When the fault occurs, s.
 const AT: f64 = 8.0;
+/// Longest duration of a stop, s.
+const STOP: f64 = 0.3;
 
 fn motion() -> Motion {
     motion::built_in(1, &Options::default()).unwrap()
@@ -34,11 +36,17 @@ fn check(name: &str, run: &NativeRun, causes: &[Trip], within: f64) {
     );
     assert!(causes.contains(&m.trip), "{name}: {:?}", m.trip);
     assert!(m.trip_time >= AT - 1e-9, "{name} tripped before the fault");
-    assert!(
-        time_to_null(run) <= within,
-        "{name}: {} s",
-        time_to_null(run)
-    );
+    assert!(m.trip_time - AT <= within, "{name}: {} s", m.trip_time - AT);
+    let stopped = time_to_null(run) - (m.trip_time - AT);
+    assert!(stopped <= STOP + PERIOD + 1e-9, "{name}: {stopped} s");
+    // No harder than the motion shook the table before.
+    let largest = |from: usize, to: usize| {
+        let part = &run.acceleration[from..to];
+        part.iter().fold(0.0, |m: f64, a| m.max(a.abs()))
+    };
+    let at = (m.trip_time / PERIOD).round() as usize;
+    let (stop, motion) = (largest(at, run.acceleration.len()), largest(0, at));
+    assert!(stop <= motion, "{name}: {stop} beyond {motion} m/s2");
     assert!(
         run.displacement.iter().all(|x| x.abs() < STROKE),
         "{name} hit the stop"
@@ -56,7 +64,7 @@ fn without_a_fault_nothing_trips() {
 }
 
 #[test]
-fn a_reading_that_is_no_number_brings_the_valve_to_null_in_22_ms() {
+fn a_reading_that_is_no_number_trips_in_2_ms() {
     for (channel, name) in CHANNELS.iter().enumerate().take(3) {
         let mut rig = laboratory();
         rig.sensors.fault = SensorFault::NotANumber;
@@ -67,33 +75,33 @@ fn a_reading_that_is_no_number_brings_the_valve_to_null_in_22_ms() {
             &format!("{name} is not a number"),
             &run,
             &[Trip::NotFinite],
-            0.022,
+            0.002,
         );
     }
 }
 
 #[test]
-fn a_frozen_sensor_brings_the_valve_to_null_in_100_ms_of_motion() {
+fn a_frozen_sensor_trips_in_80_ms_of_motion() {
     for (channel, name) in CHANNELS.iter().enumerate().take(3) {
         let mut rig = laboratory();
         rig.sensors.fault = SensorFault::Frozen;
         rig.sensors.fault_channel = channel;
         rig.sensors.fault_time = AT;
         let run = rig.play(&motion());
-        check(&format!("{name} frozen"), &run, &[Trip::Stale], 0.1);
+        check(&format!("{name} frozen"), &run, &[Trip::Stale], 0.08);
     }
 }
 
 #[test]
-fn a_failed_controller_brings_the_valve_to_null_in_32_ms() {
+fn a_failed_controller_trips_in_10_ms() {
     let mut rig = laboratory();
     rig.injected = Injected::ControllerFails(AT);
     let run = rig.play(&motion());
-    check("controller fails", &run, &[Trip::Heartbeat], 0.032);
+    check("controller fails", &run, &[Trip::Heartbeat], 0.0101);
 }
 
 #[test]
-fn a_lost_supply_brings_the_valve_to_null_in_a_second_of_motion() {
+fn a_lost_supply_trips_in_a_second_of_motion() {
     let mut rig = laboratory();
     rig.injected = Injected::SupplyLost(AT);
     let run = rig.play(&motion());

@@ -12,6 +12,7 @@ pub mod signals;
 pub mod summary;
 pub mod table;
 pub mod text;
+mod warned;
 
 use std::path::{Path, PathBuf};
 

@@ -126,6 +126,7 @@ impl Summary {
             .collect();
         let notes = system.notes.iter().chain(&outcome.notes);
         warnings.splice(0..0, notes.cloned());
+        warnings.extend(super::warned::warned(system, outcome));
         if let Some(taken) = outcome.variable.as_ref().filter(|taken| taken.over > 0) {
             warnings.push(format!(
                 "{} of {} steps were accepted with an estimated coupling error above {} % (at \

@@ -160,27 +160,31 @@ fn bands(own: &Laboratory) -> Vec<Vec<String>> {
     let head = [
         "band",
         "response spectrum, largest",
+        "at",
         "mean",
         "gain",
         "delay",
         "coherence",
     ];
     let mut rows = vec![head.map(str::to_string).to_vec()];
-    for (n, spectrum) in own.response_spectrum_percent.iter().enumerate() {
+    for (n, spectrum) in own.spectrum_deviations().enumerate() {
         let [from, to] = spectrum.band_hz;
         let mut row = vec![
             format!("{from} to {to} Hz"),
             format!("{:.2} %", spectrum.largest),
+            format!("{:.3} Hz", spectrum.largest_at_hz),
             format!("{:.2} %", spectrum.mean),
         ];
-        row.extend(match own.coherence.as_ref().map(|bands| &bands[n]) {
-            Some(band) => [
-                format!("{:.4}", band.gain),
-                format!("{:.2} ms", 1e3 * band.delay_s),
-                format!("{:.4}", band.coherence),
-            ],
-            None => ["-", "-", "-"].map(str::to_string),
-        });
+        row.extend(
+            match own.coherence.as_ref().and_then(|bands| bands.get(n)) {
+                Some(band) => [
+                    format!("{:.4}", band.gain),
+                    format!("{:.2} ms", 1e3 * band.delay_s),
+                    format!("{:.4}", band.coherence),
+                ],
+                None => ["-", "-", "-"].map(str::to_string),
+            },
+        );
         rows.push(row);
     }
     rows

@@ -147,6 +147,9 @@ fn add_aids(file: &mut SystemFile, wanted: &[&str]) -> Result<(), SystemError> {
     Ok(())
 }
 
+/// The interlock's parameter for the mass that moves.
+const MOVING_MASS: &str = "moving_mass";
+
 /// Names of the plants.
 pub fn plants() -> impl Iterator<Item = &'static str> {
     PLANTS.iter().map(|part| part.name)
@@ -271,7 +274,17 @@ pub fn system(
     tuning::apply(&mut file, &rig, own, wanted)
         .map_err(|reason| file.at_fault("tuning", reason))?;
     file.redirect(&rig.instead);
+    let mass =
+        tuning::rigid_mass(&rig, wanted).map_err(|reason| file.at_fault("tuning", reason))?;
     file.extend(rig);
+    // Of a computed structure nobody states the mass.
+    let mass = mass.filter(|_| opensees::model_of(specimen).is_none());
+    if let (Some(mass), Some(interlock)) = (mass, file.components.get_mut("interlock"))
+        && interlock.fmu == "Interlock"
+        && !interlock.parameters.contains_key(MOVING_MASS)
+    {
+        interlock.set(MOVING_MASS, mass);
+    }
     match on_table {
         None => file.disconnect("specimen"),
         Some((specimen, _)) => {

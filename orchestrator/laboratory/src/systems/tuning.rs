@@ -136,6 +136,24 @@ pub(super) fn apply(
     rules.apply(file, specimen)
 }
 
+/// The rigid mass that moves on `plant` by the model that its controllers are tuned on, kg; none without a model of
+/// valve and oil, in which it would be no more than a coefficient.
+///
+/// # Errors
+/// A model that cannot be read.
+pub(super) fn rigid_mass(plant: &SystemFile, wanted: Wanted<'_>) -> Result<Option<f64>, String> {
+    let of = |model: &ControlModel| model.hydraulics.map(|_| model.rig.table.mass);
+    match (wanted.rules, wanted.tuning, wanted.model) {
+        (Some(rules), ..) => Ok(of(&rules.model)),
+        (None, Some(Tuning::Printed), _) => Ok(None),
+        (None, _, Some(path)) => ControlModel::read(path).map(|model| of(&model)),
+        (None, _, None) if plant.commissioned => {
+            ControlModel::commissioned().map(|model| of(&model))
+        }
+        (None, _, None) => Ok(None),
+    }
+}
+
 /// The references that go to `inputs` of the component `name` are those `ahead` samples ahead.
 fn place_references(
     connections: &mut [Link],

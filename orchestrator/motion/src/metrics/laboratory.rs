@@ -10,18 +10,26 @@ use crate::peak;
 
 /// Bands in which figures are given, Hz.
 pub const BANDS: [[f64; 2]; 5] = [[0.5, 1.0], [1.0, 2.0], [2.0, 4.0], [4.0, 8.0], [8.0, 15.0]];
-/// Oscillators an octave.
-const PER_OCTAVE: f64 = 12.0;
+/// Bands above them in which response spectra are compared, Hz. The transfer function is not: the motions have
+/// no power there.
+pub const HIGH_BANDS: [[f64; 2]; 2] = [[15.0, 30.0], [30.0, 50.0]];
+/// Oscillators an octave at least.
+const PER_OCTAVE: f64 = 24.0;
+/// Oscillators between the two neighbours of the one that is farthest off.
+const BETWEEN: usize = 8;
 /// Segments of the transfer function, s: Hann windows that overlap by half.
 const SEGMENT: f64 = 8.0;
 
 /// How far the response spectrum of the table is from the reference's, in a band.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct SpectrumDeviation {
     /// From and to, Hz.
     pub band_hz: [f64; 2],
     /// Largest `100 |S_table / S_reference - 1|`, %.
     pub largest: f64,
+    /// Natural frequency of the oscillator where it is, Hz.
+    #[serde(default)]
+    pub largest_at_hz: f64,
     /// Its mean over the band, oscillators evenly spaced by the logarithm of frequency, %.
     pub mean: f64,
 }
@@ -45,6 +53,9 @@ pub struct Transfer {
 pub struct Laboratory {
     /// Response spectra at 5 % damping, by band.
     pub response_spectrum_percent: [SpectrumDeviation; BANDS.len()],
+    /// The same above 15 Hz, to where the spectrum is the peak acceleration.
+    #[serde(default)]
+    pub response_spectrum_above_percent: [SpectrumDeviation; HIGH_BANDS.len()],
     /// Transfer function, by band; none for a motion shorter than two segments.
     pub coherence: Option<[Transfer; BANDS.len()]>,
     /// `100 rms(a_ref - a) / max|a_ref|` over the time in which the reference's Arias intensity goes
@@ -71,6 +82,8 @@ impl Laboratory {
             .collect();
         Self {
             response_spectrum_percent: BANDS.map(|band| deviation(wanted, found, dt, band)),
+            response_spectrum_above_percent: HIGH_BANDS
+                .map(|band| deviation(wanted, found, dt, band)),
             coherence: transfer(wanted, found, dt),
             significant_duration_percent: 100.0 * rms(&strong) / peak(wanted),
             significant_duration_s: (to - from) as f64 * dt,
@@ -79,11 +92,30 @@ impl Laboratory {
         }
     }
 
-    /// The largest deviation of the response spectra over all bands, %.
+    /// The largest deviation of the response spectra from 0.5 to 15 Hz, %.
     #[must_use]
     pub fn largest_spectrum_deviation(&self) -> f64 {
         let bands = self.response_spectrum_percent.iter();
         bands.map(|band| band.largest).fold(0.0, f64::max)
+    }
+
+    /// The deviations of the response spectra in all bands from 0.5 to 50 Hz.
+    pub fn spectrum_deviations(&self) -> impl Iterator<Item = &SpectrumDeviation> {
+        let above = self.response_spectrum_above_percent.iter();
+        self.response_spectrum_percent.iter().chain(above)
+    }
+
+    /// The band from 0.5 to 50 Hz in which the response spectra are farthest apart.
+    #[must_use]
+    pub fn worst_band(&self) -> &SpectrumDeviation {
+        let first = &self.response_spectrum_percent[0];
+        self.spectrum_deviations().fold(first, |worst, band| {
+            if band.largest > worst.largest {
+                band
+            } else {
+                worst
+            }
+        })
     }
 }
 
@@ -107,21 +139,39 @@ fn significant(acceleration: &[f64]) -> [usize; 2] {
 fn deviation(wanted: &[f64], found: &[f64], dt: f64, band: [f64; 2]) -> SpectrumDeviation {
     let octaves = (band[1] / band[0]).log2();
     let count = (octaves * PER_OCTAVE).ceil().max(1.0);
-    let frequencies: Vec<f64> = (0..=count as usize)
-        .map(|n| band[0] * (octaves * n as f64 / count).exp2())
+    let at = |place: f64| band[0] * (octaves * (place / count).clamp(0.0, 1.0)).exp2();
+    let off = |places: &[f64]| -> Vec<f64> {
+        let frequencies: Vec<f64> = places.iter().map(|place| at(*place)).collect();
+        let [reference, table] =
+            [wanted, found].map(|a| pseudo_acceleration(a, dt, &frequencies, USUAL_DAMPING));
+        let pairs = table.iter().zip(&reference);
+        pairs
+            .map(|(table, reference)| 100.0 * (table / reference - 1.0).abs())
+            .collect()
+    };
+    let largest = |places: &[f64], off: &[f64]| {
+        let pairs = places.iter().copied().zip(off.iter().copied());
+        pairs.fold(
+            (0.0, 0.0),
+            |most: (f64, f64), one| {
+                if one.1 > most.1 { one } else { most }
+            },
+        )
+    };
+    let places: Vec<f64> = (0..=count as usize).map(|n| n as f64).collect();
+    let all = off(&places);
+    let coarse = largest(&places, &all);
+    // The curve between the neighbours of the largest one.
+    let finer: Vec<f64> = (0..BETWEEN)
+        .map(|n| coarse.0 - 1.0 + 2.0 * (n as f64 + 0.5) / BETWEEN as f64)
         .collect();
-    let [reference, table] =
-        [wanted, found].map(|a| pseudo_acceleration(a, dt, &frequencies, USUAL_DAMPING));
-    let (mut largest, mut sum) = (0.0f64, 0.0);
-    for (table, reference) in table.iter().zip(&reference) {
-        let off = 100.0 * (table / reference - 1.0).abs();
-        largest = largest.max(off);
-        sum += off;
-    }
+    let fine = largest(&finer, &off(&finer));
+    let worst = if fine.1 > coarse.1 { fine } else { coarse };
     SpectrumDeviation {
         band_hz: band,
-        largest,
-        mean: sum / (count + 1.0),
+        largest: worst.1,
+        largest_at_hz: at(worst.0),
+        mean: all.iter().sum::<f64>() / (count + 1.0),
     }
 }
 
@@ -198,7 +248,7 @@ mod tests {
         wanted[6000..].fill(0.0);
         let found: Vec<f64> = wanted.iter().map(|a| 1.1 * a).collect();
         let own = Laboratory::new(&wanted, &found, dt);
-        for band in own.response_spectrum_percent {
+        for band in own.spectrum_deviations() {
             assert!((band.largest - 10.0).abs() < 1e-9 && (band.mean - 10.0).abs() < 1e-9);
         }
         assert!((own.peak_ratio - 1.1).abs() < 1e-12);
@@ -209,5 +259,49 @@ mod tests {
         let expected = 10.0 * rms(strong) / peak(strong);
         let got = own.significant_duration_percent;
         assert!((got / expected - 1.0).abs() < 0.05, "{got} {expected}");
+    }
+
+    #[test]
+    fn the_frequency_of_the_largest_error_is_where_a_resonance_was_added() {
+        let dt = 0.002;
+        for resonance in [6.31, 22.7, 41.3] {
+            let wanted = noise(10_000, 9);
+            // A narrow resonance of 1 % damping in parallel, by its exact response to held samples.
+            let w = TAU * resonance;
+            let (zeta, damped) = (0.01, w * (1.0_f64 - 1e-4).sqrt());
+            let decay = (-zeta * w * dt).exp();
+            let (mut one, mut two) = (0.0, 0.0);
+            let found: Vec<f64> = wanted
+                .iter()
+                .map(|a| {
+                    let now =
+                        2.0 * decay * (damped * dt).cos() * one - decay * decay * two + 0.05 * a;
+                    (two, one) = (one, now);
+                    a + now
+                })
+                .collect();
+            let own = Laboratory::new(&wanted, &found, dt);
+            let worst = own.worst_band();
+            assert!(
+                (worst.largest_at_hz / resonance - 1.0).abs() < 0.03,
+                "{worst:?} for {resonance} Hz"
+            );
+            // As an independent scan of 200 oscillators an octave finds it.
+            let [low, high] = worst.band_hz;
+            let count = (200.0 * (high / low).log2()) as usize;
+            let scan: Vec<f64> = (0..=count)
+                .map(|n| low * (high / low).powf(n as f64 / count as f64))
+                .collect();
+            let [reference, table] =
+                [&wanted, &found].map(|a| pseudo_acceleration(a, dt, &scan, USUAL_DAMPING));
+            let pairs = table.iter().zip(&reference);
+            let most = pairs.fold(0.0_f64, |most, (t, r)| {
+                most.max(100.0 * (t / r - 1.0).abs())
+            });
+            assert!(
+                (worst.largest / most - 1.0).abs() < 0.02,
+                "{worst:?}, {most} %"
+            );
+        }
     }
 }

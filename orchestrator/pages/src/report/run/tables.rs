@@ -52,14 +52,16 @@ pub(super) fn tracking(run: &Run, tracking: &Tracking) -> Table {
 /// Response spectra and transfer function, a row for each band.
 pub(super) fn bands(own: &Laboratory) -> Table {
     let percent = |value| Cell::Quantity(value, Units::PERCENT, 3);
-    let rows = own.response_spectrum_percent.iter().enumerate();
+    let rows = own.spectrum_deviations().enumerate();
     Table::of(
-        "Response spectrum at 5 % damping: how far the table's is from the reference's. \
+        "Response spectrum at 5 % damping, at least 24 oscillators an octave: how far the table's is from \
+         the reference's, and the natural frequency of the largest error. \
          Transfer function from the reference's to the table's acceleration, each frequency \
          weighted by the reference's power.",
         [
             "band, Hz",
             "spectrum, largest",
+            "at, Hz",
             "spectrum, mean",
             "gain",
             "delay, ms",
@@ -67,13 +69,14 @@ pub(super) fn bands(own: &Laboratory) -> Table {
         ],
         rows.map(|(n, spectrum)| {
             let [from, to] = spectrum.band_hz;
-            let band = own.coherence.as_ref().map(|bands| &bands[n]);
+            let band = own.coherence.as_ref().and_then(|bands| bands.get(n));
             let number = |value: Option<f64>, digits| {
                 value.map_or("-".into(), |value| Cell::Number(value, digits))
             };
             [
                 format!("{from} to {to}").into(),
                 percent(spectrum.largest),
+                Cell::Number(spectrum.largest_at_hz, 3),
                 percent(spectrum.mean),
                 number(band.map(|band| band.gain), 4),
                 number(band.map(|band| 1e3 * band.delay_s), 3),
