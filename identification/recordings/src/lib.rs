@@ -6,6 +6,7 @@ mod error;
 mod even_base;
 mod faults;
 mod identification_error;
+mod mat;
 mod number;
 mod reader;
 mod recording;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::DataError;
+use super::mat::{self, is_mat};
 
 /// A file's text with `\n` line ends.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,11 +29,14 @@ pub fn read_text(file: &Path) -> Result<Text, DataError> {
     decode(file, &bytes)
 }
 
-/// The text of `bytes`; `file` is what messages call them.
+/// The text of `bytes`, of a MAT file its table; `file` is what messages call them.
 ///
 /// # Errors
-/// No text, or binary data.
+/// No text, or binary data; a MAT file that cannot be read.
 pub fn decode(file: &Path, bytes: &[u8]) -> Result<Text, DataError> {
+    if is_mat(bytes) {
+        return mat::table(file, bytes);
+    }
     let mut note = None;
     let text = match bytes {
         [0xef, 0xbb, 0xbf, rest @ ..] => std::str::from_utf8(rest).ok().map(str::to_string),

@@ -301,7 +301,7 @@ a = { start = 0.01, range = [0, 0.1], unit = "s" }
         (
             "a * du",
             "a * dv",
-            "line 4, `mine.value`: `u + a * dv` at character 9: `dv` is unknown; did you mean `du`?",
+            "line 4, `mine.value`: `u + a * dv` at character 9: `dv` is unknown; did you mean",
         ),
         (
             "a * du",
@@ -325,8 +325,8 @@ a = { start = 0.01, range = [0, 0.1], unit = "s" }
         ),
         (
             "unit = \"s\"",
-            "unit = \"sec2\"",
-            "line 8, `mine.parameters.a.unit`: `sec2`",
+            "unit = \"flop\"",
+            "line 8, `mine.parameters.a.unit`: `flop`",
         ),
         (
             "[0, 0.1]",
