@@ -38,7 +38,8 @@ const COMPLEX: u8 = 0x08;
 pub(super) fn is_mat(bytes: &[u8]) -> bool {
     let head = &bytes[..HEADER.min(bytes.len())];
     let is_named = || head.windows(8).any(|own| own == b"MAT-file");
-    (bytes.starts_with(b"MATLAB ") && is_named()) || (bytes.len() >= HEADER && order(bytes).is_some() && version(bytes).is_some())
+    (bytes.starts_with(b"MATLAB ") && is_named())
+        || (bytes.len() >= HEADER && order(bytes).is_some() && version(bytes).is_some())
 }
 
 /// Whether the numbers are in little-endian order.
@@ -52,7 +53,11 @@ fn order(bytes: &[u8]) -> Option<bool> {
 
 fn version(bytes: &[u8]) -> Option<u16> {
     let pair = [*bytes.get(VERSION)?, *bytes.get(VERSION + 1)?];
-    let own = if order(bytes)? { u16::from_le_bytes(pair) } else { u16::from_be_bytes(pair) };
+    let own = if order(bytes)? {
+        u16::from_le_bytes(pair)
+    } else {
+        u16::from_be_bytes(pair)
+    };
     matches!(own, 0x0100 | 0x0200).then_some(own)
 }
 
@@ -85,26 +90,33 @@ pub(super) fn table(file: &Path, bytes: &[u8]) -> Result<Text, DataError> {
         ));
     }
     let Some(little) = order(bytes) else {
-        return Err(fault("a MAT file without its byte order; it is damaged or not of level 5".to_owned()));
+        return Err(fault(
+            "a MAT file without its byte order; it is damaged or not of level 5".to_owned(),
+        ));
     };
     let mut found = Found::default();
     let mut total = 0;
     let reader = Reader { little };
     reader
-        .elements(&bytes[HEADER.min(bytes.len())..], &mut |kind, data| match kind {
-            COMPRESSED => {
-                let mut whole = Vec::new();
-                let most = LARGEST - total;
-                let read = ZlibDecoder::new(data).take(most).read_to_end(&mut whole);
-                read.map_err(|error| format!("a compressed variable cannot be read: {error}"))?;
-                total += whole.len() as u64;
-                if total == LARGEST {
-                    return Err("its variables have more than 1 GB".to_owned());
+        .elements(
+            &bytes[HEADER.min(bytes.len())..],
+            &mut |kind, data| match kind {
+                COMPRESSED => {
+                    let mut whole = Vec::new();
+                    let most = LARGEST - total;
+                    let read = ZlibDecoder::new(data).take(most).read_to_end(&mut whole);
+                    read.map_err(|error| format!("a compressed variable cannot be read: {error}"))?;
+                    total += whole.len() as u64;
+                    if total == LARGEST {
+                        return Err("its variables have more than 1 GB".to_owned());
+                    }
+                    reader.elements(&whole, &mut |kind, data| {
+                        reader.variable(kind, data, &mut found)
+                    })
                 }
-                reader.elements(&whole, &mut |kind, data| reader.variable(kind, data, &mut found))
-            }
-            _ => reader.variable(kind, data, &mut found),
-        })
+                _ => reader.variable(kind, data, &mut found),
+            },
+        )
         .map_err(|what| fault(format!("a damaged MAT file: {what}")))?;
     let text = written(&found).map_err(fault)?;
     let note = match found.left.as_slice() {
@@ -125,7 +137,11 @@ impl Reader {
             .get(..4)
             .and_then(|four| four.try_into().ok())
             .ok_or("it ends within an element")?;
-        Ok(if self.little { u32::from_le_bytes(four) } else { u32::from_be_bytes(four) })
+        Ok(if self.little {
+            u32::from_le_bytes(four)
+        } else {
+            u32::from_be_bytes(four)
+        })
     }
 
     /// The first element: type, data, and what follows it.
@@ -141,7 +157,11 @@ impl Reader {
             (first & 0xffff, length, 4, 8)
         } else {
             let length = self.word(&bytes[4..])? as usize;
-            let padded = if first == COMPRESSED { length } else { length.next_multiple_of(8) };
+            let padded = if first == COMPRESSED {
+                length
+            } else {
+                length.next_multiple_of(8)
+            };
             (first, length, 8, 8 + padded)
         };
         let data = bytes.get(begin..begin + length).ok_or_else(ends)?;
@@ -162,11 +182,21 @@ impl Reader {
     }
 
     fn variable(self, kind: u32, data: &[u8], found: &mut Found) -> Result<(), String> {
-        if kind == MATRIX { self.matrix(data, "", 0, found) } else { Ok(()) }
+        if kind == MATRIX {
+            self.matrix(data, "", 0, found)
+        } else {
+            Ok(())
+        }
     }
 
     /// An array: numbers are kept under `name` or their own, structures taken apart.
-    fn matrix(self, data: &[u8], name: &str, depth: usize, found: &mut Found) -> Result<(), String> {
+    fn matrix(
+        self,
+        data: &[u8],
+        name: &str,
+        depth: usize,
+        found: &mut Found,
+    ) -> Result<(), String> {
         if data.is_empty() {
             return Ok(());
         }
@@ -177,7 +207,11 @@ impl Reader {
         let sizes = self.numbers(kind, dimensions)?;
         let (_, own, rest) = self.element(rest)?;
         let own = String::from_utf8_lossy(own);
-        let name = if name.is_empty() { own.trim_end_matches('\0') } else { name };
+        let name = if name.is_empty() {
+            own.trim_end_matches('\0')
+        } else {
+            name
+        };
         let count = sizes.iter().product::<f64>();
         if NUMERIC.contains(&class) {
             let (kind, real, _) = self.element(rest)?;
@@ -186,7 +220,9 @@ impl Reader {
                 return Err(format!("`{name}` has {} values, not {count}", values.len()));
             }
             if flags & COMPLEX != 0 || sizes.len() != 2 {
-                found.left.push(format!("`{name}` (complex, or of more than two dimensions)"));
+                found.left.push(format!(
+                    "`{name}` (complex, or of more than two dimensions)"
+                ));
                 return Ok(());
             }
             found.variables.push(Variable {
@@ -232,7 +268,11 @@ impl Reader {
                 let all = data.chunks_exact($size).map(|bytes| {
                     let mut own = [0; $size];
                     own.copy_from_slice(bytes);
-                    if self.little { <$number>::from_le_bytes(own) as f64 } else { <$number>::from_be_bytes(own) as f64 }
+                    if self.little {
+                        <$number>::from_le_bytes(own) as f64
+                    } else {
+                        <$number>::from_be_bytes(own) as f64
+                    }
                 });
                 all.collect()
             }};
@@ -268,14 +308,23 @@ fn written(found: &Found) -> Result<String, String> {
             columns.extend(all.map(|(i, own)| (format!("{}_{}", one.name, i + 1), own)));
         }
     }
-    let count = |length: usize| columns.iter().filter(|(_, own)| own.len() == length).count();
+    let count = |length: usize| {
+        columns
+            .iter()
+            .filter(|(_, own)| own.len() == length)
+            .count()
+    };
     let lengths = columns.iter().map(|(_, own)| own.len());
     let length = lengths.max_by_key(|length| (count(*length), *length));
-    let length = length.ok_or("a MAT file without a vector; expected a column of numbers for each channel")?;
+    let length = length
+        .ok_or("a MAT file without a vector; expected a column of numbers for each channel")?;
     columns.retain(|(_, own)| own.len() == length);
     let is_time = |name: &str| {
         let name = name.to_lowercase();
-        ["t", "time", "t_s", "time_s", "zeit", "temps", "tiempo", "tempo"].contains(&name.as_str())
+        [
+            "t", "time", "t_s", "time_s", "zeit", "temps", "tiempo", "tempo",
+        ]
+        .contains(&name.as_str())
     };
     let scalar = |names: &[&str]| {
         let all = found.variables.iter();
@@ -297,13 +346,21 @@ fn written(found: &Found) -> Result<String, String> {
     }
     let heads = columns.iter().map(|(name, _)| {
         // A vector of times has no unit in its name, and every program counts them in s.
-        if is_time(name) && !name.contains('_') { format!("{name} [s]") } else { name.clone() }
+        if is_time(name) && !name.contains('_') {
+            format!("{name} [s]")
+        } else {
+            name.clone()
+        }
     });
     let mut text = heads.collect::<Vec<_>>().join(",");
     for k in 0..length {
         text.push('\n');
         let cells = columns.iter().map(|(_, own)| {
-            if own[k].is_finite() { own[k].to_string() } else { String::new() }
+            if own[k].is_finite() {
+                own[k].to_string()
+            } else {
+                String::new()
+            }
         });
         text += &cells.collect::<Vec<_>>().join(",");
     }
@@ -328,7 +385,11 @@ mod tests {
 
     impl Writer {
         fn word(&self, value: u32) -> [u8; 4] {
-            if self.little { value.to_le_bytes() } else { value.to_be_bytes() }
+            if self.little {
+                value.to_le_bytes()
+            } else {
+                value.to_be_bytes()
+            }
         }
 
         fn element(&self, kind: u32, data: &[u8]) -> Vec<u8> {
@@ -346,11 +407,22 @@ mod tests {
         fn head(&self, class: u32, sizes: [u32; 2], name: &str) -> Vec<u8> {
             let flags = [self.word(class), self.word(0)].concat();
             let sizes = sizes.map(|size| self.word(size)).concat();
-            [self.element(6, &flags), self.element(5, &sizes), self.element(1, name.as_bytes())].concat()
+            [
+                self.element(6, &flags),
+                self.element(5, &sizes),
+                self.element(1, name.as_bytes()),
+            ]
+            .concat()
         }
 
         fn doubles(&self, name: &str, sizes: [u32; 2], values: &[f64]) -> Vec<u8> {
-            let bytes = |value: &f64| if self.little { value.to_le_bytes() } else { value.to_be_bytes() };
+            let bytes = |value: &f64| {
+                if self.little {
+                    value.to_le_bytes()
+                } else {
+                    value.to_be_bytes()
+                }
+            };
             let data: Vec<u8> = values.iter().flat_map(bytes).collect();
             let all = [self.head(6, sizes, name), self.element(9, &data)].concat();
             self.element(MATRIX, &all)
@@ -360,13 +432,22 @@ mod tests {
             let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
             encoder.write_all(element).unwrap();
             let data = encoder.finish().unwrap();
-            [&self.word(COMPRESSED)[..], &self.word(data.len() as u32), &data].concat()
+            [
+                &self.word(COMPRESSED)[..],
+                &self.word(data.len() as u32),
+                &data,
+            ]
+            .concat()
         }
 
         fn file(&self, elements: &[Vec<u8>]) -> Vec<u8> {
             let mut bytes = b"MATLAB 5.0 MAT-file, written by a test".to_vec();
             bytes.resize(VERSION, b' ');
-            bytes.extend(if self.little { [0, 1, b'I', b'M'] } else { [1, 0, b'M', b'I'] });
+            bytes.extend(if self.little {
+                [0, 1, b'I', b'M']
+            } else {
+                [1, 0, b'M', b'I']
+            });
             bytes.extend(elements.concat());
             bytes
         }
@@ -415,7 +496,10 @@ mod tests {
         ];
         let bytes = own.file(&elements);
         let text = read(&bytes).unwrap();
-        assert!(text.note.as_ref().unwrap().contains("`tt` (an object"), "{text:?}");
+        assert!(
+            text.note.as_ref().unwrap().contains("`tt` (an object"),
+            "{text:?}"
+        );
         let recording = Recording::parse(Path::new("a.mat"), text, "a").unwrap();
         assert_eq!(recording.samples(Channel::Displacement), [1e-3, 2e-3, 4e-3]);
         assert_eq!(recording.samples(Channel::Reference), [3e-3, 5e-3, 6e-3]);
@@ -431,7 +515,11 @@ mod tests {
         let said = |bytes: &[u8]| read(bytes).unwrap_err().to_string();
         assert!(said(&newer).contains("-v7'"), "{}", said(&newer));
         let alone = own.file(&[own.doubles("x", [1, 1], &[1.0])]);
-        assert!(said(&alone).contains("without a vector"), "{}", said(&alone));
+        assert!(
+            said(&alone).contains("without a vector"),
+            "{}",
+            said(&alone)
+        );
         // Cut or changed anywhere it is an error or another table, and never a panic.
         for end in HEADER + 1..whole.len() {
             let _ = read(&whole[..end]);

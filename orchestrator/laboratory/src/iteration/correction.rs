@@ -17,6 +17,10 @@ const SEGMENT: f64 = 4.0;
 const MOST_GAIN: f64 = 3.0;
 /// Quiet time after a motion, s: the correction of its end does not reach around to its beginning.
 const QUIET: f64 = 8.0;
+/// Share of the strongest line's power below which a drive has nothing at a line, and coherence below which
+/// drive and response have nothing to do with each other.
+const FAINT: f64 = 1e-10;
+const UNRELATED: f64 = 0.2;
 /// Time at either end in which corrections rise from nothing, s.
 const EDGE: f64 = 0.5;
 
@@ -72,13 +76,18 @@ impl Response {
         let all = pairs.iter().map(|pair| Spectra::new(pair, dt, length));
         let all = all.collect::<Result<Vec<_>, _>>().ok()?;
         let frequency = &all.first()?.frequency;
+        let drives = |k| all.iter().map(|own| own.power(0, k)).sum::<f64>();
+        let most = (0..frequency.len()).map(drives).fold(0.0, f64::max);
         let (mut gain, mut coherence) = (Vec::new(), Vec::new());
         for k in 0..frequency.len() {
             let power = |channel| all.iter().map(|own| own.power(channel, k)).sum::<f64>();
             let cross: Complex64 = all.iter().map(|own| own.cross(1, 0, k)).sum();
             let (input, output) = (power(0), power(1));
-            gain.push(cross / input.max(f64::MIN_POSITIVE));
-            coherence.push(cross.norm_sqr() / (input * output).max(f64::MIN_POSITIVE));
+            let common = cross.norm_sqr() / (input * output).max(f64::MIN_POSITIVE);
+            // What was hardly driven, or not followed, says nothing of a response there.
+            let says = input > FAINT * most && common > UNRELATED;
+            gain.push(if says { cross / input } else { Complex64::new(0.0, 0.0) });
+            coherence.push(if says { common } else { 0.0 });
         }
         // The mean is taken from every segment: what is steady follows as the slowest line does.
         gain[0] = Complex64::new(gain.get(1)?.re, 0.0);
@@ -141,7 +150,24 @@ impl Inverse {
             band,
             response: shown,
         }
-        .within_band()
+    }
+
+    /// What a drive of displacement lacks for an `error` of displacement, both m, a sample every `dt` s.
+    #[must_use]
+    pub fn correction(&self, error: &[f64], dt: f64) -> Vec<f64> {
+        let (samples, length) = (error.len(), padded(error.len(), dt));
+        let step = 1.0 / (length as f64 * dt);
+        let lines = spectrum(error, length).into_iter().enumerate();
+        let lines = lines.map(|(k, line)| {
+            let frequency = k as f64 * step;
+            line * self.at(frequency) * inside(frequency, self.band)
+        });
+        let mut history = from_spectrum(lines.collect(), length);
+        history.truncate(samples);
+        for (n, value) in history.iter_mut().enumerate() {
+            *value *= window(n, samples, dt)[0];
+        }
+        history
     }
 
     /// The lowest and the highest frequency that are corrected, Hz.

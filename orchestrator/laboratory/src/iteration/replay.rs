@@ -14,7 +14,7 @@ use motion::metrics::{rms, spectrum};
 use realfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use super::correction::{Inverse, Measured, Response, from_spectrum, padded};
+use super::correction::{Inverse, Response, from_spectrum, padded};
 use super::drive;
 use crate::error::Error;
 use crate::results::Results;
@@ -26,6 +26,8 @@ const FIGURES: &str = "replay.json";
 const TRIED: usize = 20;
 /// Coherence below which nothing is corrected.
 const COHERENT: f64 = 0.5;
+/// Share of the displacement that a drive of a table that follows it may leave unexplained, %.
+const UNEXPLAINED: f64 = 50.0;
 /// Samples in a row at the largest value that show a rail.
 const RAIL: usize = 3;
 /// Share of the record by which two clocks may differ.
@@ -193,10 +195,6 @@ impl Recorded {
             drive,
             displacement,
         })
-    }
-
-    fn motion(&self, displacement: Vec<f64>) -> Motion {
-        motion_of("drive", self.dt, displacement)
     }
 }
 
@@ -377,6 +375,16 @@ pub fn replay(plan: &Plan) -> Result<Replay, Error> {
             peak_command: own.command.as_deref().map(motion::peak),
         });
     }
+    let least = described.iter().map(|own| own.unexplained_percent);
+    let least = least.fold(f64::INFINITY, f64::min);
+    if !(least < UNEXPLAINED) {
+        let reason = format!(
+            "no linear response to `reference` explains more than {:.0} % of `displacement`; expected the \
+             drive of a table that follows it: check columns and units, or diagnose the table first",
+            (100.0 - least).max(0.0)
+        );
+        return Err(fault(&first.file, reason));
+    }
     // Every later round from those before it, and the share of the change by which that is off.
     let mut checks = Vec::new();
     let mut off = Vec::new();
@@ -431,18 +439,7 @@ fn next(
     off: f64,
 ) -> Result<(Next, Motion), Error> {
     let dt = base.dt;
-    let wanted = base.motion(shown.to_vec());
-    let got = base.motion(base.displacement.clone());
-    let error = inverse.error(
-        &wanted,
-        &Measured {
-            displacement: got.displacement,
-            acceleration: got.acceleration,
-        },
-    );
-    let mut whole = base.motion(base.drive.clone());
-    inverse.correct(&mut whole, &error, 1.0);
-    let correction = less(&whole.displacement, &base.drive);
+    let correction = inverse.correction(&less(shown, &base.displacement), dt);
     let change = response.of(&correction, dt);
     let commands = match &base.command {
         None => None,
@@ -649,6 +646,16 @@ mod tests {
             refused.contains("round_0.csv") && refused.contains("--columns"),
             "{refused}"
         );
+        // A drive that the table does not follow is refused, and not inverted.
+        let drive = wanted();
+        let other: Vec<f64> = drive.iter().map(|x| (4e5 * x * x).sin() * 1e-3).collect();
+        let rows = drive.iter().zip(&other).enumerate();
+        let text: String = rows
+            .map(|(k, (u, y))| format!("{:.4},{:.7},{:.7}\n", k as f64 * DT, 1e3 * u, 1e3 * y))
+            .collect();
+        std::fs::write(path(0), format!("time [s],reference [mm],displacement [mm]\n{text}")).unwrap();
+        let refused = replay(&plan(1, None)).unwrap_err().to_string();
+        assert!(refused.contains("no linear response to `reference`"), "{refused}");
         std::fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -59,12 +59,13 @@ fn refused(wrong: Wrong, name: &str, path: &Path) -> DescriptionError {
     let Wrong { key, text, what } = wrong;
     let file = std::fs::read_to_string(path).unwrap_or_default();
     let line = line_of(&file, name, &key).map_or_else(String::new, |line| format!("line {line}, "));
+    let is_named = text == name || key.split('.').any(|part| part == text);
     let key = if key.is_empty() {
         String::new()
     } else {
         format!(".{key}")
     };
-    let text = if text.is_empty() || what.starts_with(&format!("`{text}`")) {
+    let text = if text.is_empty() || is_named || what.starts_with(&format!("`{text}`")) {
         String::new()
     } else {
         format!("`{text}` ")

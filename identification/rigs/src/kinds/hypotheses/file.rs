@@ -69,12 +69,12 @@ pub fn line_of(text: &str, name: &str, key: &str) -> Option<usize> {
             // `key = ...`, or the table that holds it in one line.
             let own = line.split('=').next().unwrap_or_default().trim();
             let parent = key.rsplit('.').nth(1);
-            let is_own = own == last || own == key;
+            let is_own = !key.is_empty() && (own == last || own == key);
             let holds = parent.is_some_and(|parent| own == parent && line.contains(last));
             if is_own || holds {
                 best = best.or(Some(i + 1));
             }
         }
     }
-    best.or(head)
+    if key.is_empty() { head } else { best.or(head) }
 }

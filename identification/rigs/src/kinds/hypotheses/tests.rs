@@ -316,12 +316,12 @@ a = { start = 0.01, range = [0, 0.1], unit = "s" }
         (
             "[0, 0.1]",
             "[0.1, 0]",
-            "line 8, `mine.parameters.a.range`: `a` [0.1, 0]: expected the smallest",
+            "line 8, `mine.parameters.a.range`: [0.1, 0]: expected the smallest",
         ),
         (
             "start = 0.01",
             "start = 0.2",
-            "line 8, `mine.parameters.a.start`: `a` [0.2]: expected one value or more within [0, 0.1]",
+            "line 8, `mine.parameters.a.start`: [0.2]: expected one value or more within [0, 0.1]",
         ),
         (
             "unit = \"s\"",
@@ -331,12 +331,12 @@ a = { start = 0.01, range = [0, 0.1], unit = "s" }
         (
             "[0, 0.1]",
             "[0.001, 0.1]",
-            "`mine.parameters`: `mine` has no size: expected a parameter whose range holds 0",
+            "`mine.parameters`: has no size: expected a parameter whose range holds 0",
         ),
         (
             "[mine]",
             "[dead_band]",
-            "line 2, `dead_band`: `dead_band` the kind closed_loop_actuator has an effect of this name",
+            "line 2, `dead_band`: the kind closed_loop_actuator has an effect of this name",
         ),
         (
             "[mine.parameters]",
