@@ -126,6 +126,9 @@ pub(super) fn table(file: &Path, bytes: &[u8]) -> Result<Text, DataError> {
     Ok(Text { text, note })
 }
 
+/// What is done with an element of a type.
+type Taking<'a> = dyn FnMut(u32, &[u8]) -> Result<(), String> + 'a;
+
 #[derive(Clone, Copy)]
 struct Reader {
     little: bool,
@@ -168,11 +171,7 @@ impl Reader {
         Ok((kind, data, bytes.get(end..).unwrap_or_default()))
     }
 
-    fn elements(
-        self,
-        mut bytes: &[u8],
-        take: &mut dyn FnMut(u32, &[u8]) -> Result<(), String>,
-    ) -> Result<(), String> {
+    fn elements(self, mut bytes: &[u8], take: &mut Taking<'_>) -> Result<(), String> {
         while !bytes.is_empty() {
             let (kind, data, rest) = self.element(bytes)?;
             take(kind, data)?;

@@ -86,7 +86,11 @@ impl Response {
             let common = cross.norm_sqr() / (input * output).max(f64::MIN_POSITIVE);
             // What was hardly driven, or not followed, says nothing of a response there.
             let says = input > FAINT * most && common > UNRELATED;
-            gain.push(if says { cross / input } else { Complex64::new(0.0, 0.0) });
+            gain.push(if says {
+                cross / input
+            } else {
+                Complex64::new(0.0, 0.0)
+            });
             coherence.push(if says { common } else { 0.0 });
         }
         // The mean is taken from every segment: what is steady follows as the slowest line does.

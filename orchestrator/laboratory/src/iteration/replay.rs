@@ -653,9 +653,16 @@ mod tests {
         let text: String = rows
             .map(|(k, (u, y))| format!("{:.4},{:.7},{:.7}\n", k as f64 * DT, 1e3 * u, 1e3 * y))
             .collect();
-        std::fs::write(path(0), format!("time [s],reference [mm],displacement [mm]\n{text}")).unwrap();
+        std::fs::write(
+            path(0),
+            format!("time [s],reference [mm],displacement [mm]\n{text}"),
+        )
+        .unwrap();
         let refused = replay(&plan(1, None)).unwrap_err().to_string();
-        assert!(refused.contains("no linear response to `reference`"), "{refused}");
+        assert!(
+            refused.contains("no linear response to `reference`"),
+            "{refused}"
+        );
         std::fs::remove_dir_all(&folder).unwrap();
     }
 }
