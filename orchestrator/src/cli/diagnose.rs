@@ -130,6 +130,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if let (None, [case]) = (&arguments.fmu, arguments.cases.as_slice())
         && multivariable::is_description(case)
     {
+        if arguments.effects.is_some() {
+            return Err(Error::Option {
+                option: "--effects",
+                reason: format!(
+                    "{} is a rig of several actuators; effects of your own apply to the kinds of rigs with \
+                     one output",
+                    case.display()
+                ),
+            });
+        }
         return multivariable::diagnosed(
             case,
             &arguments.data,

@@ -377,7 +377,7 @@ pub fn replay(plan: &Plan) -> Result<Replay, Error> {
     }
     let least = described.iter().map(|own| own.unexplained_percent);
     let least = least.fold(f64::INFINITY, f64::min);
-    if !(least < UNEXPLAINED) {
+    if least.is_nan() || least >= UNEXPLAINED {
         let reason = format!(
             "no linear response to `reference` explains more than {:.0} % of `displacement`; expected the \
              drive of a table that follows it: check columns and units, or diagnose the table first",
