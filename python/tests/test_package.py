@@ -92,8 +92,12 @@ class Package(unittest.TestCase):
             shakebench.identify("nothing.csv")
         with self.assertRaisesRegex(shakebench.InputError, "nowhere"):
             shakebench.diagnose("nowhere")
-        with self.assertRaisesRegex(shakebench.InputError, "--nonsense"):
+        with self.assertRaisesRegex(shakebench.InputError, "`nonsense`"):
             shakebench.run(nonsense=True)
+        with self.assertRaisesRegex(TypeError, "did you mean `record_every`"):
+            shakebench.run(record_evry=2)
+        with self.assertRaisesRegex(shakebench.InputError, "^duration: "):
+            shakebench.run(duration="1 kg")
         self.assertEqual(list(self.folder.iterdir()), [])
 
     def test_a_rig_is_identified_from_a_recording_of_the_simulated_one(self):

@@ -1,8 +1,8 @@
 """Opens pages in a real browser, uses their controls and checks what they show.
 
-Usage: pages.py [--pictures DIR] PAGE.html...
+Usage: pages.py [--pictures DIR] [--axe axe.min.js] PAGE.html...
 
-Beside a page, `summary.json` of a run is compared with the figures on it. Exit status 1 and a line
+With axe-core (the npm package) every page is checked for accessibility, light and dark. Beside a page, `summary.json` of a run is compared with the figures on it. Exit status 1 and a line
 for each fault; 3 where there is no browser.
 """
 
@@ -42,7 +42,7 @@ LAYOUT = r"""(() => {
 
 PLOTS = r"""(() => {
   const faults = [];
-  for (const place of document.querySelectorAll(".chart")) {
+  for (const place of document.querySelectorAll("figure:not([hidden]) .chart")) {
     const title = place.closest("figure").querySelector("figcaption").firstChild.textContent;
     const canvas = place.querySelector("canvas");
     if (!canvas) { faults.push(`"${title}" has no canvas: ${place.textContent}`); continue; }
@@ -60,6 +60,29 @@ PLOTS = r"""(() => {
 
 CONTROLS = r"""(async () => {
   const faults = [];
+  // A plot by its keys alone.
+  const keyboard = async (figure) => {
+    const wrong = [];
+    const place = figure.querySelector(".chart");
+    const press = (at, key) => at.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true }));
+    const shown = () => figure.querySelectorAll(".readout td").length;
+    place.focus();
+    if (document.activeElement !== place) wrong.push("a plot cannot be focused");
+    if (!/: .* to /.test(place.querySelector("canvas").getAttribute("aria-label"))) wrong.push("a plot has no words");
+    for (const key of ["+", "ArrowRight", ".", "a", ">", "b"]) press(place, key);
+    await new Promise((done) => setTimeout(done, 50));
+    const between = figure.querySelector(".readout tbody tr td:last-child");
+    if (!between || !(parseFloat(between.textContent) > 0)) wrong.push(`the cursors differ by ${between && between.textContent}`);
+    press(place, "Escape");
+    if (shown()) wrong.push("Escape leaves cursors");
+    press(place, "0");
+    const button = figure.querySelector(".u-legend [role=button]");
+    press(button, "Enter");
+    if (button.getAttribute("aria-pressed") !== "false") wrong.push("a legend does not hide its curve");
+    press(button, " ");
+    if (button.getAttribute("aria-pressed") !== "true") wrong.push("a legend does not show its curve again");
+    return wrong;
+  };
   const root = document.documentElement;
   for (const system of ["si", "laboratory"]) {
     document.querySelector(`[data-set-units="${system}"]`).click();
@@ -76,7 +99,7 @@ CONTROLS = r"""(async () => {
   const blobs = [];
   const make = URL.createObjectURL;
   URL.createObjectURL = (blob) => { blobs.push(blob); return make.call(URL, blob); };
-  const figures = [...document.querySelectorAll("figure")].filter((f) => f.querySelector(".chart"));
+  const figures = [...document.querySelectorAll("figure:not([hidden])")].filter((f) => f.querySelector(".chart"));
   for (const figure of figures) {
     figure.querySelector('[data-export="csv"]').click();
     const text = blobs.length ? await blobs.pop().text() : "";
@@ -87,10 +110,19 @@ CONTROLS = r"""(async () => {
     }
   }
   if (figures.length) {
-    figures[0].querySelector('[data-export="png"]').click();
-    await new Promise((done) => setTimeout(done, 300));
-    const picture = blobs.pop();
+    const saved = async (kind) => {
+      figures[0].querySelector(`[data-export="${kind}"]`).click();
+      for (let n = 0; n < 100 && !blobs.length; n++) await new Promise((done) => setTimeout(done, 50));
+      return blobs.pop();
+    };
+    const picture = await saved("png");
     if (!picture || picture.type !== "image/png" || picture.size < 2000) faults.push("the picture is none");
+    for (const [id, value] of [["figure-width", 85], ["figure-height", 60]]) document.getElementById(id).value = value;
+    const drawing = await saved("svg");
+    const svg = new DOMParser().parseFromString(drawing ? await drawing.text() : "", "image/svg+xml").documentElement;
+    const curves = svg.querySelectorAll("g path[d]").length;
+    if (svg.nodeName !== "svg" || Math.round(svg.getAttribute("width")) !== 321 || !curves) faults.push(`the SVG is ${svg.nodeName}, ${svg.getAttribute("width")} px, ${curves} curves`);
+    faults.push(...await keyboard(figures[0]));
   }
   URL.createObjectURL = make;
   return faults;
@@ -99,7 +131,7 @@ CONTROLS = r"""(async () => {
 # Text of the cell in row ROW and column COLUMN of the first table that has both.
 CELL = r"""(([row, column]) => {
   for (const table of document.querySelectorAll("table.figures")) {
-    const heads = [...table.querySelectorAll("thead th")].map((th) => th.textContent);
+    const heads = [...table.querySelectorAll("thead tr > *")].map((th) => th.textContent);
     const at = heads.indexOf(column);
     const found = [...table.querySelectorAll("tbody tr")].find((tr) => tr.cells[0].textContent === row);
     if (at < 0 || !found) continue;
@@ -145,7 +177,24 @@ def figures(browser, summary):
     return faults
 
 
-def check(browser, page, pictures):
+AXE = r"""(async () => {
+  const found = await axe.run(document, { resultTypes: ["violations"] });
+  return found.violations.map((one) => `${one.id}: ${one.help}: ${one.nodes.length} times, ${one.nodes[0].html.slice(0, 160)}`);
+})()"""
+
+
+def accessible(browser, axe):
+    """Violations that axe-core finds, light and dark."""
+    browser.run(axe + "; true")
+    found = []
+    for theme in ["light", "dark"]:
+        browser.run(f"document.querySelector('[data-set-theme=\"{theme}\"]').click()")
+        found += [f"{theme}: {one}" for one in browser.run(AXE)]
+    browser.run("document.querySelector('[data-set-theme=\"light\"]').click()")
+    return found
+
+
+def check(browser, page, pictures, axe):
     """Faults of one page."""
     faults = []
     for width in WIDTHS:
@@ -158,6 +207,9 @@ def check(browser, page, pictures):
         found = browser.run(LAYOUT) + browser.run(PLOTS)
         if width == WIDTHS[-1]:
             found += browser.run(CONTROLS) + browser.run(PLOTS)
+        if axe:
+            found += accessible(browser, axe)
+        if width == WIDTHS[-1]:
             beside = page.parent / "summary.json"
             if beside.is_file():
                 found += figures(browser, json.loads(beside.read_text()))
@@ -180,13 +232,17 @@ def main(arguments):
         pictures = pathlib.Path(arguments[1])
         pictures.mkdir(parents=True, exist_ok=True)
         arguments = arguments[2:]
+    axe = None
+    if arguments[:1] == ["--axe"]:
+        axe = pathlib.Path(arguments[1]).read_text(encoding="utf-8")
+        arguments = arguments[2:]
     if devtools.program() is None:
         print("SKIPPED: there is no Chromium (Debian: apt-get install chromium)")
         return 3
     faults = []
     with devtools.Browser() as browser:
         for page in arguments:
-            faults += check(browser, pathlib.Path(page).resolve(), pictures)
+            faults += check(browser, pathlib.Path(page).resolve(), pictures, axe)
     print("\n".join(faults))
     return 1 if faults else 0
 

@@ -43,6 +43,23 @@ fn package_runs_the_program_and_returns_what_it_computed() {
     unittest(python(), "test_package");
 }
 
+/// Nothing depends on the library that the package steps simulations with, so it is built here.
+#[test]
+fn simulations_are_stepped_inside_of_python() {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["build", "--offline", "-p", "shakebench-native"]);
+    if !cfg!(debug_assertions) {
+        cargo.arg("--release");
+    }
+    let built = cargo.current_dir(root()).output().unwrap();
+    assert!(
+        built.status.success(),
+        "{}",
+        String::from_utf8_lossy(&built.stderr)
+    );
+    unittest(python(), "test_simulation");
+}
+
 #[test]
 fn a_study_on_dask_is_that_of_the_program_though_a_worker_is_killed() {
     unittest(dask(), "test_campaign");

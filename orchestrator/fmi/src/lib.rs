@@ -14,6 +14,7 @@ mod messages;
 mod native;
 mod options;
 mod processes;
+mod stand_in;
 mod trace;
 
 use std::collections::HashMap;
@@ -33,6 +34,7 @@ pub use messages::Message;
 pub use native::printing::Diverted;
 pub use options::{Isolation, Options};
 pub use processes::Processes;
+pub use stand_in::{Begin, Behaviour};
 pub use trace::Trace;
 
 /// What helps where a component of this project is not whole, or of another machine.
@@ -62,6 +64,8 @@ pub struct Fmu {
     /// Where the file is, which may be called by another path.
     file: PathBuf,
     unpacked: Arc<folder::Folder>,
+    /// What computes its instances in place of its library, where something does.
+    stand_in: Option<stand_in::StandIn>,
 }
 
 /// A library that stays loaded as long as this lives.
@@ -122,6 +126,7 @@ impl Fmu {
             sizes: HashMap::new(),
             platforms,
             unpacked: Arc::new(unpacked),
+            stand_in: None,
         })
     }
 

@@ -90,6 +90,26 @@ impl Simulation {
     /// # Errors
     /// A checkpoint of another system, or a state that an FMU does not take.
     pub fn resume(&mut self, checkpoint: &Checkpoint, record: Record) -> Result<(), MasterError> {
+        if record.columns != self.columns() || record.exact_columns != self.exact_names {
+            return Err(MasterError::OtherCheckpoint);
+        }
+        self.go_to(checkpoint)?;
+        self.notes.push(format!(
+            "the run continues from its checkpoint at {} s",
+            checkpoint.time
+        ));
+        self.resumed = Some(Resumed {
+            record,
+            wall: checkpoint.wall,
+        });
+        Ok(())
+    }
+
+    /// Takes over the moment of a checkpoint of the same system.
+    ///
+    /// # Errors
+    /// A checkpoint of another system, or a state that an FMU does not take.
+    pub(super) fn go_to(&mut self, checkpoint: &Checkpoint) -> Result<(), MasterError> {
         let fits = checkpoint.numbers.len() == self.signals.numbers.len()
             && checkpoint.exact.len() == self.signals.exact.len()
             && checkpoint.last_numbers.len() == self.last_signals.numbers.len()
@@ -101,7 +121,7 @@ impl Simulation {
                 .zip(&self.parts)
                 .all(|(kept, part)| kept.name == part.instance.name);
         let fits = fits && checkpoint.variable.is_some() == self.variable.is_some();
-        if !fits || record.columns != self.columns() || record.exact_columns != self.exact_names {
+        if !fits {
             return Err(MasterError::OtherCheckpoint);
         }
         self.check_checkpoints()?;
@@ -122,20 +142,16 @@ impl Simulation {
         if let (Some(control), Some(progress)) = (&mut self.variable, &checkpoint.variable) {
             control.progress.clone_from(progress);
         }
+        for part in &mut self.parts {
+            (part.failure, part.ended) = (None, None);
+        }
+        self.is_stopped = false;
         self.tick = checkpoint.tick;
-        self.notes.push(format!(
-            "the run continues from its checkpoint at {} s",
-            checkpoint.time
-        ));
-        self.resumed = Some(Resumed {
-            record,
-            wall: checkpoint.wall,
-        });
         Ok(())
     }
 
     /// The present moment; none where a component has failed, which nothing can go on from.
-    fn checkpoint(&mut self, wall: f64) -> Result<Option<Checkpoint>, MasterError> {
+    pub(super) fn checkpoint(&mut self, wall: f64) -> Result<Option<Checkpoint>, MasterError> {
         if self.parts.iter().any(|part| part.failure.is_some()) {
             return Ok(None);
         }

@@ -258,6 +258,7 @@ impl Simulation {
             clock: None,
             end,
             stop: guard,
+            is_stopped: false,
         };
         start::initialize(&mut simulation, system.start + stop)?;
         Ok(simulation)

@@ -62,6 +62,12 @@ pub enum MasterError {
          FMU does not offer canGetAndSetFMUState); take --mode rig"
     )]
     NotSaved(String),
+    /// A simulation that has ended has no state to go on from.
+    #[error("the run has ended at {time} s; save a state before its end")]
+    Ended {
+        /// When, s.
+        time: f64,
+    },
     /// A component asked to end the run.
     #[error("`{0}` asked to end the run")]
     Over(String),

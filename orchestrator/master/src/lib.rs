@@ -24,6 +24,7 @@ mod run;
 mod samples;
 mod signals;
 mod start;
+mod stepwise;
 mod transfer;
 mod variable;
 
@@ -42,6 +43,7 @@ pub use observer::Observer;
 pub use record::Record;
 pub use run::{Ended, Ending, LogLine, Outcome, Pace};
 pub use samples::{Column, Samples};
+pub use stepwise::{Saved, Stepwise};
 pub use variable::{StepsTaken, VariableStep};
 
 use action::{Action, Moment};
@@ -118,6 +120,8 @@ pub struct Simulation {
     end: Option<EndSignals>,
     /// The part and input that is set when a sampled component fails.
     stop: Option<(usize, u32)>,
+    /// Whether it has been set.
+    is_stopped: bool,
     /// The signals at the tick before.
     last_signals: Signals,
     /// What continuous components give each other, for [`Algorithm::Iterative`].

@@ -265,7 +265,6 @@ impl Simulation {
         record: &mut Record,
         stopwatch: &Stopwatch,
     ) -> Result<Ended, MasterError> {
-        let mut stopped = false;
         while self.tick < samples * self.ticks_per_row {
             if let Some(clock) = &mut self.clock {
                 clock.wait(self.tick);
@@ -282,56 +281,78 @@ impl Simulation {
             if self.is_checkpoint_due() {
                 self.keep_checkpoint(record, stopwatch.read())?;
             }
-            self.observe()?;
-            if comes(self.tick, self.ticks_per_row) {
-                let sample = self.sample();
-                if comes(sample, self.keep_every) {
-                    self.keep(self.time(), record);
-                }
-                self.check_bounds()?;
-                if sample.is_multiple_of(1024) {
-                    progress(sample);
-                }
+            if self.arrive(record)? {
+                break;
             }
-            if let Some((part, input)) = self.stop
-                && !stopped
-                && self.parts.iter().any(|part| part.failure.is_some())
+            if let Some(sample) = self
+                .whole_sample()
+                .filter(|sample| sample.is_multiple_of(1024))
             {
-                // The guard acts on it when it is called next, at the sample after this one.
-                self.parts[part]
-                    .instance
-                    .set(&Kind::Boolean, &[input], &[1.0])?;
-                stopped = true;
-            }
-            if let Some(end) = &self.end {
-                let numbers = &self.signals.numbers;
-                if self.tripped.is_none() && numbers[end.when] != 0.0 {
-                    self.tripped = Some(Tripped {
-                        time: self.time(),
-                        end: self.time() + end.after,
-                        signal: self.names[end.when].clone(),
-                        cause: end.cause_in_words(numbers),
-                    });
-                }
-                if self.tripped.as_ref().is_some_and(|t| self.time() >= t.end) {
-                    break;
-                }
+                progress(sample);
             }
             self.advance()?;
             if let Some(ended) = self.terminated(record)? {
                 return Ok(ended);
             }
         }
+        Ok(self.ended())
+    }
+
+    /// The sample of the motion at the present tick; none between two.
+    fn whole_sample(&self) -> Option<usize> {
+        comes(self.tick, self.ticks_per_row).then(|| self.sample())
+    }
+
+    /// Makes the present tick known and keeps its row; gives whether the run ends here, because what
+    /// tripped has had its time.
+    ///
+    /// # Errors
+    /// A call that an FMU did not complete, or a run that diverges.
+    pub(super) fn arrive(&mut self, record: &mut Record) -> Result<bool, MasterError> {
+        self.observe()?;
+        if let Some(sample) = self.whole_sample() {
+            if comes(sample, self.keep_every) {
+                self.keep(self.time(), record);
+            }
+            self.check_bounds()?;
+        }
+        if let Some((part, input)) = self.stop
+            && !self.is_stopped
+            && self.parts.iter().any(|part| part.failure.is_some())
+        {
+            // The guard acts on it when it is called next, at the sample after this one.
+            self.parts[part]
+                .instance
+                .set(&Kind::Boolean, &[input], &[1.0])?;
+            self.is_stopped = true;
+        }
+        if let Some(end) = &self.end {
+            let numbers = &self.signals.numbers;
+            if self.tripped.is_none() && numbers[end.when] != 0.0 {
+                self.tripped = Some(Tripped {
+                    time: self.time(),
+                    end: self.time() + end.after,
+                    signal: self.names[end.when].clone(),
+                    cause: end.cause_in_words(numbers),
+                });
+            }
+            return Ok(self.tripped.as_ref().is_some_and(|t| self.time() >= t.end));
+        }
+        Ok(false)
+    }
+
+    /// How a run that goes no further ended.
+    pub(super) fn ended(&mut self) -> Ended {
         let tripped = self.tripped.take();
         let time = tripped.as_ref().map_or(self.time(), |t| t.time);
         if let Some(error) = self.parts.iter_mut().find_map(|part| part.failure.take()) {
-            return Ok(Ended::Stopped { error, time });
+            return Ended::Stopped { error, time };
         }
-        Ok(tripped.map_or(Ended::Complete, |t| Ended::Interlock {
+        tripped.map_or(Ended::Complete, |t| Ended::Interlock {
             signal: t.signal,
             time: t.time,
             cause: t.cause,
-        }))
+        })
     }
 }
 
@@ -422,7 +443,7 @@ impl Simulation {
     }
 
     /// Whether a component has asked to end the run; the values at that moment are recorded.
-    fn terminated(&mut self, record: &mut Record) -> Result<Option<Ended>, MasterError> {
+    pub(super) fn terminated(&mut self, record: &mut Record) -> Result<Option<Ended>, MasterError> {
         let mut asked = self.parts.iter().filter_map(|part| {
             let time = part.ended?;
             Some((part.instance.name.clone(), time))

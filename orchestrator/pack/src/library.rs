@@ -17,6 +17,8 @@ pub struct FmuLibrary {
     files: Files,
     /// Components of this project.
     own: HashMap<PathBuf, Arc<Fmu>>,
+    /// FMUs that are not files, by name.
+    given: HashMap<String, Arc<Fmu>>,
 }
 
 impl FmuLibrary {
@@ -26,7 +28,13 @@ impl FmuLibrary {
             version,
             files: Files::in_directory(directory),
             own: HashMap::new(),
+            given: HashMap::new(),
         }
+    }
+
+    /// Adds an FMU that is not a file, under a name that no file or component has.
+    pub fn give(&mut self, name: &str, fmu: Arc<Fmu>) {
+        self.given.insert(name.to_string(), fmu);
     }
 
     /// The library of a system file: with its directory, or its archive.
@@ -44,6 +52,9 @@ impl Library for FmuLibrary {
     /// # Errors
     /// An unknown name (with the nearest one), a component that does not build, an FMU at fault.
     fn fmu(&mut self, name: &str) -> Result<Arc<Fmu>, Box<dyn Error>> {
+        if let Some(fmu) = self.given.get(name) {
+            return Ok(fmu.clone());
+        }
         if self.files.is_file(name) {
             return self.files.fmu(name);
         }

@@ -37,6 +37,7 @@ mod interrupt;
 pub mod iterate;
 mod motion;
 mod multivariable;
+mod negative;
 mod progress;
 pub mod qualify;
 mod quantity;
@@ -227,7 +228,8 @@ fn print_files(files: &[PathBuf]) {
 /// Reads the command line, does what it says and gives the exit status.
 pub fn main() -> ExitCode {
     interrupt::survive_full_disks();
-    let cli = Cli::from_arg_matches(&program().get_matches()).unwrap_or_else(|error| error.exit());
+    let words = program().get_matches_from(negative::joined(std::env::args_os()));
+    let cli = Cli::from_arg_matches(&words).unwrap_or_else(|error| error.exit());
     progress::choose(match (cli.quiet, cli.verbose) {
         (true, _) => Detail::Quiet,
         (_, true) => Detail::Verbose,

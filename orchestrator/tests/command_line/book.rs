@@ -256,10 +256,12 @@ fn from_your_csv_to_a_diagnosis() {
     run_page("from-csv-to-diagnosis.md");
 }
 
-/// Every page is in the summary, every link leads somewhere, and the summary names nothing else.
+/// Every page is in the summary, every link leads somewhere within the book, and the summary names nothing
+/// else.
 #[test]
 fn pages_and_links_are_there() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let docs = docs.canonicalize().unwrap();
     let summary = fs::read_to_string(docs.join("SUMMARY.md")).unwrap();
     let mut pages: Vec<PathBuf> = Vec::new();
     let mut folders = vec![docs.clone()];
@@ -290,8 +292,13 @@ fn pages_and_links_are_there() {
             if target.is_empty() || target.contains("://") {
                 continue;
             }
-            if !page.parent().unwrap().join(target).exists() {
+            let found = page.parent().unwrap().join(target);
+            if !found.exists() {
                 faults.push(format!("{name} links to {target}, which is not there"));
+            } else if !found.canonicalize().unwrap().starts_with(&docs) {
+                faults.push(format!(
+                    "{name} links to {target}, which is not in the book"
+                ));
             }
         }
     }

@@ -52,6 +52,12 @@ fn look_at(pages: &[PathBuf]) {
     let mut arguments: Vec<&str> = pages.iter().map(String::as_str).collect();
     // To look at them: SHAKEBENCH_PICTURES=FOLDER.
     let pictures = std::env::var("SHAKEBENCH_PICTURES").ok();
+    // axe-core, which `.ci/run` takes from its package.
+    let axe = std::env::var("SHAKEBENCH_AXE").ok();
+    match &axe {
+        Some(axe) => drop(arguments.splice(0..0, ["--axe", axe])),
+        None => println!("SKIPPED: accessibility; SHAKEBENCH_AXE names no axe.min.js"),
+    }
     if let Some(pictures) = &pictures {
         arguments.splice(0..0, ["--pictures", pictures]);
     }

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Optional, Union
 
-from ._program import InputError, PathLike, call, options, text
+from ._program import InputError, PathLike, call, check_keywords, options, text
 from ._results import Result
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def campaign(
     Raises :class:`shakebench.InputError` for a study at fault, and :class:`shakebench.Error` naming the
     worker that has another version, other FMUs or none.
     """
+    check_keywords("campaign", more)
     if client is not None and (jobs is not None or shard is not None):
         raise InputError("jobs and shard are for runs on this machine; a client has its own workers")
     if client is None and batch is not None:

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Union
 
-from ._program import PathLike, call, optional_path, options, text
+from ._program import PathLike, call, check_keywords, optional_path, options, say, text
 from ._results import Result
 
 Quantity = Union[str, float]
@@ -33,6 +33,11 @@ def _paths(files: Union[PathLike, Sequence[PathLike]]) -> List[str]:
     if isinstance(files, (list, tuple)):
         return [text(file) for file in files]
     return [text(files)]
+
+
+def _settings(values: Optional[Mapping[str, Any]]) -> List[str]:
+    """Options ``--set``."""
+    return [part for name, value in (values or {}).items() for part in ("--set", f"{name}={text(value)}")]
 
 
 def run(
@@ -67,9 +72,9 @@ def run(
     Raises :class:`shakebench.InputError` for input at fault. A run that ended early is returned:
     ``result["ended"]`` is then not ``"complete"`` and ``result["ended_because"]`` tells why.
     """
+    check_keywords("run", more)
     arguments = ["run", *([] if system is None else [text(system)])]
-    for name, value in (set or {}).items():
-        arguments += ["--set", f"{name}={text(value)}"]
+    arguments += _settings(set)
     arguments += options(
         {
             "record": optional_path(record),
@@ -108,6 +113,7 @@ def compare(
 
     Raises :class:`shakebench.InputError` for unknown names or records at fault.
     """
+    check_keywords("compare", more)
     arguments = options(
         {
             "controllers": None if controllers is None else ",".join(controllers),
@@ -126,6 +132,7 @@ def design(loop: Optional[str] = None, **more: Any) -> Dict[str, Any]:
 
     Raises :class:`shakebench.InputError` for an unknown loop.
     """
+    check_keywords("design", more)
     with tempfile.TemporaryDirectory(prefix="shakebench-") as folder:
         named = options({"loop": loop, "out": str(Path(folder) / "design"), **more})
         return call(["design", *named, "--json"])
@@ -146,6 +153,7 @@ def identify(
 
     Raises :class:`shakebench.InputError` for data at fault, with file, row and what was expected.
     """
+    check_keywords("identify", more)
     named = options({"fit_part": fit_part, "specimen": optional_path(specimen), **more})
     arguments = ["identify", *_paths(data), *named, "--json"]
     if out is not None:
@@ -173,6 +181,7 @@ def diagnose(
 
     Raises :class:`shakebench.InputError` for a case at fault.
     """
+    check_keywords("diagnose", more)
     named: List[str] = []
     for file in [] if data is None else _paths(data):
         named += ["--data", file]
@@ -187,7 +196,97 @@ def tune(study: PathLike, *, out: Optional[PathLike] = None, **more: Any) -> Res
 
     Raises :class:`shakebench.InputError` for a study at fault.
     """
+    check_keywords("tune", more)
     return _finished(["tune", text(study), *options(more)], out)
+
+
+def commission(*, out: Optional[PathLike] = None, set: Optional[Mapping[str, Any]] = None, **more: Any) -> Result:
+    """Records, identifies and validates a simulated rig, and designs its controllers.
+
+    The keywords are the options of ``shakebench commission``. ``result.folder`` holds a system file
+    for each controller, ``result["predicted_percent"]`` the errors to expect.
+
+    Raises :class:`shakebench.InputError` for input at fault.
+    """
+    check_keywords("commission", more)
+    return _finished(["commission", *_settings(set), *options(more)], out)
+
+
+def qualify(
+    rule: PathLike,
+    *,
+    set: Optional[Mapping[str, Any]] = None,
+    out: Optional[PathLike] = None,
+    **more: Any,
+) -> Result:
+    """Makes a motion for a required response spectrum and plays it until its spectrum holds.
+
+    ``rule`` is ``"ac156"``, ``"ieee693"`` or a file; ``set`` gives its parameters,
+    ``{"s_ds": 1.0, "z_h": 0.0}``. ``result["verdict"]`` and ``result["rounds"]`` say how it went.
+
+    Raises :class:`shakebench.InputError` for input at fault.
+    """
+    check_keywords("qualify", more)
+    return _finished(["qualify", text(rule), *_settings(set), *options(more)], out)
+
+
+def trs(
+    record: PathLike,
+    rrs: PathLike,
+    *,
+    set: Optional[Mapping[str, Any]] = None,
+    out: Optional[PathLike] = None,
+    **more: Any,
+) -> Result:
+    """Compares a record's response spectrum with the required one of a rule.
+
+    Raises :class:`shakebench.InputError` for input at fault.
+    """
+    check_keywords("trs", more)
+    return _finished(["trs", text(record), "--rrs", text(rrs), *_settings(set), *options(more)], out)
+
+
+def iterate(
+    system: Optional[PathLike] = None,
+    *,
+    set: Optional[Mapping[str, Any]] = None,
+    out: Optional[PathLike] = None,
+    **more: Any,
+) -> Result:
+    """Corrects the drive of a motion over several runs. The keywords are the options of
+    ``shakebench iterate``.
+
+    Raises :class:`shakebench.InputError` for input at fault.
+    """
+    check_keywords("iterate", more)
+    named = [] if system is None else [text(system)]
+    return _finished(["iterate", *named, *_settings(set), *options(more)], out)
+
+
+def validate(file: PathLike) -> Dict[str, Any]:
+    """Checks an FMU or an SSP archive: ``validate(file)["findings"]``, by severity.
+
+    Raises :class:`shakebench.InputError` for a file that is neither.
+    """
+    return call(["validate", text(file), "--json"])
+
+
+def info(file: PathLike) -> str:
+    """What an FMU, an archive, a system or a data file holds, as text.
+
+    Raises :class:`shakebench.InputError` for a file at fault.
+    """
+    return say(["info", text(file)]).stdout.decode("utf-8")
+
+
+def export(system: PathLike, ssp: PathLike, **more: Any) -> Path:
+    """Writes a system as an SSP archive and gives its path.
+
+    Raises :class:`shakebench.InputError` for input at fault.
+    """
+    check_keywords("export", more)
+    say(["export", text(system), "--ssp", text(ssp), *options(more)])
+    return Path(ssp)
 
 
 def doctor() -> Dict[str, Any]:

@@ -21,6 +21,22 @@ def _folders() -> List[Path]:
     return [own.parent / "fmus", own.parent.parent / "fmus"]
 
 
+def folder(fmi: int = 3) -> Path:
+    """The folder with the FMUs: ``fmi2/NAME.fmu`` and ``fmi3/NAME.fmu``.
+
+    Raises :class:`shakebench.InputError` where there are none.
+    """
+    looked = _folders()
+    for place in looked:
+        if any((place / f"fmi{fmi}").glob("*.fmu")):
+            return place
+    places = " nor in ".join(str(place / f"fmi{fmi}") for place in looked)
+    raise InputError(
+        f"no FMUs in {places}: install the package again, give their folder in SHAKEBENCH_FMUS, or, "
+        "in a checkout, run `cargo run --release -- build`"
+    )
+
+
 def fmus(fmi: int = 3) -> Dict[str, Path]:
     """All FMUs of a version of FMI (2 or 3): file by name of the component.
 
@@ -28,16 +44,8 @@ def fmus(fmi: int = 3) -> Dict[str, Path]:
     """
     if fmi not in VERSIONS:
         raise InputError(f"fmi={fmi!r}: expected 2 or 3")
-    looked = [folder / f"fmi{fmi}" for folder in _folders()]
-    for folder in looked:
-        found = {file.stem: file for file in sorted(folder.glob("*.fmu"))}
-        if found:
-            return found
-    places = " nor in ".join(map(str, looked))
-    raise InputError(
-        f"no FMUs in {places}: install the package again, give their folder in SHAKEBENCH_FMUS, or, "
-        "in a checkout, run `cargo run --release -- build`"
-    )
+    files = (folder(fmi) / f"fmi{fmi}").glob("*.fmu")
+    return {file.stem: file for file in sorted(files)}
 
 
 def fmu(name: str, fmi: int = 3) -> Path:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import importlib.metadata
+import difflib
+import functools
 import json
 import os
 import platform
+import re
 import subprocess
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Union
+from typing import Any, Dict, FrozenSet, Iterable, List, Optional, Sequence, Union
 
 PathLike = Union[str, "os.PathLike[str]"]
 
@@ -22,6 +25,10 @@ class Error(Exception):
 
 class InputError(Error):
     """The input is at fault (exit status 2): nothing was written."""
+
+
+class KeywordError(InputError, TypeError):
+    """A keyword that the command does not have."""
 
 
 class ProgramMissing(Error):
@@ -73,11 +80,10 @@ def _make_executable(path: Path) -> None:
         ) from error
 
 
-def call(arguments: Sequence[str]) -> Dict[str, Any]:
-    """Runs the program and gives the JSON object that it prints.
+def say(arguments: Sequence[str]) -> "subprocess.CompletedProcess[bytes]":
+    """Runs the program to its end. An interrupt (Ctrl-C) ends it first.
 
-    Raises :class:`InputError` with the program's message for exit status 2, :class:`Error` where
-    there is no object (the program was stopped, or is from another version).
+    Raises :class:`InputError` with the program's message for exit status 2.
     """
     path = program()
     try:
@@ -92,17 +98,56 @@ def call(arguments: Sequence[str]) -> Dict[str, Any]:
             f"{path} cannot be started ({error}): it is damaged or for another platform than "
             f"{platform.machine()}-{platform.system().lower()}; install the wheel for this one"
         ) from error
-    said = done.stderr.decode("utf-8", "replace").strip()
     if done.returncode == 2:
-        raise InputError(said[7:] if said.startswith("error: ") else said)
+        raise InputError(in_keywords(message(done)))
+    return done
+
+
+def message(done: "subprocess.CompletedProcess[bytes]") -> str:
+    """What the program printed to standard error, without the word in front."""
+    said = done.stderr.decode("utf-8", "replace").strip()
+    return said[7:] if said.startswith("error: ") else said
+
+
+def in_keywords(words: str) -> str:
+    """A message with options as keywords: ``--record-every`` is ``record_every`` here."""
+    return re.sub(r"(?<![\w-])--([a-z][a-z-]*[a-z])", lambda m: m[1].replace("-", "_"), words)
+
+
+def call(arguments: Sequence[str]) -> Dict[str, Any]:
+    """Runs the program and gives the JSON object that it prints.
+
+    Raises :class:`InputError` with the program's message for exit status 2, :class:`Error` where
+    there is no object (the program was stopped, or is from another version).
+    """
+    done = say(arguments)
     try:
         printed = json.loads(done.stdout.decode("utf-8"))
     except ValueError:
         ended = f"ended with status {done.returncode}"
         if done.returncode < 0:
             ended = f"was ended by signal {-done.returncode}"
-        raise Error(f"{path} {ended} and printed no result: {said}") from None
+        raise Error(f"{program()} {ended} and printed no result: {message(done)}") from None
     return printed
+
+
+@functools.lru_cache(maxsize=None)
+def known_options(command: str) -> FrozenSet[str]:
+    """The options of a command as keywords, as its help lists them."""
+    listed = say([command, "--help"]).stdout.decode("utf-8", "replace")
+    found = re.findall(r"(?m)^\s+(?:-\w, )?--([a-z][a-z-]*)", listed)
+    return frozenset(name.replace("-", "_") for name in found) - {"help", "json"}
+
+
+def check_keywords(command: str, names: Iterable[str]) -> None:
+    """Raises :class:`KeywordError` for a keyword that is not an option of the command."""
+    for name in names:
+        known = known_options(command)
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f", did you mean `{near[0]}`?" if near else f"; expected some of {', '.join(sorted(known))}"
+            function = command.replace("-", "_")
+            raise KeywordError(f"{function}() got an unexpected keyword argument `{name}`{hint}")
 
 
 def options(named: Dict[str, Any]) -> List[str]:

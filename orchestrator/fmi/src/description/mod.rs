@@ -241,6 +241,32 @@ impl Description {
         all.into_iter()
     }
 
+    /// Adds an input of type Float64 without a unit that the FMU itself has not.
+    pub(super) fn add_input(&mut self, name: &str) {
+        let references = self.variables.iter().map(|variable| variable.reference);
+        let reference = references.max().map_or(0, |most| most.wrapping_add(1));
+        let position = self.variables.len();
+        self.positions.insert(name.to_string(), position);
+        self.variables.push(Variable {
+            name: name.to_string(),
+            reference,
+            kind: Kind::Float64,
+            causality: Causality::Input,
+            variability: Variability::Continuous,
+            unit: None,
+            base_unit: None,
+            display_unit: None,
+            start: Some("0".to_string()),
+            is_settable: true,
+            is_structural: false,
+            clocks: Vec::new(),
+            element: (0, 1),
+            is_element: false,
+            description: String::new(),
+            dependencies: [].into(),
+        });
+    }
+
     /// Positions of the variables of one causality.
     pub fn of(&self, causality: Causality) -> impl Iterator<Item = usize> + '_ {
         (0..self.variables.len()).filter(move |&index| self.variables[index].causality == causality)

@@ -13,26 +13,7 @@ impl Instance {
 
     #[inline]
     pub(super) fn scalar(&self, kind: &Kind) -> Scalar {
-        match kind {
-            Kind::Float64 => Scalar::Float64,
-            Kind::Float32 => Scalar::Float32,
-            Kind::Int8 => Scalar::Int8,
-            Kind::UInt8 => Scalar::UInt8,
-            Kind::Int16 => Scalar::Int16,
-            Kind::UInt16 => Scalar::UInt16,
-            Kind::Int32 => Scalar::Int32,
-            Kind::UInt32 => Scalar::UInt32,
-            Kind::Int64 => Scalar::Int64,
-            Kind::UInt64 => Scalar::UInt64,
-            Kind::Boolean => Scalar::Boolean,
-            Kind::String => Scalar::String,
-            Kind::Binary => Scalar::Binary,
-            Kind::Clock => Scalar::Clock,
-            Kind::Enumeration(_) => match self.version() {
-                FmiVersion::V2 => Scalar::Int32,
-                FmiVersion::V3 => Scalar::Int64,
-            },
-        }
+        Scalar::of(kind, self.version())
     }
 
     pub(super) fn plain(&mut self, function: Function) -> Outcome {

@@ -13,6 +13,7 @@ use super::isolation::Remote;
 use super::messages::{Messages, TELLING};
 use super::native::{self, Mode, Setup, Sink};
 use super::processes::{Processes, refused};
+use super::stand_in::Computed;
 use super::{
     CURE, CallError, FmiVersion, Fmu, FmuError, Interface, Kind, Message, Options, Trace, archive,
 };
@@ -108,6 +109,13 @@ impl Instance {
         };
         let clocks = Clocks::of(description, has_events);
         let clocks = clocks.map_err(|reason| refused(fmu, name, reason))?;
+        if let Some(stand_in) = &fmu.stand_in {
+            let computed = Computed::new(stand_in, fmu, name);
+            let computed = computed.map_err(|reason| refused(fmu, name, reason))?;
+            let messages = Arc::new(Messages::new(true));
+            let endpoint = Box::new(computed);
+            return Ok(Self::around(fmu, name, endpoint, messages, None, clocks));
+        }
         let place = processes.place(fmu, alone);
         let place = place.map_err(|reason| refused(fmu, name, reason))?;
         let options = processes.options();
@@ -161,19 +169,9 @@ impl Instance {
             }
             refused(fmu, name, reason)
         })?;
-        let mut instance = Self {
-            name: name.to_string(),
-            fmu: fmu.clone(),
-            endpoint,
-            messages,
-            trace: options.trace.clone(),
-            time: 0.0,
-            phase: Phase::Instantiated,
-            has_events,
-            clocks,
-            start: 0.0,
-            scratch: Vec::new(),
-        };
+        let trace = options.trace.clone();
+        let mut instance = Self::around(fmu, name, endpoint, messages, trace, clocks);
+        instance.has_events = has_events;
         if setup.logging {
             instance.log_categories(&told);
         }
@@ -182,6 +180,30 @@ impl Instance {
             instance.messages.message(1, "", &text);
         }
         Ok(instance)
+    }
+
+    /// An instance whose calls `endpoint` carries out.
+    fn around(
+        fmu: &Arc<Fmu>,
+        name: &str,
+        endpoint: Box<dyn Endpoint>,
+        messages: Arc<Messages>,
+        trace: Option<Arc<Trace>>,
+        clocks: Clocks,
+    ) -> Self {
+        Self {
+            name: name.to_string(),
+            fmu: fmu.clone(),
+            endpoint,
+            messages,
+            trace,
+            time: 0.0,
+            phase: Phase::Instantiated,
+            has_events: false,
+            clocks,
+            start: 0.0,
+            scratch: Vec::new(),
+        }
     }
 
     /// Asks for messages of these categories; an FMU that refuses logs what it likes.

@@ -264,7 +264,8 @@ pub fn prepare_shared(
         let count = (duration / motion.dt).round();
         if count > MOST_SAMPLES {
             return Err(fault(format!(
-                "{duration} s need {count:e} samples, more than fit; use a shorter --duration"
+                "a duration of {duration:e} s needs {count:e} samples; the limit is \
+                 {MOST_SAMPLES:e}"
             )));
         }
         samples = count as usize;

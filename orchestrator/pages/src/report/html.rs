@@ -9,7 +9,10 @@ use super::{Cell, Report, Section, Table, UnitSystem, bars};
 
 const TEMPLATE: &str = include_str!("assets/report.html");
 const STYLE: &str = include_str!("assets/report.css");
-const SCRIPT: &str = include_str!("assets/report.js");
+const SCRIPT: &str = concat!(
+    include_str!("assets/inspector.js"),
+    include_str!("assets/report.js")
+);
 const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const UPLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 const UPLOT_LICENSE: &str = include_str!("assets/uPlot.LICENSE");

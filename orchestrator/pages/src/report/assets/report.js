@@ -1,4 +1,3 @@
-"use strict";
 (() => {
   const root = document.documentElement;
   const source = document.getElementById("panels");
@@ -133,6 +132,9 @@
 
   let charts = [];
   let printing = false;
+  // Of the reference's peak, %.
+  let tolerance = 0;
+  const page = { colour, digits, charts: () => charts };
   const draw = (place) => {
     const panel = panels[Number(place.dataset.panel)];
     const system = root.dataset.units;
@@ -147,6 +149,7 @@
     const ySpan = Math.max(...data.slice(1).map(span));
     const bands = [];
     const drawn = [];
+    const lines = [];
     const series = [{ label: named(panel.x, xUnit), value: (_, v) => digits(v, span(data[0])) }];
     roles.forEach(({ series: one, role }, n) => {
       const stroke = strokeOf(one);
@@ -165,7 +168,32 @@
       });
       if (role === "upper") bands.push({ series: [n + 1, n], fill: `${stroke}33` });
       if (is("path")) drawn.push(path(one, xUnit, yUnit, stroke));
+      lines.push({
+        name: series.at(-1).label, stroke, width: is("band") ? 0.6 : wide ? 3 : 1.2, dash: is("dashed"), points: is("points"),
+        hidden: role === "upper",
+        path: is("path") ? [one.x.map((v) => v / xUnit[1]), one.y.map((v) => (v == null ? null : v / yUnit[1]))] : null,
+      });
     });
+    const at = tolerance > 0 ? roles.findIndex(({ series: one }) => one.colour === 0 && one.style === "line") : -1;
+    if (at >= 0) {
+      // What may lie around the reference, and how much of each other curve does not.
+      const asked = data[at + 1];
+      const allowed = tolerance / 100 * Math.max(...asked.map((v) => Math.abs(v ?? 0)));
+      roles.forEach((_, n) => {
+        if (n === at) return;
+        const both = data[n + 1].filter((v, k) => v != null && asked[k] != null).length;
+        const out = data[n + 1].filter((v, k) => v != null && asked[k] != null && Math.abs(v - asked[k]) > allowed).length;
+        if (both) series[n + 1].label = lines[n].name = `${lines[n].name} (${(100 * out / both).toPrecision(3)} % outside)`;
+      });
+      const stroke = colour("--series-0");
+      for (const sign of [1, -1]) {
+        data.push(asked.map((v) => (v == null ? null : v + sign * allowed)));
+        const label = `${sign > 0 ? "+" : "\u2212"}${tolerance} % of the peak`;
+        series.push({ label, stroke, width: 0.6, points: { show: false }, value: (_, v) => digits(v, ySpan) });
+        lines.push({ name: label, stroke, width: 0.6 });
+      }
+      bands.push({ series: [data.length - 2, data.length - 1], fill: `${stroke}22` });
+    }
     const ink = colour("--soft");
     const axis = (which, unit, size) => ({
       ...(which.log && {
@@ -198,7 +226,10 @@
       },
       hooks: { draw: drawn },
     };
-    return new uPlot(options, data, place);
+    const chart = new uPlot(options, data, place);
+    chart.names = { x: named(panel.x, xUnit), y: named(panel.y, yUnit), lines };
+    inspector.attach(chart, panel, chart.names, page);
+    return chart;
   };
   // A part of a plane is drawn as a plane, as far as there is room.
   const height = (panel, width) => {
@@ -217,6 +248,7 @@
   const build = () => {
     charts.forEach((chart) => chart.destroy());
     charts = [...document.querySelectorAll(".chart")].flatMap((place) => {
+      if (!place.dataset.panel || !panels[Number(place.dataset.panel)].series.length) return [];
       try { return [draw(place)]; } catch (error) {
         // The other plots are worth seeing even if one cannot be drawn.
         place.textContent = `This plot could not be drawn (${error.message}).`;
@@ -241,42 +273,6 @@
     `${document.title} - ${panel.title}`.replace(/[^\p{L}\p{N}.]+/gu, "-").slice(0, 90) + ending;
   const strokeOf = (one) => colour(`--series-${one.colour === 0 ? 0 : 1 + (one.colour - 1) % 8}`);
 
-  // The plot as it stands, with its title above and its legend below.
-  const picture = (chart, panel) => {
-    const ratio = devicePixelRatio;
-    const plot = chart.ctx.canvas;
-    const canvas = document.createElement("canvas");
-    const ctx = canvas.getContext("2d");
-    const font = (size, weight) => { ctx.font = `${weight} ${size * ratio}px system-ui, sans-serif`; };
-    font(12.5, 400);
-    const rows = [[]];
-    let at = 0;
-    for (const one of panel.series) {
-      const width = ctx.measureText(one.name).width + 44 * ratio;
-      if (at > 0 && at + width > plot.width - 24 * ratio) { rows.push([]); at = 0; }
-      rows.at(-1).push({ one, at });
-      at += width;
-    }
-    const head = 30 * ratio;
-    canvas.width = plot.width;
-    canvas.height = head + plot.height + (20 * rows.length + 10) * ratio;
-    ctx.fillStyle = colour("--card");
-    ctx.fillRect(0, 0, canvas.width, canvas.height);
-    ctx.fillStyle = colour("--ink");
-    font(14, 600);
-    ctx.fillText(panel.title, 12 * ratio, 21 * ratio, canvas.width - 24 * ratio);
-    ctx.drawImage(plot, 0, head);
-    font(12.5, 400);
-    rows.forEach((row, n) => row.forEach(({ one, at: left }) => {
-      const y = head + plot.height + (14 + 20 * n) * ratio;
-      ctx.fillStyle = strokeOf(one);
-      ctx.fillRect(12 * ratio + left, y - 5 * ratio, 20 * ratio, 3 * ratio);
-      ctx.fillStyle = colour("--ink");
-      ctx.fillText(one.name, 38 * ratio + left, y);
-    }));
-    return canvas;
-  };
-
   // The data in the units shown; series that stand at other places get a column of places each.
   const table = (panel) => {
     const system = root.dataset.units;
@@ -300,18 +296,68 @@
     for (let n = 0; n < longest; n++) lines.push(list.map((column) => number(column, n)).join(","));
     return `${lines.join("\n")}\n`;
   };
-  for (const button of document.querySelectorAll("[data-export]")) {
-    button.addEventListener("click", () => {
-      const place = button.closest("figure").querySelector(".chart");
-      const panel = panels[Number(place.dataset.panel)];
-      if (button.dataset.export === "csv") {
-        save(fileName(panel, ".csv"), [table(panel)], "text/csv");
-        return;
-      }
-      const chart = charts.find((one) => one.root.parentElement === place);
-      if (chart) picture(chart, panel).toBlob((blob) => save(fileName(panel, ".png"), [blob], "image/png"));
+  const field = (name, usual) => Number(document.getElementById(name)?.value) || usual;
+  // mm on the page, px of SVG.
+  const size = () => [field("figure-width", 180), field("figure-height", 75)].map((mm) => Math.min(Math.max(mm, 20), 1000) * 96 / 25.4);
+  const exports = async (button) => {
+    const place = button.closest("figure").querySelector(".chart");
+    const panel = panels[Number(place.dataset.panel)];
+    if (!panel) return undefined;
+    const kind = button.dataset.export;
+    if (kind === "csv") return save(fileName(panel, ".csv"), [table(panel)], "text/csv");
+    const chart = charts.find((one) => one.root.parentElement === place);
+    if (!chart) return undefined;
+    const text = inspector.svg(chart, panel, chart.names, page, size());
+    if (kind === "svg") return save(fileName(panel, ".svg"), [text], "image/svg+xml");
+    return save(fileName(panel, ".png"), [await inspector.png(text, size(), 300 / 96)], "image/png");
+  };
+  document.addEventListener("click", (event) => {
+    const button = event.target.closest?.("[data-export]");
+    if (button) exports(button);
+  });
+  document.getElementById("tolerance")?.addEventListener("change", (event) => {
+    tolerance = Math.max(0, Number(event.target.value) || 0);
+    build();
+  });
+
+  // Any signal of a file that the reader chooses, such as the run's results.csv.
+  const chosen = document.getElementById("signal-file");
+  chosen?.addEventListener("change", async () => {
+    const said = document.getElementById("signal-said");
+    const list = document.getElementById("signal-list");
+    const found = chosen.files.length ? inspector.read(await chosen.files[0].text()) : [];
+    list.replaceChildren();
+    said.textContent = found.length > 1 ? `${found.length - 1} signals over ${found[0].head}`
+      : "no columns of numbers; expected a CSV file such as results.csv";
+    const figure = document.getElementById("signal-figure");
+    figure.hidden = true;
+    if (found.length < 2) return;
+    const unit = ["", 1];
+    const axis = (label) => ({ label, laboratory: unit, si: unit, log: false, limits: null });
+    const place = figure.querySelector(".chart");
+    if (!place.dataset.panel) place.dataset.panel = String(panels.push({ title: "Signals", x: axis(""), y: axis(""), series: [] }) - 1);
+    const panel = panels[Number(place.dataset.panel)];
+    panel.x.label = found[0].head;
+    panel.title = chosen.files[0].name;
+    const shown = () => {
+      const names = [...list.querySelectorAll("input:checked")].map((box) => Number(box.value));
+      figure.hidden = !names.length;
+      panel.series = names.map((n, order) => ({
+        name: found[n].head, style: "line", colour: order + 1, key: "file", upper: null,
+        x: found[0].values, y: gaps(found[n].values),
+      }));
+      panel.y.label = names.length === 1 ? found[names[0]].head : "";
+      build();
+    };
+    found.forEach(({ head }, n) => {
+      if (!n) return;
+      const label = document.createElement("label");
+      const box = Object.assign(document.createElement("input"), { type: "checkbox", value: n });
+      box.addEventListener("change", shown);
+      label.append(box, ` ${head}`);
+      list.append(label);
     });
-  }
+  });
 
   const remember = (key, value) => { try { localStorage.setItem(key, value); } catch { /* a private window */ } };
   const recall = (key) => { try { return localStorage.getItem(key); } catch { return null; } };
