@@ -43,7 +43,7 @@ type Outcome_<T = Status> = Result<T, Fault>;
 enum Stage {
     Empty,
     Prepared,
-    Running(Stepwise),
+    Running(Box<Stepwise>),
     Finished(Box<Finished>),
 }
 
@@ -98,7 +98,7 @@ impl Handle {
         let simulation = simulation.and_then(|s| Stepwise::new(s, prepared.samples));
         let simulation = simulation.map_err(|error| Fault::input(&error.to_string()))?;
         self.signals = simulation.simulation().signals().to_vec();
-        self.stage = Stage::Running(simulation);
+        self.stage = Stage::Running(Box::new(simulation));
         Ok(Status::Done)
     }
 

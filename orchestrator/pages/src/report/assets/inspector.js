@@ -4,6 +4,8 @@
 const inspector = (() => {
   const escaped = (text) => String(text).replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
 
+  const element = (name, text) => `<${name}>${escaped(text)}</${name}>`;
+
   // The curves in words: the least and the greatest value of each.
   const words = (chart, panel, names, digits) => {
     const parts = names.lines.map((line, n) => {
@@ -216,7 +218,7 @@ const inspector = (() => {
       }
       const look = line.points ? 'stroke-width="5" stroke-linecap="round"' : `stroke-width="${line.width}" stroke-linejoin="round"`;
       const dash = line.dash ? ' stroke-dasharray="6 4"' : "";
-      parts.push(`<path d="${places.join("")}" fill="none" stroke="${line.stroke}" ${look}${dash}><title>${escaped(line.name)}</title></path>`);
+      parts.push(`<path d="${places.join("")}" fill="none" stroke="${line.stroke}" ${look}${dash}>${element("title", line.name)}</path>`);
     }
     parts.push("</g>");
     rows.forEach((row, n) => row.forEach(({ line, at }) => {
@@ -226,7 +228,7 @@ const inspector = (() => {
     }));
     parts.push(`<path d="M${box.left} ${box.top}V${box.bottom}H${box.right}" fill="none" stroke="${ink}"/>`);
     return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" role="img" ${font} fill="${ink}">`
-      + `<title>${escaped(panel.title)}</title><desc>${escaped(words(chart, panel, names, page.digits))}</desc>`
+      + element("title", panel.title) + element("desc", words(chart, panel, names, page.digits))
       + `<clipPath id="inside"><rect x="${box.left}" y="${box.top}" width="${box.right - box.left}" height="${box.bottom - box.top}"/></clipPath>`
       + `<rect width="100%" height="100%" fill="${page.colour("--card")}"/>${parts.join("")}</svg>`;
   };
