@@ -29,6 +29,19 @@ pub struct Plan {
     pub variable: Option<VariableStep>,
 }
 
+impl Plan {
+    /// Equal steps in the order of dependencies, s.
+    #[must_use]
+    pub fn fixed(step: f64, stop: f64) -> Self {
+        Self {
+            algorithm: Algorithm::default(),
+            step,
+            stop,
+            variable: None,
+        }
+    }
+}
+
 impl Simulation {
     /// Loads and initializes `system` under the samples of `motion`, with a coupling step of `step` seconds.
     ///

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use identification::data::DataError;
+use recordings::DataError;
 
 use super::accelerogram::{Record, file_name, stem};
 use super::error::MotionError;

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use identification::data::{
+use recordings::{
     Channel, DataError, Recording, RoundedStamps, Sheet, Text, Wanted, known_column,
 };
 

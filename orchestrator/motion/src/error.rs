@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use identification::data::DataError;
+use recordings::DataError;
 use thiserror::Error;
 
 use units::INCH;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use identification::data::{Channel, DataError, Text, read_text};
+use recordings::{Channel, DataError, Text, read_text};
 
 use super::accelerogram::{Record, file_name, stem};
 use super::at2;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use identification::data::{Channel, DataError, read_text};
+use recordings::{Channel, DataError, read_text};
 
 use super::accelerogram::{file_name, stem};
 use super::csv_file::{CsvFile, Kind, rounded};

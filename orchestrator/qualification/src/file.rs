@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use identification::data::{Sheet, Wanted, name_and_unit, read_text};
+use recordings::{Sheet, Wanted, name_and_unit, read_text};
 use motion::metrics::Measure;
 use serde::Deserialize;
 use toml::{Table, Value};

@@ -52,5 +52,5 @@ pub enum QualificationError {
     },
     /// A sheet that cannot be read.
     #[error(transparent)]
-    Data(#[from] identification::data::DataError),
+    Data(#[from] recordings::DataError),
 }

@@ -9,7 +9,7 @@
 
 use std::f64::consts::TAU;
 
-use identification::estimation::spectra::Spectra;
+use sysid::spectra::Spectra;
 use motion::metrics::{response_spectrum, rms, spectrum};
 use motion::{Motion, Options, Record, Scaling, peak};
 use rand::{RngExt, SeedableRng};

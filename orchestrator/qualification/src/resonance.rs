@@ -7,7 +7,7 @@
 
 use std::f64::consts::TAU;
 
-use identification::estimation::spectra::Spectra;
+use sysid::spectra::Spectra;
 use motion::metrics::spectrum;
 use motion::{Motion, smooth_step};
 use nalgebra::{DMatrix, DVector};

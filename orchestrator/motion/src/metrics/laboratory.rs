@@ -3,7 +3,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use identification::estimation::spectra::Spectra;
+use sysid::spectra::Spectra;
 
 use super::{USUAL_DAMPING, pseudo_acceleration, rms};
 use crate::peak;

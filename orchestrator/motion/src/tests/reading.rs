@@ -1,7 +1,7 @@
 //! Files are read as they are meant, and every fault is named with its place.
 
 use super::*;
-use identification::data::Text;
+use recordings::Text;
 
 #[needs::shared("records")]
 #[test]

@@ -1,6 +1,6 @@
 //! The plots of a run.
 
-use identification::estimation::frequency_response;
+use sysid::frequency_response;
 use plant::linear::log_space;
 
 use super::{Run, SpecimenHistory};
