@@ -217,6 +217,11 @@ fn your_own_rig() {
 }
 
 #[test]
+fn your_own_effects() {
+    run_page("your-own-effects.md");
+}
+
+#[test]
 fn reports_and_comparing_runs() {
     run_page("reports.md");
 }

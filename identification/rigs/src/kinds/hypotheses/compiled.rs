@@ -137,7 +137,9 @@ fn place(at: &str, rig: &dyn Rig) -> Result<Place, String> {
     }
     let found = all.iter().find(|(name, _)| *name == at);
     found.map(|(_, place)| *place).ok_or_else(|| {
-        let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+        let mut names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+        // An oscillator has an input and a place of one name.
+        names.dedup();
         format!(
             "`{at}` is not a place of the kind {}: expected {}",
             rig.kind(),
