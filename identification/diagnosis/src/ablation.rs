@@ -1,7 +1,7 @@
 //! What an effect is worth: against the model without it, refitted, under the noises that then fit best.
 
 use super::fit::{Fit, evaluate, residuals};
-use super::likelihood::{Hypothesis, PenalisedLikelihood, named, special_case};
+use super::likelihood::{Hypothesis, PenalisedLikelihood, named, pays, special_case};
 use super::model::{ExtensibleModel, Point};
 use super::progress::{Observer, Progress};
 
@@ -49,6 +49,12 @@ pub(super) fn settled<M: ExtensibleModel + Clone>(
             point, residuals, ..
         } = &best.hypothesis.fit;
         let lesson = best.model.with_learned_noise(point, residuals, records);
+        if let Some(own) = &lesson {
+            observer.tell(|| Progress::Noise {
+                gain: own.gain,
+                figures: own.figures.clone(),
+            });
+        }
         let Some(lesson) = lesson.filter(|own| own.is_believable && own.gain > NOTHING_NEW) else {
             break;
         };
@@ -116,12 +122,11 @@ pub(super) fn ablated<M: ExtensibleModel + Clone>(
                 observer.tell(|| Progress::Trying(format!("only {}", named(candidates, &smaller))));
                 settled_from(assumed, &current.model, &smaller, records, observer)
             })
+            .filter(|smaller| !pays(candidates, &current.hypothesis, &smaller.hypothesis))
             .min_by(|a, b| a.hypothesis.score.total_cmp(&b.hypothesis.score));
         match smaller {
-            Some(smaller) if smaller.hypothesis.score <= current.hypothesis.score => {
-                current = smaller;
-            }
-            _ => return current,
+            Some(smaller) => current = smaller,
+            None => return current,
         }
     }
 }

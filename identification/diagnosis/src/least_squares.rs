@@ -483,6 +483,7 @@ mod tests {
                     look_alikes: &[],
                     tolerance: 1.0,
                     contains: None,
+                    is_linear: false,
                 }],
                 measured,
             }

@@ -17,7 +17,7 @@ pub use adequacy::{Part, Place, Test};
 pub use cross_validation::{
     Rival, Selected, Simulated, completed, nominal, refit, select, select_jointly,
 };
-pub use fit::{Fit, Jacobian, evaluate};
+pub use fit::{Fit, Jacobian, evaluate, residuals};
 pub use least_squares::WEAK;
 pub use least_squares::{
     Columns, Free, SimulatedModel, Solution, all_errors, deviations, least_squares, solution,

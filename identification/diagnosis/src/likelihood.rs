@@ -16,6 +16,13 @@ pub const PRICE_OF_A_PARAMETER: f64 = 6.0;
 /// Share of the catalogue's weakest value below which an effect is not worth a name; an engineer's
 /// choice, below 1 since an estimate of the weakest may come out smaller.
 pub const FLOOR: f64 = 0.6;
+/// Share of the fitted residuals' power that an effect of the linear part must take away beyond its price. The
+/// form of a noise, of a coarse converter's for one, is not known better: where nothing was hidden, oil that is
+/// not there took away 0.35 %.
+pub(super) const NOISE_IS_KNOWN_TO: f64 = 0.004;
+/// Share of what an effect earns from which on the records ask for it, rather than the stated parameters: without
+/// a scale's error these would have to be far off, and the records would look the same.
+const BY_THE_RECORDS: f64 = 0.3;
 /// A model within this of the best is a rival that the data do not rule out: odds of `e^6`, 400 to
 /// one, against it; above 10 is "very strong" (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
 pub const RIVAL_WITHIN: f64 = 12.0;
@@ -77,6 +84,30 @@ fn price(candidates: &[Candidate], point: &Point) -> f64 {
         .iter()
         .map(|(i, _)| PRICE_OF_AN_EFFECT + PRICE_OF_A_PARAMETER * extra(&candidates[*i]))
         .sum()
+}
+
+/// What a noise of another form may have gained: of what an effect `gained` by the records alone and with the
+/// stated parameters, on so many residuals.
+fn unsure([by_records, all]: [f64; 2], residuals: usize) -> f64 {
+    if by_records > BY_THE_RECORDS * all {
+        NOISE_IS_KNOWN_TO * residuals as f64
+    } else {
+        0.0
+    }
+}
+
+/// Whether what `with` has more than `without` earns its price.
+pub(super) fn pays(candidates: &[Candidate], with: &Hypothesis, without: &Hypothesis) -> bool {
+    let known = without.effects();
+    let added = with.effects().into_iter().filter(|i| !known.contains(i));
+    let linear = added.filter(|i| candidates[*i].is_linear).count();
+    let of_records = |own: &Hypothesis| own.fit.cost - own.fit.point.prior_cost(candidates);
+    let gained = [
+        of_records(without) - of_records(with),
+        without.fit.cost - with.fit.cost,
+    ];
+    let unsure = unsure(gained, linear * with.fit.residuals.len());
+    without.score - with.score > unsure
 }
 
 /// True when every effect of `point` has `floor` times the strength of the catalogue's weakest.
@@ -178,6 +209,7 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
                 ("score", hypothesis.score),
                 ("cost", hypothesis.fit.cost),
                 ("mean square", hypothesis.mean_square()),
+                ("priors", hypothesis.fit.point.prior_cost(candidates)),
             ],
         });
     }
@@ -483,6 +515,7 @@ mod tests {
             look_alikes: &[],
             tolerance: 1.0,
             contains: None,
+            is_linear: false,
         }
     }
 
@@ -501,6 +534,20 @@ mod tests {
         let three: &[f64] = &[1.0, 1.0, 1.0];
         assert_eq!(price(&candidates, &with(&[(1, three)])), 30.0);
         assert_eq!(price(&candidates, &with(&[(0, &[1.0]), (1, three)])), 48.0);
+    }
+
+    /// Oil that was not there, in the records of a coarse converter, and a load cell's scale that was.
+    #[test]
+    fn a_noise_of_another_form_does_not_pay_and_a_scale_does() {
+        for (gained, residuals, is_enough) in [
+            ([94.0, 126.0], 94_208, false),
+            ([94.0, 179.0], 54_400, false),
+            ([900.0, 950.0], 94_208, true),
+            ([3.0, 90.0], 94_208, true),
+        ] {
+            let left = gained[1] - PRICE_OF_AN_EFFECT - unsure(gained, residuals);
+            assert_eq!(left > 0.0, is_enough, "{gained:?}");
+        }
     }
 
     #[test]

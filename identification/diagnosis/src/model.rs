@@ -35,6 +35,15 @@ pub trait ExtensibleModel: Sync {
     where
         Self: Sized;
 
+    /// The same rig with a predictor that follows the records less closely, if it has a choice. What the
+    /// records say of the rig stays the same then, what a wrong noise makes of it does not.
+    fn following_less(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+
     /// Whether its noises are no louder than is usual. Where they are, behaviour that the model lacks may be
     /// mistaken for them.
     fn is_usual(&self) -> bool {
@@ -190,6 +199,9 @@ pub struct Candidate {
     pub tolerance: f64,
     /// Effect that this one holds as a special case.
     pub contains: Option<&'static str>,
+    /// Whether it changes the linear part of the rig, through which the noises pass as well: a noise of
+    /// another form than was learned looks like a little of it.
+    pub is_linear: bool,
 }
 
 impl Candidate {
@@ -336,6 +348,7 @@ mod tests {
             look_alikes: &[],
             tolerance: 1.0,
             contains: None,
+            is_linear: false,
         }
     }
 

@@ -7,9 +7,9 @@ use super::adequacy::{LARGEST_DEVIATE, Test, left_over};
 use super::fit::{Fit, Jacobian, evaluate, fit as refit, polish};
 use super::likelihood::{
     FLOOR, Hypothesis, MOST_EFFECTS, NEAR_NOISE, NEARLY_NOISE, PenalisedLikelihood, RIVAL_WITHIN,
-    ROUNDS, SETTLED, matters, named,
+    ROUNDS, SETTLED, matters, named, pays,
 };
-use super::model::{Candidate, ExtensibleModel, Point, Role};
+use super::model::{Candidate, ExtensibleModel, Point, Role, Scale};
 use super::progress::{Observer, Progress, Step};
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +20,14 @@ pub const SUREST: f64 = 0.95;
 const PROPOSED: usize = 3;
 /// Share of what the best of them gains that they gain at least.
 const NEAR: f64 = 0.5;
+/// Share of its size that an effect keeps where the predictor follows the records less closely.
+const STEADY: f64 = 0.5;
+/// Rounds of the fit that asks for it.
+const ROUNDS_OF_DOUBT: usize = 4;
+/// Share of the residuals' power beyond which an effect is not doubted for that.
+const BEYOND_DOUBT: f64 = 0.02;
+/// Share of the excess error that a single effect explains to lead what is ranked.
+const MOST_OF_IT: f64 = 0.9;
 /// Models that are reported with their weights at most.
 const CANDIDATES: usize = 5;
 
@@ -82,6 +90,8 @@ pub struct NamedEffect {
 /// A model with effects, weighed against the others that were fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeighedModel {
+    /// Where it is.
+    pub point: Point,
     /// Its effects.
     pub effects: Vec<NamedEffect>,
     /// Posterior share among the models weighed, 0 to 1.
@@ -183,12 +193,14 @@ pub fn judge<M: ExtensibleModel + Clone>(
         effects: Vec::new(),
     };
     let nominal = rounds.settled(rounds.quiet, &origin)?;
-    let (mut best, others) = rounds.search(nominal, FLOOR);
+    let (best, others) = rounds.search(nominal, FLOOR);
+    let mut best = rounds.steady(best);
     let mut judgement = weigh(&best, &others, fitted, held_out, observer)?;
     let is_near = best.model.is_usual() && best.hypothesis.mean_square() < NEAR_NOISE;
     if judgement.verdict == Verdict::Unexplained && is_near && !observer.is_over() {
         // Too weak to matter, but perhaps all that is left.
         let (weak, rivals) = rounds.search(best.clone(), 0.0);
+        let weak = rounds.steady(weak);
         let again = weigh(&weak, &rivals, fitted, held_out, observer)?;
         if matches!(again.verdict, Verdict::Named | Verdict::Ambiguous) {
             let strong = matters(model.candidates(), &again.best.point, FLOOR);
@@ -203,11 +215,36 @@ pub fn judge<M: ExtensibleModel + Clone>(
             best = weak;
         }
     }
+    if judgement.verdict == Verdict::Unexplained && !observer.is_over() {
+        let core = rounds.core(&best.hypothesis.fit.point);
+        if let Some(core) = core.filter(|core| core.explains > MOST_OF_IT) {
+            let names = |own: &WeighedModel| -> Vec<&str> {
+                own.effects.iter().map(|effect| effect.effect).collect()
+            };
+            judgement
+                .candidates
+                .retain(|own| names(own) != names(&core));
+            judgement.candidates.insert(0, core);
+            judgement.candidates.truncate(CANDIDATES);
+        }
+    }
     *model = best.model;
     if observer.has_cut() && judgement.verdict != Verdict::Adequate {
         judgement.verdict = Verdict::Unexplained;
     }
     Some(judgement)
+}
+
+/// Whether an effect's sizes, at coordinates `own`, are less than half of that at `again`, or of another sign.
+fn has_shrunk(candidate: &Candidate, own: &[f64], again: &[f64]) -> bool {
+    let parameters = candidate.parameters.iter().zip(own).zip(again);
+    let mut sizes = parameters
+        .filter(|((parameter, _), _)| {
+            matches!(parameter.role, Role::Size { .. }) && parameter.scale != Scale::Logarithmic
+        })
+        .map(|((_, own), again)| again * own.signum() < STEADY * own.abs())
+        .peekable();
+    sizes.peek().is_some() && sizes.all(|shrunk| shrunk)
 }
 
 /// A search in rounds.
@@ -249,21 +286,94 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
                 })
                 .collect();
             tried.sort_by(|a, b| a.hypothesis.score.total_cmp(&b.hypothesis.score));
-            let pays = tried
-                .first()
-                .is_some_and(|first| first.hypothesis.score < current.hypothesis.score);
-            if !pays {
+            let candidates = self.assumed.candidates();
+            let taken = tried
+                .iter()
+                .position(|own| pays(candidates, &own.hypothesis, &current.hypothesis));
+            let Some(taken) = taken else {
                 if others.is_empty() {
                     others = tried;
                 }
                 break;
-            }
-            current = tried.remove(0);
+            };
+            current = tried.remove(taken);
             others = tried;
         }
         let best = ablated(self.assumed, current, self.records, self.observer);
         let others = others.into_iter().map(|own| own.hypothesis);
         (best, others.collect())
+    }
+
+    /// `found` without the effects of the linear part that hardly pay and depend on how closely the predictor
+    /// follows the records: the rig does not, a noise of another form does.
+    fn steady(&self, mut found: Settled<M>) -> Settled<M> {
+        while let Some(place) = self.wavering(&found) {
+            let smaller = ablation::without(&found.hypothesis.fit.point, place);
+            self.observer.tell(|| {
+                let what = named(self.assumed.candidates(), &smaller);
+                Progress::Trying(format!("only {what}"))
+            });
+            let model = &found.model;
+            let Some(smaller) =
+                settled_from(self.assumed, model, &smaller, self.records, self.observer)
+            else {
+                break;
+            };
+            let earned = smaller.hypothesis.score - found.hypothesis.score;
+            let residuals = found.hypothesis.fit.residuals.len() as f64;
+            if earned > BEYOND_DOUBT * residuals {
+                break;
+            }
+            found = smaller;
+        }
+        found
+    }
+
+    /// The place of an effect of the linear part in `found` that loses most of its size where the predictor
+    /// follows less closely.
+    fn wavering(&self, found: &Settled<M>) -> Option<usize> {
+        let candidates = found.model.candidates();
+        let effects = &found.hypothesis.fit.point.effects;
+        let mut linear = effects.iter().filter(|(i, _)| candidates[*i].is_linear);
+        if self.observer.is_over() || linear.next().is_none() {
+            return None;
+        }
+        let other = found.model.following_less()?;
+        let start = evaluate(&other, &found.hypothesis.fit.point, self.records)?;
+        let (again, _) = polish(&other, &start, self.records, None, ROUNDS_OF_DOUBT, SETTLED)?;
+        let mut pairs = effects.iter().zip(&again.point.effects);
+        pairs.position(|((i, own), (_, again))| {
+            let candidate = &candidates[*i];
+            candidate.is_linear && has_shrunk(candidate, own, again)
+        })
+    }
+
+    /// The one effect of `point` that explains most under the noises of the quiet records, which have no part
+    /// of what is missing.
+    fn core(&self, point: &Point) -> Option<WeighedModel> {
+        let candidates = self.assumed.candidates();
+        let selection = PenalisedLikelihood::of(self.quiet, self.records, self.observer);
+        let excess = |own: &Hypothesis| (own.mean_square() - 1.0).max(0.0);
+        let fitted = |effects: &[(usize, Vec<f64>)]| {
+            let start = Point {
+                nuisance: vec![0.0; point.nuisance.len()],
+                effects: effects.to_vec(),
+            };
+            selection.hypothesis(&evaluate(self.quiet, &start, self.records)?)
+        };
+        let nominal = excess(&fitted(&[])?);
+        let alone = point.effects.iter().filter_map(|own| {
+            let found = fitted(std::slice::from_ref(own))?;
+            let deviations = found.jacobian.deviations(self.quiet, &found.fit);
+            let deviations = deviations.unwrap_or_default();
+            Some(WeighedModel {
+                point: found.fit.point.clone(),
+                effects: estimates(candidates, &found.fit.point, &deviations),
+                weight: 0.0,
+                explains: 1.0 - excess(&found) / nominal.max(f64::MIN_POSITIVE),
+            })
+        });
+        alone.max_by(|a, b| a.explains.total_cmp(&b.explains))
     }
 
     /// Models with one more effect than `current`, the most promising first.
@@ -433,6 +543,7 @@ fn weigh<M: ExtensibleModel>(
         .map(|own| {
             let deviations = own.jacobian.deviations(model, &own.fit).unwrap_or_default();
             WeighedModel {
+                point: own.fit.point.clone(),
                 effects: estimates(model.candidates(), &own.fit.point, &deviations),
                 weight: (-0.5 * (own.score - lowest)).exp() / weight,
                 explains: explains(own),

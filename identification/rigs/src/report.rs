@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::kinds::shake_table::experiment::SeparatingExperiment;
-use super::kinds::shake_table::{self, Finding, RelationReport};
+use super::kinds::shake_table::{self, Course, Finding, RelationReport};
 use super::kinds::{Cause, NamedValue, RigDiagnosis};
 use diagnosis::{NamedEffect, Part, Test, Verdict, WeighedModel};
 
@@ -43,6 +43,9 @@ pub struct DiagnosisReport {
     /// Nominal parameters beyond two standard deviations of what was stated.
     #[serde(default)]
     pub findings: Vec<Finding>,
+    /// Effects that do not act throughout a record.
+    #[serde(default)]
+    pub courses: Vec<Course>,
     /// Where more than noise is left.
     #[serde(default)]
     pub left: Vec<LeftReport>,
@@ -126,6 +129,15 @@ pub struct EffectGain {
     pub without_nrmse: f64,
     /// And with it.
     pub with_nrmse: f64,
+    /// Error without it in units of the noise floor.
+    #[serde(default)]
+    pub without_ratio: f64,
+    /// And with it.
+    #[serde(default)]
+    pub with_ratio: f64,
+    /// Standard deviations by which the likelihood of the data rises with it.
+    #[serde(default)]
+    pub deviations: f64,
     /// 95 % interval of the share of the error that it takes away.
     pub interval_95: [f64; 2],
 }
@@ -271,6 +283,9 @@ impl EffectReport {
             gain: own.map(|own| EffectGain {
                 without_nrmse: own.without_nrmse,
                 with_nrmse: own.with_nrmse,
+                without_ratio: own.without_ratio,
+                with_ratio: own.with_ratio,
+                deviations: own.deviations,
                 interval_95: own.interval_95,
             }),
             ..named.into()
@@ -361,6 +376,7 @@ impl From<&shake_table::Diagnosis> for DiagnosisReport {
             extended_fmus: Vec::new(),
             candidates: found.candidates.iter().map(CandidateReport::from).collect(),
             findings: found.findings.clone(),
+            courses: found.courses.clone(),
             left: found
                 .remaining
                 .iter()
@@ -437,6 +453,7 @@ impl From<&RigDiagnosis> for DiagnosisReport {
             extended_fmus: Vec::new(),
             candidates: Vec::new(),
             findings: found.causes.iter().map(Finding::from).collect(),
+            courses: Vec::new(),
             left: Vec::new(),
             time_limit_reached: false,
             notes: found.notes(),

@@ -361,6 +361,37 @@ fn a_sign_turned_over_is_told_from_an_effect() {
 }
 
 #[test]
+fn a_reversed_command_is_told_from_an_effect() {
+    let mut case = healthy();
+    for recording in [&mut case.identification, &mut case.validation] {
+        edit(recording, Channel::ValveCommand, |values| {
+            values.iter_mut().for_each(|u| *u = -*u);
+        });
+    }
+    let message = refused(&case);
+    assert!(
+        message.contains("the force follows the reversed command"),
+        "{message}"
+    );
+}
+
+#[test]
+fn channels_swapped_in_the_validation_record_alone_are_named() {
+    let mut case = healthy();
+    let recording = &mut case.validation;
+    let acceleration = recording.samples(Channel::Acceleration).to_vec();
+    let of_specimen = recording.samples(Channel::SpecimenAcceleration).to_vec();
+    edit(recording, Channel::Acceleration, |values| {
+        values.clone_from(&of_specimen);
+    });
+    edit(recording, Channel::SpecimenAcceleration, |values| {
+        values.clone_from(&acceleration);
+    });
+    let message = refused(&case);
+    assert!(message.contains("validation: "), "{message}");
+}
+
+#[test]
 fn records_with_other_channels_are_not_of_one_rig() {
     let mut case = healthy();
     case.validation = case.validation.without(Channel::SpecimenAcceleration);

@@ -190,6 +190,7 @@ fn candidate(
         look_alikes: &[],
         tolerance: 1.0,
         contains: None,
+        is_linear: false,
     }
 }
 

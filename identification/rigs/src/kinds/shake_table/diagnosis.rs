@@ -7,13 +7,14 @@ use plant::identified::shake_table::ShakeTable;
 use plant::sensors::instrumentation::Instrumentation;
 use plant::specimens::linear::LinearSpecimen;
 
+use super::course::{Course, courses};
 use super::experiment::{self, SeparatingExperiment};
 use super::gain::{Gain, gain};
 use super::health::{RelationReport, health};
 use super::left_over::{self, Residual};
 use super::mains::{Line, line};
 use super::relations::{misfit, relations};
-use super::sentence::{of_findings, said, sentence};
+use super::sentence::{of_courses, of_findings, said, sentence};
 use crate::case::{
     Case, CaseError, ControlLaw, Nominal, blind_spot, noise_ratios, problems, too_little_excitation,
 };
@@ -135,6 +136,9 @@ pub struct Diagnosis {
     pub candidates: Vec<WeighedModel>,
     /// Nominal parameters that are not what was stated.
     pub findings: Vec<Finding>,
+    /// Effects that do not act throughout a record: those of the model, or of the first candidate where none is
+    /// named.
+    pub courses: Vec<Course>,
     /// What every effect brings by itself.
     pub ablations: Vec<Ablation>,
     /// Error of the nominal model as it was described, not refitted, on the validation record, in units of
@@ -300,8 +304,14 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
     let mut notes = Vec::new();
     let mut model = prepare(case, &mut notes)?;
     let relations = relations(&case.identification, &case.nominal);
-    if let Some(problem) = misfit(&relations) {
-        return Err(unfit(&problem));
+    let of_validation = super::relations::relations(&case.validation, &case.nominal);
+    for (recording, own) in [
+        (&case.identification, &relations),
+        (&case.validation, &of_validation),
+    ] {
+        if let Some(problem) = misfit(own) {
+            return Err(unfit(&format!("{}: {problem}", recording.name)));
+        }
     }
     let held_out = model.records.len() - 1;
     let fitted: Vec<usize> = (0..held_out).collect();
@@ -327,7 +337,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
     if judgement.verdict != Verdict::Unexplained {
         doubts.extend(judgement.effects.iter().filter_map(indistinct));
     }
-    if !doubts.is_empty() || loudest(&model.noise, &model.stated_noise) > TOO_LOUD {
+    if !doubts.is_empty() || loudest(&model.noise, &model.stated_noise, model.period) > TOO_LOUD {
         judgement.verdict = Verdict::Unexplained;
     }
     notes.extend(doubts);
@@ -377,6 +387,11 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         rig.sensors.acceleration.hum_amplitude = line.amplitude;
         rig.sensors.acceleration.hum_frequency = line.frequency;
     }
+    let followed = match (judgement.verdict, judgement.candidates.first()) {
+        (Verdict::Unexplained, Some(first)) => &first.point,
+        _ => &judgement.all.point,
+    };
+    let courses = courses(&model, followed);
     let effects = readable(judgement.effects);
     let separating_experiment = case.nominal.controller.and_then(|law| {
         if judgement.verdict == Verdict::Unexplained {
@@ -452,7 +467,8 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         &against,
         &judgement.tests,
         &judgement.candidates,
-    ) + &of_findings(&findings);
+    ) + &of_courses(&courses)
+        + &of_findings(&findings);
     Ok(Diagnosis {
         sentence,
         verdict: judgement.verdict,
@@ -490,6 +506,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         share_explained: judgement.share_explained,
         candidates: judgement.candidates,
         findings,
+        courses,
         ablations,
         as_described,
         notes,

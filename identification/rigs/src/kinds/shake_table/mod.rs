@@ -1,6 +1,7 @@
 //! The shake table of the thesis with its records.
 
 pub mod catalogue;
+mod course;
 mod diagnosis;
 pub mod experiment;
 mod extended;
@@ -12,6 +13,7 @@ pub mod predictor;
 pub mod relations;
 mod sentence;
 
+pub use course::Course;
 pub use diagnosis::*;
 pub use extended::{ChannelErrors, DESCRIBED, ExtendedTable, TableErrors, TablePrediction};
 pub use health::RelationReport;

@@ -21,10 +21,12 @@ pub struct Relation {
     pub name: &'static str,
     /// Root mean square error in units of the error from sensor noise.
     pub ratio: f64,
-    /// Error below 3 Hz over the size of what it is an error of, where that is a channel.
+    /// Error below 3 Hz over the size of what it is an error of, where that is a channel; of R1 over the error
+    /// with the command reversed.
     pub relative: Option<f64>,
 }
 
+const VALVE: &str = "R1 valve and actuator";
 const EQUILIBRIUM: &str = "R2 equilibrium of the table";
 const KINEMATICS: &str = "R4 kinematics";
 
@@ -35,15 +37,24 @@ const LOOKS_ABSENT: f64 = 0.2;
 /// The limits lie beyond anything that an effect of the catalogue does.
 pub fn misfit(relations: &[Relation]) -> Option<String> {
     relations.iter().find_map(|relation| {
-        let (limit, what) = match relation.name {
-            KINEMATICS => (0.8, "acceleration and displacement are not from one motion"),
-            EQUILIBRIUM => (1.2, "forces do not balance the moving mass"),
+        let (limit, what, of) = match relation.name {
+            VALVE => (
+                3.0,
+                "the force follows the reversed command",
+                "that with the command reversed",
+            ),
+            KINEMATICS => (
+                0.8,
+                "acceleration and displacement are not from one motion",
+                "the signal",
+            ),
+            EQUILIBRIUM => (1.2, "forces do not balance the moving mass", "the signal"),
             _ => return None,
         };
         let relative = relation.relative.filter(|relative| *relative > limit)?;
         Some(format!(
             "the nominal model does not fit the columns: {what} ({}, error {relative:.2} times \
-             the signal below {SLOW} Hz); check units, signs and which rig this is",
+             {of} below {SLOW} Hz); check units, signs and which rig this is",
             relation.name
         ))
     })
@@ -125,18 +136,23 @@ pub fn relations(recording: &Recording, nominal: &Nominal) -> Vec<Relation> {
             nominal.shake_table.actuator.g1(),
             nominal.shake_table.actuator.g2(),
         );
+        let error = |sign: f64, k: usize, s: Complex<f64>| {
+            // The command is held over a sample.
+            let held = (1.0 - (-s * period).exp()) / (s * period);
+            let of_x = g2.evaluate(s) * s;
+            let moved = g2.evaluate(s) * s / of_velocity(s) * velocity[k];
+            let error = f[k] - g1.evaluate(s) * held * u[k] * sign - moved;
+            let of_u = (g1.evaluate(s) * nominal.command_noise).norm_sqr();
+            (error, sf * sf + of_x.norm_sqr() * sx * sx + of_u)
+        };
+        let reversed: Vec<Complex<f64>> = (0..f.len())
+            .map(|k| error(-1.0, k, Complex::new(0.0, omega(k.max(1)))).0)
+            .collect();
+        let as_it_is = |k: usize, s: Complex<f64>| error(1.0, k, s);
         all.push(Relation {
-            name: "R1 valve and actuator",
-            ratio: ratio(&|k, s| {
-                // The command is held over a sample.
-                let held = (1.0 - (-s * period).exp()) / (s * period);
-                let of_x = g2.evaluate(s) * s;
-                let moved = g2.evaluate(s) * s / of_velocity(s) * velocity[k];
-                let error = f[k] - g1.evaluate(s) * held * u[k] - moved;
-                let of_u = (g1.evaluate(s) * nominal.command_noise).norm_sqr();
-                (error, sf * sf + of_x.norm_sqr() * sx * sx + of_u)
-            }),
-            relative: None,
+            name: VALVE,
+            ratio: ratio(&as_it_is),
+            relative: relative(&as_it_is, &reversed),
         });
     }
     if let (Some(x), Some(v), Some(a), Some(f), Some(specimen)) =

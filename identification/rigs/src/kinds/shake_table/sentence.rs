@@ -1,5 +1,6 @@
 //! A verdict as one sentence for a laboratory engineer.
 
+use super::course::Course;
 use super::diagnosis::Finding;
 use super::gain::Gain;
 use diagnosis::Test;
@@ -145,6 +146,33 @@ pub(super) fn sentence(
     }
 }
 
+/// When effects act that do not act throughout; nothing of the others.
+pub(super) fn of_courses(courses: &[Course]) -> String {
+    let told = courses.iter().map(|own| {
+        let unit = laboratory_unit(&own.unit);
+        let [before, after] = [own.before, own.after].map(|value| {
+            let factor = convert(1.0, &own.unit, unit).unwrap_or(1.0);
+            let unit = if unit == "1" { "" } else { unit };
+            format!("{:.3} {unit}", factor * value)
+                .trim_end()
+                .to_string()
+        });
+        let effect = own.effect.replace('_', " ");
+        let effect = capitalised(&effect);
+        match own.onset_s {
+            Some(onset) => format!(
+                " {effect} changes {onset:.1} s into `{}`, from {before} to {after}.",
+                own.record
+            ),
+            None => format!(
+                " {effect} drifts during `{}`, from {before} to {after}.",
+                own.record
+            ),
+        }
+    });
+    told.collect()
+}
+
 /// Findings that the sentence holds; the report has them all.
 const TOLD: usize = 2;
 /// Standard deviations from which the sentence holds them. One of fifteen parameters is farther off than
@@ -207,6 +235,25 @@ mod tests {
         ] {
             assert_eq!(amount(&estimate(value, error, si), unit), want);
         }
+    }
+
+    #[test]
+    fn a_course_is_said_with_its_instant() {
+        let course = |onset_s| Course {
+            effect: "accelerometer_scale".into(),
+            parameter: "relative_change".into(),
+            record: "identification".into(),
+            onset_s,
+            before: 0.001,
+            after: -0.1,
+            unit: "1".into(),
+            gain: 500.0,
+        };
+        assert_eq!(
+            of_courses(&[course(Some(10.04))]),
+            " Accelerometer scale changes 10.0 s into `identification`, from 0.100 % to -10.000 %."
+        );
+        assert!(of_courses(&[course(None)]).contains("drifts during `identification`"));
     }
 
     #[test]

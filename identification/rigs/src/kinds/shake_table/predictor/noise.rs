@@ -3,6 +3,8 @@
 //! Every source is a sum of independent parts: a white one, slow ones below a corner, resonances. Slow parts
 //! with spread corners make 1/f, and a sharp resonance makes a line.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::Complex;
 
 /// A part of a coloured noise: `w(k+1) = lag₁ w(k) + lag₂ w(k-1) + drive e(k)`.
@@ -71,6 +73,14 @@ impl Disturbance {
         -radius.ln() / (std::f64::consts::TAU * period)
     }
 
+    /// Share of its power above `lowest` (Hz), 0 to 1.
+    pub fn share_above(&self, lowest: f64, period: f64) -> f64 {
+        match self.frequency(period) {
+            Some(frequency) => f64::from(u8::from(frequency > lowest)),
+            None => 1.0 - (lowest / self.corner(period)).atan() / FRAC_PI_2,
+        }
+    }
+
     /// Standard deviation of what is new in a sample.
     pub fn drive(&self) -> f64 {
         let [first, second] = self.lag;
@@ -126,6 +136,13 @@ impl Noise {
         }
     }
 
+    /// Standard deviation of a channel's noise without its drift, which is slower than `lowest` (Hz), SI.
+    pub fn above(&self, channel: usize, lowest: f64, period: f64) -> f64 {
+        let parts = self.coloured[channel].iter();
+        let squares = parts.map(|part| part.sigma.powi(2) * part.share_above(lowest, period));
+        (self.white[channel].powi(2) + squares.sum::<f64>()).sqrt()
+    }
+
     /// Standard deviation of a channel's noise, SI.
     pub fn of_channel(&self, channel: usize) -> f64 {
         self.white[channel].hypot(total(&self.coloured[channel]))
@@ -165,6 +182,10 @@ mod tests {
                 (mean_square.sqrt() / 2.0 - 1.0).abs() < 0.03,
                 "{mean_square}"
             );
+            // A quarter of a turn at the corner; nearly all of a resonance above half its frequency.
+            let above = part.share_above(part.frequency(2e-3).map_or(4.0, |f| 0.5 * f), 2e-3);
+            let expected = if part.order() == 1 { 0.5 } else { 1.0 };
+            assert!((above - expected).abs() < 1e-9, "{above}");
             let steps = 20_000;
             let mean: f64 = (0..steps)
                 .map(|k| part.density((f64::from(k) + 0.5) / f64::from(steps)))
