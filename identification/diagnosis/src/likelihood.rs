@@ -368,7 +368,23 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
                 continue;
             }
             seen.push(effect);
-            let short = fit(self.model, &point, &self.records, &parent.jacobian, 6);
+            // A size far from nothing, a delay of some samples, may be beyond a ridge.
+            let known = &parent.jacobian;
+            let mut points = vec![point];
+            if candidates[effect].starts.len() > 1 {
+                let starts = candidates[effect].starts.iter();
+                points.extend(starts.map(|start| {
+                    let mut far = parent.fit.point.clone();
+                    far.effects
+                        .push((effect, candidates[effect].internal(start)));
+                    far
+                }));
+            }
+            let short = points
+                .iter()
+                .filter_map(|point| fit(self.model, point, &self.records, known, 2))
+                .min_by(|a, b| a.cost.total_cmp(&b.cost))
+                .and_then(|near| fit(self.model, &near.point, &self.records, known, 4));
             best.extend(short.and_then(|short| {
                 let known = parent
                     .jacobian

@@ -535,7 +535,12 @@ fn weigh<M: ExtensibleModel>(
     });
     let unseen_gains = unseen_gains.collect();
     let explains = |own: &Hypothesis| {
-        1.0 - excess(own.mean_square()) / excess(nominal_square).max(f64::MIN_POSITIVE)
+        let nominal = excess(nominal_square);
+        if nominal > 0.0 {
+            1.0 - excess(own.mean_square()) / nominal
+        } else {
+            0.0
+        }
     };
     let lowest = first.as_ref().map_or(0.0, |own| own.score);
     let weighed = first.iter().chain(&others).take(CANDIDATES);

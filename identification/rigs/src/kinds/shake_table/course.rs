@@ -5,7 +5,7 @@
 //! away much more than noise alone would.
 
 use super::catalogue::ShakeTableModel;
-use diagnosis::{ExtensibleModel, Point, Role, Scale, residuals};
+use diagnosis::{ExtensibleModel, FLOOR, Point, Role, Scale, residuals};
 
 /// The strength moves by this share for the derivative.
 const SHARE: f64 = 0.05;
@@ -103,6 +103,13 @@ fn course(model: &ShakeTableModel, point: &Point, place: usize, record: usize) -
         }
         parameter.scale.to_value(coordinate)
     };
+    let Role::Size { weak } = parameter.role else {
+        return None;
+    };
+    let is_large = |value: f64| match parameter.scale {
+        Scale::Inverse(_) => FLOOR * value <= weak,
+        _ => value.abs() >= FLOOR * weak,
+    };
     let (onset_s, [before, after]) = match form {
         Form::Step(piece, ends) => {
             let sample = (piece * samples.div_ceil(PIECES)) as f64;
@@ -110,7 +117,7 @@ fn course(model: &ShakeTableModel, point: &Point, place: usize, record: usize) -
         }
         Form::Line(ends) => (None, ends),
     };
-    Some(Course {
+    (is_large(value(before)) || is_large(value(after))).then(|| Course {
         effect: candidate.effect.to_string(),
         parameter: parameter.name.to_string(),
         record: model.records[record].name.clone(),

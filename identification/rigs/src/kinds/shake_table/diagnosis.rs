@@ -14,7 +14,7 @@ use super::health::{RelationReport, health};
 use super::left_over::{self, Residual};
 use super::mains::{Line, line};
 use super::relations::{misfit, relations};
-use super::sentence::{of_courses, of_findings, said, sentence};
+use super::sentence::{MOST, of_courses, of_findings, said, sentence};
 use crate::case::{
     Case, CaseError, ControlLaw, Nominal, blind_spot, noise_ratios, problems, too_little_excitation,
 };
@@ -387,11 +387,16 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         rig.sensors.acceleration.hum_amplitude = line.amplitude;
         rig.sensors.acceleration.hum_frequency = line.frequency;
     }
-    let followed = match (judgement.verdict, judgement.candidates.first()) {
-        (Verdict::Unexplained, Some(first)) => &first.point,
-        _ => &judgement.all.point,
+    let leads = |own: &&WeighedModel| own.explains > MOST;
+    let followed = match judgement.verdict {
+        Verdict::Unexplained => judgement
+            .candidates
+            .first()
+            .filter(leads)
+            .map(|own| &own.point),
+        _ => Some(&judgement.all.point),
     };
-    let courses = courses(&model, followed);
+    let courses = followed.map_or(Vec::new(), |point| courses(&model, point));
     let effects = readable(judgement.effects);
     let separating_experiment = case.nominal.controller.and_then(|law| {
         if judgement.verdict == Verdict::Unexplained {

@@ -70,7 +70,7 @@ pub fn said(effect: &NamedEffect) -> String {
 }
 
 /// Share of the excess error from which on a candidate is told with its values, though more is left.
-const MOST: f64 = 0.5;
+pub(super) const MOST: f64 = 0.5;
 
 fn uncapitalised(text: &str) -> String {
     let mut letters = text.chars();

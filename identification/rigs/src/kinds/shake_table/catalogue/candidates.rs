@@ -4,6 +4,10 @@ use plant::identified::effects::{self, Effect, Parameter};
 
 use diagnosis::{Candidate, EffectParameter, Role, Scale};
 
+/// Delays from which fits begin, in the middle of a sample each, s. At a whole number of samples the likelihood has
+/// ridges.
+const DELAYS: [f64; 6] = [0.003, 0.0045, 0.0065, 0.009, 0.013, 0.018];
+
 /// Every candidate with its effect, for records whose largest command is `peak_command` (V),
 /// sampled every `period` s.
 pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, &'static Effect)> {
@@ -19,13 +23,21 @@ fn candidate(effect: &'static Effect, peak_command: f64, period: f64) -> Candida
             .map(|(parameter, value)| parameter.basis_value(peak_command) * value)
             .collect()
     };
+    let is_delay = effect
+        .estimated()
+        .all(|p| p.basis == effects::Basis::Memory);
+    let within = |start: &f64| ((start / period).floor() + 0.5) * period;
     Candidate {
         effect: effect.name,
         parameters: effect
             .estimated()
             .filter_map(|p| estimated(p, peak_command, period))
             .collect(),
-        starts: effect.starts.iter().map(start).collect(),
+        starts: if is_delay && effect.estimated().next().is_some() {
+            DELAYS.iter().map(|start| vec![within(start)]).collect()
+        } else {
+            effect.starts.iter().map(start).collect()
+        },
         look_alikes: effect.confounded_with,
         tolerance: effect.tolerance,
         contains: effect.contains,

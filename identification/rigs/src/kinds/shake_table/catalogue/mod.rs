@@ -23,6 +23,8 @@ use recordings::OUTPUT_NAMES;
 /// A sensor whose noise is this many times what is stated is another than the one described, or a broken
 /// one: no cause is claimed from it. The prior of a level is a factor of 2.7 at its 95 % ends.
 pub const TOO_LOUD: f64 = 4.0;
+/// Drift in what is stated from which on a sensor is as good as broken, too.
+const DRIFTS_AT_MOST: f64 = 20.0;
 /// Slower noise of a sensor is a drift, Hz.
 const DRIFT_BELOW: f64 = 0.5;
 /// Noises beyond this many times what is stated or assumed may hide behaviour that the model lacks.
@@ -184,13 +186,14 @@ impl ShakeTableModel {
     }
 }
 
-/// The level of a sensor's noise over what is `stated`, of the loudest. A drift of its zero does not count: its
-/// size beyond a record's length is not known.
+/// The level of a sensor's noise over what is `stated`, of the loudest. A drift of its zero counts little: its size
+/// is known poorly, and a slow voltage that nobody sees looks like one.
 pub fn loudest(noise: &Noise, stated: &Noise, period: f64) -> f64 {
     let ratios = (0..4).filter_map(|i| {
         let own = stated.white[i];
-        own.is_finite()
-            .then(|| noise.above(i, DRIFT_BELOW, period) / own)
+        let level = noise.above(i, DRIFT_BELOW, period);
+        let with_drift = noise.of_channel(i) * TOO_LOUD / DRIFTS_AT_MOST;
+        own.is_finite().then(|| level.max(with_drift) / own)
     });
     ratios.fold(0.0, f64::max)
 }
