@@ -104,8 +104,8 @@ pub(super) fn sentence(
     );
     match verdict {
         Verdict::Adequate => format!(
-            "The nominal model is adequate: within its stated uncertainty the error on the \
-             validation record is {:.2} times the noise floor.",
+            "The nominal model is adequate: with its parameters refitted the error on the validation \
+             record is {:.2} times the noise floor.",
             gain.after_ratio
         ),
         Verdict::Named => format!("{causes}; with {it} {falls}."),
