@@ -289,6 +289,12 @@ fn columns(sheet: &Sheet, called: &[Called]) -> Result<Vec<Column>, DataError> {
         })
     });
     found.extend(known);
+    // A reference without a unit is a number for a controller; beside a voltage it is not needed.
+    let has_voltage = found
+        .iter()
+        .any(|own| own.channel == Channel::ValveCommand && own.unit.is_some());
+    let is_number = |own: &Column| own.channel == Channel::Reference && own.unit.is_none();
+    found.retain(|own| !(has_voltage && is_number(own)));
     Ok(found)
 }
 

@@ -362,3 +362,12 @@ fn channels_that_are_called_otherwise() {
     let error = Recording::read_called(&file, "a", &without).unwrap_err();
     assert!(error.to_string().contains("has no unit"), "{error}");
 }
+
+#[test]
+fn a_reference_without_a_unit_is_left_alone_beside_a_voltage_only() {
+    let read = read("time [s],reference,command [V],displacement [mm]\n0,1,0.5,2\n1,2,0.5,3\n");
+    assert!(read.channel(Channel::Reference).is_none());
+    assert_eq!(read.samples(Channel::ValveCommand), [0.5, 0.5]);
+    let alone = fault("time [s],reference,displacement [mm]\n0,1,2\n1,2,3\n");
+    assert!(alone.contains("`reference` has no unit"), "{alone}");
+}

@@ -14,6 +14,7 @@ mod cyclic_material;
 mod description;
 mod diagnosis;
 mod extended;
+mod fitted;
 pub mod foreign;
 pub mod guess;
 pub mod hypotheses;
@@ -41,6 +42,7 @@ pub use description::{
 };
 pub use diagnosis::{PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
 pub use extended::{ExtendedRig, FileErrors, Prediction};
+pub use fitted::{FittedNominal, fit_nominal};
 pub use named_value::NamedValue;
 
 pub use natural::Natural;

@@ -125,8 +125,13 @@ impl Description {
         }
         let given = |channel: &Channel| self.columns.contains_key(channel.name());
         wanted.extend(optional.chain([Channel::Time]).filter(given));
+        // A velocity is derived from the displacement.
+        let is_derived = |channel: &Channel| {
+            *channel == Channel::Velocity && !given(channel) && given(&Channel::Displacement)
+        };
         wanted
             .into_iter()
+            .filter(|channel| !is_derived(channel))
             .map(|channel| {
                 let (name, si) = (channel.name(), channel.unit());
                 let column = self.columns.get(name).ok_or_else(|| {
@@ -228,6 +233,12 @@ impl Description {
                 );
             }
         };
+        if rig.inputs().contains(&Channel::Velocity)
+            && channels.iter().all(|own| own.0 != Channel::Velocity)
+            && let Some((_, way)) = channels.iter().find(|own| own.0 == Channel::Displacement)
+        {
+            channels.push((Channel::Velocity, velocity(way, period)));
+        }
         let (period, channels) = match &self.reduced_to {
             Some(rate) if !may_lack => {
                 let (rate, _) = self.si("reduced_to", rate, "1/s")?;
@@ -307,6 +318,21 @@ fn bridged(read: Recording) -> Recording {
         }
         _ => read,
     }
+}
+
+/// Time over which a velocity is the slope of the displacement, s.
+const SLOPE: f64 = 0.01;
+
+/// Velocity from samples of a displacement: differences over [`SLOPE`] about each sample.
+fn velocity(way: &[f64], period: f64) -> Vec<f64> {
+    let reach = ((0.5 * SLOPE / period).round() as usize).max(1);
+    let last = way.len().saturating_sub(1);
+    (0..way.len())
+        .map(|k| {
+            let (from, to) = (k.saturating_sub(reach), (k + reach).min(last));
+            (way[to] - way[from]) / ((to - from).max(1) as f64 * period)
+        })
+        .collect()
 }
 
 /// Means of neighbouring samples, as many as bring the rate down towards `rate`.
@@ -423,5 +449,16 @@ mod tests {
             .map(|t| if *t > 1.0 { t + 0.1 } else { *t })
             .collect();
         assert_eq!(even_period(&gap), Err(251));
+    }
+
+    #[test]
+    fn a_velocity_is_derived_from_a_displacement() {
+        let way: Vec<f64> = (0..1000).map(|k| (0.02 * f64::from(k)).sin()).collect();
+        // 4 rad/s at 200 Hz: a difference over 10 ms is short by (0.02)^2/6.
+        for (k, v) in velocity(&way, 0.005).iter().enumerate().take(999).skip(1) {
+            let exact = 4.0 * (0.02 * k as f64).cos();
+            assert!((v - exact).abs() < 1e-3, "{k}: {v}, {exact}");
+        }
+        assert_eq!(velocity(&[1.0], 0.1), [0.0]);
     }
 }

@@ -14,6 +14,8 @@ const DELAYS: [f64; 5] = [0.0, 2e-3, 5e-3, 12e-3, 30e-3];
 const LONGEST: f64 = 0.2;
 /// Starts that are refined, the best of them.
 const STARTS: usize = 2;
+/// A pole that a richer structure begins with, over the highest frequency.
+const FAST: f64 = 3.0;
 /// Fastest growth of a pole of a rig that is driven by a valve, 1/s.
 const GROWTH: f64 = 5.0;
 /// Regressions, each weighted with the denominator of the one before (Sanathanan and Koerner 1963).
@@ -81,6 +83,11 @@ pub(super) fn squares(model: &DelayedTransferFunction, bands: &[Own]) -> Vec<f64
     bands.iter().map(of).collect()
 }
 
+/// Power of what the model misses of a band, as far as the instrument explains it, m².
+pub(super) fn missed(model: &DelayedTransferFunction, own: Own) -> f64 {
+    error(model, own).0.norm_sqr()
+}
+
 /// What is left over what the output does, both as projected.
 pub(super) fn relative_error(model: &DelayedTransferFunction, bands: &[Own]) -> f64 {
     let (mut left, mut size) = (0.0, 0.0);
@@ -124,6 +131,42 @@ pub(super) struct Fitted {
     pub model: DelayedTransferFunction,
 }
 
+impl Fitted {
+    /// Values of `richer` coefficients, with a pole, a zero, both or neither more, that make the same model but
+    /// for a pole at `fast` rad/s; the delay makes up for its lag.
+    fn grown(&self, richer: &Coefficients, fast: f64) -> Option<Vec<f64>> {
+        let own = self.coefficients.structure;
+        let poles = richer.structure.poles.checked_sub(own.poles)?;
+        let zeros = richer.structure.zeros.checked_sub(own.zeros)?;
+        if richer.structure.integrates != own.integrates || poles > 1 || zeros > 1 {
+            return None;
+        }
+        // Time is counted otherwise there.
+        let ratio = self.coefficients.scale / richer.scale;
+        let order = own.poles + usize::from(own.integrates);
+        let (denominator, rest) = self.optimum.values.split_at(own.poles);
+        let (numerator, delay) = rest.split_at(own.zeros + 1);
+        let power = |i: usize| ratio.powi(i as i32);
+        let counted = denominator.iter().enumerate();
+        let mut denominator: Vec<f64> = counted.map(|(i, c)| c * power(i + 1)).collect();
+        let counted = numerator.iter().enumerate();
+        let counted = counted.map(|(i, c)| c * power(order - own.zeros + i));
+        let mut numerator: Vec<f64> = std::iter::repeat_n(0.0, zeros).chain(counted).collect();
+        let mut delay = *delay.first()? / ratio;
+        if poles == 1 {
+            let fast = fast / richer.scale;
+            let before = [&[1.0], denominator.as_slice()].concat();
+            denominator.push(0.0);
+            for (slot, lower) in denominator.iter_mut().zip(&before) {
+                *slot += fast * lower;
+            }
+            numerator.iter_mut().for_each(|c| *c *= fast);
+            delay = (delay - 1.0 / fast).max(0.0);
+        }
+        Some([denominator, numerator, vec![delay]].concat())
+    }
+}
+
 /// The frequency (rad/s) below which a hundredth of the input's power lies: what is slower is not shown.
 fn lowest(bands: &[Own]) -> f64 {
     let mut powers: Vec<(f64, f64)> = bands
@@ -149,8 +192,14 @@ fn lowest(bands: &[Own]) -> f64 {
     0.0
 }
 
-/// The best model of a structure; `None` where no start makes one.
-pub(super) fn fit(structure: Structure, between: Between, bands: &[Own]) -> Option<Fitted> {
+/// The best model of a structure; `None` where no start makes one. A richer structure begins from what
+/// `simpler` ones found in the same bands as well, so that it is not worse than these there.
+pub(super) fn fit(
+    structure: Structure,
+    between: Between,
+    bands: &[Own],
+    simpler: &[Fitted],
+) -> Option<Fitted> {
     if 2 * bands.len() < 2 * structure.parameters() {
         return None;
     }
@@ -175,8 +224,17 @@ pub(super) fn fit(structure: Structure, between: Between, bands: &[Own]) -> Opti
         .filter_map(|delay| weigh(regress(&coefficients, bands, *delay)?))
         .collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    starts.truncate(STARTS);
+    let fastest = bands
+        .iter()
+        .map(|own| own.band.middle())
+        .fold(0.0, f64::max);
+    let grown = simpler
+        .iter()
+        .filter_map(|own| weigh(own.grown(&coefficients, FAST * fastest)?));
+    starts.extend(grown.min_by(|a, b| a.0.total_cmp(&b.0)));
     let mut best: Option<Optimum> = None;
-    for (_, start) in starts.iter().take(STARTS) {
+    for (_, start) in &starts {
         if let Some(found) = approach(&coefficients, bands, start)
             && best.as_ref().is_none_or(|own| found.cost < own.cost)
         {

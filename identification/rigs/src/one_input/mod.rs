@@ -6,6 +6,8 @@
 //! bias (see [`crate::closed_loop::bands`]). Poles, zeros and a pole at zero are chosen by how a
 //! model that was fitted to every second band predicts the others.
 
+mod controller;
+mod explained;
 mod fit;
 mod model_file;
 mod structure;
@@ -19,12 +21,17 @@ use recordings::IdentificationError;
 use recordings::{Channel, Recording, fit_percent};
 use sysid::state_variable_filter::Between;
 
+pub use controller::Controller;
+pub use explained::Explained;
 pub use structure::{DelayedTransferFunction, Structure};
 
 /// Frequencies between which a model is fitted, Hz.
 const BAND: (f64, f64) = (0.05, 40.0);
 /// Mean square of the whitened errors above which there is a warning.
 const CLEAR: f64 = 1.6;
+
+/// What of the displacement a valve's command is to explain, %, where a recorded reference may explain more.
+const WELL: f64 = 90.0;
 
 /// A structure that was tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +64,10 @@ pub struct OneInput {
     pub relative_error: f64,
     /// Simulated from the command alone, the worst recording, %: [`fit_percent`].
     pub simulated_percent: f64,
+    /// What is explained, and what could be.
+    pub explained: Explained,
+    /// The controller where reference and command were recorded and it is a gain.
+    pub controller: Option<Controller>,
     /// What was tried, the simplest first.
     pub candidates: Vec<Candidate>,
     /// One standard deviation of the white noise of command and displacement, SI.
@@ -211,12 +222,37 @@ fn all(experiments: &[Bands], evenly: bool) -> Vec<Own<'_>> {
 }
 
 /// Identifies a rig: orders and check come from the first `part` of each recording and the rest, the
-/// coefficients from everything.
+/// coefficients from everything. Of a table in a loop whose reference was recorded beside a voltage, and that
+/// follows the reference rather than the voltage, the loop is identified.
 ///
 /// # Errors
 /// Every way in which data give no model, see [`IdentificationError`].
 pub fn identify(recordings: &[Recording], part: f64) -> Result<OneInput, IdentificationError> {
     let input = input_of(recordings)?;
+    let found = identify_from(recordings, part, input)?;
+    let has_reference = |r: &Recording| r.channel(Channel::Reference).is_some();
+    let is_driven = input == Channel::ValveCommand
+        && (found.structure.integrates || found.simulated_percent > WELL);
+    if input == Channel::Reference || is_driven || !recordings.iter().all(has_reference) {
+        return Ok(found);
+    }
+    let Ok(mut closed) = identify_from(recordings, part, Channel::Reference) else {
+        return Ok(found);
+    };
+    if closed.simulated_percent < found.simulated_percent {
+        return Ok(found);
+    }
+    closed.controller = Controller::of(recordings, BAND);
+    let sentence = closed.controller.map(|own| own.sentence());
+    closed.warnings.extend(sentence);
+    Ok(closed)
+}
+
+fn identify_from(
+    recordings: &[Recording],
+    part: f64,
+    input: Channel,
+) -> Result<OneInput, IdentificationError> {
     let between = match input {
         Channel::ValveCommand => Between::Held,
         _ => Between::Straight,
@@ -233,16 +269,21 @@ pub fn identify(recordings: &[Recording], part: f64) -> Result<OneInput, Identif
     let experiments = of(&fitted)?;
     let mut own = all(&experiments, false);
     let may_integrate = input == Channel::ValveCommand;
-    let (mut candidates, mut structure) = choose(between, &own, may_integrate)?;
+    let mut chosen = choose(between, &own, may_integrate)?;
     // No transfer function is within the noise of a rig with friction. Weights by the noise then let the
     // bands that hold most of the motion be missed; what simulates best counts them as they are.
-    let best = candidates.iter().map(|own| own.predicted);
+    let best = chosen.candidates.iter().map(|own| own.predicted);
     let evenly = !may_integrate && best.fold(f64::INFINITY, f64::min) > CLEAR;
     if evenly {
         own = all(&experiments, true);
-        (candidates, structure) = choose(between, &own, may_integrate)?;
+        chosen = choose(between, &own, may_integrate)?;
     }
-    let found = fit(structure, between, &own).ok_or_else(no_model)?;
+    let Chosen {
+        candidates,
+        structure,
+        found,
+    } = chosen;
+    let found = fit(structure, between, &own, &found).ok_or_else(no_model)?;
     let unseen = of(&rest)?;
     let unseen = all(&unseen, false);
     let by_noise = all(&experiments, false);
@@ -261,10 +302,17 @@ pub fn identify(recordings: &[Recording], part: f64) -> Result<OneInput, Identif
     let simulated_percent = fits.fold(f64::INFINITY, f64::min);
     let check = mean(squares(&found.model, &unseen));
     let relative_error = relative_error(&found.model, &unseen);
+    let explained = Explained::of(&found.model, &unseen, &rest, floor(Channel::Displacement));
     // What was validated is then fitted to everything there is.
     let everything = of(recordings)?;
     let everything = all(&everything, evenly);
-    let found = fit(structure, between, &everything).unwrap_or(found);
+    let found = fit(
+        structure,
+        between,
+        &everything,
+        std::slice::from_ref(&found),
+    )
+    .unwrap_or(found);
     let mut one = OneInput {
         input,
         structure,
@@ -277,6 +325,8 @@ pub fn identify(recordings: &[Recording], part: f64) -> Result<OneInput, Identif
         check,
         relative_error,
         simulated_percent,
+        explained,
+        controller: None,
         model: found.model,
         candidates,
         noise: [input, Channel::Displacement].map(floor),
@@ -299,6 +349,15 @@ fn no_model() -> IdentificationError {
     }
 }
 
+/// A structure that was chosen.
+struct Chosen {
+    /// What was tried.
+    candidates: Vec<Candidate>,
+    structure: Structure,
+    /// Models of it, of a part of the bands each.
+    found: Vec<Fitted>,
+}
+
 /// The simplest structure that predicts bands it was not fitted to as well as the best does: every second
 /// one from those between, and the lowest ones from those above, for motions go on below what was
 /// excited and a model that reaches down wrongly is of no use there.
@@ -306,7 +365,7 @@ fn choose(
     between: Between,
     bands: &[Own],
     may_integrate: bool,
-) -> Result<(Vec<Candidate>, Structure), IdentificationError> {
+) -> Result<Chosen, IdentificationError> {
     // Those at the low end, where a band is wide beside its frequency, and the last are fitted always:
     // beyond its data a model says nothing.
     const ALWAYS: usize = 2;
@@ -339,11 +398,13 @@ fn choose(
     }
     let unseen = folds.iter().map(|fold| fold.1.len()).sum::<usize>();
     let mut tried: Vec<(Candidate, Vec<f64>)> = Vec::new();
+    let mut fitted: Vec<Vec<Fitted>> = vec![Vec::new(); folds.len()];
     for structure in Structure::candidates(may_integrate) {
         let mut predicted = Vec::new();
-        for (seen, unseen) in &folds {
-            if let Some(own) = fit(structure, between, seen) {
+        for ((seen, unseen), fitted) in folds.iter().zip(&mut fitted) {
+            if let Some(own) = fit(structure, between, seen, fitted) {
                 predicted.extend(squares(&own.model, unseen));
+                fitted.push(own);
             }
         }
         if predicted.len() == unseen && unseen > 0 {
@@ -374,7 +435,14 @@ fn choose(
     };
     let simplest = tried.iter().find(|own| as_good(own)).unwrap_or(best);
     let structure = simplest.0.structure;
-    Ok((tried.iter().map(|own| own.0).collect(), structure))
+    let found = fitted.into_iter().flatten();
+    Ok(Chosen {
+        candidates: tried.iter().map(|own| own.0).collect(),
+        structure,
+        found: found
+            .filter(|own| own.coefficients.structure == structure)
+            .collect(),
+    })
 }
 
 /// Standard errors of the coefficients in `s` by the mean square of the whitened errors.
@@ -468,17 +536,13 @@ fn with_free_motion(
 /// What a reader should know of a result.
 fn remarks(found: &OneInput, recordings: &[Recording]) -> Vec<String> {
     let mut all = Vec::new();
-    for (what, square) in [
-        ("that was fitted", found.mean_square),
-        ("that was not fitted", found.check),
-    ] {
-        if square > CLEAR {
-            all.push(format!(
-                "what the model leaves of the displacement {what} is not noise alone (mean square \
-                 {square:.2} of it): the rig does something that a transfer function lacks, such as \
-                 friction, a dead band or unequal areas"
-            ));
-        }
+    all.extend(found.explained.sentence());
+    if all.is_empty() && found.check.max(found.mean_square) > CLEAR {
+        all.push(format!(
+            "what the model leaves of the displacement is not noise alone (mean square {:.2} of it, {:.2} on \
+             the part that was not fitted), though it is small",
+            found.mean_square, found.check
+        ));
     }
     if let Some(error) = bias(found, recordings) {
         all.push(error);

@@ -7,10 +7,13 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::OneInput;
-use crate::kinds::{Column, Quantity, Windows};
+use crate::kinds::{self, Column, FittedNominal, Quantity, Windows, fit_nominal};
 use recordings::IdentificationError;
 use recordings::{Channel, Named};
 use sysid::state_variable_filter::Between;
+
+/// One over the angular frequency at which a table's mass swings on the oil, before it is fitted: 30 Hz.
+const RESONANCE: f64 = 5.3e-3;
 
 #[derive(Serialize)]
 struct File {
@@ -56,7 +59,8 @@ struct Errors {
 
 impl OneInput {
     /// The text of the model file. Of a rig whose data are in `data`, with these `columns`, it is a
-    /// description for the diagnosis as well, unless its input is a voltage and it does not integrate.
+    /// description for the diagnosis as well, unless its input is a voltage and it does not integrate. The
+    /// description's nominal values are fitted to all data, so that it predicts as it stands.
     ///
     /// # Errors
     /// Numbers that TOML cannot hold.
@@ -79,8 +83,10 @@ impl OneInput {
             .zip(self.noise)
             .map(|(channel, value)| (channel.name(), value))
             .collect();
+        let mut description = self.description(name, data, columns);
+        let fitted = description.as_mut().and_then(Description::fit);
         let file = File {
-            description: self.description(name, data, columns),
+            description,
             transfer_function: Section {
                 input: self.input.name(),
                 input_unit: self.input.unit(),
@@ -102,15 +108,18 @@ impl OneInput {
                 },
             },
         };
-        let text = toml::to_string(&file).map_err(|error| IdentificationError::ModelFile {
-            path: name.into(),
-            what: error.to_string(),
-            expected: "finite numbers",
-        })?;
-        let diagnosis = match file.description {
-            Some(_) => "# shakebench diagnose THIS.toml finds effects that this model lacks.\n",
-            None => "",
-        };
+        let text = toml::to_string(&file).map_err(|error| refused(name, &error))?;
+        let mut diagnosis = String::new();
+        if file.description.is_some() {
+            diagnosis += "# shakebench diagnose THIS.toml finds effects that this model lacks.\n";
+        }
+        if let Some(fitted) = fitted {
+            diagnosis += &format!(
+                "# [nominal] is fitted to all data and leaves {:.1} % of the displacement;\n\
+                 # shakebench diagnose --model THIS.toml --validate OTHER.csv predicts with it.\n",
+                100.0 * fitted.error
+            );
+        }
         Ok(format!(
             "# Command to displacement, descending powers of s, SI: numerator/denominator exp(-s delay).\n\
              {diagnosis}{text}"
@@ -168,7 +177,7 @@ impl OneInput {
     }
 
     /// Nominal values of a closed loop, by the response's slowest pole and its delay.
-    fn closed_loop(&self) -> [(&'static str, Quantity); 8] {
+    fn closed_loop(&self) -> [(&'static str, Quantity); 10] {
         let scale = self.model.response(1e-3, self.period).re;
         let slowest = self.model.poles().into_iter().map(|pole| pole.norm());
         let gain = slowest.fold(f64::INFINITY, f64::min);
@@ -176,6 +185,8 @@ impl OneInput {
         [
             ("loop_gain", quantity(gain, 0.5 * gain, "1/s")),
             ("loop_lag", quantity(0.1 / gain, 0.1 / gain, "s")),
+            ("resonance", quantity(RESONANCE, RESONANCE, "s")),
+            ("resonance_damping", quantity(0.5, 0.3, "1")),
             ("command_lag", quantity(0.0, 0.0, "s")),
             ("feedforward", quantity(0.1, 0.1, "1")),
             ("integral", quantity(0.1, 0.1, "1/s")),
@@ -215,6 +226,30 @@ impl OneInput {
                 ("offset", quantity(0.0, 0.1 * force, "N")),
             ]
         })
+    }
+}
+
+impl Description {
+    /// Puts the values that all data give into the nominal model; none, and as it was, where it cannot be
+    /// fitted.
+    fn fit(&mut self) -> Option<FittedNominal> {
+        let text = toml::to_string(&self).ok()?;
+        let own = kinds::Description::parse(Path::new(&self.name), &text).ok()?;
+        let found = fit_nominal(&own).ok()??;
+        for parameter in &found.parameters {
+            if let Some(quantity) = self.nominal.get_mut(parameter.name.as_str()) {
+                quantity.value = parameter.value;
+            }
+        }
+        Some(found)
+    }
+}
+
+fn refused(name: &str, error: &toml::ser::Error) -> IdentificationError {
+    IdentificationError::ModelFile {
+        path: name.into(),
+        what: error.to_string(),
+        expected: "finite numbers",
     }
 }
 

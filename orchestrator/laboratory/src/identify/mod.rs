@@ -15,6 +15,7 @@ use std::time::Instant;
 
 use identification::IdentificationError;
 use identification::data::{Channel, Recording};
+use identification::diagnosis::rigs::guess::{SLOWEST, slow};
 use identification::identify::identified::RigIdentification;
 use identification::identify::instrument::bias;
 use identification::identify::model_file::ModelFile;
@@ -117,16 +118,27 @@ pub fn identify(request: &Request) -> Result<Outcome, Error> {
     for path in &request.data {
         let measured = columns::read(path, request.columns.as_deref())?;
         let (pieces, findings) = measured.on_even_base()?;
+        let mut rates = pieces.iter().map(|piece| 1.0 / piece.period());
+        if let Some(rate) = rates.find(|rate| *rate < SLOWEST) {
+            return Err(Error::File {
+                path: path.clone(),
+                reason: slow(rate),
+            });
+        }
         warnings.extend(findings.iter().map(ToString::to_string));
         recordings.extend(long_enough(pieces, &mut warnings));
     }
-    let lacks_both = |recording: &Recording| {
+    // Without force or acceleration the table's mass cannot be found; the displacement can.
+    let lacks = |recording: &Recording| {
         [Channel::Acceleration, Channel::ActuatorForce]
             .iter()
-            .all(|channel| recording.channel(*channel).is_none())
+            .any(|channel| recording.channel(*channel).is_none())
     };
     let has_way = |recording: &Recording| recording.channel(Channel::Displacement).is_some();
-    if request.one_input || recordings.iter().all(|own| lacks_both(own) && has_way(own)) {
+    let is_one_input = request.specimen.is_none()
+        && recordings.iter().any(lacks)
+        && recordings.iter().all(has_way);
+    if request.one_input || is_one_input {
         let named = match request.data.first() {
             Some(path) => columns::named(path, request.columns.as_deref())?,
             None => Vec::new(),
