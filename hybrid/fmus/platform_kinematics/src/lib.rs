@@ -29,7 +29,6 @@ pub struct PlatformKinematics {
     residual: f64,
     iterations: i32,
     fits: bool,
-    start: Pose,
 }
 
 impl Default for PlatformKinematics {
@@ -53,7 +52,6 @@ impl Default for PlatformKinematics {
             residual: 0.0,
             iterations: 0,
             fits: true,
-            start: Pose::default(),
         }
     }
 }
@@ -93,7 +91,7 @@ impl PlatformKinematics {
         )?)
     }
 
-    /// The pose of the measured strokes.
+    /// The pose of the measured strokes, searched from the zero position: it depends on nothing else.
     fn back(&mut self) -> Result<(), ModelError> {
         let Some(platform) = &self.platform else {
             return Ok(());
@@ -106,13 +104,13 @@ impl PlatformKinematics {
             (self.residual, self.iterations, self.fits) = (0.0, 0, true);
             return Ok(());
         }
-        let found = platform.pose(&self.measured, &self.start);
+        let found = platform.pose(&self.measured, &Pose::default());
         let [x, y, z, rx, ry, rz] = found.pose.0;
         self.found_translation = [x, y, z];
         self.found_rotation = [rx, ry, rz];
         self.residual = found.largest().0;
         self.iterations = found.iterations as i32;
-        self.start = found.within(self.tolerance)?;
+        found.within(self.tolerance)?;
         self.fits = true;
         Ok(())
     }
@@ -279,7 +277,6 @@ impl Component for PlatformKinematics {
             FIRST_STROKE => Some(self.closed()?),
             _ => None,
         };
-        self.start = Pose::default();
         self.found_translation = [0.0; 3];
         self.found_rotation = [0.0; 3];
         Ok(())
