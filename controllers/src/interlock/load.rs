@@ -91,8 +91,8 @@ impl Load {
         let off = force - (0..COUNT).map(|i| row[i] * self.found[i]).sum::<f64>();
         for i in 0..COUNT {
             self.found[i] += weighted[i] / expected * off;
-            for j in 0..COUNT {
-                p[i][j] -= weighted[i] * weighted[j] / expected;
+            for (entry, other) in p[i].iter_mut().zip(&weighted) {
+                *entry -= weighted[i] * other / expected;
             }
         }
         self.squares += off * off / expected;
