@@ -4,6 +4,7 @@ use std::env;
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use fmi_import::Options;
 
@@ -26,6 +27,14 @@ pub fn file() -> io::Result<PathBuf> {
     Ok(found.canonicalize().unwrap_or(found))
 }
 
+/// Whether this is the program, whatever its file is called.
+static IS_PROGRAM: AtomicBool = AtomicBool::new(false);
+
+/// Notes that this process runs the program, and not a test or another program with its libraries.
+pub fn declare() {
+    IS_PROGRAM.store(true, Ordering::Relaxed);
+}
+
 /// The program that carries out calls of FMUs in processes of their own: the one named in
 /// `SHAKEBENCH_PROGRAM`, this one, or one beside it (a test's program lies in a folder below).
 #[must_use]
@@ -35,7 +44,8 @@ pub fn guest() -> Option<PathBuf> {
     }
     let name = format!("shakebench{}", env::consts::EXE_SUFFIX);
     let own = file().ok()?;
-    if own.file_name().is_some_and(|file| file == name.as_str()) {
+    let is_called = own.file_name().is_some_and(|file| file == name.as_str());
+    if is_called || IS_PROGRAM.load(Ordering::Relaxed) {
         return Some(own);
     }
     own.ancestors()

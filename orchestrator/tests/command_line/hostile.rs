@@ -151,7 +151,7 @@ fn processes_that_an_fmu_leaves_behind_hold_nobody_up_and_end_with_it() {
     assert_eq!(marked.count(), 0);
 }
 
-/// 146 libraries: every way to misbehave in a step, and nine of them in seven other functions.
+/// 147 libraries: every way to misbehave in a step, and nine of them in seven other functions.
 #[test]
 #[ignore = "slow: a minute, most of which it waits"]
 fn no_fmu_hangs_or_ends_the_program_whatever_it_does_and_wherever() {
@@ -168,7 +168,7 @@ fn no_fmu_hangs_or_ends_the_program_whatever_it_does_and_wherever() {
         stdout(&output),
         stderr(&output)
     );
-    assert!(stdout(&output).contains("146 libraries, 0 faults"));
+    assert!(stdout(&output).contains("147 libraries, 0 faults"));
 }
 
 #[test]
@@ -473,6 +473,21 @@ fn one_instance_a_process_is_heeded() {
         let run = run(folder.path(), system, &["--isolate", isolate]);
         assert_eq!(run.status, Some(0), "{isolate}: {}", run.said);
     }
+}
+
+#[test]
+fn a_program_under_another_name_runs_fmus_in_processes_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    pack(folder.path(), "HONEST", "");
+    fs::write(folder.path().join("rig.toml"), ALONE).unwrap();
+    let renamed = folder.path().join("shakebench-0.1");
+    fs::copy(env!("CARGO_BIN_EXE_shakebench"), &renamed).unwrap();
+    let output = Command::new(renamed)
+        .args(["run", "rig.toml", "--out", "out"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
 }
 
 #[test]

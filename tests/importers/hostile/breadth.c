@@ -15,10 +15,13 @@
 
 typedef struct {
     double u, y;
-    void *log, *environment;
 } Instance;
 
+typedef void (*Update)(void *, double, _Bool, _Bool, _Bool, _Bool, _Bool *, double *);
+
 static double first;
+static Update intermediate;
+static void *host;
 static int is_over;
 
 static void *spin(void *nothing) {
@@ -114,6 +117,12 @@ static int act(const char *where) {
     if (IS("memory")) memset(malloc((size_t)1 << 46), 1, 1);
     if (IS("frees-twice")) { void *room = malloc(2000); free(room); free(room); }
     if (IS("no-number")) first = zero / zero;
+    if (IS("updates")) {
+        _Bool early = 1;
+        double at = 0;
+        intermediate(host, 0.02, 0, 1, 1, 1, &early, &at);
+        if (early) abort();
+    }
     if (IS("sleep")) usleep(300000);
     return 0;
 }
@@ -176,7 +185,9 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
                                   _Bool logging, _Bool events, _Bool early, const unsigned *required,
                                   size_t n, void *environment, void *log, void *update) {
     (void)token; (void)resources; (void)visible; (void)logging; (void)events; (void)early; (void)required;
-    (void)n; (void)environment; (void)log; (void)update;
+    (void)n; (void)log;
+    intermediate = (Update)update;
+    host = environment;
     return make(name);
 }
 void fmi3FreeInstance(void *c) { act("FreeInstance"); free(c); }

@@ -23,11 +23,11 @@ ELSEWHERE = "segfault exit kill spin print stop fork daemon longjmp".split()
 PLACES = "Instantiate EnterInitializationMode ExitInitializationMode Get Set Terminate FreeInstance".split()
 CASES = [(2, what, "DoStep") for what in STEP]
 CASES += [(2, what, place) for place in PLACES for what in ELSEWHERE]
-CASES += [(3, what, "DoStep") for what in STEP[:20]]
+CASES += [(3, what, "DoStep") for what in STEP[:20] + ["updates"]]
 CASES += [(3, what, place) for place in PLACES for what in ("segfault", "spin")]
 # These leave the FMU as it was.
 HARMLESS = set("""fork forks returns-twice daemon thread-spins traps rounds truncates masks directory
-environment prints-much prints-bytes handlers sleep""".split())
+environment prints-much prints-bytes handlers sleep updates""".split())
 DESCRIPTION = {
     2: """<fmiModelDescription fmiVersion="2.0" modelName="breadth" guid="1"><CoSimulation
 modelIdentifier="breadth" canHandleVariableCommunicationStepSize="true"/><ModelVariables>

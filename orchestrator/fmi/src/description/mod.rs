@@ -273,6 +273,9 @@ impl Description {
     }
 }
 
+/// Characters of a remark at most.
+const LONGEST_REMARK: usize = 500;
+
 /// Values of structural parameters by value reference, in place of their start values.
 pub(super) type Sizes = HashMap<u32, u64>;
 
@@ -340,6 +343,13 @@ pub(super) fn read(
         Err(reason) => {
             let remark = format!("terminalsAndIcons.xml cannot be read: {reason}");
             description.remarks.push(remark);
+        }
+    }
+    for remark in &mut description.remarks {
+        // Some list all of very many variables.
+        if let Some((end, _)) = remark.char_indices().nth(LONGEST_REMARK) {
+            remark.truncate(end);
+            remark.push_str(" ...");
         }
     }
     structure::name(&mut description, root).map_err(wrong)?;

@@ -158,6 +158,24 @@ pub(super) unsafe extern "C" fn log_message(
     unsafe { shakebench_log(environment, status, category, text) }
 }
 
+/// FMI 3.0's `intermediateUpdate`: nothing is read, set or ended between communication points. FMUs call it
+/// without a look at whether there is one.
+pub(super) unsafe extern "C" fn intermediate_update(
+    _environment: *mut c_void,
+    _time: f64,
+    _can_set: u8,
+    _can_get: u8,
+    _step_finished: u8,
+    _can_return_early: u8,
+    return_early: *mut u8,
+    _early_time: *mut f64,
+) {
+    if !return_early.is_null() {
+        // SAFETY: the FMU's own truth value.
+        unsafe { *return_early = 0 };
+    }
+}
+
 /// A text of C; bytes that are not UTF-8 are replaced.
 ///
 /// # Safety

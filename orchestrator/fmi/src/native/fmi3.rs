@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::super::FmiVersion;
 use super::super::call::{Call, Endpoint, Function, Lost, Scalar, Stepped, Values};
-use super::callbacks::{Environment, log_message};
+use super::callbacks::{Environment, intermediate_update, log_message};
 use super::library::Functions;
 use super::state::StateFunctions;
 use super::{
@@ -14,6 +14,8 @@ use super::{
 };
 
 type LogMessage = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
+type IntermediateUpdate =
+    unsafe extern "C" fn(*mut c_void, f64, u8, u8, u8, u8, *mut u8, *mut f64);
 type InstantiateCoSimulation = unsafe extern "C" fn(
     *const c_char,
     *const c_char,
@@ -26,7 +28,7 @@ type InstantiateCoSimulation = unsafe extern "C" fn(
     usize,
     *mut c_void,
     LogMessage,
-    *const c_void,
+    IntermediateUpdate,
 ) -> *mut c_void;
 type InstantiateModelExchange = unsafe extern "C" fn(
     *const c_char,
@@ -194,9 +196,9 @@ impl Fmi3 {
                     let library = f.finish()?;
                     let make = make.ok_or("the library lacks functions")?;
                     // Nothing is asked for between communication points, so that no variables are
-                    // required there and no callback is given. A step may be returned from early
-                    // where events are handled from outside.
-                    let (none, callback) = (std::ptr::null(), std::ptr::null());
+                    // required there. A step may be returned from early where events are handled
+                    // from outside.
+                    let (none, callback) = (std::ptr::null(), intermediate_update);
                     let on = setup.logging;
                     let early = event_mode;
                     let instance = make(
