@@ -14,8 +14,7 @@ use super::{
 };
 
 type LogMessage = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
-type IntermediateUpdate =
-    unsafe extern "C" fn(*mut c_void, f64, u8, u8, u8, u8, *mut u8, *mut f64);
+type IntermediateUpdate = unsafe extern "C" fn(*mut c_void, f64, u8, u8, u8, u8, *mut u8, *mut f64);
 type InstantiateCoSimulation = unsafe extern "C" fn(
     *const c_char,
     *const c_char,

@@ -155,7 +155,7 @@ fn robertson_s_reaction_agrees_with_scipy() {
         }
         assert!(solved.solver.now.is_stiff);
         println!("{} evaluations", solved.evaluations());
-        assert!(solved.evaluations() < 20_000);
+        assert!(solved.evaluations() < 30_000);
     }
 }
 
@@ -173,16 +173,31 @@ fn van_der_pol_s_oscillator_agrees_with_scipy() {
         (1.2e6, -1.6994006675043591),
         (1.6e6, -1.119268647778863),
     ];
-    let mut solved = Solved::new(van_der_pol, &[2.0, 0.0], None, None);
-    let mut time = 0.0;
-    for (end, expected) in reference {
-        let y = solved.step(time, end);
-        println!("{end}: {:e}", y[0] - expected);
-        assert!((y[0] - expected).abs() < 1e-6, "{end} s: {y:?}");
-        time = end;
+    let derivative: fn(&[f64], usize, &mut [f64]) = |y, column, into| match column {
+        0 => (into[0], into[1]) = (0.0, -2e6 * y[0] * y[1] - 1.0),
+        _ => (into[0], into[1]) = (1.0, 1e6 * (1.0 - y[0] * y[0])),
+    };
+    for (step, directional) in [
+        (4e5, None),
+        (2e5, Some(derivative)),
+        (2e4, None),
+        (2e4, Some(derivative)),
+    ] {
+        let mut solved = Solved::new(van_der_pol, &[2.0, 0.0], None, directional);
+        let mut time = 0.0;
+        while time < 1.6e6 {
+            let y = solved.step(time, time + step);
+            time += step;
+            let expected = reference.iter().find(|(end, _)| *end == time);
+            if let Some((end, expected)) = expected {
+                let error = (y[0] - expected).abs();
+                println!("steps of {step} s, {end} s: {error:e}");
+                assert!(error < 1e-6, "steps of {step} s, {end} s: {y:?}");
+            }
+        }
+        println!("{} evaluations", solved.evaluations());
+        assert!(solved.evaluations() < 100_000, "{}", solved.evaluations());
     }
-    assert!(solved.evaluations() < 100_000, "{}", solved.evaluations());
-    println!("{} evaluations", solved.evaluations());
 }
 
 #[test]
