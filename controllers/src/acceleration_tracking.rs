@@ -113,7 +113,7 @@ pub struct AccelerationLoop {
     #[parameter("V.s2/m" => "V.s2/in", name = "gain", finite)]
     pub proportional: f64,
     /// Ki of the acceleration loop, V.s/m.
-    #[parameter("V.s/m" => "V.s/in", name = "integral_gain", finite)]
+    #[parameter("V.s/m" => "V.s/in", name = vocabulary::INTEGRAL_GAIN, finite)]
     pub integral: f64,
     /// Kii of the acceleration loop, V/m.
     #[parameter("V/m" => "V/in", name = "double_integral_gain", finite)]
@@ -137,7 +137,7 @@ impl AccelerationLoop {
 )]
 pub struct ForceLoop {
     /// Kf of the force loop, V/N.
-    #[parameter("V/N" => "V/lbf", name = "force_gain", finite)]
+    #[parameter("V/N" => "V/lbf", name = vocabulary::FORCE_GAIN, finite)]
     pub gain: f64,
     /// Corner of its lag, rad/s.
     #[parameter("rad/s", name = "force_corner", positive)]

@@ -8,6 +8,7 @@
 use nalgebra::DMatrix;
 use plant::linear::{StateSpace, discrete_riccati};
 use plant::specimens::MAX_STOREYS;
+use units::vocabulary;
 
 use crate::mpc::kalman::SteadyStateKalmanFilter;
 use crate::{Controller, ModelError};
@@ -108,7 +109,7 @@ impl ClippedOptimalDesign {
         let n = self.storeys;
         if !(1..=MAX_STOREYS).contains(&n) || self.damper_storey >= n {
             return Err(ModelError::Parameter {
-                name: "damper_storey",
+                name: vocabulary::DAMPER_STOREY,
                 value: (self.damper_storey + 1) as f64,
                 expected: "a storey of a building of 1 to 10",
             });
@@ -152,12 +153,15 @@ impl ClippedOptimalDesign {
         for (name, value) in [
             ("force_weight", self.force_weight),
             ("ground_noise", self.ground_noise),
-            ("measurement_noise", self.measurement_noise),
+            (vocabulary::SENSOR_NOISE, self.measurement_noise),
             ("largest_voltage", self.largest_voltage),
         ] {
             ModelError::require_positive(name, value)?;
         }
-        ModelError::require_non_negative("acceleration_weight", self.acceleration_weight)?;
+        ModelError::require_non_negative(
+            vocabulary::ACCELERATION_WEIGHT,
+            self.acceleration_weight,
+        )?;
         ModelError::require_non_negative("drift_weight", self.drift_weight)?;
         let n = self.storeys;
         let building = self.building()?;

@@ -12,10 +12,10 @@ use crate::{Controller, ModelError};
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct Pid {
     /// Proportional gain, V per unit.
-    #[parameter(name = "proportional_gain", about = "Proportional gain", finite)]
+    #[parameter(name = vocabulary::PROPORTIONAL_GAIN, about = "Proportional gain", finite)]
     pub proportional: f64,
     /// Integral gain, V per unit and second.
-    #[parameter(name = "integral_gain", about = "Integral gain", finite)]
+    #[parameter(name = vocabulary::INTEGRAL_GAIN, about = "Integral gain", finite)]
     pub integral: f64,
     /// Rate at which the integral leaks away, 1/s.
     ///

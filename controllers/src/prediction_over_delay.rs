@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 use plant::identified::shake_table::ShakeTable;
 use plant::linear::{discrete_riccati, zero_order_hold};
 use units::constants::{INCH, LBF};
+use units::vocabulary;
 
 use crate::allocation::{ControlAllocation, LoopCommands};
 use crate::hierarchy::{LowLevelReferences, SlidingModeInput, displacement_loop, force_loop};
@@ -123,14 +124,14 @@ impl PredictionOverDelay {
         let delay = self.loop_delay_samples;
         if delay > MOST_DELAY_SAMPLES {
             return Err(ModelError::Parameter {
-                name: "loop_delay_samples",
+                name: vocabulary::LOOP_DELAY_SAMPLES,
                 value: delay as f64,
                 expected: "a whole number from 0 to 8",
             });
         }
         if self.command_delay_samples > delay.min(1) {
             return Err(ModelError::Parameter {
-                name: "command_delay_samples",
+                name: vocabulary::COMMAND_DELAY_SAMPLES,
                 value: self.command_delay_samples as f64,
                 expected: "0 or 1, and no more than loop_delay_samples",
             });

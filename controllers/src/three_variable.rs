@@ -30,10 +30,10 @@ pub struct ThreeVariableControl {
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, Parameters)]
 pub struct ThreeVariableGains {
     /// P of Table 3-2, V/m.
-    #[parameter(name = "proportional_gain", "V/m" => "V/in", finite)]
+    #[parameter(name = vocabulary::PROPORTIONAL_GAIN, "V/m" => "V/in", finite)]
     pub proportional: f64,
     /// I of Table 3-2, V/(m.s).
-    #[parameter(name = "integral_gain", "V/(m.s)" => "V/(in.s)", finite)]
+    #[parameter(name = vocabulary::INTEGRAL_GAIN, "V/(m.s)" => "V/(in.s)", finite)]
     pub integral: f64,
     /// Kbv of Table 3-2, V.s/m.
     #[parameter(name = "velocity_feedback_gain", "V.s/m" => "V.s/in", finite)]

@@ -5,6 +5,7 @@
 //! its first sample everything is in the steady state of that sample.
 
 use crate::ModelError;
+use units::vocabulary;
 
 /// The effects; SI or whatever unit the signal has.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -47,9 +48,9 @@ impl SignalEffects {
         let sizes = [
             ("delay", self.delay),
             ("lag", self.lag),
-            ("rate_limit", self.rate_limit),
+            (vocabulary::RATE_LIMIT, self.rate_limit),
             ("play", self.play),
-            ("dead_band", self.dead_band),
+            (vocabulary::DEAD_BAND, self.dead_band),
             ("saturation", self.saturation),
         ];
         for (name, value) in sizes {

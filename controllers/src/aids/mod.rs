@@ -33,17 +33,17 @@ pub struct Switches {
     /// Whether dry friction along the wanted motion is compensated.
     ///
     /// See [`FrictionCompensation`].
-    #[parameter(name = "friction_compensation")]
+    #[parameter(name = vocabulary::FRICTION_COMPENSATION)]
     pub friction: bool,
     /// Whether the specimen's measured force is compensated.
     ///
     /// See [`SpecimenForceCompensation`].
-    #[parameter(name = "specimen_compensation")]
+    #[parameter(name = vocabulary::SPECIMEN_COMPENSATION)]
     pub specimen: bool,
     /// Whether the actuator's force makes the valve yield.
     ///
     /// See [`DeltaPressure`].
-    #[parameter(name = "pressure_stabilisation")]
+    #[parameter(name = vocabulary::PRESSURE_STABILISATION)]
     pub pressure: bool,
     /// Whether the valve's curve is compensated.
     ///

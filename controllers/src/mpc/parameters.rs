@@ -214,14 +214,18 @@ impl Default for Parameters {
 const OUTPUT_WEIGHTS: [&str; CHANNELS] = [
     "displacement_weight",
     "velocity_weight",
-    "acceleration_weight",
+    vocabulary::ACCELERATION_WEIGHT,
 ];
 const RATE_WEIGHTS: [&str; CHANNELS] = [
     "displacement_rate_weight",
     "velocity_rate_weight",
     "acceleration_rate_weight",
 ];
-const SCALES: [&str; CHANNELS] = ["displacement_scale", "velocity_scale", "acceleration_scale"];
+const SCALES: [&str; CHANNELS] = [
+    vocabulary::DISPLACEMENT_SCALE,
+    vocabulary::VELOCITY_SCALE,
+    vocabulary::ACCELERATION_SCALE,
+];
 const MINIMA: [&str; CHANNELS] = [
     "minimum_displacement",
     "minimum_velocity",
@@ -282,8 +286,8 @@ impl Parameters {
             }
         }
         self.disturbance.validate()?;
-        ModelError::require_non_negative("valve_noise", self.noise.valve)?;
-        ModelError::require_non_negative("force_noise", self.noise.force)?;
+        ModelError::require_non_negative(vocabulary::VALVE_NOISE, self.noise.valve)?;
+        ModelError::require_non_negative(vocabulary::FORCE_NOISE, self.noise.force)?;
         for channel in 0..CHANNELS {
             ModelError::require_positive(
                 vocabulary::MEASUREMENT_NOISE[channel],
@@ -292,7 +296,7 @@ impl Parameters {
         }
         if self.time_limit.is_nan() || self.time_limit <= 0.0 {
             return Err(ModelError::Parameter {
-                name: "time_limit",
+                name: vocabulary::TIME_LIMIT,
                 value: self.time_limit,
                 expected: "a positive number of seconds, or infinity",
             });

@@ -33,10 +33,10 @@ pub struct Uncertainty {
     #[parameter(2, name = vocabulary::MEASUREMENT_NOISE[2], about = NOISE, "m/s2" => "g", positive)]
     pub measurement: [f64; OUTPUTS],
     /// Standard deviation of white noise on the valve command, V.
-    #[parameter("V", name = "valve_noise", non_negative)]
+    #[parameter("V", name = vocabulary::VALVE_NOISE, non_negative)]
     pub valve: f64,
     /// Standard deviation of white noise of the force on the table, N.
-    #[parameter("N" => "lbf", name = "force_noise", non_negative)]
+    #[parameter("N" => "lbf", name = vocabulary::FORCE_NOISE, non_negative)]
     pub force: f64,
     /// Standard deviation of the unknown force's step a sample, N.
     #[parameter("N" => "lbf", positive)]

@@ -1,6 +1,7 @@
 //! Every controller of a rig from its model, each by its stated rule, and each as it runs.
 
 use std::sync::OnceLock;
+use units::vocabulary;
 
 use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
@@ -247,8 +248,8 @@ impl Suite {
         };
         let pid = |pid: &Pid| {
             [
-                ("proportional_gain", pid.proportional),
-                ("integral_gain", pid.integral),
+                (vocabulary::PROPORTIONAL_GAIN, pid.proportional),
+                (vocabulary::INTEGRAL_GAIN, pid.integral),
             ]
         };
         Ok(match member {
@@ -277,12 +278,12 @@ impl Suite {
                 // The sensors' noise, and outputs in units of the stroke, 20 in/s and 1 g: with the
                 // printed weights on unscaled outputs displacement counts for nothing and drifts.
                 all.extend(own(&[
-                    ("displacement_measurement_noise", noise[0]),
-                    ("velocity_measurement_noise", noise[1]),
-                    ("acceleration_measurement_noise", noise[2]),
-                    ("displacement_scale", scale[0]),
-                    ("velocity_scale", scale[1]),
-                    ("acceleration_scale", scale[2]),
+                    (vocabulary::MEASUREMENT_NOISE[0], noise[0]),
+                    (vocabulary::MEASUREMENT_NOISE[1], noise[1]),
+                    (vocabulary::MEASUREMENT_NOISE[2], noise[2]),
+                    (vocabulary::DISPLACEMENT_SCALE, scale[0]),
+                    (vocabulary::VELOCITY_SCALE, scale[1]),
+                    (vocabulary::ACCELERATION_SCALE, scale[2]),
                 ]));
                 all
             }

@@ -7,6 +7,7 @@ use controllers::acceleration_tracking::{
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Acceleration tracking from motion and force to valve command.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -27,9 +28,9 @@ impl Component for AccelerationTracking {
             "measured",
             "motion",
             &[
-                ("displacement", "measured_displacement"),
-                ("acceleration", "measured_acceleration"),
-                ("force", "measured_force"),
+                ("displacement", vocabulary::MEASURED_DISPLACEMENT),
+                ("acceleration", vocabulary::MEASURED_ACCELERATION),
+                ("force", vocabulary::MEASURED_FORCE),
             ],
         ),
         Terminal::VALVE,
@@ -40,16 +41,16 @@ impl Component for AccelerationTracking {
             input("ahead_displacement", s.input.ahead.displacement, "Wanted displacement, ahead by what the rig is late", "m" => "in").nominal(0.0381);
             input("ahead_velocity", s.input.ahead.velocity, "Wanted velocity, ahead", "m/s" => "in/s").nominal(0.5);
             input("ahead_acceleration", s.input.ahead.acceleration, "Wanted acceleration, ahead", "m/s2" => "g").nominal(10.0);
-            input("reference_displacement", s.input.reference.displacement, "Wanted displacement at the time that is measured", "m" => "in").nominal(0.0381);
-            input("reference_velocity", s.input.reference.velocity, "Wanted velocity at that time", "m/s" => "in/s").nominal(0.5);
-            input("reference_acceleration", s.input.reference.acceleration, "Wanted acceleration at that time", "m/s2" => "g").nominal(10.0);
-            input("measured_displacement", s.input.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
-            input("measured_acceleration", s.input.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
-            input("measured_force", s.input.force, "Force of the actuator", "N" => "lbf").nominal(200.0);
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+            input(vocabulary::REFERENCE_DISPLACEMENT, s.input.reference.displacement, "Wanted displacement at the time that is measured", "m" => "in").nominal(0.0381);
+            input(vocabulary::REFERENCE_VELOCITY, s.input.reference.velocity, "Wanted velocity at that time", "m/s" => "in/s").nominal(0.5);
+            input(vocabulary::REFERENCE_ACCELERATION, s.input.reference.acceleration, "Wanted acceleration at that time", "m/s2" => "g").nominal(10.0);
+            input(vocabulary::MEASURED_DISPLACEMENT, s.input.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input(vocabulary::MEASURED_ACCELERATION, s.input.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
+            input(vocabulary::MEASURED_FORCE, s.input.force, "Force of the actuator", "N" => "lbf").nominal(200.0);
+            output(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0).depends_on_inputs(Dependent);
             group(s.law);
-            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
+            parameter(vocabulary::VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }
 

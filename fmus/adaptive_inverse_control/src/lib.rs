@@ -8,6 +8,7 @@ use controllers::adaptive_inverse::{
 use fmu_kit::{Built, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::ModelError;
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Adaptive inverse control from motion to valve command.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -37,16 +38,16 @@ impl Component for AdaptiveInverseControl {
             "reference",
             "reference",
             &[
-                ("displacement", "reference_displacement"),
-                ("acceleration", "reference_acceleration"),
+                ("displacement", vocabulary::REFERENCE_DISPLACEMENT),
+                ("acceleration", vocabulary::REFERENCE_ACCELERATION),
             ],
         ),
         Terminal::bus(
             "measured",
             "motion",
             &[
-                ("displacement", "measured_displacement"),
-                ("acceleration", "measured_acceleration"),
+                ("displacement", vocabulary::MEASURED_DISPLACEMENT),
+                ("acceleration", vocabulary::MEASURED_ACCELERATION),
             ],
         ),
         Terminal::VALVE,
@@ -56,15 +57,15 @@ impl Component for AdaptiveInverseControl {
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:
             input("ahead_velocity", s.input.ahead, "Wanted velocity 16 samples ahead", "m/s" => "in/s").nominal(0.5);
-            input("reference_displacement", s.input.reference.displacement, "Wanted displacement at the time that is measured", "m" => "in").nominal(0.0381);
-            input("reference_acceleration", s.input.reference.acceleration, "Wanted acceleration at that time", "m/s2" => "g").nominal(10.0);
-            input("measured_displacement", s.input.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
-            input("measured_acceleration", s.input.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+            input(vocabulary::REFERENCE_DISPLACEMENT, s.input.reference.displacement, "Wanted displacement at the time that is measured", "m" => "in").nominal(0.0381);
+            input(vocabulary::REFERENCE_ACCELERATION, s.input.reference.acceleration, "Wanted acceleration at that time", "m/s2" => "g").nominal(10.0);
+            input(vocabulary::MEASURED_DISPLACEMENT, s.input.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input(vocabulary::MEASURED_ACCELERATION, s.input.measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
+            output(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0).depends_on_inputs(Dependent);
             group(s.law);
-            parameter("loop_delay_samples", s.law.rig.delay, "Samples by which measurements are late").min(0.0).max(4.0);
-            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
+            parameter(vocabulary::LOOP_DELAY_SAMPLES, s.law.rig.delay, "Samples by which measurements are late").min(0.0).max(4.0);
+            parameter(vocabulary::VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
             group(s.law.rig);
         }
     }

@@ -9,6 +9,7 @@ use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Vari
 use fmu_kit::{Enumeration, Item};
 use plant::specimens::MAX_STOREYS;
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// From floors' accelerations and damper's force to its voltage.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -93,12 +94,12 @@ impl Component for ClippedOptimalControl {
             output("wanted_force", s.wanted_force, "The force that would be best", "N" => "lbf")
                 .discrete().nominal(50.0).depends_on(&inputs, Dependent);
             parameter("storeys", s.storeys, "Number of storeys").min(1.0).max(10.0);
-            parameter("damper_storey", s.damper_storey, "Storey of the damper, the lowest 1").min(1.0).max(10.0);
-            parameter("acceleration_weight", s.design.acceleration_weight, "Weight of each floor's absolute acceleration", "s2/m").min(0.0);
+            parameter(vocabulary::DAMPER_STOREY, s.damper_storey, "Storey of the damper, the lowest 1").min(1.0).max(10.0);
+            parameter(vocabulary::ACCELERATION_WEIGHT, s.design.acceleration_weight, "Weight of each floor's absolute acceleration", "s2/m").min(0.0);
             parameter("drift_weight", s.design.drift_weight, "Weight of each storey's drift", "1/m").min(0.0);
             parameter("force_weight", s.design.force_weight, "Weight of the force", "1/N").min(0.0);
             parameter("ground_noise", s.design.ground_noise, "White noise that the ground's acceleration is taken for, one standard deviation", "m/s2" => "g").min(0.0);
-            parameter("measurement_noise", s.design.measurement_noise, "Noise of the measured accelerations, one standard deviation", "m/s2" => "g").min(0.0);
+            parameter(vocabulary::SENSOR_NOISE, s.design.measurement_noise, "Noise of the measured accelerations, one standard deviation", "m/s2" => "g").min(0.0);
             parameter("largest_voltage", s.design.largest_voltage, "The voltage that is given", "V").min(0.0);
         };
         variables.push(

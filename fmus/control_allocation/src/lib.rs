@@ -7,6 +7,7 @@ use controllers::{
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// The shares of displacement and force loop in the valve command.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -37,7 +38,7 @@ impl Component for ControlAllocation {
                 .nominal(10.0);
             input("force_loop_command", s.force_loop_command, "Command of the force loop", "V")
                 .nominal(10.0);
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+            output(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0)
                 .depends_on_inputs(Dependent);
             group(s.law);

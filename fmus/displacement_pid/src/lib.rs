@@ -7,6 +7,7 @@ use controllers::{
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// PID control from displacement to valve command.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -36,31 +37,31 @@ impl Component for DisplacementPid {
         Terminal::bus(
             "reference",
             "reference",
-            &[("displacement", "reference_displacement")],
+            &[("displacement", vocabulary::REFERENCE_DISPLACEMENT)],
         ),
         Terminal::bus(
             "measured",
             "motion",
-            &[("displacement", "measured_displacement")],
+            &[("displacement", vocabulary::MEASURED_DISPLACEMENT)],
         ),
         Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:
-            input("reference_displacement", s.reference_displacement, "Wanted displacement", "m" => "in")
+            input(vocabulary::REFERENCE_DISPLACEMENT, s.reference_displacement, "Wanted displacement", "m" => "in")
                 .nominal(0.0381);
-            input("measured_displacement", s.measured_displacement, "Displacement of the table", "m" => "in")
+            input(vocabulary::MEASURED_DISPLACEMENT, s.measured_displacement, "Displacement of the table", "m" => "in")
                 .nominal(0.0381);
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+            output(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0)
                 .depends_on_inputs(Dependent);
-            parameter(Pid::PROPORTIONAL_GAIN, s.law.proportional, "Proportional gain", "V/m" => "V/in");
-            parameter(Pid::INTEGRAL_GAIN, s.law.integral, "Integral gain", "V/(m.s)" => "V/(in.s)");
+            parameter(vocabulary::PROPORTIONAL_GAIN, s.law.proportional, "Proportional gain", "V/m" => "V/in");
+            parameter(vocabulary::INTEGRAL_GAIN, s.law.integral, "Integral gain", "V/(m.s)" => "V/(in.s)");
             parameter(Pid::INTEGRAL_LEAK, s.law.integral_leak, "Rate at which the integral leaks away", "1/s");
             parameter(Pid::DERIVATIVE_GAIN, s.law.derivative, "Derivative gain", "V.s/m" => "V.s/in");
             parameter(Pid::DERIVATIVE_LAG, s.law.derivative_lag, "Time constant of the derivative's lag", "s");
-            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
+            parameter(vocabulary::VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }
 

@@ -7,6 +7,7 @@ use controllers::{
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// PID control from actuator force to valve command.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -34,7 +35,11 @@ impl Component for ForcePid {
     const DOCUMENTATION: &'static str = include_str!("../README.md");
     const TERMINALS: &'static [Terminal] = &[
         Terminal::bus("reference", "reference", &[("force", "reference_force")]),
-        Terminal::bus("measured", "motion", &[("force", "measured_force")]),
+        Terminal::bus(
+            "measured",
+            "motion",
+            &[("force", vocabulary::MEASURED_FORCE)],
+        ),
         Terminal::VALVE,
     ];
 
@@ -42,17 +47,17 @@ impl Component for ForcePid {
         fmu_kit::table! { Self, s:
             input("reference_force", s.reference_force, "Wanted force of the actuator", "N" => "lbf")
                 .nominal(200.0);
-            input("measured_force", s.measured_force, "Force of the actuator", "N" => "lbf")
+            input(vocabulary::MEASURED_FORCE, s.measured_force, "Force of the actuator", "N" => "lbf")
                 .nominal(200.0);
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+            output(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0)
                 .depends_on_inputs(Dependent);
-            parameter(Pid::PROPORTIONAL_GAIN, s.law.proportional, "Proportional gain", "V/N" => "V/lbf");
-            parameter(Pid::INTEGRAL_GAIN, s.law.integral, "Integral gain", "V/(N.s)" => "V/(lbf.s)");
+            parameter(vocabulary::PROPORTIONAL_GAIN, s.law.proportional, "Proportional gain", "V/N" => "V/lbf");
+            parameter(vocabulary::INTEGRAL_GAIN, s.law.integral, "Integral gain", "V/(N.s)" => "V/(lbf.s)");
             parameter(Pid::INTEGRAL_LEAK, s.law.integral_leak, "Rate at which the integral leaks away", "1/s");
             parameter(Pid::DERIVATIVE_GAIN, s.law.derivative, "Derivative gain", "V.s/N" => "V.s/lbf");
             parameter(Pid::DERIVATIVE_LAG, s.law.derivative_lag, "Time constant of the derivative's lag", "s");
-            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
+            parameter(vocabulary::VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }
 

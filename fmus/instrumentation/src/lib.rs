@@ -13,6 +13,7 @@ use plant::sensors::instrumentation::{
     VelocityEstimate, VelocityFilter,
 };
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// What is in doubt, by the numbers of [`Doubt`].
 const DOUBTS: Enumeration = Enumeration {
@@ -108,8 +109,12 @@ const FAULTY_CHANNELS: Enumeration = Enumeration {
     items: &[
         item("displacement", 0, "Displacement of the table"),
         item("acceleration", 1, "Acceleration of the table"),
-        item("actuator_force", 2, "Force of the actuator"),
-        item("specimen_acceleration", 3, "Acceleration of the specimen"),
+        item(vocabulary::ACTUATOR_FORCE, 2, "Force of the actuator"),
+        item(
+            vocabulary::SPECIMEN_ACCELERATION,
+            3,
+            "Acceleration of the specimen",
+        ),
     ],
 };
 
@@ -171,14 +176,14 @@ const CHANNELS: [Described; 4] = [
         of: |s| &mut s.acceleration,
     },
     Described {
-        name: "actuator_force",
+        name: vocabulary::ACTUATOR_FORCE,
         sensor: "Load cell",
         unit: "N",
         shown: "lbf",
         of: |s| &mut s.actuator_force,
     },
     Described {
-        name: "specimen_acceleration",
+        name: vocabulary::SPECIMEN_ACCELERATION,
         sensor: "Specimen's accelerometer",
         unit: "m/s2",
         shown: "in/s2",
@@ -353,29 +358,29 @@ impl Component for Instrumentation {
                 ("displacement", "displacement"),
                 ("velocity", "velocity"),
                 ("acceleration", "acceleration"),
-                ("force", "actuator_force"),
+                ("force", vocabulary::ACTUATOR_FORCE),
             ],
         ),
         Terminal::plug(
             "specimen",
             "specimen-motion",
-            &[("acceleration", "specimen_acceleration")],
+            &[("acceleration", vocabulary::SPECIMEN_ACCELERATION)],
         ),
         Terminal::bus(
             "measured",
             "motion",
             &[
-                ("displacement", "measured_displacement"),
-                ("velocity", "measured_velocity"),
-                ("acceleration", "measured_acceleration"),
-                ("force", "measured_force"),
+                ("displacement", vocabulary::MEASURED_DISPLACEMENT),
+                ("velocity", vocabulary::MEASURED_VELOCITY),
+                ("acceleration", vocabulary::MEASURED_ACCELERATION),
+                ("force", vocabulary::MEASURED_FORCE),
                 ("valid", "measurement_valid"),
             ],
         ),
         Terminal::plug(
             "measured_specimen",
             "specimen-motion",
-            &[("acceleration", "measured_specimen_acceleration")],
+            &[("acceleration", vocabulary::MEASURED_SPECIMEN_ACCELERATION)],
         ),
     ];
 
@@ -384,18 +389,18 @@ impl Component for Instrumentation {
             input("displacement", s.motion.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
             input("velocity", s.motion.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
             input("acceleration", s.motion.acceleration, "Absolute acceleration of the table", "m/s2" => "g").nominal(10.0);
-            input("actuator_force", s.motion.actuator_force, "Force of the actuator", "N" => "lbf").nominal(400.0);
-            input("specimen_acceleration", s.motion.specimen_acceleration, "Absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
-            output("measured_displacement", s.measured.displacement, "Displacement of the table, as measured", "m" => "in")
+            input(vocabulary::ACTUATOR_FORCE, s.motion.actuator_force, "Force of the actuator", "N" => "lbf").nominal(400.0);
+            input(vocabulary::SPECIMEN_ACCELERATION, s.motion.specimen_acceleration, "Absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
+            output(vocabulary::MEASURED_DISPLACEMENT, s.measured.displacement, "Displacement of the table, as measured", "m" => "in")
                 .discrete().nominal(0.0381).depends_on(&["displacement", "acceleration"], Dependent);
-            output("measured_velocity", s.measured.velocity, "Velocity of the table, as measured", "m/s" => "in/s")
+            output(vocabulary::MEASURED_VELOCITY, s.measured.velocity, "Velocity of the table, as measured", "m/s" => "in/s")
                 .discrete().nominal(0.5).depends_on(&["displacement", "velocity", "acceleration"], Dependent);
-            output("measured_acceleration", s.measured.acceleration, "Absolute acceleration of the table, as measured", "m/s2" => "g")
+            output(vocabulary::MEASURED_ACCELERATION, s.measured.acceleration, "Absolute acceleration of the table, as measured", "m/s2" => "g")
                 .discrete().nominal(10.0).depends_on(&["displacement", "acceleration"], Dependent);
-            output("measured_force", s.measured.actuator_force, "Force of the actuator, as measured", "N" => "lbf")
-                .discrete().nominal(400.0).depends_on(&["actuator_force"], Dependent);
-            output("measured_specimen_acceleration", s.measured.specimen_acceleration, "Absolute acceleration of the specimen, as measured", "m/s2" => "g")
-                .discrete().nominal(10.0).depends_on(&["specimen_acceleration"], Dependent);
+            output(vocabulary::MEASURED_FORCE, s.measured.actuator_force, "Force of the actuator, as measured", "N" => "lbf")
+                .discrete().nominal(400.0).depends_on(&[vocabulary::ACTUATOR_FORCE], Dependent);
+            output(vocabulary::MEASURED_SPECIMEN_ACCELERATION, s.measured.specimen_acceleration, "Absolute acceleration of the specimen, as measured", "m/s2" => "g")
+                .discrete().nominal(10.0).depends_on(&[vocabulary::SPECIMEN_ACCELERATION], Dependent);
             output("measurement_valid", s.valid, "Whether all readings are numbers; those that are not keep their last value");
             output("sensors_disagree", s.voted.disagree, "Whether accelerometer and displacement contradict each other; by the vote");
             output("displacement_jumped", s.voted.jumped, "Whether the displacement jumped for longer than the bridge time; by the vote");
@@ -408,7 +413,7 @@ impl Component for Instrumentation {
         variables.extend(effect_parameters());
         variables.extend(fmu_kit::table! { Self, s:
             parameter("delay", s.sensors.delay, "Lateness of all channels together", "s").min(0.0);
-            parameter("velocity_lag", s.sensors.velocity_lag, "Lag of the differentiated velocity", "s").min(0.0);
+            parameter(vocabulary::VELOCITY_LAG, s.sensors.velocity_lag, "Lag of the differentiated velocity", "s").min(0.0);
             parameter("seed", s.seed, "Seed of the noise").min(0.0);
             parameter("fault_time", s.sensors.fault_time, "When the fault occurs", "s");
             parameter("fault_duration", s.sensors.fault_duration, "How long the fault lasts, 0 for good", "s").min(0.0);

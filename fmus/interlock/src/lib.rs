@@ -7,6 +7,7 @@ use fmu_kit::{
     Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Terminal, Variable,
 };
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Causes by the numbers of [`Trip`], in the words of a trip or of a warning.
 const fn causes(warn: bool) -> [Item; Trip::ALL.len()] {
@@ -95,23 +96,23 @@ impl Component for Interlock {
         Terminal::bus(
             "reference",
             "reference",
-            &[("displacement", "reference_displacement")],
+            &[("displacement", vocabulary::REFERENCE_DISPLACEMENT)],
         ),
         Terminal::bus(
             "measured",
             "motion",
             &[
-                ("displacement", "measured_displacement"),
-                ("velocity", "measured_velocity"),
-                ("acceleration", "measured_acceleration"),
-                ("force", "measured_force"),
+                ("displacement", vocabulary::MEASURED_DISPLACEMENT),
+                ("velocity", vocabulary::MEASURED_VELOCITY),
+                ("acceleration", vocabulary::MEASURED_ACCELERATION),
+                ("force", vocabulary::MEASURED_FORCE),
                 ("valid", "measurement_valid"),
             ],
         ),
         Terminal::plug(
             "specimen",
             "specimen-motion",
-            &[("acceleration", "specimen_acceleration")],
+            &[("acceleration", vocabulary::SPECIMEN_ACCELERATION)],
         ),
         Terminal::CONTROLLER,
         Terminal::VALVE,
@@ -119,13 +120,13 @@ impl Component for Interlock {
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:
-            input("controller_command", s.controller_command, "Command of the controller", "V").nominal(10.0);
-            input("reference_displacement", s.reference_displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
-            input("measured_displacement", s.measured.displacement, "Measured displacement", "m" => "in").nominal(0.0381);
-            input("measured_velocity", s.measured.velocity, "Measured velocity", "m/s" => "in/s").nominal(0.5);
-            input("measured_acceleration", s.measured.acceleration, "Measured acceleration", "m/s2" => "g").nominal(10.0);
-            input("measured_force", s.measured_force, "Measured force of the actuator", "N" => "lbf").nominal(400.0);
-            input("specimen_acceleration", s.specimen_acceleration, "Measured absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
+            input(vocabulary::CONTROLLER_COMMAND, s.controller_command, "Command of the controller", "V").nominal(10.0);
+            input(vocabulary::REFERENCE_DISPLACEMENT, s.reference_displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input(vocabulary::MEASURED_DISPLACEMENT, s.measured.displacement, "Measured displacement", "m" => "in").nominal(0.0381);
+            input(vocabulary::MEASURED_VELOCITY, s.measured.velocity, "Measured velocity", "m/s" => "in/s").nominal(0.5);
+            input(vocabulary::MEASURED_ACCELERATION, s.measured.acceleration, "Measured acceleration", "m/s2" => "g").nominal(10.0);
+            input(vocabulary::MEASURED_FORCE, s.measured_force, "Measured force of the actuator", "N" => "lbf").nominal(400.0);
+            input(vocabulary::SPECIMEN_ACCELERATION, s.specimen_acceleration, "Measured absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
             input("supply_pressure", s.supply_pressure, "Pressure of the supply; unused without a limit of it", "Pa" => "psi").nominal(2e7);
             input("supply_flow", s.supply_flow, "Flow out of the supply; unused without a limit of it", "m3/s" => "in3/s").nominal(2e-4);
             input("measurement_valid", s.measurement_valid, "Whether all measurements are numbers");
@@ -134,7 +135,7 @@ impl Component for Interlock {
             input("heartbeat", s.heartbeat, "A number that the controller changes at every sample");
             input("stop", s.stop, "The operator's stop");
             input("reset", s.reset, "A rising edge ends a trip whose cause is gone");
-            output("valve_command", s.law.memory.command, "Voltage to the servo valve", "V")
+            output(vocabulary::VALVE_COMMAND, s.law.memory.command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0).depends_on_inputs(Dependent);
             output("tripped", s.tripped, "Whether the interlock has tripped");
             output("trip_cause", s.trip_cause, "Why it tripped").choices(CAUSES);

@@ -71,12 +71,12 @@ macro_rules! row {
 macro_rules! tracking_inputs {
     ($component:ty, $s:ident: $reference:expr, $measured:expr) => {
         $crate::table! { $component, $s:
-            input("reference_displacement", $reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
-            input("reference_velocity", $reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
-            input("reference_acceleration", $reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
-            input("measured_displacement", $measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
-            input("measured_velocity", $measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
-            input("measured_acceleration", $measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
+            input($crate::vocabulary::REFERENCE_DISPLACEMENT, $reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input($crate::vocabulary::REFERENCE_VELOCITY, $reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
+            input($crate::vocabulary::REFERENCE_ACCELERATION, $reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
+            input($crate::vocabulary::MEASURED_DISPLACEMENT, $measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input($crate::vocabulary::MEASURED_VELOCITY, $measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+            input($crate::vocabulary::MEASURED_ACCELERATION, $measured.acceleration, "Acceleration of the table", "m/s2" => "g").nominal(10.0);
         }
     };
 }
@@ -89,9 +89,9 @@ macro_rules! displacement_tracking {
     ($component:ty, $s:ident: $input:expr, $command:expr) => {
         $crate::table! { $component, $s:
             input("desired_displacement", $input.desired, "Displacement that the numerical substructure wants", "m" => "mm").nominal(5e-3);
-            input("measured_displacement", $input.measured, "Displacement of the specimen, as measured", "m" => "mm").nominal(5e-3);
+            input($crate::vocabulary::MEASURED_DISPLACEMENT, $input.measured, "Displacement of the specimen, as measured", "m" => "mm").nominal(5e-3);
             output("command", $command, "Command to the actuator", "m" => "mm").discrete().nominal(5e-3)
-                .depends_on(&["desired_displacement", "measured_displacement"], $crate::Dependency::Dependent);
+                .depends_on(&["desired_displacement", $crate::vocabulary::MEASURED_DISPLACEMENT], $crate::Dependency::Dependent);
         }
     };
 }

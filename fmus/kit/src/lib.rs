@@ -79,6 +79,8 @@ pub use phase::{Kind, Phase};
 #[doc(hidden)]
 pub use shared::{exchanges, states};
 pub use terminal::Terminal;
+#[doc(hidden)]
+pub use units::vocabulary;
 pub use variable::{Causality, Dependency, Enumeration, Item, Variable};
 
 /// Short names for the types of the C interfaces, used by [`export!`].

@@ -1,5 +1,7 @@
 //! Ports of a component that belong together, so that tools connect them by name (FMI 3.0).
 
+use units::vocabulary;
+
 /// A group of variables that is connected as a whole.
 ///
 /// Two terminals fit when kind and members do, whatever their variables are called.
@@ -40,9 +42,9 @@ impl Terminal {
         "reference",
         "reference",
         &[
-            ("displacement", "reference_displacement"),
-            ("velocity", "reference_velocity"),
-            ("acceleration", "reference_acceleration"),
+            ("displacement", vocabulary::REFERENCE_DISPLACEMENT),
+            ("velocity", vocabulary::REFERENCE_VELOCITY),
+            ("acceleration", vocabulary::REFERENCE_ACCELERATION),
         ],
     );
 
@@ -51,18 +53,21 @@ impl Terminal {
         "measured",
         "motion",
         &[
-            ("displacement", "measured_displacement"),
-            ("velocity", "measured_velocity"),
-            ("acceleration", "measured_acceleration"),
+            ("displacement", vocabulary::MEASURED_DISPLACEMENT),
+            ("velocity", vocabulary::MEASURED_VELOCITY),
+            ("acceleration", vocabulary::MEASURED_ACCELERATION),
         ],
     );
 
     /// The command that the valve takes.
-    pub const VALVE: Self = Self::plug("valve", "valve", &[("command", "valve_command")]);
+    pub const VALVE: Self = Self::plug("valve", "valve", &[("command", vocabulary::VALVE_COMMAND)]);
 
     /// The command of the controller before.
-    pub const CONTROLLER: Self =
-        Self::plug("controller", "valve", &[("command", "controller_command")]);
+    pub const CONTROLLER: Self = Self::plug(
+        "controller",
+        "valve",
+        &[("command", vocabulary::CONTROLLER_COMMAND)],
+    );
 
     /// The displacement that an actuator is asked for.
     pub const DESIRED_DISPLACEMENT: Self = Self::bus(
@@ -75,7 +80,7 @@ impl Terminal {
     pub const MEASURED_DISPLACEMENT: Self = Self::bus(
         "measured",
         "motion",
-        &[("displacement", "measured_displacement")],
+        &[("displacement", vocabulary::MEASURED_DISPLACEMENT)],
     );
 
     /// The command that an actuator takes.

@@ -4,6 +4,7 @@
 use controllers::{Controller, loop_shaping::LoopShaping as Law, pid::PidInput};
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// The controller of Eq 3-10, with further sections or without, from displacement to valve command.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -22,29 +23,29 @@ impl Component for LoopShaping {
         Terminal::bus(
             "reference",
             "reference",
-            &[("displacement", "reference_displacement")],
+            &[("displacement", vocabulary::REFERENCE_DISPLACEMENT)],
         ),
         Terminal::bus(
             "measured",
             "motion",
-            &[("displacement", "measured_displacement")],
+            &[("displacement", vocabulary::MEASURED_DISPLACEMENT)],
         ),
         Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:
-            input("reference_displacement", s.reference_displacement, "Wanted displacement", "m" => "in")
+            input(vocabulary::REFERENCE_DISPLACEMENT, s.reference_displacement, "Wanted displacement", "m" => "in")
                 .nominal(0.0381);
-            input("measured_displacement", s.measured_displacement, "Displacement of the table", "m" => "in")
+            input(vocabulary::MEASURED_DISPLACEMENT, s.measured_displacement, "Displacement of the table", "m" => "in")
                 .nominal(0.0381);
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+            output(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0)
                 .depends_on_inputs(Dependent);
             group(s.law.coefficients);
             group(s.law.sections[0]).prefixed("section_1_").introduced("First further section, ");
             group(s.law.sections[1]).prefixed("section_2_").introduced("Second further section, ");
-            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
+            parameter(vocabulary::VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }
 

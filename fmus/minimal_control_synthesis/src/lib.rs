@@ -7,6 +7,7 @@ use controllers::minimal_control_synthesis::{
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Minimal control synthesis from motion to valve command.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -26,32 +27,32 @@ impl Component for MinimalControlSynthesis {
             "reference",
             "reference",
             &[
-                ("displacement", "reference_displacement"),
-                ("velocity", "reference_velocity"),
+                ("displacement", vocabulary::REFERENCE_DISPLACEMENT),
+                ("velocity", vocabulary::REFERENCE_VELOCITY),
             ],
         ),
         Terminal::bus(
             "measured",
             "motion",
-            &[("displacement", "measured_displacement")],
+            &[("displacement", vocabulary::MEASURED_DISPLACEMENT)],
         ),
         Terminal::VALVE,
     ];
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:
-            input("reference_displacement", s.input.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
-            input("reference_velocity", s.input.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
+            input(vocabulary::REFERENCE_DISPLACEMENT, s.input.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input(vocabulary::REFERENCE_VELOCITY, s.input.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
             input("wanted_displacement", s.input.wanted, "Wanted displacement at the time that is measured", "m" => "in").nominal(0.0381);
-            input("measured_displacement", s.input.measured, "Displacement of the table", "m" => "in").nominal(0.0381);
-            output("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+            input(vocabulary::MEASURED_DISPLACEMENT, s.input.measured, "Displacement of the table", "m" => "in").nominal(0.0381);
+            output(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0).depends_on_inputs(Dependent);
             output("feedback_gain", s.gains[0], "K as learnt so far", "V/m" => "V/in")
                 .discrete().nominal(300.0).depends_on_inputs(Dependent);
             output("feedforward_gain", s.gains[1], "Kr as learnt so far", "V/m" => "V/in")
                 .discrete().nominal(300.0).depends_on_inputs(Dependent);
             group(s.law);
-            parameter("valve_limit", s.law.limit, "Largest magnitude of the valve command", "V");
+            parameter(vocabulary::VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }
 

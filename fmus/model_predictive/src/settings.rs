@@ -11,6 +11,7 @@ use plant::identified::coupled::Rig;
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 use units::vocabulary::{
     COMMAND_DELAY_SAMPLES, LOOP_DELAY_SAMPLES, MEASUREMENT_NOISE, SPECIMEN_DAMPING, SPECIMEN_MASS,
     SPECIMEN_STIFFNESS,
@@ -181,14 +182,14 @@ pub fn variables() -> Vec<Variable<ModelPredictive>> {
         parameter("continuous_law", s.settings.continuous_law, "Predict with three-variable control running continuously, Eq 5-5");
         parameter("displacement_weight", s.settings.output_weights[0], "w_disp of Eq 5-16, Table 5-1");
         parameter("velocity_weight", s.settings.output_weights[1], "w_vel of Eq 5-16, Table 5-1");
-        parameter("acceleration_weight", s.settings.output_weights[2], "w_acc of Eq 5-16, Table 5-1");
+        parameter(vocabulary::ACCELERATION_WEIGHT, s.settings.output_weights[2], "w_acc of Eq 5-16, Table 5-1");
         parameter("displacement_rate_weight", s.settings.rate_weights[0], "w_delta_disp of Eq 5-17, Table 5-1");
         parameter("velocity_rate_weight", s.settings.rate_weights[1], "w_delta_vel of Eq 5-17, Table 5-1");
         parameter("acceleration_rate_weight", s.settings.rate_weights[2], "w_delta_acc of Eq 5-17, Table 5-1");
         parameter("violation_weight", s.settings.violation_weight, "rho of Eq 5-18, Table 5-1");
-        parameter("displacement_scale", s.settings.scales[0], "Unit of displacement in the cost", "m" => "in");
-        parameter("velocity_scale", s.settings.scales[1], "Unit of velocity in the cost", "m/s" => "in/s");
-        parameter("acceleration_scale", s.settings.scales[2], "Unit of acceleration in the cost", "m/s2" => "g");
+        parameter(vocabulary::DISPLACEMENT_SCALE, s.settings.scales[0], "Unit of displacement in the cost", "m" => "in");
+        parameter(vocabulary::VELOCITY_SCALE, s.settings.scales[1], "Unit of velocity in the cost", "m/s" => "in/s");
+        parameter(vocabulary::ACCELERATION_SCALE, s.settings.scales[2], "Unit of acceleration in the cost", "m/s2" => "g");
         parameter("minimum_displacement", s.settings.minimum[0], "Soft limit, Table 5-1", "m" => "in");
         parameter("maximum_displacement", s.settings.maximum[0], "Soft limit, Table 5-1", "m" => "in");
         parameter("minimum_velocity", s.settings.minimum[1], "Soft limit", "m/s" => "in/s");
@@ -196,9 +197,9 @@ pub fn variables() -> Vec<Variable<ModelPredictive>> {
         parameter("minimum_acceleration", s.settings.minimum[2], "Soft limit", "m/s2" => "g");
         parameter("maximum_acceleration", s.settings.maximum[2], "Soft limit", "m/s2" => "g");
         parameter("iteration_limit", s.settings.iteration_limit, "Iterations after which the solver gives up").min(0.0);
-        parameter("time_limit", s.settings.time_limit, "Time after which the solver gives up; 0: none", "s");
-        parameter("valve_noise", s.settings.valve_noise, "Standard deviation of the noise on the valve command", "V");
-        parameter("force_noise", s.settings.force_noise, "Standard deviation of the force on the table", "N" => "lbf");
+        parameter(vocabulary::TIME_LIMIT, s.settings.time_limit, "Time after which the solver gives up; 0: none", "s");
+        parameter(vocabulary::VALVE_NOISE, s.settings.valve_noise, "Standard deviation of the noise on the valve command", "V");
+        parameter(vocabulary::FORCE_NOISE, s.settings.force_noise, "Standard deviation of the force on the table", "N" => "lbf");
         parameter(MEASUREMENT_NOISE[0], s.settings.measurement_noise[0], "Standard deviation of the sensor", "m" => "in");
         parameter(MEASUREMENT_NOISE[1], s.settings.measurement_noise[1], "Standard deviation of the sensor", "m/s" => "in/s");
         parameter(MEASUREMENT_NOISE[2], s.settings.measurement_noise[2], "Standard deviation of the sensor", "m/s2" => "g");

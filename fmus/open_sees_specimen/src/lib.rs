@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
+use units::vocabulary;
 
 use bridges::opensees::{CARRIED, OpenSeesError, Reply, Role, Settings, Structure};
 use fmu_kit::{Component, ComponentResult, Enumeration, Item, Variable};
@@ -138,10 +139,10 @@ impl Component for OpenSeesSpecimen {
         // The motion is that at the communication point: a master that extrapolates continuous inputs
         // to the middle of the step would have it half a step ahead.
         fmu_kit::table! { Self, s:
-            input("table_displacement", s.table_displacement, "Absolute displacement of the table", "m" => "in").discrete().nominal(0.05);
-            input("table_velocity", s.table_velocity, "Absolute velocity of the table", "m/s" => "in/s").discrete().nominal(0.5);
-            input("table_acceleration", s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g").discrete().nominal(10.0);
-            input("measured_force", s.measured_force, "Force with which the specimen resists; of a substructure", "N" => "lbf").nominal(400.0);
+            input(vocabulary::TABLE_DISPLACEMENT, s.table_displacement, "Absolute displacement of the table", "m" => "in").discrete().nominal(0.05);
+            input(vocabulary::TABLE_VELOCITY, s.table_velocity, "Absolute velocity of the table", "m/s" => "in/s").discrete().nominal(0.5);
+            input(vocabulary::TABLE_ACCELERATION, s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g").discrete().nominal(10.0);
+            input(vocabulary::MEASURED_FORCE, s.measured_force, "Force with which the specimen resists; of a substructure", "N" => "lbf").nominal(400.0);
             output("force", s.force, "Force on the table", "N" => "lbf").nominal(400.0);
             output("acceleration", s.acceleration, "Mean absolute acceleration of the mass: force on the structure over mass", "m/s2" => "g").nominal(10.0);
             output("displacement", s.displacement, "Displacement of the base, or of the interface of a substructure", "m" => "in").nominal(0.05);
@@ -152,7 +153,7 @@ impl Component for OpenSeesSpecimen {
             parameter("python", s.python, "Python with openseespy; empty to look for one");
             parameter("role", s.role, "What the structure is in the experiment").choices(ROLES);
             parameter("direction", s.direction, "Direction of motion, from 1; 0 for what the model says, or 1");
-            parameter("time_limit", s.time_limit, "How long OpenSees may be silent", "s" => "s");
+            parameter(vocabulary::TIME_LIMIT, s.time_limit, "How long OpenSees may be silent", "s" => "s");
         }
     }
 

@@ -5,6 +5,7 @@ use controllers::Controller;
 use controllers::aids::{AidsInput as Input, OperatorAids as Law};
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 use units::vocabulary::{
     CONTROLLER_COMMAND, LOOP_DELAY_SAMPLES, MEASURED_FORCE, VALVE_COMMAND, VALVE_LIMIT,
 };
@@ -29,10 +30,10 @@ impl Component for OperatorAids {
             "measured",
             "motion",
             &[
-                ("displacement", "measured_displacement"),
-                ("velocity", "measured_velocity"),
-                ("acceleration", "measured_acceleration"),
-                ("force", "measured_force"),
+                ("displacement", vocabulary::MEASURED_DISPLACEMENT),
+                ("velocity", vocabulary::MEASURED_VELOCITY),
+                ("acceleration", vocabulary::MEASURED_ACCELERATION),
+                ("force", vocabulary::MEASURED_FORCE),
             ],
         ),
         Terminal::CONTROLLER,
@@ -55,8 +56,8 @@ impl Component for OperatorAids {
             output("phase_lag", s.law.harmonics.memory.measured.phase_lag, "Sines: by which it is late", "rad" => "deg")
                 .discrete().depends_on_inputs(Dependent);
             group(s.law.on);
-            parameter("amplitude_phase_control", s.law.harmonics.fundamental, "Sines: whether the fundamental is brought to the wanted one");
-            parameter("harmonic_cancellation", s.law.harmonics.cancellation, "Sines: whether the harmonics above it are cancelled");
+            parameter(vocabulary::AMPLITUDE_PHASE_CONTROL, s.law.harmonics.fundamental, "Sines: whether the fundamental is brought to the wanted one");
+            parameter(vocabulary::HARMONIC_CANCELLATION, s.law.harmonics.cancellation, "Sines: whether the harmonics above it are cancelled");
             parameter(LOOP_DELAY_SAMPLES, s.law.rig.delay, "Samples by which measurements are late").min(0.0).max(4.0);
             parameter(VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
             group(s.law.rig);

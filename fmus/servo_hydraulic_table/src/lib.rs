@@ -11,6 +11,7 @@ use plant::servo_hydraulic::{
     ServoHydraulicState, Supply,
 };
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// The physical table between valve command, specimen force and motion.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -76,7 +77,7 @@ impl Component for ServoHydraulicTable {
                 ("displacement", "displacement"),
                 ("velocity", "velocity"),
                 ("acceleration", "acceleration"),
-                ("force", "actuator_force"),
+                ("force", vocabulary::ACTUATOR_FORCE),
             ],
         ),
         Terminal::plug(
@@ -84,7 +85,7 @@ impl Component for ServoHydraulicTable {
             "mount",
             &[
                 ("acceleration", "acceleration"),
-                ("force", "specimen_force"),
+                ("force", vocabulary::SPECIMEN_FORCE),
             ],
         ),
     ];
@@ -102,17 +103,17 @@ impl Component for ServoHydraulicTable {
         ];
         const VALVE: [&str; 7] = [
             "null_leakage",
-            "pump_pressure",
+            vocabulary::PUMP_PRESSURE,
             "pump_gain",
             "pump_limit",
-            "bulk_modulus",
-            "oil_volume",
-            "piston_leakage",
+            vocabulary::BULK_MODULUS,
+            vocabulary::OIL_VOLUME,
+            vocabulary::PISTON_LEAKAGE,
         ];
         fmu_kit::table! { Self, s:
-            input("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+            input(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0);
-            input("specimen_force", s.specimen_force, "Force of the specimen on the table", "N" => "lbf")
+            input(vocabulary::SPECIMEN_FORCE, s.specimen_force, "Force of the specimen on the table", "N" => "lbf")
                 .nominal(400.0);
             output("displacement", s.state.table.displacement, "Displacement of the table", "m" => "in")
                 .nominal(0.0381);
@@ -120,9 +121,9 @@ impl Component for ServoHydraulicTable {
                 .nominal(0.5).derivative_of("displacement");
             output("acceleration", s.rates.velocity, "Absolute acceleration of the table", "m/s2" => "g")
                 .nominal(10.0).derivative_of("velocity")
-                .depends_on(&["specimen_force"], Fixed).depends_on(&MOTION, Dependent).depends_on(&OIL, Dependent)
-                .initially_depends_on(&["specimen_force", "table_mass", "added_payload"]);
-            output("actuator_force", s.actuator_force, "Force of the actuator on the table", "N" => "lbf")
+                .depends_on(&[vocabulary::SPECIMEN_FORCE], Fixed).depends_on(&MOTION, Dependent).depends_on(&OIL, Dependent)
+                .initially_depends_on(&[vocabulary::SPECIMEN_FORCE, vocabulary::TABLE_MASS, vocabulary::ADDED_PAYLOAD]);
+            output(vocabulary::ACTUATOR_FORCE, s.actuator_force, "Force of the actuator on the table", "N" => "lbf")
                 .nominal(400.0).depends_on(&MOTION, Dependent).depends_on(&OIL, Dependent);
             output("supply_pressure", s.state.table.supply_pressure, "Pressure of the supply", "Pa" => "psi")
                 .nominal(2e7).initially_depends_on(&VALVE);
@@ -143,8 +144,8 @@ impl Component for ServoHydraulicTable {
             group(s.rig.table.friction);
             group(s.rig.table.stops);
             group(s.rig.table.table);
-            parameter("added_payload", s.rig.table.added_payload, "Mass on the table that a model does not know of", "kg" => "lbf.s2/in");
-            parameter("cubic_stiffness", s.rig.table.cubic_stiffness, "Factor of an additional force with the cube of the displacement", "N/m3" => "lbf/in3");
+            parameter(vocabulary::ADDED_PAYLOAD, s.rig.table.added_payload, "Mass on the table that a model does not know of", "kg" => "lbf.s2/in");
+            parameter(vocabulary::CUBIC_STIFFNESS, s.rig.table.cubic_stiffness, "Factor of an additional force with the cube of the displacement", "N/m3" => "lbf/in3");
             local("stop_hit", s.stop_hit, "Whether a hard stop is touched");
             local("displacement_error", s.displacement_error, "Estimated error of the displacement made in the last step, if asked for", "m" => "in")
                 .discrete().nominal(1e-6);
@@ -159,8 +160,8 @@ impl Component for ServoHydraulicTable {
                 .nominal(2e-5);
             local("der(spool_velocity)", s.rates.spool_velocity, "Acceleration of the spool", "V/s2")
                 .derivative_of("spool_velocity")
-                .depends_on(&["valve_command"], Dependent).depends_on(&["spool", "spool_velocity"], Fixed)
-                .initially_depends_on(&["valve_command", "valve_null_bias", "spool_travel_limit", "spool_slew_limit", "valve_frequency"]);
+                .depends_on(&[vocabulary::VALVE_COMMAND], Dependent).depends_on(&["spool", "spool_velocity"], Fixed)
+                .initially_depends_on(&[vocabulary::VALVE_COMMAND, vocabulary::VALVE_NULL_BIAS, "spool_travel_limit", "spool_slew_limit", vocabulary::VALVE_FREQUENCY]);
             local("der(pressure_a)", s.rates.pressures[0], "Rate of the pressure of chamber A", "Pa/s")
                 .derivative_of("pressure_a").depends_on(&CHAMBERS, Dependent).initially_depends_on(&VALVE);
             local("der(pressure_b)", s.rates.pressures[1], "Rate of the pressure of chamber B", "Pa/s")

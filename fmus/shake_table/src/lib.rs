@@ -6,6 +6,7 @@ use plant::identified::effects::{self, AtStart, Component as Part, Effects, Fiel
 use plant::identified::extended_table::{ExtendedTable, ExtendedTableState};
 use plant::identified::shake_table::{SampledShakeTable, ShakeTable as Rig, ShakeTableState};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// The identified shake table between valve command, specimen force and motion.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -63,11 +64,11 @@ impl ShakeTable {
             let mut moved = self.clone();
             let table = &mut moved.state.table;
             *match known {
-                "valve_command" => &mut moved.valve_command,
-                "specimen_force" => &mut moved.specimen_force,
+                vocabulary::VALVE_COMMAND => &mut moved.valve_command,
+                vocabulary::SPECIMEN_FORCE => &mut moved.specimen_force,
                 "displacement" => &mut table.displacement,
                 "velocity" => &mut table.velocity,
-                "actuator_force" => &mut table.actuator[0],
+                vocabulary::ACTUATOR_FORCE => &mut table.actuator[0],
                 "actuator_state[2]" => &mut table.actuator[1],
                 _ => &mut table.actuator[2],
             } += sign * amount;
@@ -96,7 +97,7 @@ impl Component for ShakeTable {
                 ("displacement", "displacement"),
                 ("velocity", "velocity"),
                 ("acceleration", "acceleration"),
-                ("force", "actuator_force"),
+                ("force", vocabulary::ACTUATOR_FORCE),
             ],
         ),
         Terminal::plug(
@@ -104,7 +105,7 @@ impl Component for ShakeTable {
             "mount",
             &[
                 ("acceleration", "acceleration"),
-                ("force", "specimen_force"),
+                ("force", vocabulary::SPECIMEN_FORCE),
             ],
         ),
     ];
@@ -112,9 +113,9 @@ impl Component for ShakeTable {
 
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::table! { Self, s:
-            input("valve_command", s.valve_command, "Voltage to the servo valve", "V")
+            input(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0);
-            input("specimen_force", s.specimen_force, "Force of the specimen on the table", "N" => "lbf")
+            input(vocabulary::SPECIMEN_FORCE, s.specimen_force, "Force of the specimen on the table", "N" => "lbf")
                 .nominal(400.0);
             output("displacement", s.state.table.displacement, "Displacement of the table", "m" => "in")
                 .nominal(0.0381);
@@ -122,10 +123,10 @@ impl Component for ShakeTable {
                 .nominal(0.5).derivative_of("displacement");
             output("acceleration", s.acceleration, "Absolute acceleration of the table", "m/s2" => "g")
                 .nominal(10.0).derivative_of("velocity")
-                .depends_on(&["specimen_force", "displacement", "velocity", "actuator_force"], Dependent)
-                .initially_depends_on(&["specimen_force", "table_mass"])
+                .depends_on(&[vocabulary::SPECIMEN_FORCE, "displacement", "velocity", vocabulary::ACTUATOR_FORCE], Dependent)
+                .initially_depends_on(&[vocabulary::SPECIMEN_FORCE, vocabulary::TABLE_MASS])
                 .initially_depends_on(&effects::acting_at_start(Part::ShakeTable, AtStart::Acceleration));
-            output("actuator_force", s.state.table.actuator[0], "Force of the actuator on the table", "N" => "lbf")
+            output(vocabulary::ACTUATOR_FORCE, s.state.table.actuator[0], "Force of the actuator on the table", "N" => "lbf")
                 .nominal(400.0);
             group(s.rig.table);
             group(s.rig.actuator);
@@ -136,19 +137,19 @@ impl Component for ShakeTable {
             local("actuator_state[2]", s.state.table.actuator[1], "Second state of the actuator", "N/s").nominal(1e5);
             local("actuator_state[3]", s.state.table.actuator[2], "Third state of the actuator", "N/s2").nominal(1e6);
             local("der(actuator_force)", s.actuator_rates[0], "Rate of the actuator's force", "N/s")
-                .derivative_of("actuator_force")
-                .depends_on(&["valve_command", "velocity", "actuator_force", "actuator_state[2]"], Dependent)
-                .initially_depends_on(&["valve_command", "actuator_b2"])
+                .derivative_of(vocabulary::ACTUATOR_FORCE)
+                .depends_on(&[vocabulary::VALVE_COMMAND, "velocity", vocabulary::ACTUATOR_FORCE, "actuator_state[2]"], Dependent)
+                .initially_depends_on(&[vocabulary::VALVE_COMMAND, "actuator_b2"])
                 .initially_depends_on(&actuator);
             local("der(actuator_state[2])", s.actuator_rates[1], "Rate of the second state", "N/s2")
                 .derivative_of("actuator_state[2]")
-                .depends_on(&["valve_command", "velocity", "actuator_force", "actuator_state[2]", "actuator_state[3]"], Dependent)
-                .initially_depends_on(&["valve_command", "actuator_b1", "actuator_b2"])
+                .depends_on(&[vocabulary::VALVE_COMMAND, "velocity", vocabulary::ACTUATOR_FORCE, "actuator_state[2]", "actuator_state[3]"], Dependent)
+                .initially_depends_on(&[vocabulary::VALVE_COMMAND, "actuator_b1", "actuator_b2"])
                 .initially_depends_on(&actuator);
             local("der(actuator_state[3])", s.actuator_rates[2], "Rate of the third state", "N/s3")
                 .derivative_of("actuator_state[3]")
-                .depends_on(&["valve_command", "velocity", "actuator_force", "actuator_state[2]"], Dependent)
-                .initially_depends_on(&["valve_command", "actuator_b0", "actuator_b2"])
+                .depends_on(&[vocabulary::VALVE_COMMAND, "velocity", vocabulary::ACTUATOR_FORCE, "actuator_state[2]"], Dependent)
+                .initially_depends_on(&[vocabulary::VALVE_COMMAND, "actuator_b0", "actuator_b2"])
                 .initially_depends_on(&actuator);
         });
         variables
@@ -238,9 +239,9 @@ impl Component for ShakeTable {
             _ => 2,
         };
         match known {
-            "valve_command" => actuator.voltage_to_force[row],
+            vocabulary::VALVE_COMMAND => actuator.voltage_to_force[row],
             "velocity" => actuator.velocity_to_force[row],
-            "actuator_force" => -actuator.denominator[row],
+            vocabulary::ACTUATOR_FORCE => -actuator.denominator[row],
             "actuator_state[2]" if row > 0 => 0.0,
             _ => 1.0,
         }

@@ -4,6 +4,7 @@
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use plant::signal_path::{SignalEffects, SignalPath as Path};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// A signal on its way.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -44,9 +45,9 @@ impl Component for SignalPath {
             parameter("period", s.period, "Sampling period", "s" => "ms").min(1e-9);
             parameter("delay", s.effects.delay, "Delay", "s" => "ms").min(0.0);
             parameter("lag", s.effects.lag, "Time constant of the lag", "s" => "ms").min(0.0);
-            parameter("rate_limit", s.effects.rate_limit, "Largest rate, 0 for none").min(0.0);
+            parameter(vocabulary::RATE_LIMIT, s.effects.rate_limit, "Largest rate, 0 for none").min(0.0);
             parameter("play", s.effects.play, "Width of the play").min(0.0);
-            parameter("dead_band", s.effects.dead_band, "Half width of the dead band").min(0.0);
+            parameter(vocabulary::DEAD_BAND, s.effects.dead_band, "Half width of the dead band").min(0.0);
             parameter("asymmetry", s.effects.asymmetry, "Share by which the gain is larger above zero and smaller below");
             parameter("gain", s.effects.gain, "Factor");
             parameter("offset", s.effects.offset, "What is added");

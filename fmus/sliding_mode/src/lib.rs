@@ -14,6 +14,7 @@ use plant::ModelError;
 use plant::identified::{actuator::IdentifiedActuator, shake_table::ShakeTable, table::Table};
 use serde::{Deserialize, Serialize};
 use units::constants::SAMPLING_PERIOD;
+use units::vocabulary;
 
 /// The sliding-mode law over the loops of Fig 4-3.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -53,11 +54,11 @@ impl Default for SlidingMode {
 }
 
 const MOTION: [&str; 5] = [
-    "reference_displacement",
-    "reference_velocity",
-    "reference_acceleration",
-    "measured_displacement",
-    "measured_velocity",
+    vocabulary::REFERENCE_DISPLACEMENT,
+    vocabulary::REFERENCE_VELOCITY,
+    vocabulary::REFERENCE_ACCELERATION,
+    vocabulary::MEASURED_DISPLACEMENT,
+    vocabulary::MEASURED_VELOCITY,
 ];
 impl Component for SlidingMode {
     const NAME: &'static str = "SlidingMode";
@@ -69,15 +70,15 @@ impl Component for SlidingMode {
             "measured",
             "motion",
             &[
-                ("displacement", "measured_displacement"),
-                ("velocity", "measured_velocity"),
-                ("force", "measured_force"),
+                ("displacement", vocabulary::MEASURED_DISPLACEMENT),
+                ("velocity", vocabulary::MEASURED_VELOCITY),
+                ("force", vocabulary::MEASURED_FORCE),
             ],
         ),
         Terminal::plug(
             "specimen",
             "specimen-motion",
-            &[("acceleration", "specimen_acceleration")],
+            &[("acceleration", vocabulary::SPECIMEN_ACCELERATION)],
         ),
         Terminal::bus(
             "command",
@@ -91,13 +92,13 @@ impl Component for SlidingMode {
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:
-            input("reference_displacement", s.input.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
-            input("reference_velocity", s.input.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
-            input("reference_acceleration", s.input.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
-            input("measured_displacement", s.input.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
-            input("measured_velocity", s.input.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
-            input("measured_force", s.input.measured_force, "Force of the actuator, for the prediction over a delay", "N" => "lbf").nominal(200.0);
-            input("specimen_acceleration", s.input.specimen_acceleration, "Absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
+            input(vocabulary::REFERENCE_DISPLACEMENT, s.input.reference.displacement, "Wanted displacement", "m" => "in").nominal(0.0381);
+            input(vocabulary::REFERENCE_VELOCITY, s.input.reference.velocity, "Wanted velocity", "m/s" => "in/s").nominal(0.5);
+            input(vocabulary::REFERENCE_ACCELERATION, s.input.reference.acceleration, "Wanted acceleration", "m/s2" => "g").nominal(10.0);
+            input(vocabulary::MEASURED_DISPLACEMENT, s.input.measured.displacement, "Displacement of the table", "m" => "in").nominal(0.0381);
+            input(vocabulary::MEASURED_VELOCITY, s.input.measured.velocity, "Velocity of the table", "m/s" => "in/s").nominal(0.5);
+            input(vocabulary::MEASURED_FORCE, s.input.measured_force, "Force of the actuator, for the prediction over a delay", "N" => "lbf").nominal(200.0);
+            input(vocabulary::SPECIMEN_ACCELERATION, s.input.specimen_acceleration, "Absolute acceleration of the specimen", "m/s2" => "g").nominal(10.0);
             output("displacement_command", s.references.displacement, "Reference of the displacement loop", "m" => "in")
                 .discrete().nominal(0.0381).depends_on_inputs(Dependent);
             output("force_command", s.references.force, "Reference of the force loop", "N" => "lbf")
@@ -108,8 +109,8 @@ impl Component for SlidingMode {
             parameter(Table::TABLE_DAMPING, s.law.table.damping, "Damping of the table", "N.s/m" => "lbf.s/in");
             parameter(Table::TABLE_STIFFNESS, s.law.table.stiffness, "Stiffness of the table's springs", "N/m" => "lbf/in");
             group(s.law);
-            parameter("loop_delay_samples", s.loop_delay_samples, "Samples from measurement to valve");
-            parameter("command_delay_samples", s.command_delay_samples, "Samples from this law to the low-level loops");
+            parameter(vocabulary::LOOP_DELAY_SAMPLES, s.loop_delay_samples, "Samples from measurement to valve");
+            parameter(vocabulary::COMMAND_DELAY_SAMPLES, s.command_delay_samples, "Samples from this law to the low-level loops");
             parameter("reference_ahead", s.reference_ahead, "The references are those of loop_delay_samples later");
             parameter("sampling_period", s.sampling_period, "Period of the prediction", "s" => "ms");
             group(s.actuator).introduced("Prediction: ");
@@ -123,14 +124,18 @@ impl Component for SlidingMode {
             parameter("force_loop_limit", s.force_loop.limit, "Of the force loop", "V");
             parameter(ControlAllocation::DISPLACEMENT_SHARE, s.allocation.displacement_share, "alpha of the allocation", "1");
             parameter(ControlAllocation::FORCE_SHARE, s.allocation.force_share, "beta of the allocation", "1");
-            parameter("valve_limit", s.allocation.limit, "Largest magnitude of the valve command", "V");
+            parameter(vocabulary::VALVE_LIMIT, s.allocation.limit, "Largest magnitude of the valve command", "V");
         }
     }
 
     fn initialize(&mut self) -> ComponentResult {
         self.law.prediction = None;
-        let loop_delay = ModelError::count("loop_delay_samples", self.loop_delay_samples)?;
-        let command_delay = ModelError::count("command_delay_samples", self.command_delay_samples)?;
+        let loop_delay =
+            ModelError::count(vocabulary::LOOP_DELAY_SAMPLES, self.loop_delay_samples)?;
+        let command_delay = ModelError::count(
+            vocabulary::COMMAND_DELAY_SAMPLES,
+            self.command_delay_samples,
+        )?;
         self.law.validate()?;
         if loop_delay > 0 || command_delay > 0 {
             let table = ShakeTable {

@@ -8,6 +8,7 @@ use plant::identified::effects::{
 use plant::specimens::extended::{ExtendedSpecimen, ExtendedSpecimenState};
 use plant::specimens::linear::{LinearSpecimen, SampledSpecimen};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// The linear specimen between the table's acceleration and its force on the table.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -62,7 +63,7 @@ impl Specimen {
             let mut moved = self.clone();
             *match known {
                 "drift" => &mut moved.state.specimen.drift,
-                "drift_velocity" => &mut moved.state.specimen.drift_velocity,
+                vocabulary::DRIFT_VELOCITY => &mut moved.state.specimen.drift_velocity,
                 _ => &mut moved.table_acceleration,
             } += sign * AMOUNT;
             moved.update_outputs(0.0);
@@ -84,7 +85,10 @@ impl Component for Specimen {
         Terminal::plug(
             "mount",
             "mount",
-            &[("acceleration", "table_acceleration"), ("force", "force")],
+            &[
+                ("acceleration", vocabulary::TABLE_ACCELERATION),
+                ("force", "force"),
+            ],
         ),
         Terminal::plug(
             "motion",
@@ -96,24 +100,24 @@ impl Component for Specimen {
 
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::table! { Self, s:
-            input("table_acceleration", s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g")
+            input(vocabulary::TABLE_ACCELERATION, s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g")
                 .nominal(10.0);
             output("force", s.force, "Force on the table", "N" => "lbf")
-                .nominal(400.0).depends_on(&["drift", "drift_velocity"], Dependent);
+                .nominal(400.0).depends_on(&["drift", vocabulary::DRIFT_VELOCITY], Dependent);
             output("acceleration", s.acceleration, "Absolute acceleration of the mass", "m/s2" => "g")
-                .nominal(10.0).depends_on(&["drift", "drift_velocity"], Dependent);
+                .nominal(10.0).depends_on(&["drift", vocabulary::DRIFT_VELOCITY], Dependent);
             output("drift", s.state.specimen.drift, "Displacement relative to the table", "m" => "in").nominal(0.05);
-            output("drift_velocity", s.state.specimen.drift_velocity, "Velocity relative to the table", "m/s" => "in/s")
+            output(vocabulary::DRIFT_VELOCITY, s.state.specimen.drift_velocity, "Velocity relative to the table", "m/s" => "in/s")
                 .nominal(0.3).derivative_of("drift");
             group(s.specimen);
         };
         variables.extend(effect_parameters());
         variables.extend(fmu_kit::table! { Self, s:
             local("der(drift_velocity)", s.drift_acceleration, "Acceleration relative to the table", "m/s2" => "g")
-                .derivative_of("drift_velocity")
-                .depends_on(&["table_acceleration"], Dependent)
-                .depends_on(&["drift", "drift_velocity"], Dependent)
-                .initially_depends_on(&["table_acceleration"])
+                .derivative_of(vocabulary::DRIFT_VELOCITY)
+                .depends_on(&[vocabulary::TABLE_ACCELERATION], Dependent)
+                .depends_on(&["drift", vocabulary::DRIFT_VELOCITY], Dependent)
+                .initially_depends_on(&[vocabulary::TABLE_ACCELERATION])
                 .initially_depends_on(&effects::acting_at_start(Part::Specimen, AtStart::Acceleration));
         });
         variables
@@ -178,7 +182,7 @@ impl Component for Specimen {
         }
         let force = match known {
             "drift" => self.specimen.stiffness,
-            "drift_velocity" => self.specimen.damping,
+            vocabulary::DRIFT_VELOCITY => self.specimen.damping,
             _ => return -1.0,
         };
         if unknown == "force" {

@@ -9,6 +9,7 @@ use plant::specimens::{
     YieldingSpecimen,
 };
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// A value of each storey, the lowest first.
 type EachStorey = [f64; MAX_STOREYS];
@@ -139,7 +140,10 @@ impl Component for StoreysSpecimen {
         Terminal::plug(
             "mount",
             "mount",
-            &[("acceleration", "table_acceleration"), ("force", "force")],
+            &[
+                ("acceleration", vocabulary::TABLE_ACCELERATION),
+                ("force", "force"),
+            ],
         ),
         Terminal::plug(
             "motion",
@@ -150,7 +154,7 @@ impl Component for StoreysSpecimen {
 
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::table! { Self, s:
-            input("table_acceleration", s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g")
+            input(vocabulary::TABLE_ACCELERATION, s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g")
                 .nominal(10.0);
             output("force", s.force, "Force on the table", "N" => "lbf").nominal(400.0);
             output("acceleration", s.acceleration, "Acceleration that times the whole mass is the force", "m/s2" => "g")
@@ -160,7 +164,7 @@ impl Component for StoreysSpecimen {
             parameter("storeys", s.storeys, "Number of storeys").min(1.0).max(10.0);
         };
         variables.extend(fmu_kit::table! { Self, s:
-            parameter("damper_storey", s.damper_storey, "Storey with a magnetorheological damper, the lowest 1; 0 is none").min(0.0).max(10.0);
+            parameter(vocabulary::DAMPER_STOREY, s.damper_storey, "Storey with a magnetorheological damper, the lowest 1; 0 is none").min(0.0).max(10.0);
             group(s.damper);
             parameter("tuned_mass_floor", s.tuned_mass_floor, "Floor with a tuned mass damper, the lowest 1; 0 is none").min(0.0).max(10.0);
             parameter("tuned_mass", s.tuned_mass.mass, "Its mass", "kg" => "lbf.s2/in").min(0.0);

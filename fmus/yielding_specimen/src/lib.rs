@@ -8,6 +8,7 @@ use fmu_kit::{
 };
 use plant::specimens::{YieldingSpecimen as Storey, YieldingState};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// The yielding specimen between the table's acceleration and its force on the table.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -52,7 +53,10 @@ impl Component for YieldingSpecimen {
         Terminal::plug(
             "mount",
             "mount",
-            &[("acceleration", "table_acceleration"), ("force", "force")],
+            &[
+                ("acceleration", vocabulary::TABLE_ACCELERATION),
+                ("force", "force"),
+            ],
         ),
         Terminal::plug(
             "motion",
@@ -62,34 +66,38 @@ impl Component for YieldingSpecimen {
     ];
 
     fn variables() -> Vec<Variable<Self>> {
-        const STATES: [&str; 3] = ["drift", "drift_velocity", "hysteretic_force_ratio"];
+        const STATES: [&str; 3] = [
+            "drift",
+            vocabulary::DRIFT_VELOCITY,
+            "hysteretic_force_ratio",
+        ];
         const MEMORY: [&str; 3] = [
-            "drift_velocity",
+            vocabulary::DRIFT_VELOCITY,
             "hysteretic_force_ratio",
             "hysteretic_work",
         ];
         fmu_kit::table! { Self, s:
-            input("table_acceleration", s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g")
+            input(vocabulary::TABLE_ACCELERATION, s.table_acceleration, "Absolute acceleration of the table", "m/s2" => "g")
                 .nominal(10.0);
             output("force", s.force, "Force on the table", "N" => "lbf")
                 .nominal(400.0).depends_on(&STATES, Dependent);
             output("acceleration", s.acceleration, "Absolute acceleration of the mass", "m/s2" => "g")
                 .nominal(10.0).depends_on(&STATES, Dependent);
             output("drift", s.state.drift, "Displacement relative to the table", "m" => "in").nominal(0.05);
-            output("drift_velocity", s.state.drift_velocity, "Velocity relative to the table", "m/s" => "in/s")
+            output(vocabulary::DRIFT_VELOCITY, s.state.drift_velocity, "Velocity relative to the table", "m/s" => "in/s")
                 .nominal(0.3).derivative_of("drift");
             group(s.storey);
             parameter("break_off_time", s.break_off_time, "Fault: the specimen is off the table from this time on", "s");
             local("hysteretic_force_ratio", s.state.hysteresis.z, "Hysteretic force over its yield force").nominal(1.0);
             local("hysteretic_work", s.state.hysteresis.work, "Work on the hysteretic part over yield force and displacement").nominal(10.0);
             local("der(drift_velocity)", s.rates.drift_velocity, "Acceleration relative to the table", "m/s2" => "g")
-                .derivative_of("drift_velocity")
-                .depends_on(&["table_acceleration"], Constant).depends_on(&STATES, Dependent)
-                .initially_depends_on(&["table_acceleration"]);
+                .derivative_of(vocabulary::DRIFT_VELOCITY)
+                .depends_on(&[vocabulary::TABLE_ACCELERATION], Constant).depends_on(&STATES, Dependent)
+                .initially_depends_on(&[vocabulary::TABLE_ACCELERATION]);
             local("der(hysteretic_force_ratio)", s.rates.hysteresis.z, "Rate of the hysteretic force ratio", "1/s")
                 .derivative_of("hysteretic_force_ratio").depends_on(&MEMORY, Dependent);
             local("der(hysteretic_work)", s.rates.hysteresis.work, "Rate of the hysteretic work", "1/s")
-                .derivative_of("hysteretic_work").depends_on(&["drift_velocity", "hysteretic_force_ratio"], Dependent);
+                .derivative_of("hysteretic_work").depends_on(&[vocabulary::DRIFT_VELOCITY, "hysteretic_force_ratio"], Dependent);
         }
     }
 

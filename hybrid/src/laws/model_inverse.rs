@@ -2,6 +2,7 @@
 //! what is left.
 
 use crate::vrths::TransferSystemParameters;
+use units::vocabulary;
 
 use super::TrackingInput;
 use super::extrapolation::{DERIVATIVES, Extrapolation};
@@ -61,8 +62,8 @@ impl Controller for ModelInverse {
         for coefficient in self.coefficients {
             ModelError::require_finite("coefficients", coefficient)?;
         }
-        ModelError::require_finite("proportional_gain", self.proportional)?;
-        ModelError::require_finite("integral_gain", self.integral)
+        ModelError::require_finite(vocabulary::PROPORTIONAL_GAIN, self.proportional)?;
+        ModelError::require_finite(vocabulary::INTEGRAL_GAIN, self.integral)
     }
 
     fn step(&mut self, input: &TrackingInput, period: f64) -> f64 {

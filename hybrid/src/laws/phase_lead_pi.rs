@@ -2,6 +2,7 @@
 //! controller of the benchmark (Silva et al. 2020).
 
 use crate::vrths::Converter;
+use units::vocabulary;
 
 use super::TrackingInput;
 use controllers::{Controller, ModelError};
@@ -55,8 +56,8 @@ impl Controller for PhaseLeadPi {
     type Output = f64;
 
     fn validate(&self) -> Result<(), ModelError> {
-        ModelError::require_finite("proportional_gain", self.proportional)?;
-        ModelError::require_finite("integral_gain", self.integral)?;
+        ModelError::require_finite(vocabulary::PROPORTIONAL_GAIN, self.proportional)?;
+        ModelError::require_finite(vocabulary::INTEGRAL_GAIN, self.integral)?;
         ModelError::require_finite("lead_gain", self.lead_gain)?;
         ModelError::require_finite("lead_numerator", self.lead_numerator)?;
         ModelError::require_positive("lead_pole", self.lead_pole)?;

@@ -1,6 +1,7 @@
 //! The quantities that a rig's recording may hold: name, SI unit and what else people call them.
 
 use units::Unit;
+use units::vocabulary;
 
 /// A quantity of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -64,7 +65,11 @@ impl Channel {
     const fn properties(self) -> (&'static str, &'static str, &'static [&'static str]) {
         match self {
             Self::Time => ("time", "s", &["t"]),
-            Self::ValveCommand => ("valve_command", "V", &["u", "command", "valve_voltage"]),
+            Self::ValveCommand => (
+                vocabulary::VALVE_COMMAND,
+                "V",
+                &["u", "command", "valve_voltage"],
+            ),
             Self::Displacement => (
                 "displacement",
                 "m",
@@ -72,21 +77,27 @@ impl Channel {
                     "x",
                     "disp",
                     "position",
-                    "table_displacement",
+                    vocabulary::TABLE_DISPLACEMENT,
                     "x_meas",
-                    "measured_displacement",
+                    vocabulary::MEASURED_DISPLACEMENT,
                 ],
             ),
-            Self::Velocity => ("velocity", "m/s", &["v", "vel", "table_velocity"]),
+            Self::Velocity => ("velocity", "m/s", &["v", "vel", vocabulary::TABLE_VELOCITY]),
             Self::Acceleration => (
                 "acceleration",
                 "m/s^2",
-                &["a", "acc", "accel", "table_acceleration"],
+                &["a", "acc", "accel", vocabulary::TABLE_ACCELERATION],
             ),
-            Self::ActuatorForce => ("actuator_force", "N", &["f", "force", "load_cell"]),
-            Self::SpecimenAcceleration => {
-                ("specimen_acceleration", "m/s^2", &["a_s", "specimen_accel"])
-            }
+            Self::ActuatorForce => (
+                vocabulary::ACTUATOR_FORCE,
+                "N",
+                &["f", "force", "load_cell"],
+            ),
+            Self::SpecimenAcceleration => (
+                vocabulary::SPECIMEN_ACCELERATION,
+                "m/s^2",
+                &["a_s", "specimen_accel"],
+            ),
             Self::Reference => (
                 "reference",
                 "m",
@@ -94,7 +105,7 @@ impl Channel {
                     "x_ref",
                     "ref",
                     "setpoint",
-                    "reference_displacement",
+                    vocabulary::REFERENCE_DISPLACEMENT,
                     "x_cmd",
                     "displacement_command",
                 ],

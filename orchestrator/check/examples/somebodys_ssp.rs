@@ -20,13 +20,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let stop: f64 = stop.parse()?;
     for finding in fmi_check::validate(Path::new(ssp), None)?.findings {
-        println!("{}: {}: {}", finding.severity, finding.place, finding.message);
+        println!(
+            "{}: {}: {}",
+            finding.severity, finding.place, finding.message
+        );
     }
     let file = fmi_ssp::read(ssp)?;
     let system = assemble(&file, &[], &mut Files::of(&file))?;
     let algorithm = Algorithm::Iterative;
-    let plan = Plan { algorithm, ..Plan::fixed(STEP, stop) };
-    let simulation = Simulation::planned(&system, &Samples::none(STEP), &plan, &Default::default())?;
+    let plan = Plan {
+        algorithm,
+        ..Plan::fixed(STEP, stop)
+    };
+    let simulation =
+        Simulation::planned(&system, &Samples::none(STEP), &plan, &Default::default())?;
     let outcome = simulation.run((stop / STEP) as usize + 1, Pace::Fastest, &mut |_| {});
     let last = outcome.record.rows().last().unwrap_or_default();
     for (name, value) in outcome.record.columns.iter().zip(last) {

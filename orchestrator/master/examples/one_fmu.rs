@@ -17,7 +17,8 @@ pub fn run(fmu: &Path, stop: f64) -> Result<Outcome, Box<dyn Error>> {
     let file = SystemFile::of_fmu(fmu);
     let system = assemble(&file, &[], &mut Files::of(&file))?;
     let plan = Plan::fixed(STEP, stop);
-    let simulation = Simulation::planned(&system, &Samples::none(STEP), &plan, &Default::default())?;
+    let simulation =
+        Simulation::planned(&system, &Samples::none(STEP), &plan, &Default::default())?;
     Ok(simulation.run((stop / STEP) as usize + 1, Pace::Fastest, &mut |_| {}))
 }
 
@@ -30,7 +31,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let outcome = run(Path::new(fmu), stop.parse()?)?;
     println!("{}", outcome.record.columns.join(","));
     for row in outcome.record.rows() {
-        println!("{}", row.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
+        println!(
+            "{}",
+            row.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+        );
     }
     Ok(println!("{}", outcome.ended.message()))
 }

@@ -30,7 +30,8 @@ pub fn run(fmu: &Path, step: f64, stop: f64) -> Result<Record, Box<dyn Error>> {
         algorithm: Algorithm::Iterative,
         ..Plan::fixed(step, stop)
     };
-    let simulation = Simulation::planned(&system, &Samples::none(step), &plan, &Default::default())?;
+    let simulation =
+        Simulation::planned(&system, &Samples::none(step), &plan, &Default::default())?;
     let outcome = simulation.run((stop / step) as usize + 1, Pace::Fastest, &mut |_| {});
     Ok(outcome.record)
 }
@@ -39,7 +40,9 @@ pub fn run(fmu: &Path, step: f64, stop: f64) -> Result<Record, Box<dyn Error>> {
 fn main() -> Result<(), Box<dyn Error>> {
     let fmu = std::env::args().nth(1).ok_or("expected StateSpace.fmu")?;
     let record = run(Path::new(&fmu), 0.1, 6.0)?;
-    let x = record.column("first.y[1]").ok_or("no output `first.y[1]`")?;
+    let x = record
+        .column("first.y[1]")
+        .ok_or("no output `first.y[1]`")?;
     for (n, x) in x.iter().enumerate().step_by(10) {
         let time = 0.1 * n as f64;
         println!("{time:4.1} s  {:8.4}  exact {:8.4}", -x, time.cos());

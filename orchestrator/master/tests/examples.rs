@@ -21,7 +21,11 @@ fn one_fmu_decays_as_its_equation_says() {
         let fmu = reference_fmu(&format!("{version}/Dahlquist.fmu"));
         let outcome = one_fmu::run(&fmu, 2.0).unwrap();
         assert!(outcome.ended.is_regular());
-        let column = outcome.record.columns.iter().find(|name| name.ends_with(".x"));
+        let column = outcome
+            .record
+            .columns
+            .iter()
+            .find(|name| name.ends_with(".x"));
         let x = outcome.record.column(column.unwrap()).unwrap();
         // x' = -x, integrated with the explicit Euler method in steps of 0.1 s.
         let (at, exact) = (x[100], 0.9_f64.powi(10));
@@ -44,5 +48,8 @@ fn two_integrators_in_a_loop_oscillate() {
     assert!(coarse < 0.2, "the largest error is {coarse}");
     // First order in the coupling step.
     let ratio = coarse / fine;
-    assert!((1.8..2.3).contains(&ratio), "half the step divides the error by {ratio}");
+    assert!(
+        (1.8..2.3).contains(&ratio),
+        "half the step divides the error by {ratio}"
+    );
 }

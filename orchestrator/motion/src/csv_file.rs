@@ -4,9 +4,7 @@
 
 use std::path::Path;
 
-use recordings::{
-    Channel, DataError, Recording, RoundedStamps, Sheet, Text, Wanted, known_column,
-};
+use recordings::{Channel, DataError, Recording, RoundedStamps, Sheet, Text, Wanted, known_column};
 
 use super::MotionError;
 use units::{nearest, split_header};

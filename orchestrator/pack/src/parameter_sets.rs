@@ -1,6 +1,7 @@
 //! Sets of parameters by name: the published models, and files that identification writes.
 
 use std::path::Path;
+use units::vocabulary;
 
 use identification::identify::model_file::ModelFile;
 use plant::identified::actuator::PublishedActuator;
@@ -118,7 +119,7 @@ fn from_file(path: &Path, component: &Description) -> Result<Vec<(usize, Value)>
 
 /// Components that a model file speaks of, each with a parameter that only it has.
 const COMPONENTS: [(Component, &str); 3] = [
-    (Component::ShakeTable, "actuator_a2"),
+    (Component::ShakeTable, vocabulary::ACTUATOR_A2),
     (Component::Specimen, "specimen_absent.absent"),
     (Component::Instrumentation, "load_cell_bias.offset"),
 ];

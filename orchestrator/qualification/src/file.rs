@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use recordings::{Sheet, Wanted, name_and_unit, read_text};
 use motion::metrics::Measure;
+use recordings::{Sheet, Wanted, name_and_unit, read_text};
 use serde::Deserialize;
 use toml::{Table, Value};
 

@@ -9,13 +9,13 @@
 
 use std::f64::consts::TAU;
 
-use sysid::spectra::Spectra;
 use motion::metrics::{response_spectrum, rms, spectrum};
 use motion::{Motion, Options, Record, Scaling, peak};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
+use sysid::spectra::Spectra;
 use units::STANDARD_GRAVITY;
 
 pub use crate::wavelets::{Aim, Histories, refine};

@@ -7,7 +7,6 @@
 
 use std::f64::consts::TAU;
 
-use sysid::spectra::Spectra;
 use motion::metrics::spectrum;
 use motion::{Motion, smooth_step};
 use nalgebra::{DMatrix, DVector};
@@ -15,6 +14,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use realfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
+use sysid::spectra::Spectra;
 use units::STANDARD_GRAVITY;
 
 use crate::rule::Search;

@@ -1,6 +1,7 @@
 //! Table and specimen as one model: the monolithic truth that the co-simulation is compared with.
 
 use nalgebra::{DMatrix, SMatrix};
+use units::vocabulary;
 
 use crate::identified::shake_table::ShakeTable;
 use crate::linear::StateSpace;
@@ -20,10 +21,10 @@ pub const RIG_OUTPUTS: [&str; 7] = [
     "displacement",
     "velocity",
     "acceleration",
-    "actuator_force",
+    vocabulary::ACTUATOR_FORCE,
     "drift",
-    "drift_velocity",
-    "specimen_acceleration",
+    vocabulary::DRIFT_VELOCITY,
+    vocabulary::SPECIMEN_ACCELERATION,
 ];
 
 impl Rig {

@@ -4,6 +4,7 @@ use crate::identified::effects::Component;
 use crate::identified::shake_table::ShakeTable;
 use crate::specimens::linear::LinearSpecimen;
 use units::Parameters;
+use units::vocabulary;
 
 /// Actuator, table and specimen of the thesis, SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +33,7 @@ pub struct NominalParameter {
 }
 
 macro_rules! parameters {
-    ($($kind:ident $name:literal $variable:literal $field:expr;)*) => {
+    ($($kind:ident $name:literal $variable:expr => $field:expr;)*) => {
         &[$(NominalParameter { name: $name, variable: $variable, field: Field::$kind($field) }),*]
     };
 }
@@ -74,21 +75,21 @@ impl NominalParameter {
 
 /// All of them: actuator, table, specimen.
 pub const PARAMETERS: &[NominalParameter] = parameters! {
-    Table "actuator.denominator[1]" "actuator_a2" |r| &mut r.actuator.denominator[0];
-    Table "actuator.denominator[2]" "actuator_a1" |r| &mut r.actuator.denominator[1];
-    Table "actuator.denominator[3]" "actuator_a0" |r| &mut r.actuator.denominator[2];
-    Table "actuator.voltage_to_force[1]" "actuator_b2" |r| &mut r.actuator.voltage_to_force[0];
-    Table "actuator.voltage_to_force[2]" "actuator_b1" |r| &mut r.actuator.voltage_to_force[1];
-    Table "actuator.voltage_to_force[3]" "actuator_b0" |r| &mut r.actuator.voltage_to_force[2];
-    Table "actuator.velocity_to_force[1]" "actuator_e2" |r| &mut r.actuator.velocity_to_force[0];
-    Table "actuator.velocity_to_force[2]" "actuator_e1" |r| &mut r.actuator.velocity_to_force[1];
-    Table "actuator.velocity_to_force[3]" "actuator_e0" |r| &mut r.actuator.velocity_to_force[2];
-    Table "table.mass" "table_mass" |r| &mut r.table.mass;
-    Table "table.damping" "table_damping" |r| &mut r.table.damping;
-    Table "table.stiffness" "table_stiffness" |r| &mut r.table.stiffness;
-    Specimen "specimen.mass" "mass" |s| &mut s.mass;
-    Specimen "specimen.damping" "damping" |s| &mut s.damping;
-    Specimen "specimen.stiffness" "stiffness" |s| &mut s.stiffness;
+    Table "actuator.denominator[1]" vocabulary::ACTUATOR_A2 => |r| &mut r.actuator.denominator[0];
+    Table "actuator.denominator[2]" "actuator_a1" => |r| &mut r.actuator.denominator[1];
+    Table "actuator.denominator[3]" "actuator_a0" => |r| &mut r.actuator.denominator[2];
+    Table "actuator.voltage_to_force[1]" "actuator_b2" => |r| &mut r.actuator.voltage_to_force[0];
+    Table "actuator.voltage_to_force[2]" "actuator_b1" => |r| &mut r.actuator.voltage_to_force[1];
+    Table "actuator.voltage_to_force[3]" "actuator_b0" => |r| &mut r.actuator.voltage_to_force[2];
+    Table "actuator.velocity_to_force[1]" "actuator_e2" => |r| &mut r.actuator.velocity_to_force[0];
+    Table "actuator.velocity_to_force[2]" "actuator_e1" => |r| &mut r.actuator.velocity_to_force[1];
+    Table "actuator.velocity_to_force[3]" "actuator_e0" => |r| &mut r.actuator.velocity_to_force[2];
+    Table "table.mass" vocabulary::TABLE_MASS => |r| &mut r.table.mass;
+    Table "table.damping" vocabulary::TABLE_DAMPING => |r| &mut r.table.damping;
+    Table "table.stiffness" vocabulary::TABLE_STIFFNESS => |r| &mut r.table.stiffness;
+    Specimen "specimen.mass" "mass" => |s| &mut s.mass;
+    Specimen "specimen.damping" "damping" => |s| &mut s.damping;
+    Specimen "specimen.stiffness" "stiffness" => |s| &mut s.stiffness;
 };
 
 /// The parameters of [`ShakeTable`] by the names of its FMU.

@@ -7,6 +7,7 @@ use crate::ModelError;
 use crate::linear::discrete_riccati;
 use crate::sensors::channel::{Channel, ChannelState, Noise};
 use units::constants::{G, INCH, LBF, STROKE};
+use units::vocabulary;
 
 /// The true motion at a sample, SI.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
@@ -74,8 +75,8 @@ pub enum SensorFault {
 pub const CHANNELS: [&str; 4] = [
     "displacement",
     "acceleration",
-    "actuator_force",
-    "specimen_acceleration",
+    vocabulary::ACTUATOR_FORCE,
+    vocabulary::SPECIMEN_ACCELERATION,
 ];
 
 /// Sensors and estimates; all times in s.
@@ -208,7 +209,7 @@ impl Instrumentation {
                 expected: "the index of a channel",
             });
         }
-        ModelError::require_non_negative("velocity_lag", self.velocity_lag)
+        ModelError::require_non_negative(vocabulary::VELOCITY_LAG, self.velocity_lag)
     }
 
     /// Checks the parameters at the sampling `period` (s).

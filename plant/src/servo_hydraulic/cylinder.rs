@@ -3,6 +3,7 @@
 use crate::ModelError;
 use units::Parameters as _;
 use units::constants::{INCH, PSI};
+use units::vocabulary;
 
 /// A symmetrical cylinder. Each chamber obeys `V dp/dt = β (q - dV/dt)` with its own volume; at
 /// the middle position and with matched flows this is `V_t/(4 β) dP_L/dt = q_L - A v - C_l P_L`
@@ -15,13 +16,13 @@ pub struct Cylinder {
     #[parameter("m2" => "in2", name = "piston_area", positive)]
     pub area: f64,
     /// Volume of both chambers with hoses, m3.
-    #[parameter("m3" => "in3", name = "oil_volume")]
+    #[parameter("m3" => "in3", name = vocabulary::OIL_VOLUME)]
     pub volume: f64,
     /// Effective bulk modulus, Pa.
     #[parameter("Pa" => "psi", positive)]
     pub bulk_modulus: f64,
     /// Leakage past the piston, m3/(s.Pa).
-    #[parameter("m3/(s.Pa)" => "in3/(s.psi)", name = "piston_leakage", non_negative)]
+    #[parameter("m3/(s.Pa)" => "in3/(s.psi)", name = vocabulary::PISTON_LEAKAGE, non_negative)]
     pub leakage: f64,
     /// Flow of the anti-cavitation valves per missing pressure, m3/(s.Pa).
     #[parameter("m3/(s.Pa)" => "in3/(s.psi)", name = "make_up_flow", non_negative)]
@@ -54,7 +55,7 @@ impl Cylinder {
             return Ok(());
         }
         Err(ModelError::Parameter {
-            name: Self::OIL_VOLUME,
+            name: vocabulary::OIL_VOLUME,
             value: self.volume,
             expected: "more than the piston sweeps over its stroke",
         })

@@ -3,6 +3,7 @@
 use crate::ModelError;
 use units::Parameters as _;
 use units::constants::{INCH, LBF, LBF_PER_INCH, LBF_S_PER_INCH};
+use units::vocabulary;
 
 /// The elasto-plastic bristle model (Dupont, Hayward, Armstrong and Altpeter, IEEE Transactions on
 /// Automatic Control 47, 2002) with the Stribeck curve of the LuGre model (Canudas de Wit, Olsson,
@@ -16,7 +17,7 @@ use units::constants::{INCH, LBF, LBF_PER_INCH, LBF_S_PER_INCH};
 )]
 pub struct SealFriction {
     /// Coulomb friction of the seals, N.
-    #[parameter("N" => "lbf", name = "coulomb_friction", non_negative)]
+    #[parameter("N" => "lbf", name = vocabulary::COULOMB_FRICTION, non_negative)]
     pub coulomb: f64,
     /// Static friction of the seals, N.
     #[parameter("N" => "lbf", name = "static_friction")]

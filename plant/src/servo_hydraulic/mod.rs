@@ -22,6 +22,7 @@ pub use friction::SealFriction;
 pub use rig::{ServoHydraulicRig, ServoHydraulicRigState};
 pub use stops::Stops;
 pub use supply::Supply;
+use units::vocabulary;
 pub use valve::{ServoValve, ValveFlows};
 
 use crate::ModelError;
@@ -123,7 +124,7 @@ const SHORTEST_STEP: f64 = 2e-6;
 /// inner step by no more than half of what they give before they slide.
 const REVERSAL: f64 = 25.0;
 /// The parameter that makes the seals quick at a reversal.
-const FRICTION: &str = "coulomb_friction";
+const FRICTION: &str = vocabulary::COULOMB_FRICTION;
 
 impl ServoHydraulicTable {
     /// Checks the parameters.
@@ -137,8 +138,8 @@ impl ServoHydraulicTable {
         self.cylinder.validate(self.stops.stroke)?;
         self.friction.validate()?;
         self.table.validate()?;
-        ModelError::require_non_negative("added_payload", self.added_payload)?;
-        ModelError::require_finite("cubic_stiffness", self.cubic_stiffness)?;
+        ModelError::require_non_negative(vocabulary::ADDED_PAYLOAD, self.added_payload)?;
+        ModelError::require_finite(vocabulary::CUBIC_STIFFNESS, self.cubic_stiffness)?;
         let (name, value, rate) = self.quickest();
         if rate * SHORTEST_STEP <= STEP_BY_RATE {
             return Ok(());
@@ -173,9 +174,13 @@ impl ServoHydraulicTable {
                 stops.stiffness,
                 (stops.stiffness / mass).sqrt(),
             ),
-            ("oil_volume", cylinder.volume, (column / mass).sqrt()),
             (
-                "bulk_modulus",
+                vocabulary::OIL_VOLUME,
+                cylinder.volume,
+                (column / mass).sqrt(),
+            ),
+            (
+                vocabulary::BULK_MODULUS,
                 cylinder.bulk_modulus,
                 cylinder.bulk_modulus / small * self.valve.steepest_edge(),
             ),
@@ -185,7 +190,7 @@ impl ServoHydraulicTable {
                 cylinder.bulk_modulus / small * cylinder.make_up,
             ),
             (
-                "valve_frequency",
+                vocabulary::VALVE_FREQUENCY,
                 self.valve.frequency,
                 spool * self.valve.damping_ratio.max(0.5) * 2.0,
             ),

@@ -3,6 +3,7 @@
 use crate::ModelError;
 use units::Parameters as _;
 use units::constants::{INCH, PSI};
+use units::vocabulary;
 
 /// A pump that delivers in proportion to the missing pressure, up to its largest flow, into a
 /// gas-charged accumulator from which the valve draws. Assumed values: at a mean demand of
@@ -12,7 +13,7 @@ use units::constants::{INCH, PSI};
 )]
 pub struct Supply {
     /// Pressure at which the pump stops delivering, Pa.
-    #[parameter("Pa" => "psi", name = "pump_pressure", positive)]
+    #[parameter("Pa" => "psi", name = vocabulary::PUMP_PRESSURE, positive)]
     pub pressure: f64,
     /// Pump flow per missing pressure, m3/(s.Pa).
     #[parameter("m3/(s.Pa)" => "in3/(s.psi)", positive)]

@@ -1,6 +1,7 @@
 //! The servo valve: spool dynamics, its travel limit and overlap, and the flow through its edges.
 
 use std::f64::consts::TAU;
+use units::vocabulary;
 
 use crate::ModelError;
 use units::Parameters as _;
@@ -13,7 +14,7 @@ use units::constants::{INCH, PSI};
 )]
 pub struct ServoValve {
     /// Natural frequency of the spool, Hz.
-    #[parameter("Hz", name = "valve_frequency", positive)]
+    #[parameter("Hz", name = vocabulary::VALVE_FREQUENCY, positive)]
     pub frequency: f64,
     /// Damping ratio of the spool.
     #[parameter(name = "valve_damping_ratio", positive)]
@@ -34,7 +35,7 @@ pub struct ServoValve {
     #[parameter("V", name = "valve_null_width", positive)]
     pub null_width: f64,
     /// Position of the spool at zero command, V.
-    #[parameter("V", name = "valve_null_bias", finite)]
+    #[parameter("V", name = vocabulary::VALVE_NULL_BIAS, finite)]
     pub null_bias: f64,
     /// Flow through an edge per volt and root of pressure, m3/(s V sqrt(Pa)).
     #[parameter(positive)]

@@ -5,6 +5,7 @@ use super::magnetorheological::{DamperState, MagnetorheologicalDamper};
 use super::storeys::{MAX_STOREYS, Storeys, StoreysState};
 use crate::ModelError;
 use crate::integration::{self, Dynamics};
+use units::vocabulary;
 
 const OF_STOREYS: usize = 4 * MAX_STOREYS;
 const STATES: usize = OF_STOREYS + 5;
@@ -85,7 +86,7 @@ impl ControlledStoreys {
             })
         };
         if let Some((storey, damper)) = &self.damper {
-            place("damper_storey", *storey)?;
+            place(vocabulary::DAMPER_STOREY, *storey)?;
             damper.validate()?;
         }
         if let Some(mass) = &self.tuned_mass {

@@ -2,6 +2,7 @@
 //! interaction, and the specimen that it moves.
 
 use crate::ModelError;
+use units::vocabulary;
 
 use crate::linear::matrix_of;
 
@@ -93,14 +94,14 @@ impl TransferSystemParameters {
     /// Names the first parameter that is not a positive (or not a finite) number.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_positive("valve_gain", self.valve_gain)?;
-        ModelError::require_positive("valve_beta1", self.valve_beta1)?;
-        ModelError::require_positive("valve_beta2", self.valve_beta2)?;
-        ModelError::require_non_negative("actuator_a2", self.actuator_a2)?;
+        ModelError::require_positive(vocabulary::VALVE_BETA1, self.valve_beta1)?;
+        ModelError::require_positive(vocabulary::VALVE_BETA2, self.valve_beta2)?;
+        ModelError::require_non_negative(vocabulary::ACTUATOR_A2, self.actuator_a2)?;
         // Three standard deviations below the nominal value it is negative.
-        ModelError::require_finite("actuator_a3", self.actuator_a3)?;
+        ModelError::require_finite(vocabulary::ACTUATOR_A3, self.actuator_a3)?;
         ModelError::require_positive("command_gain", self.command_gain)?;
-        ModelError::require_positive("specimen_mass", self.specimen_mass)?;
-        ModelError::require_positive("specimen_stiffness", self.specimen_stiffness)?;
+        ModelError::require_positive(vocabulary::SPECIMEN_MASS, self.specimen_mass)?;
+        ModelError::require_positive(vocabulary::SPECIMEN_STIFFNESS, self.specimen_stiffness)?;
         ModelError::require_non_negative("specimen_damping_ratio", self.specimen_damping_ratio)
     }
 }

@@ -8,6 +8,7 @@ use hybrid::laws::adaptive_inverse::AdaptiveInverse as Law;
 use hybrid::laws::extrapolation::Extrapolation;
 use hybrid::vrths::{Deviation, PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Tracking control by an inverse that is estimated during the test.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -57,7 +58,7 @@ impl Component for AdaptiveInverse {
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
         variables.extend(fmu_kit::table! { Self, s:
-            parameter("lead_samples", s.lead, "Lead of the desired displacement, samples");
+            parameter(vocabulary::LEAD_SAMPLES, s.lead, "Lead of the desired displacement, samples");
             parameter("stiffness_deviation", s.deviation.specimen_stiffness, "Standard deviation of the specimen's stiffness at the start", "N/m").min(0.0);
             parameter("beta1_deviation", s.deviation.valve_beta1, "Standard deviation of the valve's beta1 at the start", "1/s").min(0.0);
             parameter("beta2_deviation", s.deviation.valve_beta2, "Standard deviation of the valve's beta2 at the start", "1/s2").min(0.0);

@@ -7,6 +7,7 @@ use hybrid::laws::TrackingInput;
 use hybrid::laws::linear_quadratic::{LinearQuadraticDesign, LinearQuadraticTracking as Law};
 use hybrid::vrths::{PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Linear quadratic Gaussian tracking control.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -43,11 +44,11 @@ impl Component for LinearQuadraticTracking {
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
         variables.extend(fmu_kit::table! { Self, s:
-            parameter("command_weight", s.design.command_weight, "Weight of the command against the displacement error");
+            parameter(vocabulary::COMMAND_WEIGHT, s.design.command_weight, "Weight of the command against the displacement error");
             parameter("command_noise", s.design.command_noise, "White noise on the command, one standard deviation", "m");
             parameter("disturbance_step", s.design.disturbance_step, "Step of the disturbance at the command a sample, one standard deviation", "m");
-            parameter("measurement_noise", s.design.measurement_noise, "Noise of the measured displacement, one standard deviation", "m");
-            parameter("lead_samples", s.design.lead, "Lead of the desired displacement, samples");
+            parameter(vocabulary::SENSOR_NOISE, s.design.measurement_noise, "Noise of the measured displacement, one standard deviation", "m");
+            parameter(vocabulary::LEAD_SAMPLES, s.design.lead, "Lead of the desired displacement, samples");
         });
         variables
     }

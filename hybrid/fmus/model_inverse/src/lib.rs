@@ -8,6 +8,7 @@ use hybrid::laws::extrapolation::Extrapolation;
 use hybrid::laws::model_inverse::ModelInverse as Law;
 use hybrid::vrths::TransferSystemParameters;
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Tracking control by the inverse of a model, with PI.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -50,14 +51,14 @@ impl Component for ModelInverse {
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
         variables.extend(fmu_kit::table! { Self, s:
-            parameter("proportional_gain", s.proportional, "Proportional gain");
-            parameter("integral_gain", s.integral, "Integral gain", "1/s");
-            parameter("lead_samples", s.lead, "Lead of the desired displacement beside that of the held command, samples");
-            parameter("valve_beta1", s.plant.valve_beta1, "beta1 of the model's valve", "1/s");
-            parameter("valve_beta2", s.plant.valve_beta2, "beta2 of the model's valve", "1/s2");
-            parameter("actuator_a3", s.plant.actuator_a3, "a3 of the model's actuator", "1/s");
-            parameter("specimen_mass", s.plant.specimen_mass, "Mass of the model's specimen", "kg");
-            parameter("specimen_stiffness", s.plant.specimen_stiffness, "Stiffness of the model's specimen", "N/m");
+            parameter(vocabulary::PROPORTIONAL_GAIN, s.proportional, "Proportional gain");
+            parameter(vocabulary::INTEGRAL_GAIN, s.integral, "Integral gain", "1/s");
+            parameter(vocabulary::LEAD_SAMPLES, s.lead, "Lead of the desired displacement beside that of the held command, samples");
+            parameter(vocabulary::VALVE_BETA1, s.plant.valve_beta1, "beta1 of the model's valve", "1/s");
+            parameter(vocabulary::VALVE_BETA2, s.plant.valve_beta2, "beta2 of the model's valve", "1/s2");
+            parameter(vocabulary::ACTUATOR_A3, s.plant.actuator_a3, "a3 of the model's actuator", "1/s");
+            parameter(vocabulary::SPECIMEN_MASS, s.plant.specimen_mass, "Mass of the model's specimen", "kg");
+            parameter(vocabulary::SPECIMEN_STIFFNESS, s.plant.specimen_stiffness, "Stiffness of the model's specimen", "N/m");
         });
         variables
     }

@@ -6,10 +6,11 @@ mod matrix;
 use fmu_kit::{Causality, Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use hybrid::vrths::{BenchmarkCase, Frame, NumericalSubstructure as Part, PERIOD};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Inputs that accelerations follow at once.
 const ACCELERATING: [&str; 3] = [
-    "measured_force",
+    vocabulary::MEASURED_FORCE,
     "ground_acceleration",
     "payload_acceleration",
 ];
@@ -133,22 +134,22 @@ impl Component for NumericalSubstructure {
     const TERMINALS: &'static [Terminal] = &[Terminal::bus(
         "measured",
         "motion",
-        &[("force", "measured_force")],
+        &[("force", vocabulary::MEASURED_FORCE)],
     )];
     const STEP_SIZE: f64 = PERIOD;
 
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::table! { Self, s:
-            input("measured_force", s.force, "Force of the specimen, as measured", "N" => "kN").nominal(5e3);
+            input(vocabulary::MEASURED_FORCE, s.force, "Force of the specimen, as measured", "N" => "kN").nominal(5e3);
             input("ground_acceleration", s.ground, "Acceleration of the ground", "m/s2" => "g").nominal(3.0);
             input("ground_acceleration_next", s.ground_next, "The same one sample later", "m/s2" => "g").nominal(3.0);
             parameter("case", s.case, "Case of the benchmark, where no matrices are given").min(1.0).max(4.0);
             parameter("mass", s.mass, "Mass of the whole frame in kg, rows separated by semicolons");
             parameter("damping", s.damping, "Damping of the whole frame in N.s/m, likewise");
             parameter("stiffness", s.stiffness, "Stiffness of the whole frame in N/m, likewise");
-            parameter("specimen_mass", s.specimen[0], "Mass that the specimen takes off", "kg");
-            parameter("specimen_damping", s.specimen[1], "Damping that the specimen takes off", "N.s/m");
-            parameter("specimen_stiffness", s.specimen[2], "Stiffness that the specimen takes off", "N/m");
+            parameter(vocabulary::SPECIMEN_MASS, s.specimen[0], "Mass that the specimen takes off", "kg");
+            parameter(vocabulary::SPECIMEN_DAMPING, s.specimen[1], "Damping that the specimen takes off", "N.s/m");
+            parameter(vocabulary::SPECIMEN_STIFFNESS, s.specimen[2], "Stiffness that the specimen takes off", "N/m");
             parameter("interface", s.interface, "Degree of freedom that the specimen belongs to, from 1").min(1.0).max(8.0);
             parameter("force_delay_samples", s.force_delay, "Samples by which the force is fed late").min(0.0).max(64.0);
         };
@@ -178,7 +179,7 @@ impl Component for NumericalSubstructure {
             element
                 .depends_on(&ACCELERATING, Dependent)
                 .initially_depends_on(&ACCELERATING)
-                .initially_depends_on(&["specimen_mass", "payload_mass"])
+                .initially_depends_on(&[vocabulary::SPECIMEN_MASS, "payload_mass"])
         }));
         variables.extend(fmu_kit::table! { Self, s:
             input("payload_acceleration", s.payload_acceleration, "Measured absolute acceleration of a storey that is tested", "m/s2" => "g").nominal(3.0);
@@ -186,17 +187,17 @@ impl Component for NumericalSubstructure {
             input("ground_velocity", s.ground_velocity, "Velocity of the ground", "m/s" => "in/s").nominal(0.2);
             parameter("payload_mass", s.payload_mass, "Mass of that storey: times its acceleration it is a force taken from the structure", "kg").min(0.0);
             parameter("lead", s.lead, "Time by which the table's motion is asked for ahead: how late the table is", "s" => "ms").min(0.0).max(0.05);
-            output("table_displacement", s.table.displacement, "Absolute displacement of the degree of freedom `interface`: what a table under the specimen is asked for", "m" => "in")
+            output(vocabulary::TABLE_DISPLACEMENT, s.table.displacement, "Absolute displacement of the degree of freedom `interface`: what a table under the specimen is asked for", "m" => "in")
                 .nominal(0.02).depends_on(&["ground_displacement", "ground_velocity"], Dependent).depends_on(&ACCELERATING, Dependent)
                 .initially_depends_on(&["ground_displacement", "ground_velocity", "lead"]).initially_depends_on(&ACCELERATING)
-                .initially_depends_on(&["specimen_mass", "payload_mass"]);
-            output("table_velocity", s.table.velocity, "Absolute velocity of the same", "m/s" => "in/s")
+                .initially_depends_on(&[vocabulary::SPECIMEN_MASS, "payload_mass"]);
+            output(vocabulary::TABLE_VELOCITY, s.table.velocity, "Absolute velocity of the same", "m/s" => "in/s")
                 .nominal(0.2).depends_on(&["ground_velocity"], Dependent).depends_on(&ACCELERATING, Dependent)
                 .initially_depends_on(&["ground_velocity", "lead"]).initially_depends_on(&ACCELERATING)
-                .initially_depends_on(&["specimen_mass", "payload_mass"]);
-            output("table_acceleration", s.table.acceleration, "Absolute acceleration of the same", "m/s2" => "g")
+                .initially_depends_on(&[vocabulary::SPECIMEN_MASS, "payload_mass"]);
+            output(vocabulary::TABLE_ACCELERATION, s.table.acceleration, "Absolute acceleration of the same", "m/s2" => "g")
                 .nominal(3.0).depends_on(&ACCELERATING, Dependent).initially_depends_on(&ACCELERATING)
-                .initially_depends_on(&["specimen_mass", "payload_mass"]);
+                .initially_depends_on(&[vocabulary::SPECIMEN_MASS, "payload_mass"]);
         });
         variables
     }

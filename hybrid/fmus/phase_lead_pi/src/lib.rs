@@ -6,6 +6,7 @@ use fmu_kit::{Component, ComponentResult, Terminal, Variable};
 use hybrid::laws::TrackingInput;
 use hybrid::laws::phase_lead_pi::PhaseLeadPi as Law;
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Tracking control by PI with phase lead.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -42,13 +43,13 @@ impl Component for PhaseLeadPi {
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
         variables.extend(fmu_kit::table! { Self, s:
-            parameter("proportional_gain", s.start.proportional, "Proportional gain");
-            parameter("integral_gain", s.start.integral, "Integral gain", "1/s");
+            parameter(vocabulary::PROPORTIONAL_GAIN, s.start.proportional, "Proportional gain");
+            parameter(vocabulary::INTEGRAL_GAIN, s.start.integral, "Integral gain", "1/s");
             parameter("lead_gain", s.start.lead_gain, "Gain of the lead at high frequency");
             parameter("lead_numerator", s.start.lead_numerator, "Constant of the lead's numerator", "1/s");
             parameter("lead_pole", s.start.lead_pole, "Pole of the lead", "1/s");
-            parameter("converter_quantum", s.start.converter.quantum, "Step of the converters, 0 for none", "m").min(0.0);
-            parameter("converter_limit", s.start.converter.limit, "Limit of the converters, 0 for none", "m").min(0.0);
+            parameter(vocabulary::CONVERTER_QUANTUM, s.start.converter.quantum, "Step of the converters, 0 for none", "m").min(0.0);
+            parameter(vocabulary::CONVERTER_LIMIT, s.start.converter.limit, "Limit of the converters, 0 for none", "m").min(0.0);
         });
         variables
     }

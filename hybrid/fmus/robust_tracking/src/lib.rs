@@ -7,6 +7,7 @@ use hybrid::laws::TrackingInput;
 use hybrid::laws::robust_tracking::RobustTracking as Law;
 use hybrid::vrths::{PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Tracking control by synthesised loop shaping.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -49,7 +50,7 @@ impl Component for RobustTracking {
         variables.extend(fmu_kit::table! { Self, s:
             parameter("crossover", s.crossover, "Crossover of the weight's integrator", "rad/s");
             parameter("zero", s.zero, "Zero of the weight", "rad/s");
-            parameter("lead_samples", s.lead, "Lead of the desired displacement, samples");
+            parameter(vocabulary::LEAD_SAMPLES, s.lead, "Lead of the desired displacement, samples");
         });
         variables
     }

@@ -5,6 +5,7 @@ use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Varia
 use hybrid::vrths::{Converter, PERIOD, SensorNoise};
 use plant::sensors::channel::Noise;
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Noise and converter between the specimen and the computer.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -35,8 +36,8 @@ impl Component for TrackingSensors {
             "measured",
             "motion",
             &[
-                ("displacement", "measured_displacement"),
-                ("force", "measured_force"),
+                ("displacement", vocabulary::MEASURED_DISPLACEMENT),
+                ("force", vocabulary::MEASURED_FORCE),
             ],
         ),
     ];
@@ -46,16 +47,16 @@ impl Component for TrackingSensors {
         fmu_kit::table! { Self, s:
             input("displacement", s.displacement, "Displacement of the specimen", "m" => "mm").nominal(5e-3);
             input("force", s.force, "Force of the specimen", "N" => "kN").nominal(5e3);
-            output("measured_displacement", s.measured_displacement, "Displacement with noise", "m" => "mm")
+            output(vocabulary::MEASURED_DISPLACEMENT, s.measured_displacement, "Displacement with noise", "m" => "mm")
                 .discrete().nominal(5e-3).depends_on(&["displacement"], Dependent);
             output("read_displacement", s.read_displacement, "The same behind the converter", "m" => "mm")
                 .discrete().nominal(5e-3).depends_on(&["displacement"], Dependent);
-            output("measured_force", s.measured_force, "Force with noise", "N" => "kN")
+            output(vocabulary::MEASURED_FORCE, s.measured_force, "Force with noise", "N" => "kN")
                 .discrete().nominal(5e3).depends_on(&["force"], Dependent);
             parameter("displacement_noise", s.noise.displacement, "White noise of the displacement, one standard deviation", "m").min(0.0);
-            parameter("force_noise", s.noise.force, "White noise of the force, one standard deviation", "N").min(0.0);
-            parameter("converter_quantum", s.converter.quantum, "Step of the converter, 0 for none", "m").min(0.0);
-            parameter("converter_limit", s.converter.limit, "Limit of the converter, 0 for none", "m").min(0.0);
+            parameter(vocabulary::FORCE_NOISE, s.noise.force, "White noise of the force, one standard deviation", "N").min(0.0);
+            parameter(vocabulary::CONVERTER_QUANTUM, s.converter.quantum, "Step of the converter, 0 for none", "m").min(0.0);
+            parameter(vocabulary::CONVERTER_LIMIT, s.converter.limit, "Limit of the converter, 0 for none", "m").min(0.0);
             parameter("seed", s.seed, "Seed of the noise").min(0.0);
             parameter("stream", s.stream, "Number of the draws that the seed stands for").min(0.0);
         }

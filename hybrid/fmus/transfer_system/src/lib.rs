@@ -6,6 +6,7 @@ use hybrid::vrths::{
     Converter, InteractionForm, PERIOD, TransferSystem as Plant, TransferSystemParameters,
 };
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 /// Servo valve, actuator and specimen.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -63,13 +64,13 @@ impl Component for TransferSystem {
             output("velocity", s.velocity, "Velocity of the specimen", "m/s" => "mm/s").nominal(0.1);
             output("force", s.force, "Force of the specimen", "N" => "kN").nominal(5e3);
             parameter("valve_gain", s.parameters.valve_gain, "a1 beta0", "N/(m.s3)");
-            parameter("valve_beta1", s.parameters.valve_beta1, "beta1 of the valve", "1/s");
-            parameter("valve_beta2", s.parameters.valve_beta2, "beta2 of the valve", "1/s2");
-            parameter("actuator_a2", s.parameters.actuator_a2, "a2: interaction with the specimen's velocity", "N/m");
-            parameter("actuator_a3", s.parameters.actuator_a3, "a3 of the actuator", "1/s");
+            parameter(vocabulary::VALVE_BETA1, s.parameters.valve_beta1, "beta1 of the valve", "1/s");
+            parameter(vocabulary::VALVE_BETA2, s.parameters.valve_beta2, "beta2 of the valve", "1/s2");
+            parameter(vocabulary::ACTUATOR_A2, s.parameters.actuator_a2, "a2: interaction with the specimen's velocity", "N/m");
+            parameter(vocabulary::ACTUATOR_A3, s.parameters.actuator_a3, "a3 of the actuator", "1/s");
             parameter("command_gain", s.parameters.command_gain, "Gain on the command");
-            parameter("specimen_mass", s.parameters.specimen_mass, "Mass of the specimen", "kg");
-            parameter("specimen_stiffness", s.parameters.specimen_stiffness, "Stiffness of the specimen", "N/m");
+            parameter(vocabulary::SPECIMEN_MASS, s.parameters.specimen_mass, "Mass of the specimen", "kg");
+            parameter(vocabulary::SPECIMEN_STIFFNESS, s.parameters.specimen_stiffness, "Stiffness of the specimen", "N/m");
             parameter("specimen_damping_ratio", s.parameters.specimen_damping_ratio, "Damping ratio of the specimen");
             parameter("command_quantum", s.converter.quantum, "Step of the converter of the command, 0 for none", "m").min(0.0);
             parameter("command_limit", s.converter.limit, "Limit of the converter of the command, 0 for none", "m").min(0.0);

@@ -1,6 +1,7 @@
 //! An identified hydraulic rig as a model file.
 
 use std::collections::BTreeMap;
+use units::vocabulary;
 
 use nalgebra::DMatrix;
 use plant::identified::valve_curve::ValveCurve;
@@ -108,10 +109,10 @@ impl Found {
     /// Standard errors of what `[hydraulics]` holds.
     fn hydraulic_errors(&self) -> BTreeMap<String, f64> {
         let table = [
-            "table_mass",
-            "table_damping",
-            "table_stiffness",
-            "specimen_mass",
+            vocabulary::TABLE_MASS,
+            vocabulary::TABLE_DAMPING,
+            vocabulary::TABLE_STIFFNESS,
+            vocabulary::SPECIMEN_MASS,
             "command_delay",
         ];
         let names = NAMES.map(|name| name.replace(' ', "_"));
@@ -191,9 +192,9 @@ impl Found {
         let keys = [
             ("displacement", units.length),
             ("acceleration", units.length),
-            ("actuator_force", units.force),
-            ("specimen_acceleration", units.length),
-            ("valve_command", 1.0),
+            (vocabulary::ACTUATOR_FORCE, units.force),
+            (vocabulary::SPECIMEN_ACCELERATION, units.length),
+            (vocabulary::VALVE_COMMAND, 1.0),
         ];
         for ((key, factor), own) in keys.into_iter().zip(self.noise) {
             // Without a specimen its channel is as noisy as the table's: a diagnosis wants one.

@@ -11,6 +11,7 @@
 use std::cell::Cell;
 
 use nalgebra::SMatrix;
+use units::vocabulary;
 
 use super::hypotheses::Inside;
 use super::sensors::accelerometer_scale;
@@ -72,7 +73,7 @@ effects! {
     reduced_null_gain: ReducedNullGain {
         reduction: size("1", 0.05, (-1.0, 1.0)),
         width: shape("m", 0.1, 1.0),
-    } from [[0.4, 0.1], [-0.3, 0.1]], like ["dead_band"];
+    } from [[0.4, 0.1], [-0.3, 0.1]], like [vocabulary::DEAD_BAND];
     /// Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
     /// of Hydraulic Servosystems, 1980).
     asymmetric_gain: AsymmetricGain {
@@ -121,7 +122,7 @@ impl Equations for ClosedLoopActuator {
     const CAUSES: &'static [&'static str] = &["command_delay", "scale", "offset"];
     // Of a drive that is not known: a motor sticks as a valve with an overlap does.
     const LOOKS_LIKE: &'static [[&'static str; 3]] = &[
-        ["dead_band", "friction", "resonance"],
+        [vocabulary::DEAD_BAND, "friction", "resonance"],
         ["reduced_null_gain", "friction", "resonance"],
     ];
 

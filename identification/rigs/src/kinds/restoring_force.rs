@@ -3,6 +3,7 @@
 //! values loses the motion after a few oscillations and says nothing of the way.
 
 use nalgebra::{DMatrix, DVector, Dyn, OMatrix, U4};
+use units::vocabulary;
 
 use super::RigRecording;
 use recordings::Channel;
@@ -108,7 +109,7 @@ fn models(moments: &[Moment], mass: Option<f64>, start: (f64, f64)) -> Vec<ReadO
     let alone = |value: f64, _: f64| vec![value];
     let mut beside: Vec<Beside<'_>> = vec![
         (
-            "cubic_stiffness",
+            vocabulary::CUBIC_STIFFNESS,
             Box::new(|m| m.y.powi(3)),
             Box::new(alone),
         ),
@@ -123,7 +124,7 @@ fn models(moments: &[Moment], mass: Option<f64>, start: (f64, f64)) -> Vec<ReadO
             Box::new(|value, stiffness| vec![value / stiffness]),
         ),
         (
-            "coulomb_friction",
+            vocabulary::COULOMB_FRICTION,
             Box::new(move |m| m.v / m.v.hypot(rounding)),
             Box::new(move |value, _| vec![value, rounding]),
         ),

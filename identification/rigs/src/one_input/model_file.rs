@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use units::vocabulary;
 
 use serde::Serialize;
 
@@ -214,13 +215,13 @@ impl OneInput {
         (gain.is_finite() && gain > 0.0).then(|| {
             [
                 ("mass", quantity(1.0, 0.0, "kg")),
-                ("force_gain", quantity(gain, 0.5 * gain, "N/V")),
+                (vocabulary::FORCE_GAIN, quantity(gain, 0.5 * gain, "N/V")),
                 (
                     "viscous_friction",
                     quantity(viscous, 0.5 * viscous, "N s/m"),
                 ),
                 (
-                    "coulomb_friction",
+                    vocabulary::COULOMB_FRICTION,
                     quantity(0.05 * force, 0.05 * force, "N"),
                 ),
                 ("offset", quantity(0.0, 0.1 * force, "N")),

@@ -4,6 +4,7 @@
 use controllers::pid::Pid;
 use identification::closed_loop::velocity::noise_floor;
 use identification::data::{Channel, Recording, mean_and_deviation};
+use units::vocabulary;
 
 use super::Request;
 use crate::error::Error;
@@ -77,10 +78,10 @@ impl Bench {
                 }
             };
             for (name, slot) in [
-                ("proportional_gain", &mut pid.proportional),
-                ("integral_gain", &mut pid.integral),
+                (vocabulary::PROPORTIONAL_GAIN, &mut pid.proportional),
+                (vocabulary::INTEGRAL_GAIN, &mut pid.integral),
                 ("integral_leak", &mut pid.integral_leak),
-                ("valve_limit", &mut pid.limit),
+                (vocabulary::VALVE_LIMIT, &mut pid.limit),
             ] {
                 *slot = value(name).unwrap_or(*slot);
             }

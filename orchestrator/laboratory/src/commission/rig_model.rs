@@ -2,6 +2,7 @@
 //! going to be played.
 
 use std::f64::consts::TAU;
+use units::vocabulary;
 
 use identification::closed_loop::Found;
 use identification::closed_loop::equations::HydraulicRig;
@@ -42,7 +43,7 @@ fn parameters(
     let friction = rig.seal_friction;
     let delay = (rig.command_delay - sensor_delay).max(0.0);
     vec![
-        ("valve_frequency", 1.0 / (TAU * inertia)),
+        (vocabulary::VALVE_FREQUENCY, 1.0 / (TAU * inertia)),
         (
             "valve_damping_ratio",
             (0.5 * rig.spool_lag / inertia).max(0.05),
@@ -51,17 +52,17 @@ fn parameters(
         ("valve_null_loss", curve.null_loss),
         ("valve_null_width", curve.null_width),
         ("valve_asymmetry", curve.asymmetry),
-        ("valve_null_bias", curve.null_bias),
+        (vocabulary::VALVE_NULL_BIAS, curve.null_bias),
         (
             "flow_coefficient",
             speed * cylinder.area / (0.5 * supply).sqrt(),
         ),
-        ("bulk_modulus", bulk),
+        (vocabulary::BULK_MODULUS, bulk),
         (
-            "piston_leakage",
+            vocabulary::PISTON_LEAKAGE,
             (rig.leakage_rate * compliance - valve.null_leakage).max(0.0),
         ),
-        ("coulomb_friction", friction),
+        (vocabulary::COULOMB_FRICTION, friction),
         ("static_friction", friction * (1.0 + shape.excess)),
         ("stribeck_velocity", shape.stribeck_velocity),
         ("seal_viscous_friction", rig.seal_damping),
@@ -70,9 +71,9 @@ fn parameters(
             "presliding_damping",
             friction / shape.presliding * shape.relaxation,
         ),
-        ("table_mass", rig.mass),
-        ("table_damping", rig.damping.max(0.0)),
-        ("table_stiffness", rig.stiffness.max(0.0)),
+        (vocabulary::TABLE_MASS, rig.mass),
+        (vocabulary::TABLE_DAMPING, rig.damping.max(0.0)),
+        (vocabulary::TABLE_STIFFNESS, rig.stiffness.max(0.0)),
         // A delay of less than a hundredth of a sample is none.
         (
             "command_delay.delay",
@@ -104,7 +105,13 @@ pub(super) fn predicted(
     let mut file = built_in::system(controller, &request.plant, specimen, wanted)?;
     if is_inside {
         let own = VariableName::new(SPECIMEN, "acceleration");
-        file.redirect(&[(VariableName::new(TABLE, "specimen_acceleration"), own)].into());
+        file.redirect(
+            &[(
+                VariableName::new(TABLE, vocabulary::SPECIMEN_ACCELERATION),
+                own,
+            )]
+            .into(),
+        );
     }
     let settings = request.set.iter();
     let others = settings.filter(|own| own.split('.').next().map(str::trim) != Some(TABLE));

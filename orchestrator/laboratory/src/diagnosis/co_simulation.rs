@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use units::vocabulary;
 
 use identification::data::{Channel, OUTPUT_NAMES, Recording, mean_and_deviation};
 use identification::diagnosis::case::{ControlLaw, Nominal};
@@ -91,10 +92,10 @@ pub fn play(
         column.ok_or_else(|| format!("`{name}` was not recorded"))
     };
     Ok([
-        column("measured_displacement")?,
-        column("measured_acceleration")?,
-        column("measured_force")?,
-        column("measured_specimen_acceleration")?,
+        column(vocabulary::MEASURED_DISPLACEMENT)?,
+        column(vocabulary::MEASURED_ACCELERATION)?,
+        column(vocabulary::MEASURED_FORCE)?,
+        column(vocabulary::MEASURED_SPECIMEN_ACCELERATION)?,
     ])
 }
 
@@ -137,7 +138,7 @@ fn system(
             "controller.velocity_filter = {share}, expected more than 0 and at most 1"
         ));
     }
-    let mut sensors = vec![("velocity_lag", period * (1.0 - share) / share)];
+    let mut sensors = vec![(vocabulary::VELOCITY_LAG, period * (1.0 - share) / share)];
     if let Some((noise, _)) = noise {
         let names = [
             "displacement_noise",
@@ -150,8 +151,8 @@ fn system(
     }
     // The component feeds back the errors of velocity and acceleration, the law the motion itself.
     let control = [
-        ("proportional_gain", law.proportional),
-        ("integral_gain", law.integral),
+        (vocabulary::PROPORTIONAL_GAIN, law.proportional),
+        (vocabulary::INTEGRAL_GAIN, law.integral),
         ("velocity_feedback_gain", law.velocity_feedback),
         ("acceleration_feedback_gain", law.acceleration_feedback),
         ("displacement_feedforward_gain", 0.0),
@@ -163,7 +164,7 @@ fn system(
             "acceleration_feedforward_gain",
             law.acceleration_feedforward - law.acceleration_feedback,
         ),
-        ("valve_limit", law.limit),
+        (vocabulary::VALVE_LIMIT, law.limit),
     ];
     let component = |fmu: &Path, parameters: &[(&str, f64)]| {
         let mut component = ComponentFile::new(&fmu.display().to_string());
@@ -200,28 +201,43 @@ fn system(
         connect(Origin::output("table", name), "sensors", name);
     }
     for (from, output, to, input) in [
-        ("table", "actuator_force", "sensors", "actuator_force"),
-        ("control", "valve_command", "table", "valve_command"),
+        (
+            "table",
+            vocabulary::ACTUATOR_FORCE,
+            "sensors",
+            vocabulary::ACTUATOR_FORCE,
+        ),
+        (
+            "control",
+            vocabulary::VALVE_COMMAND,
+            "table",
+            vocabulary::VALVE_COMMAND,
+        ),
     ] {
         connect(Origin::output(from, output), to, input);
     }
     if let Some(fmu) = &rig.specimen {
         for (from, output, to, input) in [
-            ("table", "acceleration", "specimen", "table_acceleration"),
-            ("specimen", "force", "table", "specimen_force"),
+            (
+                "table",
+                "acceleration",
+                "specimen",
+                vocabulary::TABLE_ACCELERATION,
+            ),
+            ("specimen", "force", "table", vocabulary::SPECIMEN_FORCE),
             (
                 "specimen",
                 "acceleration",
                 "sensors",
-                "specimen_acceleration",
+                vocabulary::SPECIMEN_ACCELERATION,
             ),
         ] {
             connect(Origin::output(from, output), to, input);
         }
         system.add("specimen", of_rig(fmu, "Specimen", &[]));
     } else {
-        table = table.input("specimen_force", 0.0);
-        sensors = sensors.input("specimen_acceleration", 0.0);
+        table = table.input(vocabulary::SPECIMEN_FORCE, 0.0);
+        sensors = sensors.input(vocabulary::SPECIMEN_ACCELERATION, 0.0);
     }
     system.add("table", table);
     system.add("sensors", sensors);

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
+use units::vocabulary;
 
 use identification::data::Recording;
 use identification::identify::rig;
@@ -23,17 +24,17 @@ const SEED: u64 = 1;
 /// Name in the recording, signal and unit of every channel, with the noise of a laboratory's sensor:
 /// 5e-4 in, 1.5 in/s², 0.3 lbf.
 const CHANNELS: [(&str, &str, &str, f64); 6] = [
-    ("valve_command", "control.valve_command", "V", 0.0),
+    (vocabulary::VALVE_COMMAND, "control.valve_command", "V", 0.0),
     ("displacement", "table.displacement", "m", 5e-4 * INCH),
     ("acceleration", "table.acceleration", "m/s^2", 1.5 * INCH),
     (
-        "actuator_force",
+        vocabulary::ACTUATOR_FORCE,
         "table.actuator_force",
         "N",
         0.3 * POUND_FORCE,
     ),
     (
-        "specimen_acceleration",
+        vocabulary::SPECIMEN_ACCELERATION,
         "specimen.acceleration",
         "m/s^2",
         1.0 * INCH,
@@ -208,7 +209,7 @@ fn fits(run: &Run) -> Result<Vec<Figure>, Error> {
         })
     };
     let figures = [
-        figure("2-7", "actuator_force", "force", Units::FORCE),
+        figure("2-7", vocabulary::ACTUATOR_FORCE, "force", Units::FORCE),
         figure("2-10", "displacement", "displacement", Units::DISPLACEMENT),
     ];
     Ok(figures.into_iter().flatten().collect())

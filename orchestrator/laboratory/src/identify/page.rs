@@ -2,6 +2,7 @@
 
 use identification::data::Recording;
 use identification::identify::identified::RigIdentification;
+use units::vocabulary;
 
 use super::parameters::{parameter_table, parameters};
 use super::summary::Summary;
@@ -54,7 +55,7 @@ pub(super) fn report(
         .map(|fit| {
             let units = match fit.channel {
                 "displacement" => Units::DISPLACEMENT,
-                "actuator_force" => Units::FORCE,
+                vocabulary::ACTUATOR_FORCE => Units::FORCE,
                 _ => Units::ACCELERATION,
             };
             let line = |name: &str, values: &[f64]| {

@@ -9,6 +9,7 @@ mod page;
 pub mod replay;
 
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 pub use self::correction::{Inverse, Line, Measured};
 pub use self::drive::{read as read_drive, text as drive_text};
@@ -348,7 +349,11 @@ fn play(prepared: &Prepared, drive: Motion, late: usize) -> Result<Played, Error
                 prepared.system.name
             ),
         })?;
-    let seen = pair(record, "measured_displacement", "measured_acceleration");
+    let seen = pair(
+        record,
+        vocabulary::MEASURED_DISPLACEMENT,
+        vocabulary::MEASURED_ACCELERATION,
+    );
     let (shown, late) = match seen {
         Some((_, columns)) => (columns, late),
         None => ([displacement.clone(), acceleration.clone()], 0),

@@ -3,6 +3,7 @@
 use controllers::interlock::Interlock;
 use motion::Motion;
 use serde::{Deserialize, Serialize};
+use units::vocabulary;
 
 use crate::run::manifest::Manifest;
 
@@ -61,13 +62,13 @@ impl Limits {
         };
         let laboratory = Interlock::laboratory();
         let lock = |name: &str, usual: f64| value("interlock", name).unwrap_or(usual);
-        let specimen = value("specimen", "mass").or(value("specimen", "specimen_mass"));
+        let specimen = value("specimen", "mass").or(value("specimen", vocabulary::SPECIMEN_MASS));
         let hydraulics = || {
             Some(Hydraulics {
                 area: value("table", "piston_area")?,
                 coefficient: value("table", "flow_coefficient")?,
                 command: lock("saturation_level", laboratory.saturation_level),
-                pressure: value("table", "pump_pressure")?,
+                pressure: value("table", vocabulary::PUMP_PRESSURE)?,
                 flow: lock("flow_limit", laboratory.flow_limit),
                 flow_time: lock("flow_time", laboratory.flow_time),
             })
@@ -79,7 +80,7 @@ impl Limits {
             velocity: lock("velocity_limit", laboratory.velocity_limit),
             acceleration: lock("acceleration_limit", laboratory.acceleration_limit),
             force: lock("force_limit", laboratory.force_limit),
-            mass: value("table", "table_mass").unwrap_or(0.0) + specimen.unwrap_or(0.0),
+            mass: value("table", vocabulary::TABLE_MASS).unwrap_or(0.0) + specimen.unwrap_or(0.0),
             hydraulics: hydraulics(),
         }
     }

@@ -14,6 +14,7 @@ mod page;
 
 use std::path::PathBuf;
 use std::time::Instant;
+use units::vocabulary;
 
 use fmi_import::Datum;
 use fmi_master::Ending;
@@ -611,13 +612,16 @@ fn play(prepared: &Prepared, drive: Motion, run: usize) -> Result<Played, Error>
                 ),
             })
     };
-    let specimen = column(&prepared.system, &["measured_specimen_acceleration"])
-        .or_else(|| outcome.record.column("specimen.acceleration"));
+    let specimen = column(
+        &prepared.system,
+        &[vocabulary::MEASURED_SPECIMEN_ACCELERATION],
+    )
+    .or_else(|| outcome.record.column("specimen.acceleration"));
     Ok(Played {
-        velocity: table("measured_velocity", "velocity")?,
+        velocity: table(vocabulary::MEASURED_VELOCITY, "velocity")?,
         table: Measured {
-            displacement: table("measured_displacement", "displacement")?,
-            acceleration: table("measured_acceleration", "acceleration")?,
+            displacement: table(vocabulary::MEASURED_DISPLACEMENT, "displacement")?,
+            acceleration: table(vocabulary::MEASURED_ACCELERATION, "acceleration")?,
         },
         specimen,
         ended: outcome.ended,

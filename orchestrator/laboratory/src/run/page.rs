@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use units::vocabulary;
 
 use sha2::{Digest, Sha256};
 
@@ -151,7 +152,11 @@ fn page(
 fn valve_limit(manifest: &Manifest, commands: &[String]) -> Option<f64> {
     let (controller, _) = commands.first()?.rsplit_once('.')?;
     let component = manifest.components.get(controller)?;
-    component.parameters.get("valve_limit")?.0.as_f64()
+    component
+        .parameters
+        .get(vocabulary::VALVE_LIMIT)?
+        .0
+        .as_f64()
 }
 
 /// Drift and force of the first component that has both.

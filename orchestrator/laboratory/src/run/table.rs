@@ -3,6 +3,7 @@
 use super::manifest::Manifest;
 use fmi_master::Record;
 use fmi_system::{Link, Origin};
+use units::vocabulary;
 
 /// The component that is the table: `table`, or the first with a displacement, velocity and
 /// acceleration that takes a valve command.
@@ -28,7 +29,9 @@ impl<'a> Table<'a> {
         let valve = |name: &str| {
             let mut links = connections.iter();
             links
-                .find(|link| link.to.component == name && link.to.variable == "valve_command")
+                .find(|link| {
+                    link.to.component == name && link.to.variable == vocabulary::VALVE_COMMAND
+                })
                 .map(|link| &link.from)
         };
         let moves = |name: &str| {
@@ -53,7 +56,7 @@ impl<'a> Table<'a> {
                 .iter()
                 .find(|link| {
                     link.to.component == output.component
-                        && link.to.variable == "controller_command"
+                        && link.to.variable == vocabulary::CONTROLLER_COMMAND
                 })
                 .map(|link| &link.from);
         }

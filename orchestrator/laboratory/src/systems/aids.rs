@@ -7,6 +7,7 @@ use identification::closed_loop::equations::HydraulicRig;
 use plant::specimens::YieldingSpecimen;
 use plant::specimens::linear::LinearSpecimen;
 use units::Parameters as _;
+use units::vocabulary;
 use units::vocabulary::LOOP_DELAY_SAMPLES;
 
 use super::control_model::ControlModel;
@@ -93,11 +94,11 @@ impl Rules {
         }
         let on = |switch: &str| component.parameters.get(switch) == Some(&Setting::Boolean(true));
         let known = [
-            "friction_compensation",
-            "specimen_compensation",
-            "pressure_stabilisation",
-            "amplitude_phase_control",
-            "harmonic_cancellation",
+            vocabulary::FRICTION_COMPENSATION,
+            vocabulary::SPECIMEN_COMPENSATION,
+            vocabulary::PRESSURE_STABILISATION,
+            vocabulary::AMPLITUDE_PHASE_CONTROL,
+            vocabulary::HARMONIC_CANCELLATION,
         ];
         if !known.into_iter().any(on) {
             return Ok(());

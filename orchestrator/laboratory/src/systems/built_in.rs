@@ -3,6 +3,7 @@
 //! so: `three-variable+friction`.
 
 use std::path::Path;
+use units::vocabulary;
 
 use bridges::opensees;
 use plant::specimens::YieldingSpecimen;
@@ -76,11 +77,11 @@ const STRUCTURES: [Part; 1] = [part!("structure/", "two-storeys")];
 const AID_STAGE: &str = include_str!("../../systems/aids.toml");
 /// What may follow a controller's name behind a `+`, and the switch of the component that it turns on.
 const AIDS: [(&str, &str); 6] = [
-    ("friction", "friction_compensation"),
-    ("specimen", "specimen_compensation"),
+    ("friction", vocabulary::FRICTION_COMPENSATION),
+    ("specimen", vocabulary::SPECIMEN_COMPENSATION),
     ("delta-p", tuning::PRESSURE_STABILISATION),
-    ("amplitude-phase", "amplitude_phase_control"),
-    ("harmonics", "harmonic_cancellation"),
+    ("amplitude-phase", vocabulary::AMPLITUDE_PHASE_CONTROL),
+    ("harmonics", vocabulary::HARMONIC_CANCELLATION),
     (VALVE, "valve_compensation"),
 ];
 /// The aid that every controller has on a model whose valve is not an ideal one.

@@ -1,6 +1,7 @@
 //! What a master that steps all components from the same values adds to a loop.
 
 use std::collections::BTreeMap;
+use units::vocabulary;
 
 use fmi_system::Origin;
 use fmi_system::Setting;
@@ -17,8 +18,8 @@ pub fn know_jacobi(
     is_built_in: bool,
     has: &mut dyn FnMut(&str, &str) -> bool,
 ) {
-    const LOOP: &str = "loop_delay_samples";
-    const COMMAND: &str = "command_delay_samples";
+    const LOOP: &str = vocabulary::LOOP_DELAY_SAMPLES;
+    const COMMAND: &str = vocabulary::COMMAND_DELAY_SAMPLES;
     /// Of a law that predicts the sampled law below it: its loop begins there.
     const LAW_BELOW: &str = "continuous_law";
     let sampled = |name: &String| {

@@ -4,6 +4,7 @@ use controllers::preview::feedback::Uncertainty;
 use controllers::surface_control::{Parameters, Variant};
 use controllers::three_variable::ThreeVariableGains;
 use plant::specimens::YieldingSpecimen;
+use units::vocabulary;
 
 use units::Parameters as _;
 
@@ -22,7 +23,7 @@ impl Rules {
         let gains = gains.map_err(|error| error.to_string())?;
         set(component, &rig.named());
         set(component, &[("hold_gain", 0.5 * gains.proportional)]);
-        component.set("loop_delay_samples", self.model.delay as i64);
+        component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
         Ok(())
     }
 
@@ -63,12 +64,12 @@ impl Rules {
                 ("spool_filter_time", tuned.filter_times[1]),
                 ("move_weight", tuned.move_weight),
                 ("force_step", tuned.uncertainty.force_step),
-                ("displacement_measurement_noise", noise[0]),
-                ("velocity_measurement_noise", noise[1]),
-                ("acceleration_measurement_noise", noise[2]),
+                (vocabulary::MEASUREMENT_NOISE[0], noise[0]),
+                (vocabulary::MEASUREMENT_NOISE[1], noise[1]),
+                (vocabulary::MEASUREMENT_NOISE[2], noise[2]),
             ],
         );
-        component.set("loop_delay_samples", self.model.delay as i64);
+        component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
         component.set("reference_lead_samples", tuned.lead as i64);
         Ok(())
     }

@@ -29,6 +29,7 @@
 
 use std::path::Path;
 use std::sync::OnceLock;
+use units::vocabulary;
 
 use controllers::acceleration_tracking::{AccelerationTracking, SHAPES};
 use controllers::aids::friction::FrictionCompensation;
@@ -51,7 +52,7 @@ use plant::identified::nominal::shake_table_values;
 use plant::specimens::YieldingSpecimen;
 
 /// The switch of the aids by which the rig is another one to the controllers.
-pub(super) const PRESSURE_STABILISATION: &str = "pressure_stabilisation";
+pub(super) const PRESSURE_STABILISATION: &str = vocabulary::PRESSURE_STABILISATION;
 
 /// Which parameters the controllers of a built-in system have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -320,7 +321,7 @@ impl Rules {
                 Rule::ThreeVariable => Member::ThreeVariable,
                 Rule::ModelPredictive => {
                     self.model(component);
-                    component.set("loop_delay_samples", self.model.delay as i64);
+                    component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
                     delay_references(&mut file.connections, name, self.model.delay);
                     Member::ModelPredictive
                 }
@@ -332,8 +333,8 @@ impl Rules {
                     let found = suite.sliding_mode().map_err(|error| error.to_string())?;
                     let force = &found.force;
                     let gains = [
-                        ("proportional_gain", force.proportional),
-                        ("integral_gain", force.integral),
+                        (vocabulary::PROPORTIONAL_GAIN, force.proportional),
+                        (vocabulary::INTEGRAL_GAIN, force.integral),
                     ];
                     set(component, &gains);
                     continue;
@@ -395,9 +396,9 @@ impl Rules {
     fn sliding_mode(&self, component: &mut ComponentFile, specimen_mass: Option<f64>) {
         self.model(component);
         if let Some(mass) = specimen_mass {
-            component.set("specimen_mass", mass);
+            component.set(vocabulary::SPECIMEN_MASS, mass);
         }
-        component.set("loop_delay_samples", self.model.delay as i64);
+        component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
         // The valve moves when the reference is due; only the measurements are late.
         component.set("reference_ahead", true);
     }
@@ -425,8 +426,8 @@ impl Rules {
             set(
                 component,
                 &[
-                    ("specimen_mass", known.mass),
-                    ("specimen_damping", known.damping),
+                    (vocabulary::SPECIMEN_MASS, known.mass),
+                    (vocabulary::SPECIMEN_DAMPING, known.damping),
                     ("specimen_yield_force", known.columns.yield_force),
                     (
                         "specimen_yield_displacement",
@@ -458,14 +459,14 @@ impl Rules {
         set(
             component,
             &[
-                ("command_weight", tuned.command_weight),
+                (vocabulary::COMMAND_WEIGHT, tuned.command_weight),
                 ("force_step", tuned.uncertainty.force_step),
-                ("displacement_measurement_noise", noise.displacement),
-                ("velocity_measurement_noise", noise.velocity),
-                ("acceleration_measurement_noise", noise.acceleration),
+                (vocabulary::MEASUREMENT_NOISE[0], noise.displacement),
+                (vocabulary::MEASUREMENT_NOISE[1], noise.velocity),
+                (vocabulary::MEASUREMENT_NOISE[2], noise.acceleration),
             ],
         );
-        component.set("loop_delay_samples", self.model.delay as i64);
+        component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
         Ok(())
     }
 

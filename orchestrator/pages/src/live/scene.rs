@@ -1,6 +1,7 @@
 //! Which signals of a run are watched, in which plots, with which limits.
 
 use serde::Serialize;
+use units::vocabulary;
 
 use crate::report::{UnitSystem, Units};
 use fmi_import::Kind;
@@ -65,7 +66,10 @@ const WANTED: [Wanted; 4] = [
             "allocation.valve_command",
             "interlock.valve_command",
         ],
-        &[("control", "valve_limit"), ("allocation", "valve_limit")],
+        &[
+            ("control", vocabulary::VALVE_LIMIT),
+            ("allocation", vocabulary::VALVE_LIMIT),
+        ],
     ),
     (
         "Drift of the specimen",

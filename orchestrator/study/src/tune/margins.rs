@@ -6,6 +6,7 @@
 //! controller or rig, and noise, which is the same both times, drops out.
 
 use std::sync::Mutex;
+use units::vocabulary;
 
 use controllers::robustness::Pushed;
 use plant::linear::margins::Margins;
@@ -87,8 +88,8 @@ fn break_at_valve(file: &mut SystemFile) -> Result<String, Error> {
         part.is_some_and(|part| part.period.is_none())
     };
     let mut links = file.connections.iter_mut();
-    let link =
-        links.find(|link| link.to.variable == "valve_command" && is_table(&link.to.component));
+    let link = links
+        .find(|link| link.to.variable == vocabulary::VALVE_COMMAND && is_table(&link.to.component));
     let Some(link) = link else {
         let reason = "nothing drives a `valve_command` of its plant: margins cannot be measured; expected \
                       a study without `gain_margin` and `phase_margin`";

@@ -1,5 +1,6 @@
 //! Dry friction that is larger one way than the other, as of a seal that points one way.
 
+use units::vocabulary;
 use super::friction::{COULOMB_FORCE, STICKS, TRANSITION_VELOCITY, tanh};
 use super::quantity::FORCE;
 use super::{Component, Effect, Family, Parameter, TableMotion};
@@ -54,8 +55,8 @@ impl Family for DirectionalFriction {
             &[2.5 * LBF, 1.2 * LBF, 0.1 * INCH],
             &[2.5 * LBF, -1.2 * LBF, 0.1 * INCH],
         ],
-        confounded_with: &["coulomb_friction", "load_cell_bias"],
-        contains: Some("coulomb_friction"),
+        confounded_with: &[vocabulary::COULOMB_FRICTION, "load_cell_bias"],
+        contains: Some(vocabulary::COULOMB_FRICTION),
         is_fast: true,
         tolerance: STICKS,
         ..Effect::new("directional_friction", Component::ShakeTable)

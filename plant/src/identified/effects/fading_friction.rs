@@ -1,5 +1,6 @@
 //! Dry friction that fades as the table is first moved farther, as of a guide that runs in.
 
+use units::vocabulary;
 use super::friction::{COULOMB_FORCE, STICKS, TRANSITION_VELOCITY, tanh};
 use super::quantity::{LENGTH, RATIO};
 use super::{Component, Effect, Family, Parameter, Scale, TableMotion};
@@ -69,8 +70,8 @@ impl Family for FadingFriction {
             &[3.0 * LBF, 0.3, 0.3 * INCH, 0.1 * INCH],
             &[3.0 * LBF, 0.7, 0.3 * INCH, 0.1 * INCH],
         ],
-        confounded_with: &["coulomb_friction"],
-        contains: Some("coulomb_friction"),
+        confounded_with: &[vocabulary::COULOMB_FRICTION],
+        contains: Some(vocabulary::COULOMB_FRICTION),
         is_fast: true,
         needs_co_simulation: true,
         tolerance: STICKS,

@@ -1,5 +1,6 @@
 //! Dry friction between table and guide.
 
+use units::vocabulary;
 use super::quantity::{FORCE, RATIO, VELOCITY};
 use super::{Component, Effect, Family, Parameter, Scale, TableMotion};
 use crate::ModelError;
@@ -75,7 +76,7 @@ impl Family for FrictionEffects {
             confounded_with: &["stribeck_friction"],
             is_fast: true,
             tolerance: STICKS,
-            ..Effect::new("coulomb_friction", Component::ShakeTable)
+            ..Effect::new(vocabulary::COULOMB_FRICTION, Component::ShakeTable)
         },
         Effect {
             equation: "m a = F - (F_c + F_s exp(-|v/v_s|^delta)) tanh(v/v_0) - c v - k x",
@@ -83,7 +84,7 @@ impl Family for FrictionEffects {
             parameters: &[
                 COULOMB_FORCE
                     .on_table(|e| &mut e.friction.coulomb_force)
-                    .of("coulomb_friction"),
+                    .of(vocabulary::COULOMB_FRICTION),
                 Parameter::new(
                     "stribeck_force",
                     FORCE,
@@ -114,14 +115,14 @@ impl Family for FrictionEffects {
                 .min(1e-2),
                 TRANSITION_VELOCITY
                     .on_table(|e| &mut e.friction.transition_velocity)
-                    .of("coulomb_friction"),
+                    .of(vocabulary::COULOMB_FRICTION),
             ],
             starts: &[
                 &[1.0 * LBF, 1.0 * LBF, 0.3 * INCH, 2.0, 0.1 * INCH],
                 &[1.0 * LBF, 2.0 * LBF, 1.0 * INCH, 2.0, 0.1 * INCH],
             ],
-            confounded_with: &["coulomb_friction"],
-            contains: Some("coulomb_friction"),
+            confounded_with: &[vocabulary::COULOMB_FRICTION],
+            contains: Some(vocabulary::COULOMB_FRICTION),
             is_fast: true,
             tolerance: STICKS,
             ..Effect::new("stribeck_friction", Component::ShakeTable)

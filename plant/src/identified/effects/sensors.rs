@@ -5,6 +5,7 @@
 use super::quantity::{ACCELERATION, ANGLE, FORCE, FREQUENCY, RATIO, TILT, TIME_CONSTANT};
 use super::{Component, Effect, Parameter, Reporting};
 use units::constants::{INCH, LBF};
+use units::vocabulary;
 
 const fn effect(name: &'static str) -> Effect {
     Effect {
@@ -65,7 +66,7 @@ pub const EFFECTS: &[Effect] = &[
                 .on_sensors(|s| &mut s.displacement.scale_error),
         ],
         starts: &[&[0.0]],
-        ..effect("displacement_scale")
+        ..effect(vocabulary::DISPLACEMENT_SCALE)
     },
     Effect {
         equation: "y' = 2 pi f (x - y)",

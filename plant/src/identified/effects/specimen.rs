@@ -1,5 +1,6 @@
 //! A specimen that is not the linear one of Appendix A.
 
+use units::vocabulary;
 use super::quantity::{FREQUENCY, LENGTH, RATIO};
 use super::{AtStart, Component, Effect, Family, Parameter, Scale};
 use crate::ModelError;
@@ -114,7 +115,7 @@ impl Family for SpecimenEffects {
             .on_specimen(|s| &mut s.stiffness_change)],
             starts: &[&[0.0], &[0.25], &[-0.25]],
             is_linear: true,
-            ..Effect::new("specimen_stiffness", Component::Specimen)
+            ..Effect::new(vocabulary::SPECIMEN_STIFFNESS, Component::Specimen)
         },
         Effect {
             equation: "f = k d + (1 + p) c d'",
@@ -128,7 +129,7 @@ impl Family for SpecimenEffects {
             .on_specimen(|s| &mut s.damping_change)],
             starts: &[&[0.0], &[1.0], &[2.5]],
             is_linear: true,
-            ..Effect::new("specimen_damping", Component::Specimen)
+            ..Effect::new(vocabulary::SPECIMEN_DAMPING, Component::Specimen)
         },
         Effect {
             equation: "p m (a + d'' + e'') = -k_2 e - c_2 e', k_2 = p m w², c_2 = 2 zeta w p m, w = 2 pi f",

@@ -1,5 +1,6 @@
 //! What the table carries and rubs against beyond Eq 2-5.
 
+use units::vocabulary;
 use super::quantity::{CUBIC_STIFFNESS, DAMPING, MASS};
 use super::{AtStart, Component, Effect, Family, Parameter};
 use crate::ModelError;
@@ -36,7 +37,7 @@ impl Family for TableEffects {
             .at_start(AtStart::Acceleration)],
             starts: &[&[0.01 * LBF_S2_PER_INCH], &[0.035 * LBF_S2_PER_INCH]],
             is_linear: true,
-            ..Effect::new("added_payload", Component::ShakeTable)
+            ..Effect::new(vocabulary::ADDED_PAYLOAD, Component::ShakeTable)
         },
         Effect {
             equation: "m a = F - (c + c_a) v - k x",
@@ -63,7 +64,7 @@ impl Family for TableEffects {
             .positive(2.0 * LBF_PER_INCH3, 30.0 * LBF_PER_INCH3)
             .on_table(|e| &mut e.table.cubic_stiffness)],
             starts: &[&[4.0 * LBF_PER_INCH3], &[15.0 * LBF_PER_INCH3]],
-            ..Effect::new("cubic_stiffness", Component::ShakeTable)
+            ..Effect::new(vocabulary::CUBIC_STIFFNESS, Component::ShakeTable)
         },
     ];
 
@@ -76,6 +77,6 @@ impl Family for TableEffects {
     fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_finite("added_mass", self.added_mass)?;
         ModelError::require_finite("viscous_damping", self.viscous_damping)?;
-        ModelError::require_finite("cubic_stiffness", self.cubic_stiffness)
+        ModelError::require_finite(vocabulary::CUBIC_STIFFNESS, self.cubic_stiffness)
     }
 }

@@ -1,5 +1,6 @@
 //! Effects between the valve command and the flow.
 
+use units::vocabulary;
 use std::f64::consts::TAU;
 
 use super::quantity::{DELAY, FREQUENCY, RATIO, VOLTAGE};
@@ -91,7 +92,7 @@ impl Family for ValveEffects {
                     .at_start(AtStart::ActuatorRates),
             ],
             starts: &[&[0.0]],
-            ..Effect::new("valve_null_bias", Component::ShakeTable)
+            ..Effect::new(vocabulary::VALVE_NULL_BIAS, Component::ShakeTable)
         },
         Effect {
             equation: "u_f = sign(u_s) max(|u_s| - w, 0)",
@@ -223,7 +224,7 @@ impl Family for ValveEffects {
         ModelError::require_finite("null_bias", self.null_bias)?;
         ModelError::require_finite("flow_gain", self.flow_gain)?;
         ModelError::require_finite("asymmetry", self.asymmetry)?;
-        ModelError::require_non_negative("dead_band", self.dead_band)?;
+        ModelError::require_non_negative(vocabulary::DEAD_BAND, self.dead_band)?;
         ModelError::require_non_negative("spool_frequency", self.spool_frequency)?;
         ModelError::require_positive("spool_damping", self.spool_damping)?;
         ModelError::require_non_negative("command_delay", self.command_delay)?;

@@ -9,6 +9,7 @@
 mod sections;
 
 use std::path::Path;
+use units::vocabulary;
 
 use plant::identified::actuator::IdentifiedActuator;
 use plant::identified::shake_table::ShakeTable;
@@ -337,7 +338,7 @@ fn noise(found: &RigIdentification) -> toml::Table {
     let acceleration = found.noise(0, 1);
     let mut noise = toml::Table::new();
     for (i, name) in OUTPUT_NAMES.iter().enumerate() {
-        let factor = if *name == "actuator_force" {
+        let factor = if *name == vocabulary::ACTUATOR_FORCE {
             units.force
         } else {
             units.length
@@ -352,7 +353,10 @@ fn noise(found: &RigIdentification) -> toml::Table {
         };
         noise.insert((*name).to_string(), (own / factor).into());
     }
-    noise.insert("valve_command".into(), found.command_noise(0).into());
+    noise.insert(
+        vocabulary::VALVE_COMMAND.into(),
+        found.command_noise(0).into(),
+    );
     noise
 }
 

@@ -1,6 +1,7 @@
 //! Extensions of a model: effects on the path of a signal, and parameters that drifted.
 
 use plant::signal_path::SignalEffects;
+use units::vocabulary;
 
 use super::{ForeignModel, Parameter};
 use diagnosis::{Candidate, EffectParameter, Role, Scale};
@@ -55,9 +56,9 @@ impl Border {
         match self {
             Self::Delay => ("delay", "time"),
             Self::Lag => ("lag", "time_constant"),
-            Self::RateLimit => ("rate_limit", "limit"),
+            Self::RateLimit => (vocabulary::RATE_LIMIT, "limit"),
             Self::Play => ("play", "width"),
-            Self::DeadBand => ("dead_band", "half_width"),
+            Self::DeadBand => (vocabulary::DEAD_BAND, "half_width"),
             Self::Asymmetry => ("asymmetry", "share"),
             Self::Gain => ("gain", "relative_change"),
             Self::Offset => ("offset", "offset"),

@@ -6,6 +6,7 @@ mod roles;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use units::vocabulary;
 
 use recordings::{DataError, Sheet, Wanted, mean_and_deviation};
 
@@ -459,9 +460,9 @@ fn axis(voltage: &[f64], one: &RigRecording) -> Vec<Start> {
     let coulomb = or(found[2], 0.1 * gain * volts);
     vec![
         ("mass", 1.0, 0.0, "kg"),
-        ("force_gain", gain, 0.9 * gain, "N/V"),
+        (vocabulary::FORCE_GAIN, gain, 0.9 * gain, "N/V"),
         ("viscous_friction", viscous, 0.9 * viscous, "N s/m"),
-        ("coulomb_friction", coulomb, 0.9 * coulomb, "N"),
+        (vocabulary::COULOMB_FRICTION, coulomb, 0.9 * coulomb, "N"),
         ("offset", 0.0, 0.2 * gain * volts, "N"),
     ]
 }

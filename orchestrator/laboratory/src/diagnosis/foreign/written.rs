@@ -3,6 +3,7 @@
 
 use std::io::{self, Write};
 use std::path::Path;
+use units::vocabulary;
 
 use identification::diagnosis::rigs::foreign::{ForeignDiagnosis, ForeignModel, Signal};
 use plant::signal_path::SignalEffects;
@@ -54,9 +55,9 @@ fn path(effects: &SignalEffects, period: f64) -> Value {
     let all = [
         ("delay", effects.delay, none.delay),
         ("lag", effects.lag, none.lag),
-        ("rate_limit", effects.rate_limit, none.rate_limit),
+        (vocabulary::RATE_LIMIT, effects.rate_limit, none.rate_limit),
         ("play", effects.play, none.play),
-        ("dead_band", effects.dead_band, none.dead_band),
+        (vocabulary::DEAD_BAND, effects.dead_band, none.dead_band),
         ("asymmetry", effects.asymmetry, none.asymmetry),
         ("gain", effects.gain, none.gain),
         ("offset", effects.offset, none.offset),

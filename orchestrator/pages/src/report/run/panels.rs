@@ -1,7 +1,7 @@
 //! The plots of a run.
 
-use sysid::frequency_response;
 use plant::linear::log_space;
+use sysid::frequency_response;
 
 use super::{Run, SpecimenHistory};
 use crate::report::{Abscissa, Axis, Panel, Series, Style, Units};
