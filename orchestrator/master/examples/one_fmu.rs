@@ -13,6 +13,7 @@ use fmi_system::{Files, SystemFile, assemble};
 /// Seconds between two rows.
 const STEP: f64 = 0.01;
 
+/// Steps the FMU to `stop`, s.
 pub fn run(fmu: &Path, stop: f64) -> Result<Outcome, Box<dyn Error>> {
     let file = SystemFile::of_fmu(fmu);
     let system = assemble(&file, &[], &mut Files::of(&file))?;

@@ -22,6 +22,7 @@ fmu = "FMU"
 parameters = { "A[1,1]" = 0, "D[1,1]" = 0 }
 "#;
 
+/// The signals up to `stop`, s, with a coupling step of `step`, s.
 pub fn run(fmu: &Path, step: f64, stop: f64) -> Result<Record, Box<dyn Error>> {
     let text = SYSTEM.replace("FMU", &fmu.display().to_string());
     let file = SystemFile::parse("oscillator", &text)?;
