@@ -529,9 +529,9 @@ pub fn select<M: SimulatedModel>(
     })
 }
 
-/// The best of `proposals`, each a set of effects and a point to begin from: fitted to all of `record`,
-/// ordered by how either half of it predicts the other, and then without the effects that do not pay
-/// there; the nominal model where none can be fitted to the halves. None where that cannot be either.
+/// The best of `proposals`, each a set of effects and a point to begin from. Each is fitted to all of `record`;
+/// the best is the one whose halves predict each other best, without the effects that do not pay there. If none
+/// can be fitted to the halves, it is the nominal model; none if that one cannot be fitted either.
 pub fn select_jointly<M: SimulatedModel>(
     model: &M,
     proposals: &[Point],

@@ -20,8 +20,8 @@ pub const FLOOR: f64 = 0.6;
 /// form of a noise, of a coarse converter's for one, is not known better: where nothing was hidden, oil that is
 /// not there took away 0.35 %.
 pub(super) const NOISE_IS_KNOWN_TO: f64 = 0.004;
-/// Share of what an effect earns from which on the records ask for it, rather than the stated parameters: without
-/// a scale's error these would have to be far off, and the records would look the same.
+/// Least share of an effect's gain that the records must contribute; the rest comes from the stated parameters.
+/// Without the error of a scale, for one, the parameters would be far off and the records would look the same.
 const BY_THE_RECORDS: f64 = 0.3;
 /// A model within this of the best is a rival that the data do not rule out: odds of `e^6`, 400 to
 /// one, against it; above 10 is "very strong" (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).

@@ -35,8 +35,8 @@ pub trait ExtensibleModel: Sync {
     where
         Self: Sized;
 
-    /// The same rig with a predictor that follows the records less closely, if it has a choice. What the
-    /// records say of the rig stays the same then, what a wrong noise makes of it does not.
+    /// The same rig with a predictor that follows the records less closely, if it has a choice. A true effect
+    /// keeps its size then; one that only mends a wrong noise does not.
     fn following_less(&self) -> Option<Self>
     where
         Self: Sized,

@@ -69,7 +69,7 @@ struct Variable {
     values: Vec<f64>,
 }
 
-/// What was read, and what was left.
+/// The variables that were read, and the names of those that were skipped.
 #[derive(Default)]
 struct Found {
     variables: Vec<Variable>,

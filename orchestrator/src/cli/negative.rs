@@ -2,8 +2,8 @@
 
 use std::ffi::OsString;
 
-/// The arguments with `--duration "-1 s"` as `--duration=-1 s`. The option then says what is wrong with
-/// the value, which would be taken for another option otherwise.
+/// The arguments with `--duration "-1 s"` as `--duration=-1 s`. The option then reports what is
+/// wrong with the value, which would otherwise be mistaken for another option.
 pub fn joined(arguments: impl Iterator<Item = OsString>) -> Vec<OsString> {
     let mut all: Vec<OsString> = Vec::new();
     for argument in arguments {

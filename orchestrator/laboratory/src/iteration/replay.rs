@@ -2,9 +2,9 @@
 //!
 //! A round is a file with the drive that was played and the displacement that was measured; drive and wanted
 //! motion need no common clock. All rounds together give the transfer function; the best of them is the base.
-//! What a change of the drive does is predicted from the base's own response, so that what is not linear and
-//! repeats itself stays where it is; every later round is predicted from those before it, which tells how far
-//! such a prediction is off.
+//! The effect of a change of the drive is predicted from the base's own response, so that nonlinear parts that
+//! repeat themselves cancel. Every later round is predicted from those before it, which shows how accurate such
+//! a prediction is.
 
 use std::path::{Path, PathBuf};
 
@@ -93,7 +93,7 @@ pub struct Next {
     pub band_hz: [f64; 2],
     /// Predicted error, %.
     pub predicted_percent: f64,
-    /// Of it, what is left if the rig is linear, %.
+    /// The part of it that remains if the rig is linear, %.
     pub linear_percent: f64,
     /// Largest displacement of the drive, m.
     pub peak_drive_m: f64,

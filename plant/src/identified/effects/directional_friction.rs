@@ -1,11 +1,11 @@
 //! Dry friction that is larger one way than the other, as of a seal that points one way.
 
-use units::vocabulary;
 use super::friction::{COULOMB_FORCE, STICKS, TRANSITION_VELOCITY, tanh};
 use super::quantity::FORCE;
 use super::{Component, Effect, Family, Parameter, TableMotion};
 use crate::ModelError;
 use units::constants::{INCH, LBF};
+use units::vocabulary;
 
 /// Friction `F_c + D` forwards and `F_c - D` backwards, smooth about rest:
 /// `(F_c + D tanh(v/v_0)) tanh(v/v_0)`.

@@ -1,11 +1,11 @@
 //! Dry friction that fades as the table is first moved farther, as of a guide that runs in.
 
-use units::vocabulary;
 use super::friction::{COULOMB_FORCE, STICKS, TRANSITION_VELOCITY, tanh};
 use super::quantity::{LENGTH, RATIO};
 use super::{Component, Effect, Family, Parameter, Scale, TableMotion};
 use crate::ModelError;
 use units::constants::{INCH, LBF};
+use units::vocabulary;
 
 /// Friction `F_c (1 - L (1 - exp(-x_max/x_0))) tanh(v/v_0)`, where `x_max` is the table's greatest
 /// excursion so far.

@@ -1,10 +1,10 @@
 //! Dry friction between table and guide.
 
-use units::vocabulary;
 use super::quantity::{FORCE, RATIO, VELOCITY};
 use super::{Component, Effect, Family, Parameter, Scale, TableMotion};
 use crate::ModelError;
 use units::constants::{INCH, LBF};
+use units::vocabulary;
 
 /// Coulomb friction with a breakaway bump at low speed, opposing the table's velocity:
 /// `(F_c + F_s exp(-|v/v_s|^delta)) tanh(v/v_0)`.

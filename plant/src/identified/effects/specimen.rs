@@ -1,11 +1,11 @@
 //! A specimen that is not the linear one of Appendix A.
 
-use units::vocabulary;
 use super::quantity::{FREQUENCY, LENGTH, RATIO};
 use super::{AtStart, Component, Effect, Family, Parameter, Scale};
 use crate::ModelError;
 use crate::specimens::hysteresis::elastic_share;
 use units::constants::INCH;
+use units::vocabulary;
 
 /// Changes of the specimen `m_s (a + d'') = -f(d, d')`.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]

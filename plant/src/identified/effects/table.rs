@@ -1,10 +1,10 @@
 //! What the table carries and rubs against beyond Eq 2-5.
 
-use units::vocabulary;
 use super::quantity::{CUBIC_STIFFNESS, DAMPING, MASS};
 use super::{AtStart, Component, Effect, Family, Parameter};
 use crate::ModelError;
 use units::constants::{INCH, LBF, LBF_S_PER_INCH, LBF_S2_PER_INCH};
+use units::vocabulary;
 
 /// Mass, viscous damping and a hardening spring beside those of Eq 2-28.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]

@@ -1,7 +1,7 @@
 //! Effects between the valve command and the flow.
 
-use units::vocabulary;
 use std::f64::consts::TAU;
+use units::vocabulary;
 
 use super::quantity::{DELAY, FREQUENCY, RATIO, VOLTAGE};
 use super::{AtStart, Component, Effect, Family, Parameter, Scale};

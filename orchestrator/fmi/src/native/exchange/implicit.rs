@@ -1,8 +1,7 @@
 //! Radau IIA of order 5 with simplified Newton iterations and a continuous output of order 3, for stiff
 //! systems (Hairer, Wanner, *Solving Ordinary Differential Equations II*, IV.8). It is a one-step method:
-//! inputs that jump at communication points and events do not make it begin again at a low order, as they
-//! do a multistep method, and all that it knows between two steps is a step size and a Jacobian, which a
-//! saved state holds.
+//! unlike a multistep method, it keeps its order after events and after inputs that jump. Between two steps it
+//! needs only a step size and a Jacobian, which a saved state holds.
 
 use nalgebra::{Complex, DMatrix, DVector, Dyn, LU};
 
@@ -70,7 +69,7 @@ impl Newton {
         *self = Self::default();
     }
 
-    /// Tries a step with the Jacobian at hand, or a new one where there is none or it does not do.
+    /// Tries a step with the Jacobian at hand, or a new one where there is none or where that one does not converge.
     /// `before` is the size of the last step and its polynomial, from which the stages are foretold.
     pub(super) fn attempt(
         &mut self,
