@@ -113,7 +113,7 @@ pub struct AccelerationLoop {
     #[parameter("V.s2/m" => "V.s2/in", name = "gain", finite)]
     pub proportional: f64,
     /// Ki of the acceleration loop, V.s/m.
-    #[parameter("V.s/m" => "V.s/in", name = vocabulary::INTEGRAL_GAIN, finite)]
+    #[parameter("V.s/m" => "V.s/in", name = "integral_gain", finite)]
     pub integral: f64,
     /// Kii of the acceleration loop, V/m.
     #[parameter("V/m" => "V/in", name = "double_integral_gain", finite)]

@@ -166,7 +166,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     };
     let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
     // Either part proposes; all data together decide by how either part predicts the other.
-    let start = select_jointly(
+    let mut start = select_jointly(
         measured,
         &proposals(measured, [&as_described, &swapped]),
         EVERYTHING,
@@ -196,7 +196,17 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             reason: reason.to_owned(),
         });
     }
+    // What either part gives a reason against is not named.
     let mut refused: Vec<Refused> = Vec::new();
+    for effect in as_described.effects.iter().chain(&swapped.effects) {
+        let index = measured.index(&effect.effect);
+        if let (Some(index), Some(reason)) = (index, &effect.objection) {
+            start.point.effects.retain(|(known, _)| *known != index);
+            if refused.iter().all(|(known, _)| *known != index) {
+                refused.push((index, reason.clone()));
+            }
+        }
+    }
     let mut findings = Vec::new();
     let confirmed = confirm(measured, &start.point, &mut refused, &mut findings)?;
     for (i, reason) in refused {

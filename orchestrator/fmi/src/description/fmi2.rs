@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use fmi_rs::model_description::fmi2;
+use roxmltree::Node;
 
 use super::structure::Dependencies;
 use super::{
@@ -10,14 +11,34 @@ use super::{
     default_stop, preferred_step,
 };
 
+/// Declared types by name: the element of each that says its kind. `fmi-rs` reads only the first type.
+fn types<'a>(root: Node<'a, 'a>) -> HashMap<&'a str, Node<'a, 'a>> {
+    root.children()
+        .filter(|node| node.has_tag_name("TypeDefinitions"))
+        .flat_map(|node| node.children())
+        .filter(|node| node.has_tag_name("SimpleType"))
+        .filter_map(|node| Some((node.attribute("name")?, node.first_element_child()?)))
+        .collect()
+}
+
+/// Choices of a type; none where it is not an enumeration.
+fn items(declared: &Node) -> Vec<Item> {
+    let items = declared.children().filter(|node| node.has_tag_name("Item"));
+    items
+        .filter_map(|item| {
+            Some(Item {
+                name: item.attribute("name")?.to_string(),
+                value: item.attribute("value")?.parse().ok()?,
+                description: item.attribute("description").unwrap_or("").to_string(),
+            })
+        })
+        .collect()
+}
+
 /// Reads the text; `exchange`: model exchange goes before co-simulation.
-pub(super) fn read(text: &str, exchange: bool) -> Result<Description, String> {
+pub(super) fn read(text: &str, root: Node, exchange: bool) -> Result<Description, String> {
     let file = fmi2::ModelDescription::from_string(text).map_err(|error| error.to_string())?;
-    let types: HashMap<&str, &fmi2::SimpleType> = file
-        .typeDefinitions
-        .iter()
-        .map(|known| (known.name(), known))
-        .collect();
+    let types = types(root);
     let units: HashMap<&str, _> = file
         .unitDefintions
         .iter()
@@ -26,17 +47,6 @@ pub(super) fn read(text: &str, exchange: bool) -> Result<Description, String> {
     let mut variables = Vec::with_capacity(file.modelVariables.len());
     for variable in &file.modelVariables {
         use fmi2::{Causality as C, Initial as I, Variability as V, VariableType as T};
-        let items = |declared: &str| match types.get(declared) {
-            Some(fmi2::SimpleType::Enumeration { items, .. }) => items
-                .iter()
-                .map(|item| Item {
-                    name: item.name.clone(),
-                    value: i64::from(item.value),
-                    description: item.description.clone().unwrap_or_default(),
-                })
-                .collect(),
-            _ => Vec::new(),
-        };
         let (mut unit, mut display_unit, mut is_relative) = (None, None, false);
         if let T::Real {
             unit: own,
@@ -48,16 +58,11 @@ pub(super) fn read(text: &str, exchange: bool) -> Result<Description, String> {
         {
             (unit, display_unit, is_relative) =
                 (own.clone(), displayUnit.clone(), *relativeQuantity);
-            if let Some(fmi2::SimpleType::Real {
-                unit: declared,
-                displayUnit,
-                relativeQuantity,
-                ..
-            }) = declaredType.as_deref().and_then(|name| types.get(name))
-            {
-                unit = unit.or(declared.clone());
-                display_unit = display_unit.or(displayUnit.clone());
-                is_relative |= relativeQuantity;
+            if let Some(declared) = declaredType.as_deref().and_then(|name| types.get(name)) {
+                let text = |name| declared.attribute(name).map(str::to_string);
+                unit = unit.or_else(|| text("unit"));
+                display_unit = display_unit.or_else(|| text("displayUnit"));
+                is_relative |= matches!(declared.attribute("relativeQuantity"), Some("true" | "1"));
             }
         }
         let start = variable.variableType.start().clone();
@@ -74,7 +79,11 @@ pub(super) fn read(text: &str, exchange: bool) -> Result<Description, String> {
                 T::Integer { .. } => Kind::Int32,
                 T::Boolean { .. } => Kind::Boolean,
                 T::String { .. } => Kind::String,
-                T::Enumeration { declaredType, .. } => Kind::Enumeration(items(declaredType)),
+                T::Enumeration { declaredType, .. } => Kind::Enumeration(
+                    types
+                        .get(declaredType.as_str())
+                        .map_or_else(Vec::new, items),
+                ),
             },
             causality: match variable.causality {
                 C::Parameter => Causality::Parameter,
@@ -187,4 +196,46 @@ fn state_pairs(file: &fmi2::ModelDescription) -> Option<Vec<(u32, u32)>> {
         Some((state.valueReference, rate.valueReference))
     };
     file.derivatives.iter().map(pair).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `fmi-rs` 0.3 alone finds the first type and no other.
+    #[test]
+    fn every_declared_type_is_read() {
+        let text = r#"<fmiModelDescription fmiVersion="2.0" modelName="m" guid="g">
+            <CoSimulation modelIdentifier="m"/>
+            <TypeDefinitions>
+              <SimpleType name="Length"><Real unit="m" displayUnit="mm" relativeQuantity="true"/></SimpleType>
+              <SimpleType name="Gear"><Enumeration>
+                <Item name="low" value="1" description="slow"/><Item name="high" value="2"/>
+              </Enumeration></SimpleType>
+              <SimpleType name="Stroke"><Real unit="km"/></SimpleType>
+            </TypeDefinitions>
+            <ModelVariables>
+              <ScalarVariable name="gear" valueReference="0"><Enumeration declaredType="Gear" start="1"/></ScalarVariable>
+              <ScalarVariable name="stroke" valueReference="1"><Real declaredType="Stroke"/></ScalarVariable>
+              <ScalarVariable name="length" valueReference="2"><Real declaredType="Length"/></ScalarVariable>
+            </ModelVariables>
+            <ModelStructure/>
+          </fmiModelDescription>"#;
+        let document = roxmltree::Document::parse(text).unwrap();
+        let description = read(text, document.root_element(), false).unwrap();
+        let [gear, stroke, length] = &description.variables[..] else {
+            panic!("{:?}", description.variables);
+        };
+        let Kind::Enumeration(items) = &gear.kind else {
+            panic!("{:?}", gear.kind);
+        };
+        let items: Vec<(&str, i64, &str)> = items
+            .iter()
+            .map(|item| (item.name.as_str(), item.value, item.description.as_str()))
+            .collect();
+        assert_eq!(items, [("low", 1, "slow"), ("high", 2, "")]);
+        assert_eq!(stroke.unit.as_deref(), Some("km"));
+        assert_eq!(length.unit.as_deref(), Some("m"));
+        assert_eq!(length.display_unit.as_deref(), Some("mm"));
+    }
 }

@@ -310,7 +310,7 @@ pub(super) fn read(
                 "the attribute fmiVersion is missing, expected \"2.0\" or \"3.0\"".to_string(),
             ));
         }
-        Some("2.0") => fmi2::read(&text, exchange).map_err(wrong)?,
+        Some("2.0") => fmi2::read(&text, root, exchange).map_err(wrong)?,
         Some(version) if version.starts_with("3.") => {
             fmi3::read(&text, sizes, exchange).map_err(wrong)?
         }
