@@ -93,7 +93,7 @@ impl Coupler {
         let [lower, upper] = self.levers();
         let sine = (strokes[0] - strokes[1]) / (upper - lower);
         // Not a number is refused, too.
-        if !(sine.abs() <= 1.0) {
+        if sine.is_nan() || sine.abs() > 1.0 {
             return Err(ModelError::Parameter {
                 name: "stroke difference",
                 value: strokes[0] - strokes[1],

@@ -173,11 +173,10 @@ fn cost(square: &[f64]) -> f64 {
     square.iter().map(|square| square.max(1e-60).ln()).sum()
 }
 
+type Linearized = (DMatrix<f64>, Vec<Vec<f64>>, Vec<f64>);
+
 /// What `recording` leaves of a shape: coefficients, residuals, mean squares.
-fn evaluate(
-    recording: &Recording,
-    shape: &Shape,
-) -> Option<(DMatrix<f64>, Vec<Vec<f64>>, Vec<f64>)> {
+fn evaluate(recording: &Recording, shape: &Shape) -> Option<Linearized> {
     let (linear, residuals) = regress(&columns(recording, shape), &recording.strokes)?;
     let square: Vec<f64> = residuals.iter().map(|own| mean_square(own)).collect();
     square

@@ -83,7 +83,7 @@ fn check(recording: &Recording) -> Result<(), Error> {
     let dot = |i: usize, j: usize| -> f64 {
         centred[i].iter().zip(&centred[j]).map(|(a, b)| a * b).sum()
     };
-    if let Some(i) = (0..m).find(|&i| !(dot(i, i) > 0.0)) {
+    if let Some(i) = (0..m).find(|&i| dot(i, i).is_nan() || dot(i, i) <= 0.0) {
         return refused(format!(
             "`command_{}` does not move; move every actuator in the recording",
             i + 1

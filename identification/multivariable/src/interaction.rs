@@ -57,7 +57,8 @@ pub fn interaction(model: &Model) -> Result<Interaction, String> {
     let n = model.actuators();
     let gain = DMatrix::from_fn(n, n, |i, j| model.static_gain[i][j]);
     let singular = gain.clone().svd(false, false).singular_values;
-    if !(singular.min() > 1e-3 * singular.max()) {
+    let (least, largest) = (singular.min(), singular.max());
+    if least.is_nan() || largest.is_nan() || least <= 1e-3 * largest {
         return Err(format!(
             "the static gain cannot be inverted (singular values {:.3e} and {:.3e}): the commands move the strokes alike; \
              check whether two sensors or two commands are the same",
@@ -85,7 +86,7 @@ pub fn interaction(model: &Model) -> Result<Interaction, String> {
     let decoupled = grid(24, 0.05, nyquist / 4.0)
         .filter_map(|crossover| closed(model, &inverse, &frequencies, crossover))
         .filter(|own| own.simultaneous >= KEPT)
-        .last();
+        .next_back();
     Ok(Interaction {
         relative_gain_at_rest: rows(&gain.component_mul(&inverse.transpose())),
         points,

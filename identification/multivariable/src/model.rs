@@ -115,7 +115,7 @@ impl Model {
         if let Some([re, _]) = self
             .poles_rad_s
             .iter()
-            .find(|[re, im]| !(*re < 0.0) || !im.is_finite())
+            .find(|[re, im]| re.is_nan() || *re >= 0.0 || !im.is_finite())
         {
             return Err(format!(
                 "`poles_rad_s`: a real part of {re} is not stable; expected negative ones"

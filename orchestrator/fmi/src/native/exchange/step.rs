@@ -13,6 +13,8 @@ pub(super) struct Start<'a> {
 }
 
 /// What came of trying a step.
+// Moved once per step; a box would allocate in each.
+#[allow(clippy::large_enum_variant)]
 pub(super) enum Trial {
     Taken(Taken),
     /// Too large; one of this size may do.

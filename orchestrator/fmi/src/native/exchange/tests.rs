@@ -8,13 +8,16 @@ use crate::call::Values;
 
 type Slope = fn(f64, &[f64], &mut [f64]);
 
+/// `J e_i` at a point.
+type Directional = fn(&[f64], usize, &mut [f64]);
+
 /// A system of equations that answers as an FMU does.
 struct Equations {
     slope: Slope,
     /// A state that makes an event where it crosses this value.
     event: Option<(usize, f64)>,
     /// Directional derivatives, whether right or not.
-    directional: Option<fn(&[f64], usize, &mut [f64])>,
+    directional: Option<Directional>,
     states: Vec<f64>,
     time: f64,
     kept: Vec<Vec<f64>>,
@@ -73,7 +76,7 @@ impl Solved {
         slope: Slope,
         states: &[f64],
         event: Option<(usize, f64)>,
-        directional: Option<fn(&[f64], usize, &mut [f64])>,
+        directional: Option<Directional>,
     ) -> Self {
         let evaluations = Arc::new(AtomicUsize::new(0));
         let fmu = Equations {
