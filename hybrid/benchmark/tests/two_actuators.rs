@@ -53,7 +53,8 @@ fn the_loop_through_the_master_is_the_run_without_fmi() {
         "plant.seed=7",
         "control.law=decentralised_adaptive",
     ];
-    let cases: [(&str, FmiVersion, &[&str], u64, Box<dyn Law>); 3] = [
+    type Case<'a> = (&'a str, FmiVersion, &'a [&'a str], u64, Box<dyn Law>);
+    let cases: [Case<'_>; 3] = [
         (
             "two-actuators",
             FmiVersion::V3,

@@ -85,8 +85,7 @@ pub fn interaction(model: &Model) -> Result<Interaction, String> {
     let frequencies: Vec<f64> = grid(FREQUENCIES, 1e-3 * fastest, 20.0 * fastest).collect();
     let decoupled = grid(24, 0.05, nyquist / 4.0)
         .filter_map(|crossover| closed(model, &inverse, &frequencies, crossover))
-        .filter(|own| own.simultaneous >= KEPT)
-        .next_back();
+        .rfind(|own| own.simultaneous >= KEPT);
     Ok(Interaction {
         relative_gain_at_rest: rows(&gain.component_mul(&inverse.transpose())),
         points,

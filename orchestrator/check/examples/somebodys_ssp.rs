@@ -39,5 +39,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, value) in outcome.record.columns.iter().zip(last) {
         println!("{name:40} {value}");
     }
-    Ok(println!("{}", outcome.ended.message()))
+    println!("{}", outcome.ended.message());
+    Ok(())
 }

@@ -14,6 +14,9 @@ use fmi_system::{Files, SystemFile, assemble};
 const STEP: f64 = 0.01;
 
 /// Steps the FMU to `stop`, s.
+///
+/// # Errors
+/// An FMU that cannot be read or simulated.
 pub fn run(fmu: &Path, stop: f64) -> Result<Outcome, Box<dyn Error>> {
     let file = SystemFile::of_fmu(fmu);
     let system = assemble(&file, &[], &mut Files::of(&file))?;
@@ -37,5 +40,6 @@ fn main() -> Result<(), Box<dyn Error>> {
             row.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
         );
     }
-    Ok(println!("{}", outcome.ended.message()))
+    println!("{}", outcome.ended.message());
+    Ok(())
 }

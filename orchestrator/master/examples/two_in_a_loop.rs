@@ -23,6 +23,9 @@ parameters = { "A[1,1]" = 0, "D[1,1]" = 0 }
 "#;
 
 /// The signals up to `stop`, s, with a coupling step of `step`, s.
+///
+/// # Errors
+/// An FMU that cannot be read or simulated.
 pub fn run(fmu: &Path, step: f64, stop: f64) -> Result<Record, Box<dyn Error>> {
     let text = SYSTEM.replace("FMU", &fmu.display().to_string());
     let file = SystemFile::parse("oscillator", &text)?;

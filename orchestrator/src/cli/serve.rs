@@ -168,7 +168,7 @@ pub fn execute(arguments: &Arguments, units: Option<&str>) -> Result<ExitCode, E
             Event::TurnedAway { peer, reason } => eprintln!("{peer} was turned away: {reason}"),
             Event::Step(step) => {
                 if let Some(watched) = &mut watched {
-                    watched.step(&step);
+                    watched.step(step);
                 }
             }
         },
