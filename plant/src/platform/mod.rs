@@ -128,7 +128,8 @@ impl Platform {
         Ok(platform)
     }
 
-    /// Reads a platform from text: see [`text`] for the forms of `points`, `lines` and `free`.
+    /// Reads a platform from text: places as `"0.27 -0.13 0; 0.27 0.13 0"`, one actuator behind each semicolon, and axes as
+    /// `"x rz"`. Give either `bases` or `directions`.
     ///
     /// # Errors
     /// Words that are not understood, and as [`Platform::new`].
