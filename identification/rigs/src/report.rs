@@ -414,7 +414,9 @@ impl From<&RigDiagnosis> for DiagnosisReport {
                 };
                 (p.name.clone(), report)
             });
-            let own = part.effects.iter().find(|one| one.effect == *name);
+            // What one part alone proposes is tested on the other.
+            let all = part.effects.iter().chain(&found.swapped.effects);
+            let own = all.into_iter().find(|one| one.effect == *name);
             EffectReport {
                 effect: name.clone(),
                 parameters: parameters.collect(),

@@ -117,7 +117,16 @@ fn the_drive_has_asymmetric_friction() {
 fn the_axis_without_its_controller_has_the_same_asymmetric_friction() {
     let report = report("emps");
     assert_eq!(report.verdict, Verdict::Named);
-    assert_eq!(report.named, ["asymmetric_friction"]);
+    // The slope along the travel takes a sixth of what the asymmetry leaves on data not fitted.
+    names(&report, &["asymmetric_friction"]);
+    assert!(
+        report
+            .named
+            .iter()
+            .all(|name| name == "asymmetric_friction" || name == "position_dependent_friction"),
+        "{:?}",
+        report.named
+    );
     // In windows of 0.3 s, of the position's variation.
     for error in [report.confirmed.error, report.confirmed.swapped_error] {
         assert!(error < 1.5e-3, "{error}");

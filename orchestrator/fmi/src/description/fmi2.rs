@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use fmi_rs::model_description::fmi2;
 use roxmltree::Node;
 
-use super::structure::Dependencies;
+use super::structure::{Dependencies, units};
 use super::{
-    BaseUnit, Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable,
+    Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable,
     default_stop, preferred_step,
 };
 
@@ -39,11 +39,7 @@ fn items(declared: &Node) -> Vec<Item> {
 pub(super) fn read(text: &str, root: Node, exchange: bool) -> Result<Description, String> {
     let file = fmi2::ModelDescription::from_string(text).map_err(|error| error.to_string())?;
     let types = types(root);
-    let units: HashMap<&str, _> = file
-        .unitDefintions
-        .iter()
-        .map(|unit| (unit.name.as_str(), unit))
-        .collect();
+    let units = units(root);
     let mut variables = Vec::with_capacity(file.modelVariables.len());
     for variable in &file.modelVariables {
         use fmi2::{Causality as C, Initial as I, Variability as V, VariableType as T};
@@ -103,8 +99,8 @@ pub(super) fn read(text: &str, root: Node, exchange: bool) -> Result<Description
             },
             base_unit: unit
                 .as_deref()
-                .and_then(|unit| units.get(unit)?.baseUnit.as_ref())
-                .map(|base| BaseUnit::new(base, is_relative)),
+                .and_then(|unit| units.get(unit))
+                .map(|base| base.of_variable(is_relative)),
             unit,
             display_unit,
             start,
@@ -202,11 +198,16 @@ fn state_pairs(file: &fmi2::ModelDescription) -> Option<Vec<(u32, u32)>> {
 mod tests {
     use super::*;
 
-    /// `fmi-rs` 0.3 alone finds the first type and no other.
+    /// `fmi-rs` 0.3 alone finds the first type and no other, and no unit.
     #[test]
-    fn every_declared_type_is_read() {
+    fn every_declared_type_and_unit_is_read() {
         let text = r#"<fmiModelDescription fmiVersion="2.0" modelName="m" guid="g">
             <CoSimulation modelIdentifier="m"/>
+            <UnitDefinitions>
+              <Unit name="m"><BaseUnit m="1"/></Unit>
+              <Unit name="km"><BaseUnit m="1" factor="1000"/></Unit>
+              <Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>
+            </UnitDefinitions>
             <TypeDefinitions>
               <SimpleType name="Length"><Real unit="m" displayUnit="mm" relativeQuantity="true"/></SimpleType>
               <SimpleType name="Gear"><Enumeration>
@@ -218,12 +219,14 @@ mod tests {
               <ScalarVariable name="gear" valueReference="0"><Enumeration declaredType="Gear" start="1"/></ScalarVariable>
               <ScalarVariable name="stroke" valueReference="1"><Real declaredType="Stroke"/></ScalarVariable>
               <ScalarVariable name="length" valueReference="2"><Real declaredType="Length"/></ScalarVariable>
+              <ScalarVariable name="oil" valueReference="3"><Real unit="degC"/></ScalarVariable>
+              <ScalarVariable name="rise" valueReference="4"><Real unit="degC" relativeQuantity="true"/></ScalarVariable>
             </ModelVariables>
             <ModelStructure/>
           </fmiModelDescription>"#;
         let document = roxmltree::Document::parse(text).unwrap();
         let description = read(text, document.root_element(), false).unwrap();
-        let [gear, stroke, length] = &description.variables[..] else {
+        let [gear, stroke, length, oil, rise] = &description.variables[..] else {
             panic!("{:?}", description.variables);
         };
         let Kind::Enumeration(items) = &gear.kind else {
@@ -237,5 +240,12 @@ mod tests {
         assert_eq!(stroke.unit.as_deref(), Some("km"));
         assert_eq!(length.unit.as_deref(), Some("m"));
         assert_eq!(length.display_unit.as_deref(), Some("mm"));
+        let base = |variable: &Variable| {
+            let unit = variable.base_unit.unwrap();
+            (unit.exponents[1], unit.exponents[4], unit.factor, unit.offset)
+        };
+        assert_eq!(base(stroke), (1, 0, 1000.0, 0.0));
+        assert_eq!(base(oil), (0, 1, 1.0, 273.15));
+        assert_eq!(base(rise), (0, 1, 1.0, 0.0));
     }
 }

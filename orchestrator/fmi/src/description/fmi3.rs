@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use fmi_rs::model_description::fmi3;
+use roxmltree::Node;
 
-use super::structure::{Dependencies, MOST_ELEMENTS, element_names};
+use super::structure::{Dependencies, MOST_ELEMENTS, element_names, units};
 use super::{
     BaseUnit, Causality, Description, FmiVersion, InputClock, Interface, Item, Kind, Sizes, Ticks,
     Variability, Variable, default_stop, preferred_step,
@@ -12,18 +13,19 @@ use super::{
 
 /// Reads the text; structural parameters take the values in `sizes`, if given. `exchange`: model exchange
 /// goes before co-simulation.
-pub(super) fn read(text: &str, sizes: &Sizes, exchange: bool) -> Result<Description, String> {
+pub(super) fn read(
+    text: &str,
+    root: Node,
+    sizes: &Sizes,
+    exchange: bool,
+) -> Result<Description, String> {
     let file = fmi3::ModelDescription::from_string(text).map_err(|error| error.to_string())?;
     let types: HashMap<&str, &fmi3::TypeDefinition> = file
         .typeDefinitions
         .iter()
         .map(|known| (known.name(), known))
         .collect();
-    let units: HashMap<&str, _> = file
-        .unitDefinitions
-        .iter()
-        .map(|unit| (unit.name.as_str(), unit))
-        .collect();
+    let units = units(root);
     let structural: HashMap<u32, &fmi3::ModelVariable> = file
         .modelVariables
         .iter()
@@ -250,7 +252,7 @@ fn starts(variable: &fmi3::ModelVariable, count: usize) -> Vec<Option<String>> {
 fn scalar(
     variable: &fmi3::ModelVariable,
     types: &HashMap<&str, &fmi3::TypeDefinition>,
-    units: &HashMap<&str, &fmi_rs::model_description::Unit>,
+    units: &HashMap<&str, BaseUnit>,
 ) -> Variable {
     use fmi3::{Causality as C, Initial as I, Variability as V, VariableType as T};
     let items = |declared: &str| match types.get(declared) {
@@ -344,8 +346,8 @@ fn scalar(
         },
         base_unit: unit
             .as_deref()
-            .and_then(|unit| units.get(unit)?.baseUnit.as_ref())
-            .map(|base| BaseUnit::new(base, is_relative)),
+            .and_then(|unit| units.get(unit))
+            .map(|base| base.of_variable(is_relative)),
         unit,
         display_unit,
         start: None,

@@ -312,7 +312,7 @@ pub(super) fn read(
         }
         Some("2.0") => fmi2::read(&text, root, exchange).map_err(wrong)?,
         Some(version) if version.starts_with("3.") => {
-            fmi3::read(&text, sizes, exchange).map_err(wrong)?
+            fmi3::read(&text, root, sizes, exchange).map_err(wrong)?
         }
         Some("1.0") => {
             let tool = root.attribute("generationTool");

@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use roxmltree::Node;
+
 use super::{Causality, Description, Variable};
 
 /// A unit in SI: `value_si = factor value + offset`.
@@ -17,15 +19,47 @@ pub struct BaseUnit {
 }
 
 impl BaseUnit {
-    /// Of `fmi-rs`; differences of a quantity have no offset. A radian is a number here, so that
-    /// `rpm` fits `rad/s` whether or not it is declared as an angle.
-    pub(super) fn new(base: &fmi_rs::model_description::BaseUnit, is_relative: bool) -> Self {
-        Self {
-            exponents: [base.kg, base.m, base.s, base.A, base.K, base.mol, base.cd],
-            factor: base.factor,
-            offset: if is_relative { 0.0 } else { base.offset },
+    /// Attributes of a `<BaseUnit>`; none where one of them is not a number. A radian is a number here, so that `rpm`
+    /// fits `rad/s` whether or not it is declared as an angle.
+    fn read(base: Node) -> Option<Self> {
+        let mut exponents = [0; 7];
+        for (exponent, name) in exponents.iter_mut().zip(["kg", "m", "s", "A", "K", "mol", "cd"]) {
+            if let Some(text) = base.attribute(name) {
+                *exponent = text.trim().parse().ok()?;
+            }
         }
+        let number = |name, absent| match base.attribute(name) {
+            Some(text) => text.trim().parse().ok(),
+            None => Some(absent),
+        };
+        Some(Self {
+            exponents,
+            factor: number("factor", 1.0)?,
+            offset: number("offset", 0.0)?,
+        })
     }
+
+    /// The unit of a variable; differences of a quantity have no offset.
+    pub(super) fn of_variable(self, is_relative: bool) -> Self {
+        let offset = if is_relative { 0.0 } else { self.offset };
+        Self { offset, ..self }
+    }
+}
+
+/// Units that a description of either version defines in terms of SI. `fmi-rs` 0.3 finds none in FMI 2.0: it looks for
+/// `UnitDefintions`.
+pub(super) fn units<'a>(root: Node<'a, 'a>) -> HashMap<&'a str, BaseUnit> {
+    root.children()
+        .filter(|node| node.has_tag_name("UnitDefinitions"))
+        .flat_map(|node| node.children())
+        .filter(|node| node.has_tag_name("Unit"))
+        .filter_map(|unit| {
+            let base = unit
+                .children()
+                .find(|node| node.has_tag_name("BaseUnit"))?;
+            Some((unit.attribute("name")?, BaseUnit::read(base)?))
+        })
+        .collect()
 }
 
 /// The largest number of elements that the arrays of an FMU may have together.
