@@ -7,8 +7,8 @@ use roxmltree::Node;
 
 use super::structure::{Dependencies, units};
 use super::{
-    Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable,
-    default_stop, preferred_step,
+    Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable, default_stop,
+    preferred_step,
 };
 
 /// Declared types by name: the element of each that says its kind. `fmi-rs` reads only the first type.
@@ -242,7 +242,12 @@ mod tests {
         assert_eq!(length.display_unit.as_deref(), Some("mm"));
         let base = |variable: &Variable| {
             let unit = variable.base_unit.unwrap();
-            (unit.exponents[1], unit.exponents[4], unit.factor, unit.offset)
+            (
+                unit.exponents[1],
+                unit.exponents[4],
+                unit.factor,
+                unit.offset,
+            )
         };
         assert_eq!(base(stroke), (1, 0, 1000.0, 0.0));
         assert_eq!(base(oil), (0, 1, 1.0, 273.15));

@@ -23,7 +23,10 @@ impl BaseUnit {
     /// fits `rad/s` whether or not it is declared as an angle.
     fn read(base: Node) -> Option<Self> {
         let mut exponents = [0; 7];
-        for (exponent, name) in exponents.iter_mut().zip(["kg", "m", "s", "A", "K", "mol", "cd"]) {
+        for (exponent, name) in exponents
+            .iter_mut()
+            .zip(["kg", "m", "s", "A", "K", "mol", "cd"])
+        {
             if let Some(text) = base.attribute(name) {
                 *exponent = text.trim().parse().ok()?;
             }
@@ -54,9 +57,7 @@ pub(super) fn units<'a>(root: Node<'a, 'a>) -> HashMap<&'a str, BaseUnit> {
         .flat_map(|node| node.children())
         .filter(|node| node.has_tag_name("Unit"))
         .filter_map(|unit| {
-            let base = unit
-                .children()
-                .find(|node| node.has_tag_name("BaseUnit"))?;
+            let base = unit.children().find(|node| node.has_tag_name("BaseUnit"))?;
             Some((unit.attribute("name")?, BaseUnit::read(base)?))
         })
         .collect()
