@@ -15,6 +15,7 @@
 //! - A residual `r` or an acceleration that changes at once by more than sensors can is a wrong sample: the
 //!   observer's prediction takes its place, for at most a bridge time.
 //! - A `d` that lasts is an accelerometer that is frozen, reversed, offset or wrongly scaled, or a displacement that is.
+//!   It is not judged where the acceleration jumps from sample to sample, as in a loop that chatters.
 
 use std::f64::consts::TAU;
 
@@ -127,6 +128,8 @@ pub struct VoteMemory {
     lagged: [f64; 2],
     /// Means of the difference, of its square and of the motion's square.
     means: [f64; 3],
+    /// Time left until the means go on after an acceleration that jumped, s.
+    unsettled: f64,
     /// Mean square difference of the measured velocity and the observer's.
     velocity: f64,
     /// Whether the measured velocity still has a wrong displacement in it.
@@ -186,6 +189,11 @@ impl SensorVote {
         for state in &mut m.lagged {
             *state += (1.0 - pole) * (lagged - *state);
             lagged = *state;
+        }
+        // What jumps from sample to sample, as in a loop that chatters, says nothing about a second derivative.
+        if m.unsettled > 0.0 {
+            m.unsettled -= period;
+            return false;
         }
         let motion = lagged + difference;
         let weight = period / (period + self.averaging_time);
@@ -249,6 +257,9 @@ impl Controller for SensorVote {
         // The acceleration: one that jumps waits for a second opinion.
         let jumps = (y.acceleration - m.acceleration).abs() > self.acceleration_jump;
         let replaces = numbers && jumps && within(m.replaced[1]);
+        if numbers && jumps {
+            m.unsettled = self.averaging_time;
+        }
         let predicted_by = m.acceleration;
         if numbers && !replaces {
             m.acceleration = y.acceleration;

@@ -112,3 +112,27 @@ fn a_scale_that_is_a_fifth_off_and_a_small_offset_are_tolerated() {
         assert!(!voted.disagree);
     }
 }
+
+#[test]
+fn an_acceleration_that_jumps_from_sample_to_sample_is_not_a_contradiction() {
+    // A loop that chatters: 3 g one way and the other, with the half period's displacement of 1 um.
+    let chatter = |k: u32, input: &mut VoteInput| {
+        let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        if k >= 200 {
+            input.measured.acceleration += sign * 3.0 * G;
+            input.measured.displacement -= sign * 1e-6;
+        }
+    };
+    assert!(run(1000, 1.0, chatter).iter().all(|voted| !voted.disagree));
+    // Once it is over, a reversed accelerometer is noticed.
+    let then_reversed = |k: u32, input: &mut VoteInput| {
+        if k < 600 {
+            chatter(k, input);
+        } else {
+            input.measured.acceleration *= -1.0;
+        }
+    };
+    let all = run(1500, 1.0, then_reversed);
+    assert!(all[..600].iter().all(|voted| !voted.disagree));
+    assert!(all[600..].iter().any(|voted| voted.disagree));
+}

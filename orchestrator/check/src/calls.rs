@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::Findings;
+use super::{Findings, derivatives};
 use fmi_import::{
     Datum, Fmu, Instance, Interface, Isolation, Kind, Options, Processes, Progress, State, Variable,
 };
@@ -42,10 +42,11 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, guest: Option<&Path
     two_at_once(findings, fmu, &options, &first);
     from_a_state(findings, fmu, &options);
     out_of_order(findings, fmu, &options);
+    derivatives::check(findings, fmu, &options);
 }
 
 /// Step size and, where it is known, the end, s.
-fn plan(fmu: &Fmu) -> (f64, f64) {
+pub(super) fn plan(fmu: &Fmu) -> (f64, f64) {
     let description = &fmu.description;
     let stop = description.default_stop;
     let step = description.preferred_step;
@@ -57,7 +58,7 @@ fn plan(fmu: &Fmu) -> (f64, f64) {
     }
 }
 
-fn instance(fmu: &Arc<Fmu>, options: &Options) -> Result<Instance, String> {
+pub(super) fn instance(fmu: &Arc<Fmu>, options: &Options) -> Result<Instance, String> {
     let mut processes = Processes::new(options);
     Instance::within(fmu, "validated", &mut processes, true).map_err(|error| error.to_string())
 }

@@ -4,6 +4,7 @@
 
 mod archive;
 mod calls;
+mod derivatives;
 mod reference;
 mod rules;
 mod schema;

@@ -20,10 +20,12 @@ const STEP: f64 = 0.01;
 pub fn run(fmu: &Path, stop: f64) -> Result<Outcome, Box<dyn Error>> {
     let file = SystemFile::of_fmu(fmu);
     let system = assemble(&file, &[], &mut Files::of(&file))?;
-    let plan = Plan::fixed(STEP, stop);
+    // A row at `stop`, too.
+    let rows = (stop / STEP).round() as usize + 1;
+    let plan = Plan::fixed(STEP, rows as f64 * STEP);
     let simulation =
         Simulation::planned(&system, &Samples::none(STEP), &plan, &Default::default())?;
-    Ok(simulation.run((stop / STEP) as usize + 1, Pace::Fastest, &mut |_| {}))
+    Ok(simulation.run(rows, Pace::Fastest, &mut |_| {}))
 }
 
 #[allow(dead_code, reason = "a test uses `run` alone")]

@@ -41,7 +41,7 @@ fn two_integrators_in_a_loop_oscillate() {
         let record = two_in_a_loop::run(Path::new(&fmu), step, 3.0).unwrap();
         let x = record.column("first.y[1]").unwrap();
         let errors = x.iter().enumerate();
-        let errors = errors.map(|(n, x)| (-x - (step * n as f64).cos()).abs());
+        let errors = errors.map(|(n, x)| (-x - (step * n as f64).sin()).abs());
         errors.fold(0.0, f64::max)
     };
     let [coarse, fine] = [0.1, 0.05].map(error);

@@ -310,3 +310,23 @@ fn a_master_of_jacobi_s_order_delays_where_the_others_solve() {
     let [a, ..] = run.last.unwrap();
     assert!((a - 4.0 / 3.0).abs() < 1e-9, "{a}");
 }
+
+#[test]
+fn a_false_claim_of_derivatives_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |derivatives| {
+        let offer = Offer {
+            derivatives,
+            ..NONE
+        };
+        pack(folder.path(), "ring", offer);
+        let validated = shakebench(folder.path(), &["validate", "ring.fmu"]);
+        crate::stdout(&validated)
+    };
+    let text = said(3);
+    let words = "the derivative of `y` by `u` is given as -1.000000, and differences of its values are 1.000000";
+    assert!(text.contains(words), "{text}");
+    let text = said(1);
+    assert!(text.contains("derivatives against differences"), "{text}");
+    assert!(!text.contains("is given as"), "{text}");
+}
