@@ -26,6 +26,7 @@ fn rest(step: f64, samples: usize) -> Motion {
         acceleration: vec![0.0; samples],
         notes: Vec::new(),
         seed: None,
+        across: None,
     }
 }
 

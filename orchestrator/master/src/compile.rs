@@ -119,7 +119,11 @@ impl Simulation {
         };
         let mut reference = Reference::new(motion, &system.tables);
         // A system without a motion has no columns of one.
-        for quantity in Quantity::ALL.into_iter().filter(|_| !motion.is_empty()) {
+        for quantity in Quantity::ALL
+            .into_iter()
+            .take(motion.columns.len())
+            .filter(|_| !motion.is_empty())
+        {
             reference.tap(quantity, 0);
         }
         for connection in &system.connections {

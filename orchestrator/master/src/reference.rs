@@ -16,7 +16,8 @@ pub(super) struct Reference {
     spans: Vec<Span>,
     /// How many taps the spans were made of.
     planned: usize,
-    /// Displacement, velocity and acceleration, where somebody outside says them.
+    /// Displacement, velocity and acceleration along the first axis, where somebody outside says them; a second
+    /// axis rests then.
     now: Option<[f64; 3]>,
 }
 
@@ -147,7 +148,7 @@ impl Reference {
                 history.map_or((&[][..], 0.0), |own| (&own.values[..], own.after));
             let signals = &mut signals[span.first..span.first + span.count];
             if let Some(now) = self.now {
-                signals.fill(now[span.history]);
+                signals.fill(now.get(span.history).copied().unwrap_or(0.0));
                 continue;
             }
             let from = sample.checked_add_signed(span.ahead);

@@ -15,8 +15,8 @@ pub struct Column {
 pub struct Samples {
     /// Time between two samples, s.
     pub period: f64,
-    /// The histories, in the order of [`Quantity::ALL`](fmi_system::Quantity::ALL); none where
-    /// the system follows nothing.
+    /// The histories, in the order of [`Quantity::ALL`](fmi_system::Quantity::ALL): three of one axis,
+    /// six of two; none where the system follows nothing.
     pub columns: Vec<Column>,
 }
 

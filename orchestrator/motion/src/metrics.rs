@@ -251,6 +251,7 @@ mod tests {
             acceleration,
             notes: Vec::new(),
             seed: None,
+            across: None,
         }
     }
 

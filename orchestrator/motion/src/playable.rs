@@ -17,6 +17,8 @@ pub struct Motion {
     pub notes: Vec<String>,
     /// The seed, when the motion was generated.
     pub seed: Option<u64>,
+    /// The motion along a second axis at the same time, as long as this one.
+    pub across: Option<Box<Motion>>,
 }
 
 impl Motion {
@@ -42,6 +44,43 @@ impl Motion {
     #[must_use]
     pub fn peak_acceleration(&self) -> f64 {
         peak(&self.acceleration)
+    }
+
+    /// The motion with `across` along a second axis; the shorter of the two rests at its end.
+    #[must_use]
+    pub fn along_two_axes(mut self, mut across: Self) -> Self {
+        let samples = self.len().max(across.len());
+        self.rest_until(samples);
+        across.rest_until(samples);
+        self.across = Some(Box::new(across));
+        self
+    }
+
+    /// Nothing but rest, as long as this motion.
+    #[must_use]
+    pub fn at_rest(&self) -> Self {
+        let rest = || vec![0.0; self.len()];
+        Self {
+            name: "rest".to_string(),
+            dt: self.dt,
+            displacement: rest(),
+            velocity: rest(),
+            acceleration: rest(),
+            notes: Vec::new(),
+            seed: None,
+            across: None,
+        }
+    }
+
+    /// Rests from its end until it has so many samples, along both axes.
+    pub fn rest_until(&mut self, samples: usize) {
+        let last = self.displacement.last().copied().unwrap_or(0.0);
+        self.displacement.resize(samples, last);
+        self.velocity.resize(samples, 0.0);
+        self.acceleration.resize(samples, 0.0);
+        if let Some(across) = &mut self.across {
+            across.rest_until(samples);
+        }
     }
 
     /// Largest absolute velocity, m/s.

@@ -77,9 +77,35 @@ impl Unscaled {
     /// # Errors
     /// A motion beyond the stroke, a record at rest.
     pub fn scaled(&self, options: &Options) -> Result<Motion, MotionError> {
-        let [displacement, velocity, acceleration] = &self.histories;
         let scaling = options.scaling.unwrap_or(Options::DEFAULT_SCALING);
-        let factor = scaling.factor(&self.name, peak(acceleration), peak(displacement))?;
+        self.scaled_by(self.factor(scaling)?, &scaling.describe(), options)
+    }
+
+    /// This motion with `other` along a second axis, both at one scale: with limits the largest at which both
+    /// keep them, with a peak that at which the larger component has it.
+    ///
+    /// # Errors
+    /// As [`Unscaled::scaled`], of either.
+    pub fn pair_scaled(&self, other: &Self, options: &Options) -> Result<Motion, MotionError> {
+        let scaling = options.scaling.unwrap_or(Options::DEFAULT_SCALING);
+        let factor = self.factor(scaling)?.min(other.factor(scaling)?);
+        let words = format!("{}, as the other axis", scaling.describe());
+        let [own, other] = [self, other].map(|one| one.scaled_by(factor, &words, options));
+        Ok(own?.along_two_axes(other?))
+    }
+
+    fn factor(&self, scaling: Scaling) -> Result<f64, MotionError> {
+        let [displacement, _, acceleration] = &self.histories;
+        scaling.factor(&self.name, peak(acceleration), peak(displacement))
+    }
+
+    fn scaled_by(
+        &self,
+        factor: f64,
+        words: &str,
+        options: &Options,
+    ) -> Result<Motion, MotionError> {
+        let [displacement, velocity, acceleration] = &self.histories;
         let scaled = |history: &[f64]| history.iter().map(|value| value * factor).collect();
         let mut motion = Motion {
             name: self.name.clone(),
@@ -89,10 +115,11 @@ impl Unscaled {
             acceleration: scaled(acceleration),
             notes: self.notes.clone(),
             seed: self.seed,
+            across: None,
         };
         motion.notes.push(format!(
             "scaled by {factor:.4} ({}): peak {:.3} g, {:.2} in/s ({:.1} mm/s), {:.3} in ({:.2} mm)",
-            scaling.describe(),
+            words,
             motion.peak_acceleration() / STANDARD_GRAVITY,
             peak(&motion.velocity) / INCH,
             1e3 * peak(&motion.velocity),

@@ -81,6 +81,7 @@ pub fn load_reference(path: &Path, options: &Options) -> Result<Motion, MotionEr
         acceleration,
         notes,
         seed: None,
+        across: None,
     };
     let factor = match options.scaling {
         Some(Scaling::Factor(factor)) => factor,

@@ -186,6 +186,7 @@ impl Series {
                     .into(),
             ],
             seed: None,
+            across: None,
         };
         Matched {
             ratios: twelfths(rule, &motion.acceleration, dt),

@@ -154,6 +154,7 @@ pub fn excitation(search: &Search, how: Excitation, seed: u64, dt: f64, most: f6
         acceleration,
         notes: Vec::new(),
         seed: (how == Excitation::Random).then_some(seed),
+        across: None,
     }
 }
 

@@ -39,9 +39,16 @@ pub struct Arguments {
     /// Records, or folders of them [default: the built-in motion with eight seeds]
     #[arg(long, value_name = "FILE|DIR", num_args = 1.., conflicts_with = "reference")]
     records: Vec<PathBuf>,
+    /// Records along the second axis of a biaxial table, one for each of --records in their order; without them that
+    /// axis rests
+    #[arg(long, value_name = "FILE|DIR", num_args = 1.., requires = "records")]
+    records_y: Vec<PathBuf>,
     /// Reference: .csv with time, displacement, velocity, acceleration, played as given
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
+    /// Reference along the second axis of a biaxial table
+    #[arg(long, value_name = "FILE", requires = "reference")]
+    reference_y: Option<PathBuf>,
     /// Built-in motion with this seed alone
     #[arg(long, value_name = "N", conflicts_with_all = ["records", "reference"])]
     seed: Option<u64>,
@@ -319,8 +326,10 @@ fn report_runs(
 }
 
 fn played(arguments: &Arguments) -> Result<Vec<Played>, Error> {
-    if let Some(reference) = &arguments.reference {
-        return Ok(vec![Played::Reference(reference.clone())]);
+    match (&arguments.reference, &arguments.reference_y) {
+        (Some(x), Some(y)) => return Ok(vec![Played::References([x.clone(), y.clone()])]),
+        (Some(x), None) => return Ok(vec![Played::Reference(x.clone())]),
+        (None, _) => {}
     }
     if let Some(seed) = arguments.seed {
         return Ok(vec![Played::Seed(seed)]);
@@ -328,12 +337,32 @@ fn played(arguments: &Arguments) -> Result<Vec<Played>, Error> {
     if arguments.records.is_empty() {
         return Ok((1..=8).map(Played::Seed).collect());
     }
+    let first = record_files(&arguments.records)?;
+    if arguments.records_y.is_empty() {
+        return Ok(first.into_iter().map(Played::Record).collect());
+    }
+    let second = record_files(&arguments.records_y)?;
+    if first.len() != second.len() {
+        return Err(Error::Option {
+            option: "--records-y",
+            reason: format!(
+                "{} records along y and {} along x; expected one of each for a pair",
+                second.len(),
+                first.len()
+            ),
+        });
+    }
+    let pairs = first.into_iter().zip(second);
+    Ok(pairs.map(|(x, y)| Played::Records([x, y])).collect())
+}
+
+/// The files among `records`, and those in the folders among them.
+fn record_files(records: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
     let mut found = Vec::new();
-    for path in &arguments.records {
-        if path.is_dir() {
-            found.extend(Played::records_in(path)?);
-        } else {
-            found.push(Played::Record(path.clone()));
+    for path in records {
+        match path.is_dir() {
+            true => found.extend(Played::records_in(path)?),
+            false => found.push(path.clone()),
         }
     }
     Ok(found)

@@ -37,6 +37,7 @@ pub struct Arguments {
     /// Compute the drive on this extended model from `shakebench diagnose`, instead of from runs
     #[arg(long, value_name = "MODEL.toml", requires = "system", conflicts_with_all = [
         "plant", "specimen", "tuning", "control_model", "set", "gain", "target", "exposure", "measurement_delay", "dummy_mass", "drive",
+        "record_y", "reference_y", "drive_y",
     ])]
     model: Option<PathBuf>,
     #[command(flatten)]
@@ -71,11 +72,14 @@ pub struct Arguments {
     /// Initial drive: the drive.csv of an earlier iteration
     #[arg(long, value_name = "FILE")]
     drive: Option<PathBuf>,
+    /// Initial drive along the second axis of a biaxial table: the drive_y.csv of an earlier iteration
+    #[arg(long, value_name = "FILE")]
+    drive_y: Option<PathBuf>,
     /// Recorded rounds in their order, with the drive that was played (`reference`) and the measured displacement:
     /// the next drive and its predicted error, without a run
     #[arg(long, value_name = "ROUND.csv", num_args = 1.., conflicts_with_all = [
         "model", "record", "plant", "specimen", "tuning", "control_model", "set", "iterations", "target", "exposure",
-        "measurement_delay", "dummy_mass", "drive",
+        "measurement_delay", "dummy_mass", "drive", "record_y", "reference_y", "drive_y",
     ])]
     replay: Vec<PathBuf>,
     /// Names of the columns of the rounds, one per line: `channel = "header"` or `channel = { column = "header",
@@ -269,6 +273,7 @@ fn plan(arguments: &Arguments) -> Result<Plan, Error> {
         measurement_delay: if_given("--measurement-delay", &arguments.measurement_delay, "s")?,
         dummy_mass: if_given("--dummy-mass", &arguments.dummy_mass, "kg")?,
         drive: arguments.drive.clone(),
+        drive_y: arguments.drive_y.clone(),
     })
 }
 
@@ -282,11 +287,16 @@ fn text(found: &Iteration) -> String {
         "exposure",
         "",
     ];
+    let along_y = ["measured y", "RMS error y"];
+    let is_biaxial = found.runs.iter().any(|run| run.along_y.is_some());
     let mut rows = vec![head.map(str::to_string).to_vec()];
+    if is_biaxial {
+        rows[0].splice(3..3, along_y.map(str::to_string));
+    }
     let percent =
         |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.3} %"));
     for (n, run) in found.runs.iter().enumerate() {
-        rows.push(vec![
+        let mut row = vec![
             run.iteration.to_string(),
             percent(run.measured_percent),
             percent(run.time_domain_percent),
@@ -294,7 +304,11 @@ fn text(found: &Iteration) -> String {
             percent(run.response_spectrum_percent),
             format!("{:.2}", run.exposure),
             if n == found.best { "best" } else { "" }.to_string(),
-        ]);
+        ];
+        if let Some(own) = run.along_y {
+            row.splice(3..3, [own.measured_percent, own.time_domain_percent].map(percent));
+        }
+        rows.push(row);
     }
     format!(
         "{} on {}, transfer function with a mean coherence of {:.3}\n\n{}\n{}\n",

@@ -20,9 +20,15 @@ pub struct MotionArguments {
         conflicts_with = "reference"
     )]
     pub record: Option<PathBuf>,
+    /// Ground motion along the second axis of a biaxial table, with one scale for both; without it that axis rests
+    #[arg(long, value_name = "FILE", requires = "record")]
+    pub record_y: Option<PathBuf>,
     /// Reference: .csv with time, displacement, velocity, acceleration, played as given
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
+    /// Reference along the second axis of a biaxial table
+    #[arg(long, value_name = "FILE", requires = "reference")]
+    pub reference_y: Option<PathBuf>,
     /// Scale of the motion: a factor
     #[arg(long, value_name = "FACTOR", group = "scaling")]
     pub scale: Option<f64>,

@@ -10,8 +10,8 @@ use laboratory::systems::tuning::Tuning;
 /// Options that choose a rig.
 #[derive(Debug, Clone, Default, Args)]
 pub struct RigArguments {
-    /// Plant of a built-in system: identified, servohydraulic, or a .toml file [default:
-    /// identified]
+    /// Plant of a built-in system: identified, servohydraulic, biaxial (the latter along two axes), or a .toml file
+    /// [default: identified]
     #[arg(long)]
     pub plant: Option<String>,
     /// Specimen of a built-in system: none, linear, yielding, storeys,

@@ -119,13 +119,13 @@ pub struct Arguments {
     checkpoint_every: Option<String>,
     /// Continue the run in this folder from its last checkpoint
     #[arg(long, value_name = "DIR", conflicts_with_all = [
-        "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
+        "system", "record", "record_y", "reference", "reference_y", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
         "variable_step", "least_step", "duration", "scaling", "seed", "manifest", "out", "record_every", "checkpoint_every",
     ])]
     resume: Option<PathBuf>,
     /// Repeat the run of a manifest.json and check that it agrees to the bit
     #[arg(long, value_name = "FILE", conflicts_with_all = [
-        "system", "record", "reference", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
+        "system", "record", "record_y", "reference", "reference_y", "input", "plant", "specimen", "structure", "tuning", "control_model", "set", "fmi", "algorithm", "step",
         "variable_step", "least_step", "duration", "scaling", "seed",
     ])]
     manifest: Option<PathBuf>,
@@ -433,7 +433,9 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
         tuning: arguments.rig.tuning,
         control_model: arguments.rig.control_model.as_deref().map(absolute),
         record: arguments.motion.record.as_deref().map(absolute),
+        record_y: arguments.motion.record_y.as_deref().map(absolute),
         reference: arguments.motion.reference.as_deref().map(absolute),
+        reference_y: arguments.motion.reference_y.as_deref().map(absolute),
         seed: arguments.motion.seed(),
         scaling: arguments.motion.scaling()?,
         set: arguments.set.clone(),

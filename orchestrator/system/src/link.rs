@@ -42,11 +42,41 @@ pub enum Quantity {
     Velocity,
     /// Acceleration, m/s².
     Acceleration,
+    /// Displacement along a second axis, m.
+    DisplacementY,
+    /// Velocity along a second axis, m/s.
+    VelocityY,
+    /// Acceleration along a second axis, m/s².
+    AccelerationY,
 }
 
 impl Quantity {
-    /// All of them, in the order of their results.
-    pub const ALL: [Self; 3] = [Self::Displacement, Self::Velocity, Self::Acceleration];
+    /// All of them, in the order of their results: one axis after the other.
+    pub const ALL: [Self; 6] = [
+        Self::Displacement,
+        Self::Velocity,
+        Self::Acceleration,
+        Self::DisplacementY,
+        Self::VelocityY,
+        Self::AccelerationY,
+    ];
+    /// Those of the first axis, or of a reference with a single one.
+    pub const FIRST_AXIS: [Self; 3] = [Self::Displacement, Self::Velocity, Self::Acceleration];
+
+    /// Whether it is along the second axis.
+    pub fn is_second(self) -> bool {
+        !Self::FIRST_AXIS.contains(&self)
+    }
+
+    /// The same along the second axis.
+    #[must_use]
+    pub fn second(self) -> Self {
+        match self {
+            Self::Displacement | Self::DisplacementY => Self::DisplacementY,
+            Self::Velocity | Self::VelocityY => Self::VelocityY,
+            Self::Acceleration | Self::AccelerationY => Self::AccelerationY,
+        }
+    }
 
     /// Its name as an output of `reference`.
     pub fn name(self) -> &'static str {
@@ -54,15 +84,18 @@ impl Quantity {
             Self::Displacement => "displacement",
             Self::Velocity => "velocity",
             Self::Acceleration => "acceleration",
+            Self::DisplacementY => "displacement_y",
+            Self::VelocityY => "velocity_y",
+            Self::AccelerationY => "acceleration_y",
         }
     }
 
     /// Its unit in SI.
     pub fn base_unit(self) -> BaseUnit {
         let seconds = match self {
-            Self::Displacement => 0,
-            Self::Velocity => -1,
-            Self::Acceleration => -2,
+            Self::Displacement | Self::DisplacementY => 0,
+            Self::Velocity | Self::VelocityY => -1,
+            Self::Acceleration | Self::AccelerationY => -2,
         };
         BaseUnit {
             exponents: [0, 1, seconds, 0, 0, 0, 0],
@@ -74,9 +107,9 @@ impl Quantity {
     /// Its unit.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Displacement => "m",
-            Self::Velocity => "m/s",
-            Self::Acceleration => "m/s2",
+            Self::Displacement | Self::DisplacementY => "m",
+            Self::Velocity | Self::VelocityY => "m/s",
+            Self::Acceleration | Self::AccelerationY => "m/s2",
         }
     }
 }
@@ -274,4 +307,29 @@ fn reference(variable: &str) -> Option<Origin> {
     };
     let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name)?;
     Some(Origin::Reference { quantity, ahead })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reference_has_two_axes() {
+        for text in [
+            "reference.displacement",
+            "reference.velocity_y",
+            "reference.acceleration_y[3]",
+        ] {
+            let origin: Origin = text.parse().unwrap();
+            assert_eq!(origin.to_string(), text);
+        }
+        let Origin::Reference { quantity, ahead } = "reference.acceleration_y[3]".parse().unwrap()
+        else {
+            panic!("a reference")
+        };
+        assert_eq!((quantity, ahead), (Quantity::Acceleration.second(), 3));
+        assert!(quantity.is_second() && !Quantity::Acceleration.is_second());
+        let refused = "reference.displacement_z".parse::<Origin>().unwrap_err();
+        assert!(refused.contains("no `displacement_z`"), "{refused}");
+    }
 }

@@ -152,5 +152,6 @@ fn sine(amplitude: f64, frequency: f64) -> Motion {
             .collect(),
         notes: Vec::new(),
         seed: None,
+        across: None,
     }
 }

@@ -101,6 +101,7 @@ pub fn motion(name: &str, shape: &[f64], scale: f64, dt: f64, seed: Option<u64>)
         displacement,
         notes: Vec::new(),
         seed,
+        across: None,
     }
 }
 

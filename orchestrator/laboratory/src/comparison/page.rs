@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::errors;
-use super::result::{Comparison, History, Row};
+use super::result::{Comparison, History, Measure, Row};
 use super::tables::{ErrorTable, tables};
 use crate::error::Error;
 use crate::json;
@@ -97,7 +97,16 @@ fn summary(comparison: &Comparison) -> String {
     let medians = medians.filter_map(|(name, own)| Some((own.time_domain_percent?, name)));
     let least = medians.min_by(|a, b| a.0.total_cmp(&b.0));
     let best = least.map_or(String::new(), |(error, name)| {
-        format!(" The smallest median of the acceleration error is {error:.2} %, of {name}.")
+        let along_y = comparison.medians[name].along_y.and_then(|own| own.time_domain_percent);
+        match along_y {
+            Some(other) => format!(
+                " The smallest median of the acceleration error along x is {error:.2} %, of {name}; along y it has \
+                 {other:.2} %."
+            ),
+            None => {
+                format!(" The smallest median of the acceleration error is {error:.2} %, of {name}.")
+            }
+        }
     });
     let early = comparison.ended_early().count();
     let early = match early {
@@ -119,9 +128,7 @@ fn bars(comparison: &Comparison) -> Vec<Bars> {
         let place = controllers.iter().position(|own| *own == name);
         1 + place.unwrap_or(0) % 8
     };
-    let groups = motions(&comparison.rows)
-        .into_iter()
-        .map(|motion| BarGroup {
+    let group = |motion: &str, measure: Measure| BarGroup {
             label: motion.to_string(),
             bars: comparison
                 .rows
@@ -130,18 +137,27 @@ fn bars(comparison: &Comparison) -> Vec<Bars> {
                 .filter_map(|row| {
                     Some(Bar {
                         name: row.controller.clone(),
-                        value: row.time_domain_percent?,
+                        value: measure(row)?,
                         interval: None,
                         colour: colour(&row.controller),
                     })
                 })
                 .collect(),
-        });
-    vec![Bars {
-        title: "Normalised RMS acceleration error, %".into(),
-        groups: groups.collect(),
+        };
+    let bars = |title: &str, measure: Measure| Bars {
+        title: title.into(),
+        groups: motions(&comparison.rows).into_iter().map(|motion| group(motion, measure)).collect(),
         mark: None,
-    }]
+    };
+    match comparison.is_biaxial() {
+        false => vec![bars("Normalised RMS acceleration error, %", |row| row.time_domain_percent)],
+        true => vec![
+            bars("Normalised RMS acceleration error along x, %", |row| row.time_domain_percent),
+            bars("Normalised RMS acceleration error along y, %", |row| {
+                row.along_y?.time_domain_percent
+            }),
+        ],
+    }
 }
 
 /// A line for each run that ended early.
@@ -169,7 +185,10 @@ fn panels(rows: &[Row]) -> Vec<Panel> {
         return Vec::new();
     };
     let panel = |what: &str, units: Units, values: fn(&History) -> &[f64]| Panel {
-        title: format!("{what} error on {}", first.record),
+        title: match first.along_y {
+            Some(_) => format!("{what} error along x on {}", first.record),
+            None => format!("{what} error on {}", first.record),
+        },
         x: Axis::linear("time", Units::TIME),
         y: Axis::linear("table minus reference", units),
         series: kept

@@ -5,8 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::result::{Comparison, History, Row};
+use super::result::{AlongY, Comparison, History, Row};
 use crate::error::Error;
+use crate::run::axes;
 use crate::run::experiment::{Request, is_file, prepare, system_file};
 use crate::run::table::Table;
 use fmi_system::Link;
@@ -29,8 +30,12 @@ pub struct Plan {
 pub enum Played {
     /// A record, made playable.
     Record(PathBuf),
+    /// Records along two axes, made playable at one scale.
+    Records([PathBuf; 2]),
     /// A reference, as it stands.
     Reference(PathBuf),
+    /// References along two axes.
+    References([PathBuf; 2]),
     /// The built-in motion with a seed.
     Seed(u64),
 }
@@ -47,9 +52,22 @@ pub struct Progress {
 impl Played {
     /// What a request plays.
     pub fn of(request: &Request) -> Self {
-        match (&request.record, &request.reference) {
-            (Some(path), _) => Self::Record(path.clone()),
-            (None, Some(path)) => Self::Reference(path.clone()),
+        let Request {
+            record,
+            record_y,
+            reference,
+            reference_y,
+            ..
+        } = request.clone();
+        match (record, reference) {
+            (Some(x), _) => match record_y {
+                Some(y) => Self::Records([x, y]),
+                None => Self::Record(x),
+            },
+            (None, Some(x)) => match reference_y {
+                Some(y) => Self::References([x, y]),
+                None => Self::Reference(x),
+            },
             (None, None) => Self::Seed(request.seed),
         }
     }
@@ -58,12 +76,20 @@ impl Played {
     pub fn request(&self, base: &Request) -> Request {
         let mut own = Request {
             record: None,
+            record_y: None,
             reference: None,
+            reference_y: None,
             ..base.clone()
         };
         match self {
             Self::Record(path) => own.record = Some(path.clone()),
+            Self::Records([x, y]) => {
+                (own.record, own.record_y) = (Some(x.clone()), Some(y.clone()));
+            }
             Self::Reference(path) => own.reference = Some(path.clone()),
+            Self::References([x, y]) => {
+                (own.reference, own.reference_y) = (Some(x.clone()), Some(y.clone()));
+            }
             Self::Seed(number) => own.seed = *number,
         }
         own
@@ -73,7 +99,7 @@ impl Played {
     ///
     /// # Errors
     /// A folder that cannot be read or holds none.
-    pub fn records_in(folder: &Path) -> Result<Vec<Self>, Error> {
+    pub fn records_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
         let fault = |reason: String| Error::File {
             path: folder.to_path_buf(),
             reason,
@@ -91,7 +117,7 @@ impl Played {
             return Err(fault("holds no record (.AT2 or .csv)".into()));
         }
         found.sort();
-        Ok(found.into_iter().map(Self::Record).collect())
+        Ok(found)
     }
 }
 
@@ -205,6 +231,9 @@ fn run(request: &Request, label: &str, keep_history: bool) -> Result<Row, Error>
     let system = &prepared.system;
     let names = system.components.iter().map(|own| own.name.as_str());
     let links: Vec<Link> = system.links().collect();
+    let both = axes::tables(names.clone(), &links, &outcome.record);
+    let is_measured = outcome.ended.is_regular();
+    let axes = axes::measure(both.as_ref(), &prepared.motion, &outcome.record, is_measured);
     let table = Table::among(names, &links, &outcome.record);
     let column = |name: &str| outcome.record.column(&table.as_ref()?.name(name));
     let motion = &prepared.motion;
@@ -224,7 +253,10 @@ fn run(request: &Request, label: &str, keep_history: bool) -> Result<Row, Error>
         acceleration_error: difference(&a, &motion.acceleration),
     });
     Ok(Row {
-        record: prepared.motion.name.clone(),
+        record: match &motion.across {
+            Some(across) => format!("{} and {}", motion.name, across.name),
+            None => motion.name.clone(),
+        },
         controller: label.to_string(),
         time_domain_percent: tracking.map(|t| t.time_domain_percent),
         frequency_domain_percent: tracking.map(|t| t.frequency_domain_percent),
@@ -233,6 +265,7 @@ fn run(request: &Request, label: &str, keep_history: bool) -> Result<Row, Error>
         significant_duration_percent: tracking
             .and_then(|t| Some(t.laboratory?.significant_duration_percent)),
         peak_displacement_m,
+        along_y: axes.get(1).map(AlongY::of),
         ended: outcome.ended.kind(),
         ended_because: outcome.ended.reason(),
         ended_s: outcome.ended.time(),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::run::axes::Axis;
 use fmi_master::Ending;
 
 /// Runs of controllers on motions: `comparison.json`, and what `--json` prints.
@@ -38,6 +39,9 @@ pub struct Row {
     pub significant_duration_percent: Option<f64>,
     /// Largest displacement of the table, m.
     pub peak_displacement_m: Option<f64>,
+    /// The second axis of a table with two; the other errors are then those of the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along_y: Option<AlongY>,
     /// How it ended.
     pub ended: Ending,
     /// Why it ended early.
@@ -47,6 +51,35 @@ pub struct Row {
     /// For the plots, of the first motion only.
     #[serde(skip)]
     pub history: Option<History>,
+}
+
+/// Errors along the second axis; of an axis at rest there is its motion alone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AlongY {
+    /// Time-domain error of the acceleration, %.
+    pub time_domain_percent: Option<f64>,
+    /// Frequency-domain error of the acceleration, %.
+    pub frequency_domain_percent: Option<f64>,
+    /// Largest deviation of the response spectrum at 5 % damping from 0.5 to 15 Hz, %.
+    pub response_spectrum_percent: Option<f64>,
+    /// Time-domain error over the significant duration, %.
+    pub significant_duration_percent: Option<f64>,
+    /// RMS acceleration of an axis that was to rest, over the peak of the other axis' reference, %.
+    pub at_rest_percent: Option<f64>,
+}
+
+impl AlongY {
+    pub(super) fn of(axis: &Axis) -> Self {
+        let figures = axis.tracking.as_ref();
+        let laboratory = figures.and_then(|own| own.laboratory.as_ref());
+        Self {
+            time_domain_percent: figures.map(|own| own.time_domain_percent),
+            frequency_domain_percent: figures.map(|own| own.frequency_domain_percent),
+            response_spectrum_percent: laboratory.map(|own| own.largest_spectrum_deviation()),
+            significant_duration_percent: laboratory.map(|own| own.significant_duration_percent),
+            at_rest_percent: axis.at_rest.map(|own| own.acceleration_percent),
+        }
+    }
 }
 
 /// Distance of the table from its reference, one value per sample.
@@ -73,6 +106,9 @@ pub struct Median {
     /// Time-domain error over the significant duration, %.
     #[serde(default)]
     pub significant_duration_percent: Option<f64>,
+    /// Medians along the second axis, of tables with two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along_y: Option<AlongY>,
     /// Runs that were stopped or failed; they count as worse than any other.
     pub ended_early: usize,
 }
@@ -111,6 +147,11 @@ impl Comparison {
         names
     }
 
+    /// Whether any of the tables has two axes.
+    pub fn is_biaxial(&self) -> bool {
+        self.rows.iter().any(|row| row.along_y.is_some())
+    }
+
     /// The runs that did not reach the end of their motion.
     pub fn ended_early(&self) -> impl Iterator<Item = &Row> {
         self.rows.iter().filter(|row| !row.is_complete())
@@ -131,6 +172,19 @@ impl Comparison {
                     response_spectrum_percent: of(controller, |row| row.response_spectrum_percent),
                     significant_duration_percent: of(controller, |row| {
                         row.significant_duration_percent
+                    }),
+                    along_y: self.is_biaxial().then(|| AlongY {
+                        time_domain_percent: of(controller, |row| row.along_y?.time_domain_percent),
+                        frequency_domain_percent: of(controller, |row| {
+                            row.along_y?.frequency_domain_percent
+                        }),
+                        response_spectrum_percent: of(controller, |row| {
+                            row.along_y?.response_spectrum_percent
+                        }),
+                        significant_duration_percent: of(controller, |row| {
+                            row.along_y?.significant_duration_percent
+                        }),
+                        at_rest_percent: of(controller, |row| row.along_y?.at_rest_percent),
                     }),
                     ended_early: own.count(),
                 };

@@ -12,9 +12,12 @@ pub struct ErrorTable {
 }
 
 /// Errors in time and in frequency, as laboratories measure, a row for each motion, then median and
-/// standard deviation.
-pub fn tables(comparison: &Comparison) -> [ErrorTable; 4] {
-    [
+/// standard deviation; of tables with two axes the second axis too.
+pub fn tables(comparison: &Comparison) -> Vec<ErrorTable> {
+    if comparison.is_biaxial() {
+        return along_both_axes(comparison);
+    }
+    vec![
         table(
             "Normalised RMS acceleration error, % (printed values of Table 4-1 and 5-2 in brackets)",
             comparison,
@@ -43,6 +46,46 @@ pub fn tables(comparison: &Comparison) -> [ErrorTable; 4] {
     ]
 }
 
+fn along_both_axes(comparison: &Comparison) -> Vec<ErrorTable> {
+    let errors: [(&str, [Measure; 2]); 4] = [
+        (
+            "Normalised RMS acceleration error",
+            [|row| row.time_domain_percent, |row| row.along_y?.time_domain_percent],
+        ),
+        (
+            "Fourier amplitude error",
+            [|row| row.frequency_domain_percent, |row| row.along_y?.frequency_domain_percent],
+        ),
+        (
+            "Response spectrum at 5 % damping, largest deviation from 0.5 to 15 Hz",
+            [|row| row.response_spectrum_percent, |row| row.along_y?.response_spectrum_percent],
+        ),
+        (
+            "Normalised RMS acceleration error over the significant duration (5 to 95 % of the Arias intensity)",
+            [
+                |row| row.significant_duration_percent,
+                |row| row.along_y?.significant_duration_percent,
+            ],
+        ),
+    ];
+    let has = |measure: Measure| comparison.rows.iter().any(|row| measure(row).is_some());
+    let mut all = Vec::new();
+    for (name, measures) in errors {
+        for (axis, measure) in ["x", "y"].into_iter().zip(measures) {
+            if has(measure) {
+                let caption = format!("{name} along {axis}, %");
+                all.push(table(&caption, comparison, measure, None));
+            }
+        }
+    }
+    let at_rest: Measure = |row| row.along_y?.at_rest_percent;
+    if has(at_rest) {
+        let caption = "RMS acceleration of y, which was to rest, over the peak of the reference along x, %";
+        all.push(table(caption, comparison, at_rest, None));
+    }
+    all
+}
+
 /// The printed values of a motion, and their medians and deviations.
 type PrintedColumn = (fn(&Printed) -> [f64; 3], [[f64; 3]; 2]);
 
@@ -68,7 +111,7 @@ fn table(
     head.extend(controllers.iter().map(ToString::to_string));
     let mut lines = vec![head];
     for record in &records {
-        let known = known(record);
+        let known = known(record).filter(|_| !comparison.is_biaxial());
         let mut line = vec![known.map_or(*record, |printed| printed.title).to_string()];
         for &controller in &controllers {
             let mut ours = rows
@@ -141,6 +184,7 @@ mod tests {
             response_spectrum_percent: None,
             significant_duration_percent: None,
             peak_displacement_m: None,
+            along_y: None,
             ended,
             ended_because: None,
             ended_s: Some(3.21),

@@ -122,6 +122,7 @@ fn motion(reference: &[f64], period: f64) -> Motion {
         acceleration: (0..reference.len()).map(acceleration).collect(),
         notes: Vec::new(),
         seed: None,
+        across: None,
     }
 }
 
@@ -189,7 +190,7 @@ fn system(
     let mut connect = |from: Origin, component: &str, variable: &str| {
         system.connect(from, VariableName::new(component, variable));
     };
-    for quantity in Quantity::ALL {
+    for quantity in Quantity::FIRST_AXIS {
         let name = quantity.name();
         connect(
             Origin::reference(quantity),

@@ -66,6 +66,7 @@ fn excitation(dt: f64) -> Motion {
         acceleration: Vec::with_capacity(samples),
         notes: Vec::new(),
         seed: Some(SEED),
+        across: None,
     };
     for sample in 0..samples {
         let t = sample as f64 * dt;

@@ -15,9 +15,13 @@ pub use self::correction::{Inverse, Line, Measured};
 pub use self::drive::{read as read_drive, text as drive_text};
 pub use self::page::{ITERATION, write};
 use crate::error::Error;
+use crate::run::axes;
 use crate::run::experiment::{Prepared, Request, prepare};
+use crate::run::table::Table;
+use crate::systems::built_in;
 use crate::systems::control_model::ControlModel;
 use fmi_master::{Ending, Record};
+use fmi_system::Link;
 use motion::metrics::{self, rms};
 use motion::{self, Motion, Scaling};
 use units::STANDARD_GRAVITY;
@@ -54,6 +58,8 @@ pub struct Plan {
     pub dummy_mass: Option<f64>,
     /// Drive of an earlier session to begin with.
     pub drive: Option<std::path::PathBuf>,
+    /// The same along the second axis of a table with two.
+    pub drive_y: Option<std::path::PathBuf>,
 }
 
 /// Why the iteration ended.
@@ -97,8 +103,12 @@ impl Stop {
 pub struct Run {
     /// Corrections that its drive has.
     pub iteration: usize,
-    /// `100 rms/peak` of the measured acceleration error within the band, %; what the iteration goes by.
+    /// `100 rms/peak` of the measured acceleration error within the band, %; what the iteration goes by. Of a table
+    /// with two axes the larger of the two.
     pub measured_percent: Option<f64>,
+    /// The second axis of a table with two; the errors below are those of the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along_y: Option<AlongY>,
     /// Time-domain error of the true acceleration, %.
     pub time_domain_percent: Option<f64>,
     /// Frequency-domain error, %.
@@ -113,6 +123,16 @@ pub struct Run {
     pub ended: Ending,
     /// Why it ended early.
     pub ended_because: Option<String>,
+}
+
+/// A run along the second axis.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct AlongY {
+    /// `100 rms/peak` of the measured acceleration error within the band, %; for an axis that is to rest over the
+    /// peak of the first.
+    pub measured_percent: Option<f64>,
+    /// Time-domain error of the true acceleration, %; none of an axis that is to rest.
+    pub time_domain_percent: Option<f64>,
 }
 
 /// What the iteration found: `iteration.json`, and what `--json` prints.
@@ -149,18 +169,23 @@ struct Best {
     measured: f64,
     iteration: usize,
     drive: Motion,
-    /// Acceleration error within the band, m/s².
-    error: Vec<f64>,
-    /// True acceleration error, m/s².
+    /// Acceleration error within the band along each axis, m/s².
+    errors: Vec<Vec<f64>>,
+    /// True acceleration error along the first axis, m/s².
     off: Vec<f64>,
 }
 
-/// What a run gave.
+/// What a run gave, axis by axis.
 struct Played {
+    axes: Vec<PlayedAxis>,
+    ended: fmi_master::Ended,
+}
+
+/// What a run gave along an axis.
+struct PlayedAxis {
     measured: Measured,
     displacement: Vec<f64>,
     acceleration: Vec<f64>,
-    ended: fmi_master::Ended,
 }
 
 /// Plays, corrects, and plays again; `progress` receives the number of finished runs.
@@ -182,15 +207,15 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
     let prepared = prepare(&plan.request)?;
     let wanted = prepared.motion.clone();
     let late = (delay / wanted.dt).round() as usize;
-    let mut drive = match &plan.drive {
-        Some(path) => drive::read(path, &wanted)?,
-        None => wanted.clone(),
-    };
-    let inverse = find_inverse(plan, late, crossover)?;
+    let mut drive = first_drive(plan, &wanted)?;
+    let inverses = find_inverses(plan, late, crossover)?;
+    let inverse = &inverses[0];
     progress(1);
 
     let energy = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>();
-    let whole = energy(&wanted.acceleration);
+    let asked: Vec<&Motion> = std::iter::once(&wanted).chain(wanted.across.as_deref()).collect();
+    let whole: f64 = asked.iter().map(|own| energy(&own.acceleration)).sum();
+    let peaks = peaks(&asked);
     let (mut runs, mut exposure, mut gain, mut halved) = (Vec::<Run>::new(), 0.0, plan.gain, false);
     let mut best: Option<Best> = None;
     let mut first_error = Vec::new();
@@ -198,14 +223,27 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
         let iteration = runs.len();
         let played = play(&prepared, drive.clone(), late)?;
         progress(2 + iteration);
-        exposure += energy(&played.acceleration) / whole;
+        let moved = played.axes.iter().map(|own| energy(&own.acceleration));
+        exposure += moved.sum::<f64>() / whole;
         let complete = played.ended.kind() == Ending::Complete;
-        let tracking = metrics::tracking(&wanted, &played.displacement, &played.acceleration).ok();
-        let error = inverse.error(&wanted, &played.measured);
-        let measured = 100.0 * rms(&error) / wanted.peak_acceleration();
+        let figures = |axis: usize| {
+            let own = &played.axes[axis];
+            metrics::tracking(asked[axis], &own.displacement, &own.acceleration).ok()
+        };
+        let tracking = figures(0);
+        let errors: Vec<Vec<f64>> = (0..asked.len())
+            .map(|axis| inverses[axis].error(asked[axis], &played.axes[axis].measured))
+            .collect();
+        let percents = errors.iter().zip(&peaks).map(|(error, peak)| 100.0 * rms(error) / peak);
+        let percents: Vec<f64> = percents.collect();
+        let measured = percents.iter().copied().fold(0.0, f64::max);
         runs.push(Run {
             iteration,
             measured_percent: complete.then_some(measured),
+            along_y: percents.get(1).map(|percent| AlongY {
+                measured_percent: complete.then_some(*percent),
+                time_domain_percent: figures(1).map(|own| own.time_domain_percent),
+            }),
             time_domain_percent: tracking.map(|t| t.time_domain_percent),
             frequency_domain_percent: tracking.map(|t| t.frequency_domain_percent),
             response_spectrum_percent: tracking
@@ -221,7 +259,7 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
         let off: Vec<f64> = wanted
             .acceleration
             .iter()
-            .zip(&played.acceleration)
+            .zip(&played.axes[0].acceleration)
             .map(|(wanted, got)| got - wanted)
             .collect();
         if iteration == 0 {
@@ -233,7 +271,7 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
                 measured,
                 iteration,
                 drive: drive.clone(),
-                error,
+                errors,
                 off,
             });
         }
@@ -264,7 +302,12 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
             break Stop::Exposure;
         }
         drive = nearest.drive.clone();
-        inverse.correct(&mut drive, &nearest.error, gain);
+        inverse.correct(&mut drive, &nearest.errors[0], gain);
+        if let (Some(across), [_, inverse], [_, error]) =
+            (&mut drive.across, &inverses[..], &nearest.errors[..])
+        {
+            inverse.correct(across, error, gain);
+        }
     };
     let first = runs[0].measured_percent;
     let (at, best_drive, off) = match best {
@@ -294,15 +337,44 @@ pub(crate) fn control_model(request: &Request) -> Result<Option<ControlModel>, E
     };
     match &request.control_model {
         Some(path) => ControlModel::read(path).map(Some).map_err(fault),
-        None if request.plant == "servohydraulic" => {
+        None if built_in::is_commissioned(&request.plant) => {
             ControlModel::commissioned().map(Some).map_err(fault)
         }
         None => Ok(None),
     }
 }
 
-/// Plays a random motion of a third of the usual size and finds the transfer function.
-fn find_inverse(plan: &Plan, late: usize, crossover: f64) -> Result<Inverse, Error> {
+/// The peaks that errors are measured by, m/s²: of an axis that is to rest that of the other one.
+fn peaks(asked: &[&Motion]) -> Vec<f64> {
+    let own = asked.iter().map(|motion| motion.peak_acceleration());
+    let largest = own.clone().fold(0.0, f64::max);
+    own.map(|peak| if peak > 0.0 { peak } else { largest }).collect()
+}
+
+/// The drive of an earlier session, or the motion itself.
+fn first_drive(plan: &Plan, wanted: &Motion) -> Result<Motion, Error> {
+    let mut drive = match &plan.drive {
+        Some(path) => Motion {
+            across: wanted.across.clone(),
+            ..drive::read(path, wanted)?
+        },
+        None => wanted.clone(),
+    };
+    if let Some(path) = &plan.drive_y {
+        let Some(across) = &wanted.across else {
+            return Err(Error::Option {
+                option: "--drive-y",
+                reason: format!("{} has a single axis", plan.request.system),
+            });
+        };
+        drive.across = Some(Box::new(drive::read(path, across)?));
+    }
+    Ok(drive)
+}
+
+/// Plays a random motion of a third of the usual size, along two axes one for each, and finds the transfer function of
+/// each axis.
+fn find_inverses(plan: &Plan, late: usize, crossover: f64) -> Result<Vec<Inverse>, Error> {
     let mut request = plan.request.clone();
     if let Some(mass) = plan.dummy_mass {
         request.specimen = "none".into();
@@ -315,7 +387,10 @@ fn find_inverse(plan: &Plan, late: usize, crossover: f64) -> Result<Inverse, Err
         scaling: Some(Scaling::PeakAcceleration(FINDING_PEAK)),
         ..motion::Options::default()
     };
-    let drive = motion::built_in(FINDING_SEED, &options)?;
+    let mut drive = motion::built_in(FINDING_SEED, &options)?;
+    if prepared.motion.across.is_some() {
+        drive = drive.along_two_axes(motion::built_in(FINDING_SEED + 1, &options)?);
+    }
     let played = play(&prepared, drive.clone(), late)?;
     if played.ended.kind() != Ending::Complete {
         return Err(Error::Option {
@@ -326,10 +401,14 @@ fn find_inverse(plan: &Plan, late: usize, crossover: f64) -> Result<Inverse, Err
             ),
         });
     }
-    Inverse::new(&drive, &played.measured, crossover, plan.band).ok_or(Error::Option {
-        option: "--iterations",
-        reason: "too little was played to find a transfer function".into(),
-    })
+    let drives = std::iter::once(&drive).chain(drive.across.as_deref());
+    let inverses = drives.zip(&played.axes).map(|(drive, own)| {
+        Inverse::new(drive, &own.measured, crossover, plan.band).ok_or(Error::Option {
+            option: "--iterations",
+            reason: "too little was played to find a transfer function".into(),
+        })
+    });
+    inverses.collect()
 }
 
 /// Plays `drive` in place of the motion; what is measured is `late` samples late.
@@ -337,7 +416,57 @@ fn play(prepared: &Prepared, drive: Motion, late: usize) -> Result<Played, Error
     let own = prepared.playing(drive);
     let outcome = own.run(own.algorithm)?;
     let record = &outcome.record;
-    let [displacement, acceleration] = pair(record, "displacement", "acceleration")
+    let names = own.system.components.iter().map(|part| part.name.as_str());
+    let links: Vec<Link> = own.system.links().collect();
+    let tables = axes::tables(names, &links, record).filter(|_| own.motion.across.is_some());
+    let histories = match &tables {
+        Some(tables) => tables.iter().filter_map(|table| seen(table, &links, record)).collect(),
+        None => vec![single(prepared, record)?],
+    };
+    if own.motion.across.is_some() && histories.len() != 2 {
+        return Err(Error::Option {
+            option: "SYSTEM",
+            reason: format!(
+                "{} follows motions along two axes; expected a table for each, whose valve is driven by what follows \
+                 the reference along its axis",
+                prepared.system.name
+            ),
+        });
+    }
+    let early = |mut history: Vec<f64>, late: usize| {
+        let last = history.last().copied().unwrap_or(0.0);
+        let length = history.len();
+        history.drain(..late.min(length));
+        history.resize(length, last);
+        history
+    };
+    let axes = histories.into_iter().map(|([displacement, acceleration], seen)| {
+        let (shown, late) = match seen {
+            Some(columns) => (columns, late),
+            None => ([displacement.clone(), acceleration.clone()], 0),
+        };
+        let [x, a] = shown.map(|history| early(history, late));
+        PlayedAxis {
+            measured: Measured {
+                displacement: x,
+                acceleration: a,
+            },
+            displacement,
+            acceleration,
+        }
+    });
+    Ok(Played {
+        axes: axes.collect(),
+        ended: outcome.ended,
+    })
+}
+
+/// Displacement and acceleration of a table, and what sensors show of them.
+type Histories = ([Vec<f64>; 2], Option<[Vec<f64>; 2]>);
+
+/// Of the table of a system with a single axis.
+fn single(prepared: &Prepared, record: &Record) -> Result<Histories, Error> {
+    let moved = pair(record, "displacement", "acceleration")
         .filter(|(name, _)| name == "table")
         .or_else(|| pair(record, "displacement", "acceleration"))
         .map(|(_, columns)| columns)
@@ -354,27 +483,23 @@ fn play(prepared: &Prepared, drive: Motion, late: usize) -> Result<Played, Error
         vocabulary::MEASURED_DISPLACEMENT,
         vocabulary::MEASURED_ACCELERATION,
     );
-    let (shown, late) = match seen {
-        Some((_, columns)) => (columns, late),
-        None => ([displacement.clone(), acceleration.clone()], 0),
-    };
-    let early = |mut history: Vec<f64>| {
-        let last = history.last().copied().unwrap_or(0.0);
-        let length = history.len();
-        history.drain(..late.min(length));
-        history.resize(length, last);
-        history
-    };
-    let [x, a] = shown.map(early);
-    Ok(Played {
-        measured: Measured {
-            displacement: x,
-            acceleration: a,
-        },
-        displacement,
-        acceleration,
-        ended: outcome.ended,
-    })
+    Ok((moved, seen.map(|(_, columns)| columns)))
+}
+
+/// Of one table of several: its sensors are the component that takes its displacement and shows it.
+fn seen(table: &Table<'_>, links: &[Link], record: &Record) -> Option<Histories> {
+    let column = |name: &str| record.column(name);
+    let displacement = table.name("displacement");
+    let moved = [column(&displacement)?, column(&table.name("acceleration"))?];
+    let takes = links.iter().filter(|link| link.from.to_string() == displacement);
+    let mut shown = takes.filter_map(|link| {
+        let output = |variable: &str| column(&format!("{}.{variable}", link.to.component));
+        Some([
+            output(vocabulary::MEASURED_DISPLACEMENT)?,
+            output(vocabulary::MEASURED_ACCELERATION)?,
+        ])
+    });
+    Some((moved, shown.next()))
 }
 
 /// The first component whose outputs have both names, the table before others, with their columns.

@@ -183,6 +183,7 @@ impl ModelledRig {
                 .collect(),
             notes: Vec::new(),
             seed: None,
+            across: None,
         };
         let linear = Self {
             rig: self.linear,

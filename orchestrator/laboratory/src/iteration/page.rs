@@ -15,6 +15,8 @@ use pages::report::{
 pub const ITERATION: &str = "iteration.json";
 /// The best drive.
 const DRIVE: &str = "drive.csv";
+/// The best drive along the second axis.
+const DRIVE_Y: &str = "drive_y.csv";
 
 /// Writes `report.html`, `iteration.json` and `drive.csv`; says where.
 ///
@@ -30,6 +32,9 @@ pub fn write(plan: &Plan, iteration: &Iteration, folder: &Path) -> Result<Vec<Pa
     )?;
     if let Some(best) = &iteration.drive {
         results.write_text(DRIVE, &drive::text(best))?;
+        if let Some(across) = &best.across {
+            results.write_text(DRIVE_Y, &drive::text(across))?;
+        }
     }
     Ok(results.finish()?)
 }
@@ -124,6 +129,29 @@ fn panels(iteration: &Iteration) -> Vec<Panel> {
     panels
 }
 
+/// The second axis by run, where there is one.
+fn along_y(iteration: &Iteration) -> Option<Table> {
+    iteration.runs.first()?.along_y?;
+    let percent = |value: Option<f64>| {
+        value.map_or("-".into(), |value| Cell::Quantity(value, Units::PERCENT, 3))
+    };
+    Some(Table::of(
+        &format!(
+            "Along y, with its drive in {DRIVE_Y}. The measured error above is the larger of both axes; the errors \
+             beside it are those along x. The error of an axis that is to rest is relative to the peak of the other one."
+        ),
+        ["corrections", "measured error", "RMS acceleration error"],
+        iteration.runs.iter().filter_map(|run| {
+            let own = run.along_y?;
+            Some([
+                run.iteration.to_string().into(),
+                percent(own.measured_percent),
+                percent(own.time_domain_percent),
+            ])
+        }),
+    ))
+}
+
 fn page(plan: &Plan, iteration: &Iteration) -> Report {
     let percent = |value: Option<f64>| {
         value.map_or("-".into(), |value| Cell::Quantity(value, Units::PERCENT, 3))
@@ -163,7 +191,7 @@ fn page(plan: &Plan, iteration: &Iteration) -> Report {
                  energy of all runs on the specimen over that of the motion played once."
                     .into(),
             ],
-            tables: vec![Table::of(
+            tables: std::iter::once(Table::of(
                 &format!(
                     "The best run is {}; its drive is in {DRIVE}.",
                     iteration.best
@@ -178,7 +206,9 @@ fn page(plan: &Plan, iteration: &Iteration) -> Report {
                     "ended",
                 ],
                 rows,
-            )],
+            ))
+            .chain(along_y(iteration))
+            .collect(),
             panels: panels(iteration),
             ..Section::default()
         }],

@@ -217,6 +217,7 @@ fn motion_of(name: &str, dt: f64, displacement: Vec<f64>) -> Motion {
         displacement,
         notes: Vec::new(),
         seed: None,
+        across: None,
     }
 }
 

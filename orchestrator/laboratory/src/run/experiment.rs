@@ -159,21 +159,25 @@ impl Library for Shared<'_> {
     }
 }
 
-/// A motion as the master plays it: after its end the table rests at the last displacement.
+/// A motion as the master plays it, axis by axis: after its end the table rests at the last displacement.
 #[must_use]
 pub fn samples(motion: &Motion) -> Samples {
     let column = |values: &[f64], after| Column {
         values: values.to_vec(),
         after,
     };
-    let last = motion.displacement.last().copied().unwrap_or(0.0);
+    let axes = std::iter::once(motion).chain(motion.across.as_deref());
+    let columns = axes.flat_map(|axis| {
+        let last = axis.displacement.last().copied().unwrap_or(0.0);
+        [
+            column(&axis.displacement, last),
+            column(&axis.velocity, 0.0),
+            column(&axis.acceleration, 0.0),
+        ]
+    });
     Samples {
         period: motion.dt,
-        columns: vec![
-            column(&motion.displacement, last),
-            column(&motion.velocity, 0.0),
-            column(&motion.acceleration, 0.0),
-        ],
+        columns: columns.collect(),
     }
 }
 
@@ -275,7 +279,7 @@ pub fn prepare_shared(
         } else if samples > motion.len() {
             let ends = motion.len() as f64 * motion.dt;
             let note = format!("the motion ends at {ends:.3} s; afterwards the table rests");
-            rest_until(&mut motion, samples);
+            motion.rest_until(samples);
             motion.notes.push(note.clone());
             system.notes.push(note);
         }
@@ -431,6 +435,7 @@ fn no_motion() -> Motion {
         acceleration: Vec::new(),
         notes: Vec::new(),
         seed: None,
+        across: None,
     }
 }
 
@@ -484,14 +489,6 @@ fn natural_end(system: &System) -> Result<f64, Error> {
                 --duration \"10 s\""
                 .to_string(),
         })
-}
-
-/// Lets a motion rest from its end until it has so many samples.
-fn rest_until(motion: &mut Motion, samples: usize) {
-    let last = motion.displacement.last().copied().unwrap_or(0.0);
-    motion.displacement.resize(samples, last);
-    motion.velocity.resize(samples, 0.0);
-    motion.acceleration.resize(samples, 0.0);
 }
 
 /// Whether a system is named by a file.

@@ -3,14 +3,15 @@
 use super::experiment::is_file;
 use super::manifest::Manifest;
 use super::request::Request;
-use super::summary::MotionSummary;
+use super::summary::{MotionSummary, Summary};
+use crate::systems::built_in;
 use crate::systems::tuning::Tuning;
 use pages::report::identity::entry;
 use pages::report::{Cell, Changed, UnitSystem, Units};
 use units::STANDARD_GRAVITY;
 
 /// The entries of a page.
-pub fn of_run(manifest: &Manifest, motion: &MotionSummary) -> Vec<(String, Cell)> {
+pub fn of_run(manifest: &Manifest, summary: &Summary) -> Vec<(String, Cell)> {
     let request = &manifest.request;
     let mut entries = vec![entry("System", request.system.as_str())];
     if !is_file(&request.system) {
@@ -25,11 +26,20 @@ pub fn of_run(manifest: &Manifest, motion: &MotionSummary) -> Vec<(String, Cell)
             all => all.join(", "),
         },
     ));
-    entries.push(entry("Motion", motion.name.as_str()));
-    entries.push(entry(
-        "Peak",
-        Cell::Quantity(motion.pga_g * STANDARD_GRAVITY, Units::ACCELERATION, 3),
-    ));
+    let mut played = |along: &str, motion: &MotionSummary| {
+        let peak = motion.pga_g * STANDARD_GRAVITY;
+        entries.push(entry(&format!("Motion{along}"), motion.name.as_str()));
+        entries.push(entry(
+            &format!("Peak{along}"),
+            Cell::Quantity(peak, Units::ACCELERATION, 3),
+        ));
+    };
+    if summary.axes.is_empty() {
+        played("", &summary.motion);
+    }
+    for axis in &summary.axes {
+        played(&format!(" along {}", axis.axis), &axis.motion);
+    }
     entries.push(entry(
         "Stepped by",
         match manifest.request.variable_step_percent {
@@ -49,7 +59,7 @@ pub fn of_run(manifest: &Manifest, motion: &MotionSummary) -> Vec<(String, Cell)
 
 /// Where the controllers' parameters come from.
 pub fn tuning(request: &Request) -> String {
-    let commissioned = request.plant == "servohydraulic";
+    let commissioned = built_in::is_commissioned(&request.plant);
     match (request.tuning, &request.control_model) {
         (_, Some(model)) => format!("by rule on {}", model.display()),
         (Some(Tuning::Printed), None) => "as printed".into(),

@@ -52,6 +52,26 @@ pub struct MotionEntry {
     pub sha256: String,
     /// What was done to it.
     pub notes: Vec<String>,
+    /// The motion along a second axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub across: Option<Box<MotionEntry>>,
+}
+
+impl MotionEntry {
+    fn of(motion: &Motion) -> Self {
+        let histories = [&motion.displacement, &motion.velocity, &motion.acceleration];
+        Self {
+            name: motion.name.clone(),
+            dt_s: motion.dt,
+            seed: motion.seed,
+            sha256: digest(histories.into_iter().flatten()),
+            notes: motion.notes.clone(),
+            across: motion
+                .across
+                .as_ref()
+                .map(|across| Box::new(Self::of(across))),
+        }
+    }
 }
 
 /// A component of a run.
@@ -110,7 +130,6 @@ impl Manifest {
             };
             (component.name.clone(), entry)
         });
-        let histories = [&motion.displacement, &motion.velocity, &motion.acceleration];
         Self {
             shakebench: env!("CARGO_PKG_VERSION").to_string(),
             platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
@@ -118,13 +137,7 @@ impl Manifest {
             algorithm,
             step_s,
             samples,
-            motion: MotionEntry {
-                name: motion.name.clone(),
-                dt_s: motion.dt,
-                seed: motion.seed,
-                sha256: digest(histories.into_iter().flatten()),
-                notes: motion.notes.clone(),
-            },
+            motion: MotionEntry::of(motion),
             components: components.collect(),
             connections: system.links().collect(),
             results_sha256: String::new(),
@@ -150,6 +163,13 @@ impl Manifest {
         compare("version", &self.shakebench, &again.shakebench);
         compare("platform", &self.platform, &again.platform);
         compare("motion", &self.motion.sha256, &again.motion.sha256);
+        let second = |own: &Self| {
+            own.motion
+                .across
+                .as_ref()
+                .map_or("none".to_string(), |own| own.sha256.clone())
+        };
+        compare("motion along y", &second(self), &second(again));
         for (name, then) in &self.components {
             let Some(now) = again.components.get(name) else {
                 compare(&format!("component `{name}`"), "there", "not");

@@ -1,5 +1,6 @@
 //! A run of a system on a motion: what is asked for, what is played, what is kept.
 
+pub mod axes;
 pub mod checkpoint;
 pub mod experiment;
 pub mod identity;

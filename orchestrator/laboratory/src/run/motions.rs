@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::request::Request;
 use crate::error::Error;
-use fmi_system::SystemFile;
+use fmi_system::{Origin, SystemFile};
 use motion::{self, Motion, Unscaled};
 
 /// Records that have been made playable but for their scale, for requests that play the same.
@@ -28,29 +28,98 @@ impl Motions {
             scaling: request.scaling,
             ..usual
         };
-        let record = match source(request, file)? {
-            Source::Reference(path) => return Ok(motion::load_reference(&path, &options)?),
-            Source::Record(path) => Some(path),
-            Source::Seed => None,
+        let is_biaxial = is_biaxial(file);
+        if !is_biaxial {
+            refuse_second(request)?;
+        }
+        let unscaled = |record: Option<&Path>, seed| self.unscaled(record, seed, &options);
+        let (motion, across) = match source(request, file)? {
+            Source::Reference(path) => {
+                let second = request.reference_y.as_deref();
+                let second = second.map(|path| motion::load_reference(path, &options));
+                (
+                    motion::load_reference(&path, &options)?,
+                    second.transpose()?,
+                )
+            }
+            Source::Record(path) => {
+                let first = unscaled(Some(&path), request.seed)?;
+                if let Some(second) = &request.record_y {
+                    let second = unscaled(Some(second), request.seed)?;
+                    return Ok(first.pair_scaled(&second, &options)?);
+                }
+                (first.scaled(&options)?, None)
+            }
+            Source::Seed => {
+                let first = unscaled(None, request.seed)?;
+                if is_biaxial {
+                    let second = unscaled(None, request.seed.wrapping_add(SECOND_SEED))?;
+                    return Ok(first.pair_scaled(&second, &options)?);
+                }
+                (first.scaled(&options)?, None)
+            }
         };
-        let key = format!("{record:?} {} {}", request.seed, options.sample_time);
+        Ok(match (across, is_biaxial) {
+            (Some(across), _) => motion.along_two_axes(across),
+            (None, true) => {
+                let rest = motion.at_rest();
+                motion.along_two_axes(rest)
+            }
+            (None, false) => motion,
+        })
+    }
+
+    /// A record, or the built-in motion of a seed, made playable but for its scale.
+    fn unscaled(
+        &self,
+        record: Option<&Path>,
+        seed: u64,
+        options: &motion::Options,
+    ) -> Result<Arc<Unscaled>, Error> {
+        let key = format!("{record:?} {seed} {}", options.sample_time);
         let open = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let known = open().get(&key).cloned();
         if let Some(unscaled) = known {
-            return Ok(unscaled.scaled(&options)?);
+            return Ok(unscaled);
         }
-        let unscaled = Arc::new(match &record {
-            Some(path) => motion::load_unscaled(path, &options)?,
-            None => motion::built_in_unscaled(request.seed, &options)?,
+        let unscaled = Arc::new(match record {
+            Some(path) => motion::load_unscaled(path, options)?,
+            None => motion::built_in_unscaled(seed, options)?,
         });
         let mut known = open();
         if known.len() >= Self::MOST {
             known.clear();
         }
         known.insert(key, unscaled.clone());
-        drop(known);
-        Ok(unscaled.scaled(&options)?)
+        Ok(unscaled)
     }
+}
+
+/// The seed of the built-in motion along a second axis, less that along the first.
+const SECOND_SEED: u64 = 100;
+
+/// Whether a system follows a motion along a second axis.
+pub(super) fn is_biaxial(file: &SystemFile) -> bool {
+    let second = |origin: &Origin| matches!(origin, Origin::Reference { quantity, .. } if quantity.is_second());
+    file.connections.iter().any(|link| second(&link.from))
+}
+
+/// # Errors
+/// A motion along a second axis, which the system has not.
+fn refuse_second(request: &Request) -> Result<(), Error> {
+    let option = match (&request.record_y, &request.reference_y) {
+        (Some(_), _) => "--record-y",
+        (None, Some(_)) => "--reference-y",
+        (None, None) => return Ok(()),
+    };
+    Err(Error::Option {
+        option,
+        reason: format!(
+            "{} has a single axis; expected `--plant biaxial`, or a system with connections from \
+             `reference.displacement_y`",
+            request.system
+        ),
+    })
 }
 
 /// What is played.

@@ -6,9 +6,10 @@ use units::vocabulary;
 
 use sha2::{Digest, Sha256};
 
+use super::axes;
 use super::experiment::Prepared;
 use super::identity;
-use super::manifest::Manifest;
+use super::manifest::{Manifest, MotionEntry};
 use super::signals::{
     COLUMNS, PARQUET, RESULTS, columns, read_csv, write_columns, write_csv, write_parquet,
 };
@@ -89,10 +90,58 @@ fn page(
     motion: &Motion,
     record: &Record,
 ) -> Option<Report> {
+    let names = manifest.components.keys().map(String::as_str);
+    let both = axes::tables(names, &manifest.connections, record);
+    if let (Some(tables), Some(motions), [_, _]) = (both, axes::motions(motion), &summary.axes[..])
+    {
+        let histories = tables.each_ref().map(|table| histories(record, table));
+        let axes = [0, 1].map(|n| {
+            let own = &summary.axes[n];
+            let run = run_of(
+                summary,
+                manifest,
+                record,
+                &tables[n],
+                motions[n],
+                &histories[n],
+            );
+            report::AxisRun {
+                name: axes::NAMES[n],
+                run: report::Run {
+                    tracking: own.tracking.as_ref(),
+                    duration: own.motion.duration_s,
+                    ..run
+                },
+                at_rest: own
+                    .at_rest
+                    .map(|own| [own.displacement_percent, own.acceleration_percent]),
+            }
+        });
+        return Some(report::run_along(&axes));
+    }
     let table = Table::find(manifest, record)?;
     let asked = asked(record, motion);
     let motion = asked.as_ref().unwrap_or(motion);
-    let column = |output| record.column(&table.name(output)).unwrap_or_default();
+    let histories = histories(record, &table);
+    let run = run_of(summary, manifest, record, &table, motion, &histories);
+    Some(report::run(&run))
+}
+
+/// Displacement, velocity and acceleration of a table.
+fn histories(record: &Record, table: &Table<'_>) -> [Vec<f64>; 3] {
+    ["displacement", "velocity", "acceleration"]
+        .map(|output| record.column(&table.name(output)).unwrap_or_default())
+}
+
+/// What a page draws of a run along one axis.
+fn run_of<'a>(
+    summary: &'a Summary,
+    manifest: &Manifest,
+    record: &Record,
+    table: &Table<'_>,
+    motion: &'a Motion,
+    [displacement, velocity, acceleration]: &'a [Vec<f64>; 3],
+) -> report::Run<'a> {
     let row = |name: &str, value: String| (name.to_string(), Cell::from(value));
     let settings = vec![
         row("FMI", summary.fmi.clone()),
@@ -117,14 +166,14 @@ fn page(
         let values = record.column(name)?;
         Some((name.clone(), values))
     });
-    let run = report::Run {
+    report::Run {
         system: &summary.system,
-        identity: identity::of_run(manifest, &summary.motion),
+        identity: identity::of_run(manifest, summary),
         motion,
         duration: summary.motion.duration_s,
-        displacement: &column("displacement"),
-        velocity: &column("velocity"),
-        acceleration: &column("acceleration"),
+        displacement,
+        velocity,
+        acceleration,
         commands: commands.collect(),
         valve_limit: valve_limit(manifest, &table.valve),
         specimen: specimen(manifest, record),
@@ -144,8 +193,7 @@ fn page(
             "shakebench {}; repeat with: shakebench run --manifest manifest.json",
             manifest.shakebench
         ),
-    };
-    Some(report::run(&run))
+    }
 }
 
 /// The limit of the component that gives the first command.
@@ -198,22 +246,29 @@ pub fn page_again(folder: &Path) -> Result<Report, Error> {
     let summary = Summary::read(&folder.join("summary.json"))?;
     let place = folder.join(RESULTS);
     let record = read_csv(&place)?;
-    let column = |quantity| {
+    let column = |quantity: &str| {
         let name = format!("reference.{quantity}");
         record.column(&name).ok_or_else(|| Error::File {
             path: place.clone(),
             reason: format!("not the results of a run: there is no column `{name}`"),
         })
     };
-    let motion = Motion {
-        name: manifest.motion.name.clone(),
-        dt: manifest.motion.dt_s,
-        displacement: column("displacement")?,
-        velocity: column("velocity")?,
-        acceleration: column("acceleration")?,
-        notes: manifest.motion.notes.clone(),
-        seed: manifest.motion.seed,
+    let played = |entry: &MotionEntry, axis: &str| -> Result<Motion, Error> {
+        Ok(Motion {
+            name: entry.name.clone(),
+            dt: entry.dt_s,
+            displacement: column(&format!("displacement{axis}"))?,
+            velocity: column(&format!("velocity{axis}"))?,
+            acceleration: column(&format!("acceleration{axis}"))?,
+            notes: entry.notes.clone(),
+            seed: entry.seed,
+            across: None,
+        })
     };
+    let mut motion = played(&manifest.motion, "")?;
+    if let Some(across) = &manifest.motion.across {
+        motion.across = Some(Box::new(played(across, "_y")?));
+    }
     page(&summary, &manifest, &motion, &record).ok_or_else(|| Error::File {
         path: folder.to_path_buf(),
         reason: "no component of the run is a table with displacement, velocity and acceleration, \

@@ -30,8 +30,14 @@ pub struct Request {
     pub control_model: Option<PathBuf>,
     /// Record to play.
     pub record: Option<PathBuf>,
+    /// Record to play along a second axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub record_y: Option<PathBuf>,
     /// Reference to play.
     pub reference: Option<PathBuf>,
+    /// Reference to play along a second axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_y: Option<PathBuf>,
     /// Seed of the built-in motion.
     pub seed: u64,
     /// How large it is played.
@@ -69,7 +75,9 @@ impl Request {
             tuning: None,
             control_model: None,
             record: None,
+            record_y: None,
             reference: None,
+            reference_y: None,
             seed: motion::DEFAULT_SEED,
             scaling: None,
             set: Vec::new(),

@@ -58,6 +58,9 @@ fn about(system: &System, name: &str) -> (String, String) {
         "reference.displacement" => return own("m", "displacement asked for"),
         "reference.velocity" => return own("m/s", "velocity asked for"),
         "reference.acceleration" => return own("m/s2", "acceleration asked for"),
+        "reference.displacement_y" => return own("m", "displacement asked for along y"),
+        "reference.velocity_y" => return own("m/s", "velocity asked for along y"),
+        "reference.acceleration_y" => return own("m/s2", "acceleration asked for along y"),
         _ => {}
     }
     let (component, variable) = name.split_once('.').unwrap_or(("", name));

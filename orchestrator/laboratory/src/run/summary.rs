@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::axes::{self, Axis};
 use super::experiment::Prepared;
 use super::manifest::Manifest;
 use super::refinement::CouplingError;
@@ -14,7 +15,7 @@ use crate::json;
 use fmi_master::{Ended, Ending, Outcome, RealTime, Record, StepsTaken};
 use motion::Motion;
 use motion::metrics::{self, Tracking};
-use units::{self, INCH, STANDARD_GRAVITY};
+use units::{self, INCH};
 
 /// `summary.json` of a run, and what `--json` prints.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -49,6 +50,9 @@ pub struct Summary {
     pub seeds: BTreeMap<String, serde_json::Value>,
     /// How well the table followed what was played; absent where there is no table or the run was stopped.
     pub tracking: Option<Tracking>,
+    /// Each axis of a table with two of them; `motion` and `tracking` are then those of the first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub axes: Vec<Axis>,
     /// What the user should know.
     pub warnings: Vec<String>,
     /// How real time was kept; of a run in real time.
@@ -89,7 +93,7 @@ impl Trip {
 }
 
 /// The motion of a run, whole.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MotionSummary {
     /// Its name.
     pub name: String,
@@ -166,6 +170,10 @@ impl Summary {
                 }
             }
         });
+        let names = manifest.components.keys().map(String::as_str);
+        let both = axes::tables(names, &manifest.connections, &outcome.record);
+        let is_measured = is_whole && !motion.is_empty() && outcome.ended.is_regular();
+        let axes = axes::measure(both.as_ref(), motion, &outcome.record, is_measured);
         if let Some(tracking) = &tracking
             && tracking.peak_displacement > units::constants::STROKE
         {
@@ -185,12 +193,7 @@ impl Summary {
         versions.dedup();
         Self {
             system: system.name.clone(),
-            motion: MotionSummary {
-                name: motion.name.clone(),
-                duration_s: motion.duration(),
-                pga_g: motion.peak_acceleration() / STANDARD_GRAVITY,
-                peak_displacement_m: motion.peak_displacement(),
-            },
+            motion: MotionSummary::of(motion),
             steps: outcome.steps,
             step_s: outcome.step,
             fmi: versions.join(" and "),
@@ -210,6 +213,7 @@ impl Summary {
                 })
                 .collect(),
             tracking,
+            axes,
             warnings,
             real_time: outcome.real_time.clone(),
             coupling_error: None,

@@ -26,26 +26,28 @@ impl<'a> Table<'a> {
         connections: &[Link],
         record: &Record,
     ) -> Option<Self> {
-        let valve = |name: &str| {
-            let mut links = connections.iter();
-            links
-                .find(|link| {
-                    link.to.component == name && link.to.variable == vocabulary::VALVE_COMMAND
-                })
-                .map(|link| &link.from)
-        };
-        let moves = |name: &str| {
-            let mut outputs = ["displacement", "velocity", "acceleration"].into_iter();
-            outputs.all(|output| record.columns.contains(&format!("{name}.{output}")))
-                && valve(name).is_some()
-        };
         let name = match names.clone().find(|name| *name == "table") {
             Some(name) => name,
-            None => names.find(|name| moves(name))?,
+            None => names.find(|name| moves(name, connections, record))?,
         };
+        Some(Self::of(name, connections))
+    }
+
+    /// The table along the second axis: the first whose valve is driven by what follows the reference along that axis.
+    pub fn second(
+        mut names: impl Iterator<Item = &'a str>,
+        connections: &[Link],
+        record: &Record,
+    ) -> Option<Self> {
+        let name = names
+            .find(|name| moves(name, connections, record) && follows_second(name, connections))?;
+        Some(Self::of(name, connections))
+    }
+
+    fn of(name: &'a str, connections: &[Link]) -> Self {
         // Back from the valve: an interlock takes the controller's command.
         let mut commands = Vec::new();
-        let mut at = valve(name);
+        let mut at = valve(name, connections);
         while let Some(Origin::Output(output)) = at {
             let signal = output.to_string();
             if commands.contains(&signal) || commands.len() > 3 {
@@ -61,14 +63,64 @@ impl<'a> Table<'a> {
                 .map(|link| &link.from);
         }
         commands.reverse();
-        Some(Self {
+        Self {
             name,
             valve: commands,
-        })
+        }
     }
 
     /// The signal that is an output of it.
     pub fn name(&self, output: &str) -> String {
         format!("{}.{output}", self.name)
     }
+}
+
+/// What drives the valve of the component `name`.
+fn valve<'a>(name: &str, connections: &'a [Link]) -> Option<&'a Origin> {
+    let mut links = connections.iter();
+    links
+        .find(|link| link.to.component == name && link.to.variable == vocabulary::VALVE_COMMAND)
+        .map(|link| &link.from)
+}
+
+/// Whether the component `name` is a table: it takes a valve command and its motion is recorded.
+fn moves(name: &str, connections: &[Link], record: &Record) -> bool {
+    let mut outputs = ["displacement", "velocity", "acceleration"].into_iter();
+    outputs.all(|output| record.columns.contains(&format!("{name}.{output}")))
+        && valve(name, connections).is_some()
+}
+
+/// Whether the reference that is nearest to the valve of the component `name`, going back along the connections, is
+/// that of the second axis alone.
+fn follows_second(name: &str, connections: &[Link]) -> bool {
+    let Some(Origin::Output(first)) = valve(name, connections) else {
+        return false;
+    };
+    let mut seen = vec![first.component.as_str()];
+    let mut from = 0;
+    while from < seen.len() {
+        let level = from..seen.len();
+        from = seen.len();
+        let into = |link: &&Link| seen[level.clone()].contains(&link.to.component.as_str());
+        let sources: Vec<&Origin> = connections
+            .iter()
+            .filter(into)
+            .map(|link| &link.from)
+            .collect();
+        let mut axes = sources.iter().filter_map(|source| match source {
+            Origin::Reference { quantity, .. } => Some(quantity.is_second()),
+            Origin::Output(_) => None,
+        });
+        if let Some(is_second) = axes.next() {
+            return is_second && axes.all(|other| other);
+        }
+        for source in sources {
+            if let Origin::Output(output) = source
+                && !seen.contains(&output.component.as_str())
+            {
+                seen.push(&output.component);
+            }
+        }
+    }
+    false
 }

@@ -1,7 +1,9 @@
 //! The figures of a run as text.
 
+use super::axes::{self, Axis};
 use super::summary::{Summary, asked};
 use fmi_master::Record;
+use motion::metrics::Tracking;
 use motion::metrics::laboratory::Laboratory;
 use motion::{Motion, peak};
 use pages::report::columns::aligned;
@@ -35,6 +37,12 @@ pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
     };
     for note in &motion.notes {
         text += &format!("  {note}\n");
+    }
+    if let Some(across) = &motion.across {
+        text += &format!("along y: {}\n", across.name);
+        for note in &across.notes {
+            text += &format!("  {note}\n");
+        }
     }
     for (name, seed) in &summary.seeds {
         text += &format!("  seed of the noise of `{name}`: {seed}\n");
@@ -78,6 +86,12 @@ pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
             1e6 * kept.jitter_p99_s,
         );
     }
+    if let Some(both) = axes::motions(motion).filter(|_| !summary.axes.is_empty()) {
+        for (axis, motion) in summary.axes.iter().zip(both) {
+            text += &along(axis, motion, record.len());
+        }
+        return text;
+    }
     let Some(tracking) = &summary.tracking else {
         return text;
     };
@@ -86,7 +100,53 @@ pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
         Some(asked) => (asked, "structure"),
         None => (motion, "reference"),
     };
-    let played = record.len().min(motion.len());
+    text + &followed(tracking, motion, heading, record.len())
+}
+
+/// How an axis followed its motion, or moved while it was to rest.
+fn along(axis: &Axis, motion: &Motion, played: usize) -> String {
+    let mut text = format!("along {}: {}\n\n", axis.axis, axis.motion.name);
+    if let Some(tracking) = &axis.tracking {
+        text += &followed(tracking, motion, "reference", played);
+        text += "\n";
+    }
+    if let Some(cross) = &axis.at_rest {
+        let system = UnitSystem::of_text();
+        let pair = |name: &str, percent: f64, peak, units| {
+            let cells = [
+                format!("{percent:.4} %"),
+                Cell::Quantity(peak, units, 4).text(system),
+            ];
+            let mut row = vec![name.to_string()];
+            row.extend(cells);
+            row
+        };
+        text += &aligned(&[
+            ["to rest", "RMS over the other axis' peak", "peak"]
+                .map(String::from)
+                .to_vec(),
+            pair(
+                "displacement",
+                cross.displacement_percent,
+                cross.peak_displacement_m,
+                Units::DISPLACEMENT,
+            ),
+            pair(
+                "acceleration",
+                cross.acceleration_percent,
+                cross.peak_acceleration_m_s2,
+                Units::ACCELERATION,
+            ),
+        ]);
+        text += "\n";
+    }
+    text
+}
+
+/// Peaks and errors of a table that followed `motion`, of which so many samples were played.
+fn followed(tracking: &Tracking, motion: &Motion, heading: &str, samples: usize) -> String {
+    let mut text = String::new();
+    let played = samples.min(motion.len());
     let row = |name: &str, cells: [String; 3]| {
         let mut row = vec![name.to_string()];
         row.extend(cells);

@@ -269,7 +269,7 @@ impl Service {
                         values: vec![0.0],
                         after: 0.0,
                     };
-                    Quantity::ALL.len()
+                    Quantity::FIRST_AXIS.len()
                 ],
             },
         };
@@ -403,6 +403,7 @@ impl Service {
             acceleration,
             notes: vec!["what a client asked for over OpenFresco's protocol".to_string()],
             seed: None,
+            across: None,
         };
         self.prepared.samples = record.len();
     }

@@ -10,6 +10,7 @@ use plant::specimens::YieldingSpecimen;
 use plant::specimens::linear::LinearSpecimen;
 use units::hint;
 
+use super::biaxial;
 use super::tuning::{self, Wanted};
 use fmi_system::SystemError;
 use fmi_system::SystemFile;
@@ -153,7 +154,13 @@ const MOVING_MASS: &str = "moving_mass";
 
 /// Names of the plants.
 pub fn plants() -> impl Iterator<Item = &'static str> {
-    PLANTS.iter().map(|part| part.name)
+    let one_axis = PLANTS.iter().map(|part| part.name);
+    one_axis.chain(std::iter::once(biaxial::PLANT))
+}
+
+/// Whether controllers on `plant` are tuned on the commissioned model of the physical rig.
+pub fn is_commissioned(plant: &str) -> bool {
+    [biaxial::RIG, biaxial::PLANT].contains(&plant)
 }
 
 /// Names of the specimens, `none` among them.
@@ -174,6 +181,10 @@ pub fn structures() -> impl Iterator<Item = &'static str> {
 pub fn add_structure(file: &mut SystemFile, name: &str, plant: &str) -> Result<(), SystemError> {
     if name == NONE {
         return Ok(());
+    }
+    if plant == biaxial::PLANT {
+        let reason = "a computed structure has a single axis; expected another plant".to_string();
+        return Err(file.at_fault("structure", reason));
     }
     let part = STRUCTURES.iter().find(|part| part.name == name);
     let mut structure = read("structure", part, name, structures())?;
@@ -234,6 +245,10 @@ pub fn system(
     specimen: &str,
     wanted: Wanted<'_>,
 ) -> Result<SystemFile, SystemError> {
+    if plant == biaxial::PLANT {
+        let one_axis = system(name, biaxial::RIG, specimen, wanted)?;
+        return Ok(biaxial::on_two_axes(one_axis));
+    }
     check(name)?;
     let (controller, aids) = name.split_once('+').unwrap_or((name, ""));
     let part = CONTROLLERS.iter().find(|part| part.name == controller);

@@ -1,6 +1,7 @@
 //! The systems that come with the program, and the parameters of their controllers by rule.
 
 mod aids;
+pub mod biaxial;
 pub mod built_in;
 pub mod control_model;
 pub mod jacobi;

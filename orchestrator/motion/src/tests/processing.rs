@@ -216,3 +216,32 @@ fn a_record_without_motion_is_refused() {
         "short: the record lasts 0.990 s, shorter than its two tapers of 2 s"
     );
 }
+
+/// Both components of a pair have one scale, by which the larger one meets what was asked for; the shorter one rests.
+#[test]
+fn a_pair_has_one_scale() {
+    let tone = |amplitude: f64, seconds: f64| Record {
+        name: "tone".into(),
+        dt: 0.01,
+        acceleration: (0..(100.0 * seconds) as usize)
+            .map(|n| amplitude * (0.2 * f64::from(n as u32)).sin())
+            .collect(),
+        origin: "tone".into(),
+        seed: None,
+    };
+    let options = Options {
+        scaling: Some(Scaling::PeakAcceleration(1.0)),
+        ..Options::default()
+    };
+    let [small, large] =
+        [tone(0.5, 30.0), tone(2.0, 20.0)].map(|record| Unscaled::new(&record, &options).unwrap());
+    for (first, second, order) in [(&small, &large, [0, 1]), (&large, &small, [1, 0])] {
+        let pair = first.pair_scaled(second, &options).unwrap();
+        let axes = [&pair, pair.across.as_deref().unwrap()];
+        let [small, large] = order.map(|n| axes[n]);
+        assert!((large.peak_acceleration() - 1.0).abs() < 1e-12);
+        assert!((small.peak_acceleration() - 0.25).abs() < 0.01);
+        assert_eq!(axes[0].len(), axes[1].len());
+        assert_eq!(large.acceleration.last(), Some(&0.0));
+    }
+}

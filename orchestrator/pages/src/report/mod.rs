@@ -20,7 +20,7 @@ use std::sync::Arc;
 pub use bars::{Bar, BarGroup, Bars};
 pub use html::html;
 pub use page::{FILE, PageError, render};
-pub use run::{Changed, Component, Run, SpecimenHistory, run};
+pub use run::{AxisRun, Changed, Component, Run, SpecimenHistory, run, run_along};
 pub use svg::svg;
 pub use units::{UnitSystem, Units};
 

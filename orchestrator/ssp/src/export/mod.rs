@@ -255,6 +255,13 @@ impl Writer<'_> {
         let Some(player) = self.supply.player().map_err(SspError::Supply)? else {
             return Err(self.fault("the system needs a motion, and there is none".to_string()));
         };
+        let second = taps.iter().find(|(quantity, _)| quantity.is_second());
+        if let Some(&(quantity, ahead)) = second {
+            let origin = Origin::Reference { quantity, ahead };
+            return Err(self.fault(format!(
+                "`{origin}` cannot be written: the component that plays the motion has a single axis"
+            )));
+        }
         let beyond = taps.iter().find(|(_, ahead)| !player.ahead.contains(ahead));
         if let Some(&(quantity, ahead)) = beyond {
             let origin = Origin::Reference { quantity, ahead };

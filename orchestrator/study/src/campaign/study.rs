@@ -461,10 +461,8 @@ fn whole_folders(values: Values, folder: &Path) -> Result<Values, String> {
             continue;
         }
         let found = laboratory::comparison::Played::records_in(&folder.join(name));
-        for played in found.map_err(|error| error.to_string())? {
-            if let laboratory::comparison::Played::Record(path) = played
-                && let Some(file) = path.file_name()
-            {
+        for path in found.map_err(|error| error.to_string())? {
+            if let Some(file) = path.file_name() {
                 let path = Path::new(name).join(file);
                 all.push(Setting::Text(path.display().to_string()));
             }

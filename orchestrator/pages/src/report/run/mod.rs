@@ -1,9 +1,12 @@
 //! The report of a run: how the table followed its reference.
 
+mod axes;
 mod panels;
 mod tables;
 
-use super::{Cell, Fact, Report, Section, Units};
+pub use axes::{AxisRun, run_along};
+
+use super::{Cell, Fact, Panel, Report, Section, Units};
 use motion::metrics::Tracking;
 use motion::{Motion, peak};
 
@@ -81,11 +84,39 @@ pub struct Component {
 /// The report of a run.
 #[must_use]
 pub fn run(run: &Run) -> Report {
-    let section = |heading: &str, panels| Section {
+    let mut all = sections(run);
+    if let Some(specimen) = &run.specimen {
+        let place = all.len() - usize::from(!run.commands.is_empty());
+        all.insert(
+            place,
+            section("The specimen", panels::specimen(run, specimen)),
+        );
+    }
+    all.push(Section {
+        notes: run.motion.notes.clone(),
+        ..section("The motion", Vec::new())
+    });
+    all.push(what_was_run(run));
+    Report {
+        title: format!("{} on {}", run.system, run.motion.name),
+        summary: sentence(run),
+        identity: run.identity.clone(),
+        facts: facts(run),
+        sections: all,
+        footer: run.footer.clone(),
+    }
+}
+
+fn section(heading: &str, panels: Vec<Panel>) -> Section {
+    Section {
         heading: heading.to_string(),
         panels,
         ..Section::default()
-    };
+    }
+}
+
+/// How the table followed, over time and frequency, and what the valve got.
+fn sections(run: &Run) -> Vec<Section> {
     let mut sections = vec![
         Section {
             tables: run
@@ -111,27 +142,24 @@ pub fn run(run: &Run) -> Report {
             ..section("In frequency", panels::frequency(run))
         },
     ];
-    if let Some(specimen) = &run.specimen {
-        sections.push(section("The specimen", panels::specimen(run, specimen)));
-    }
     if !run.commands.is_empty() {
         sections.push(section("The valve", vec![panels::valve(run)]));
     }
-    sections.push(Section {
-        notes: run.motion.notes.clone(),
-        ..section("The motion", Vec::new())
-    });
-    sections.push(Section {
+    sections
+}
+
+fn what_was_run(run: &Run) -> Section {
+    Section {
         tables: tables::what_was_run(run),
         ..section("The run", Vec::new())
-    });
-    Report {
-        title: format!("{} on {}", run.system, run.motion.name),
-        summary: sentence(run),
-        identity: run.identity.clone(),
-        facts: facts(run),
-        sections,
-        footer: run.footer.clone(),
+    }
+}
+
+fn fact(label: &str, value: Cell, note: &str) -> Fact {
+    Fact {
+        label: label.to_string(),
+        value,
+        note: note.to_string(),
     }
 }
 
@@ -153,11 +181,6 @@ fn sentence(run: &Run) -> String {
 }
 
 fn facts(run: &Run) -> Vec<Fact> {
-    let fact = |label: &str, value: Cell, note: &str| Fact {
-        label: label.to_string(),
-        value,
-        note: note.to_string(),
-    };
     let mut facts = Vec::new();
     if let Some(tracking) = run.tracking {
         let percent = |value| Cell::Quantity(value, Units::PERCENT, 3);

@@ -8,8 +8,8 @@ use crate::report::{Abscissa, Axis, Panel, Series, Style, Units};
 use motion::metrics::{HIGHEST_FREQUENCY, USUAL_DAMPING, fourier_amplitudes, pseudo_acceleration};
 
 /// Colours of the reference, the table, an error and whatever stopped the run.
-const REFERENCE: usize = 0;
-const TABLE: usize = 1;
+pub(super) const REFERENCE: usize = 0;
+pub(super) const TABLE: usize = 1;
 const ERROR: usize = 2;
 const TRIP: usize = 6;
 /// Frequencies of the response spectra, Hz.
