@@ -38,6 +38,8 @@ pub struct Loop {
 pub struct Interaction {
     /// Static relative gain array.
     pub relative_gain_at_rest: Vec<Vec<f64>>,
+    /// Actuators, from 1, whose strokes follow the command of another one: stroke and that command.
+    pub swapped: Vec<[usize; 2]>,
     /// Over frequency.
     pub points: Vec<Point>,
     /// The loop, at the highest crossover of those tried that keeps 0.5 of simultaneous margin; none if no one does.
@@ -46,6 +48,8 @@ pub struct Interaction {
 
 /// Frequencies at which margins are sought.
 const FREQUENCIES: usize = 600;
+/// Relative gain from which a stroke belongs to a command.
+const OWN: f64 = 0.5;
 /// Simultaneous margin that a loop must keep.
 const KEPT: f64 = 0.5;
 
@@ -86,11 +90,37 @@ pub fn interaction(model: &Model) -> Result<Interaction, String> {
     let decoupled = grid(24, 0.05, nyquist / 4.0)
         .filter_map(|crossover| closed(model, &inverse, &frequencies, crossover))
         .rfind(|own| own.simultaneous >= KEPT);
+    let relative_gain_at_rest = rows(&gain.component_mul(&inverse.transpose()));
     Ok(Interaction {
-        relative_gain_at_rest: rows(&gain.component_mul(&inverse.transpose())),
+        swapped: swapped(&relative_gain_at_rest),
+        relative_gain_at_rest,
         points,
         decoupled,
     })
+}
+
+/// Strokes that another command than their own has more influence on, with that command. Rows and columns of the
+/// array sum to 1.
+fn swapped(relative_gain: &[Vec<f64>]) -> Vec<[usize; 2]> {
+    let of = |(i, row): (usize, &Vec<f64>)| {
+        let follows = (0..row.len()).max_by(|a, b| row[*a].total_cmp(&row[*b]))?;
+        (follows != i && row[follows] > OWN).then_some([i + 1, follows + 1])
+    };
+    relative_gain.iter().enumerate().filter_map(of).collect()
+}
+
+impl Interaction {
+    /// What to know of actuators whose cables may be swapped.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let of = |[stroke, command]: &[usize; 2]| {
+            format!(
+                "stroke {stroke} follows command {command} and not its own: check whether the cables of these actuators \
+                 or their sensors are swapped, or rename the columns"
+            )
+        };
+        self.swapped.iter().map(of).collect()
+    }
 }
 
 fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
@@ -264,6 +294,16 @@ mod tests {
             "{} {peak}",
             own.simultaneous
         );
+    }
+
+    /// For two actuators of gain [[a, b], [c, d]] the relative gain is a d/(a d - b c), and one less it with the columns
+    /// swapped.
+    #[test]
+    fn swapped_actuators_are_named() {
+        let relative = |own: f64| vec![vec![own, 1.0 - own], vec![1.0 - own, own]];
+        assert!(swapped(&relative(1.11)).is_empty() && swapped(&relative(0.6)).is_empty());
+        assert_eq!(swapped(&relative(-0.11)), [[1, 2], [2, 1]]);
+        assert_eq!(swapped(&relative(0.3)), [[1, 2], [2, 1]]);
     }
 
     #[test]

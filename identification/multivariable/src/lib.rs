@@ -4,6 +4,7 @@
 //! found by [`identify`], judged by [`interaction`], and compared with later recordings by [`diagnose`], which names a fault
 //! and its actuator.
 
+mod description;
 pub mod diagnose;
 mod fault;
 mod fit;
@@ -11,7 +12,10 @@ pub mod identify;
 pub mod interaction;
 mod model;
 mod recording;
+mod residuals;
+mod search;
 
+pub use description::{Description, KIND, Pins, TEMPLATE};
 pub use fault::Fault;
 pub use model::Model;
 pub use recording::{Joint, Names, Recording, is_multivariable};

@@ -6,10 +6,10 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use multivariable::diagnose::{Description, Diagnosis, Verdict, diagnose};
+use multivariable::diagnose::{Diagnosis, Verdict, diagnose};
 use multivariable::identify::identify;
 use multivariable::interaction::interaction;
-use multivariable::{Model, Names, Recording, is_multivariable};
+use multivariable::{Description, Model, Names, Recording, is_multivariable};
 
 /// Numbers that look random, by splitmix64.
 struct Draw(u64);
@@ -360,6 +360,15 @@ fn what_cannot_be_used_is_refused_with_its_place() {
             "{error}"
         );
     }
+    // The columns of the commands change places: no fault of a later recording, but of this one.
+    let mut crossed = model.clone();
+    for row in &mut crossed.static_gain {
+        row.swap(0, 1);
+    }
+    let found = interaction(&crossed).unwrap();
+    assert_eq!(found.swapped, [[1, 2], [2, 1]]);
+    assert!(found.warnings()[0].contains("stroke 1 follows command 2"));
+    assert!(interaction(&model).unwrap().warnings().is_empty());
     let mut singular = model;
     singular.static_gain = vec![vec![1.0, 0.5], vec![2.0, 1.0]];
     assert!(

@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use identification::diagnosis::rigs::column_map;
-use multivariable::diagnose::{Description, Found, KIND, TEMPLATE, diagnose};
+use multivariable::diagnose::{Found, diagnose};
 use multivariable::interaction::{Interaction, interaction};
-use multivariable::{Model, Names, Recording, is_multivariable};
+use multivariable::{Description, KIND, Model, Names, Recording, TEMPLATE, is_multivariable};
 
 use laboratory::error::Error;
 use laboratory::results::Results;
@@ -107,8 +107,9 @@ pub fn identified(
     )?;
     results.finish()?;
     let mut warnings = Vec::new();
-    if let Err(reason) = &interaction {
-        warnings.push(reason.clone());
+    match &interaction {
+        Ok(found) => warnings.extend(found.warnings()),
+        Err(reason) => warnings.push(reason.clone()),
     }
     for (i, fit) in model
         .fit_percent
@@ -171,6 +172,9 @@ pub fn designed(path: &Path, json: bool) -> Result<ExitCode, Error> {
         println!("{}", serde_json::json!(found));
     } else {
         print!("{}{}", model_text(&model), interaction_text(&found));
+    }
+    for warning in found.warnings() {
+        eprintln!("warning: {warning}");
     }
     Ok(ExitCode::SUCCESS)
 }
