@@ -362,7 +362,7 @@ fn watch(
     let tap = Arc::new(Tap::new(places, prepared.samples));
     let server = Server::start(&scene, Arc::clone(&tap), port).map_err(|error| Error::Option {
         option: "--watch",
-        reason: format!("cannot listen on port {port} of 127.0.0.1: {error}"),
+        reason: error.to_string(),
     })?;
     simulation.watch(tap.clone());
     eprintln!("watch it at {}", server.url());

@@ -39,7 +39,7 @@ impl Watched {
         let server =
             Server::start(&scene, Arc::clone(&tap), port).map_err(|error| Error::Option {
                 option: "--watch",
-                reason: format!("cannot listen on port {port} of 127.0.0.1: {error}"),
+                reason: error.to_string(),
             })?;
         Ok(Self {
             tap,

@@ -51,8 +51,15 @@ impl Server {
     /// Serves the page of `tap` at a port of 127.0.0.1, any free one for 0.
     ///
     /// # Errors
-    /// A port that is taken, or a system that has no random numbers.
+    /// A port that is taken, or a system that has no random numbers; the message names the port.
     pub fn start(scene: &Scene, tap: Arc<Tap>, port: u16) -> io::Result<Self> {
+        Self::listening(scene, tap, port).map_err(|error| {
+            let reason = format!("cannot listen on port {port} of 127.0.0.1: {error}");
+            io::Error::new(error.kind(), reason)
+        })
+    }
+
+    fn listening(scene: &Scene, tap: Arc<Tap>, port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         let address = listener.local_addr()?;
         let word = || getrandom::u64().map_err(|error| io::Error::other(error.to_string()));
