@@ -180,7 +180,10 @@ fn the_axes_of_a_biaxial_table_are_coupled_by_the_eccentricity_alone() {
             ..Request::built_in("three-variable")
         });
         let column = |name: &str| record.column(name).unwrap();
-        error(&column("reference.displacement"), &column("table.displacement"))
+        error(
+            &column("reference.displacement"),
+            &column("table.displacement"),
+        )
     });
     let system = Path::new(env!("CARGO_MANIFEST_DIR")).join("../systems/biaxial.toml");
     let both = |eccentricity: &str| {
@@ -193,8 +196,14 @@ fn the_axes_of_a_biaxial_table_are_coupled_by_the_eccentricity_alone() {
         });
         let column = |name: &str| record.column(name).unwrap();
         [
-            error(&column("reference.displacement"), &column("table_x.displacement")),
-            error(&column("reference.displacement_y"), &column("table_y.displacement")),
+            error(
+                &column("reference.displacement"),
+                &column("table_x.displacement"),
+            ),
+            error(
+                &column("reference.displacement_y"),
+                &column("table_y.displacement"),
+            ),
         ]
     };
     let (centred, eccentric) = (both("0 in"), both("4 in"));

@@ -92,7 +92,12 @@ pub fn diagnose(model: &Model, pins: &Pins, recordings: &[Recording]) -> Result<
 }
 
 /// The verdict in words.
-pub(crate) fn sentence(verdict: Verdict, effects: &[Found], alternatives: &[Found], after: &[f64]) -> String {
+pub(crate) fn sentence(
+    verdict: Verdict,
+    effects: &[Found],
+    alternatives: &[Found],
+    after: &[f64],
+) -> String {
     let words = |all: &[Found]| {
         all.iter()
             .map(|own| own.words.as_str())

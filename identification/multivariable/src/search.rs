@@ -1,9 +1,9 @@
 //! The search for the faults that explain what the model of the healthy rig does not.
 
+use crate::Fault;
 use crate::diagnose::{Diagnosis, EXPLAINED, Found, Verdict, sentence};
 use crate::fit::repeats;
 use crate::residuals::{Case, Faults};
-use crate::Fault;
 
 /// Share that a fault must explain of the present excess, and of the excess of the model without faults.
 const SHARE: f64 = 0.3;

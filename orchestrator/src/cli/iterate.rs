@@ -306,7 +306,10 @@ fn text(found: &Iteration) -> String {
             if n == found.best { "best" } else { "" }.to_string(),
         ];
         if let Some(own) = run.along_y {
-            row.splice(3..3, [own.measured_percent, own.time_domain_percent].map(percent));
+            row.splice(
+                3..3,
+                [own.measured_percent, own.time_domain_percent].map(percent),
+            );
         }
         rows.push(row);
     }

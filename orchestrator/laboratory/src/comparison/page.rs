@@ -129,30 +129,37 @@ fn bars(comparison: &Comparison) -> Vec<Bars> {
         1 + place.unwrap_or(0) % 8
     };
     let group = |motion: &str, measure: Measure| BarGroup {
-            label: motion.to_string(),
-            bars: comparison
-                .rows
-                .iter()
-                .filter(|row| row.record == motion && row.is_complete())
-                .filter_map(|row| {
-                    Some(Bar {
-                        name: row.controller.clone(),
-                        value: measure(row)?,
-                        interval: None,
-                        colour: colour(&row.controller),
-                    })
+        label: motion.to_string(),
+        bars: comparison
+            .rows
+            .iter()
+            .filter(|row| row.record == motion && row.is_complete())
+            .filter_map(|row| {
+                Some(Bar {
+                    name: row.controller.clone(),
+                    value: measure(row)?,
+                    interval: None,
+                    colour: colour(&row.controller),
                 })
-                .collect(),
-        };
+            })
+            .collect(),
+    };
     let bars = |title: &str, measure: Measure| Bars {
         title: title.into(),
-        groups: motions(&comparison.rows).into_iter().map(|motion| group(motion, measure)).collect(),
+        groups: motions(&comparison.rows)
+            .into_iter()
+            .map(|motion| group(motion, measure))
+            .collect(),
         mark: None,
     };
     match comparison.is_biaxial() {
-        false => vec![bars("Normalised RMS acceleration error, %", |row| row.time_domain_percent)],
+        false => vec![bars("Normalised RMS acceleration error, %", |row| {
+            row.time_domain_percent
+        })],
         true => vec![
-            bars("Normalised RMS acceleration error along x, %", |row| row.time_domain_percent),
+            bars("Normalised RMS acceleration error along x, %", |row| {
+                row.time_domain_percent
+            }),
             bars("Normalised RMS acceleration error along y, %", |row| {
                 row.along_y?.time_domain_percent
             }),

@@ -233,7 +233,12 @@ fn run(request: &Request, label: &str, keep_history: bool) -> Result<Row, Error>
     let links: Vec<Link> = system.links().collect();
     let both = axes::tables(names.clone(), &links, &outcome.record);
     let is_measured = outcome.ended.is_regular();
-    let axes = axes::measure(both.as_ref(), &prepared.motion, &outcome.record, is_measured);
+    let axes = axes::measure(
+        both.as_ref(),
+        &prepared.motion,
+        &outcome.record,
+        is_measured,
+    );
     let table = Table::among(names, &links, &outcome.record);
     let column = |name: &str| outcome.record.column(&table.as_ref()?.name(name));
     let motion = &prepared.motion;

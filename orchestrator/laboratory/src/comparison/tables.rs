@@ -50,15 +50,24 @@ fn along_both_axes(comparison: &Comparison) -> Vec<ErrorTable> {
     let errors: [(&str, [Measure; 2]); 4] = [
         (
             "Normalised RMS acceleration error",
-            [|row| row.time_domain_percent, |row| row.along_y?.time_domain_percent],
+            [
+                |row| row.time_domain_percent,
+                |row| row.along_y?.time_domain_percent,
+            ],
         ),
         (
             "Fourier amplitude error",
-            [|row| row.frequency_domain_percent, |row| row.along_y?.frequency_domain_percent],
+            [
+                |row| row.frequency_domain_percent,
+                |row| row.along_y?.frequency_domain_percent,
+            ],
         ),
         (
             "Response spectrum at 5 % damping, largest deviation from 0.5 to 15 Hz",
-            [|row| row.response_spectrum_percent, |row| row.along_y?.response_spectrum_percent],
+            [
+                |row| row.response_spectrum_percent,
+                |row| row.along_y?.response_spectrum_percent,
+            ],
         ),
         (
             "Normalised RMS acceleration error over the significant duration (5 to 95 % of the Arias intensity)",
@@ -80,7 +89,8 @@ fn along_both_axes(comparison: &Comparison) -> Vec<ErrorTable> {
     }
     let at_rest: Measure = |row| row.along_y?.at_rest_percent;
     if has(at_rest) {
-        let caption = "RMS acceleration of y, which was to rest, over the peak of the reference along x, %";
+        let caption =
+            "RMS acceleration of y, which was to rest, over the peak of the reference along x, %";
         all.push(table(caption, comparison, at_rest, None));
     }
     all

@@ -213,7 +213,9 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
     progress(1);
 
     let energy = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>();
-    let asked: Vec<&Motion> = std::iter::once(&wanted).chain(wanted.across.as_deref()).collect();
+    let asked: Vec<&Motion> = std::iter::once(&wanted)
+        .chain(wanted.across.as_deref())
+        .collect();
     let whole: f64 = asked.iter().map(|own| energy(&own.acceleration)).sum();
     let peaks = peaks(&asked);
     let (mut runs, mut exposure, mut gain, mut halved) = (Vec::<Run>::new(), 0.0, plan.gain, false);
@@ -234,7 +236,10 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
         let errors: Vec<Vec<f64>> = (0..asked.len())
             .map(|axis| inverses[axis].error(asked[axis], &played.axes[axis].measured))
             .collect();
-        let percents = errors.iter().zip(&peaks).map(|(error, peak)| 100.0 * rms(error) / peak);
+        let percents = errors
+            .iter()
+            .zip(&peaks)
+            .map(|(error, peak)| 100.0 * rms(error) / peak);
         let percents: Vec<f64> = percents.collect();
         let measured = percents.iter().copied().fold(0.0, f64::max);
         runs.push(Run {
@@ -348,7 +353,8 @@ pub(crate) fn control_model(request: &Request) -> Result<Option<ControlModel>, E
 fn peaks(asked: &[&Motion]) -> Vec<f64> {
     let own = asked.iter().map(|motion| motion.peak_acceleration());
     let largest = own.clone().fold(0.0, f64::max);
-    own.map(|peak| if peak > 0.0 { peak } else { largest }).collect()
+    own.map(|peak| if peak > 0.0 { peak } else { largest })
+        .collect()
 }
 
 /// The drive of an earlier session, or the motion itself.
@@ -420,7 +426,10 @@ fn play(prepared: &Prepared, drive: Motion, late: usize) -> Result<Played, Error
     let links: Vec<Link> = own.system.links().collect();
     let tables = axes::tables(names, &links, record).filter(|_| own.motion.across.is_some());
     let histories = match &tables {
-        Some(tables) => tables.iter().filter_map(|table| seen(table, &links, record)).collect(),
+        Some(tables) => tables
+            .iter()
+            .filter_map(|table| seen(table, &links, record))
+            .collect(),
         None => vec![single(prepared, record)?],
     };
     if own.motion.across.is_some() && histories.len() != 2 {
@@ -440,21 +449,23 @@ fn play(prepared: &Prepared, drive: Motion, late: usize) -> Result<Played, Error
         history.resize(length, last);
         history
     };
-    let axes = histories.into_iter().map(|([displacement, acceleration], seen)| {
-        let (shown, late) = match seen {
-            Some(columns) => (columns, late),
-            None => ([displacement.clone(), acceleration.clone()], 0),
-        };
-        let [x, a] = shown.map(|history| early(history, late));
-        PlayedAxis {
-            measured: Measured {
-                displacement: x,
-                acceleration: a,
-            },
-            displacement,
-            acceleration,
-        }
-    });
+    let axes = histories
+        .into_iter()
+        .map(|([displacement, acceleration], seen)| {
+            let (shown, late) = match seen {
+                Some(columns) => (columns, late),
+                None => ([displacement.clone(), acceleration.clone()], 0),
+            };
+            let [x, a] = shown.map(|history| early(history, late));
+            PlayedAxis {
+                measured: Measured {
+                    displacement: x,
+                    acceleration: a,
+                },
+                displacement,
+                acceleration,
+            }
+        });
     Ok(Played {
         axes: axes.collect(),
         ended: outcome.ended,
@@ -491,7 +502,9 @@ fn seen(table: &Table<'_>, links: &[Link], record: &Record) -> Option<Histories>
     let column = |name: &str| record.column(name);
     let displacement = table.name("displacement");
     let moved = [column(&displacement)?, column(&table.name("acceleration"))?];
-    let takes = links.iter().filter(|link| link.from.to_string() == displacement);
+    let takes = links
+        .iter()
+        .filter(|link| link.from.to_string() == displacement);
     let mut shown = takes.filter_map(|link| {
         let output = |variable: &str| column(&format!("{}.{variable}", link.to.component));
         Some([
