@@ -20,8 +20,9 @@ use crate::vrths::motions::{INTENSITY, data_folder, records};
 /// Options of `shakebench benchmark marths`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Controllers: rodeac (the benchmark's own), none, decoupled-predictive, \
-    predictive, adaptive-predictive, adaptive-predictive-estimate.\n\nExamples:\n  \
+    after_help = "Controllers: rodeac (the benchmark's own), none, predictive, \
+    adaptive-predictive, adaptive-predictive-estimate, and the latter three with `decoupled-` before the name, which \
+    leave the coupling out.\n\nExamples:\n  \
     shakebench benchmark marths --motion el-centro --perturbed 0\n  \
     shakebench benchmark marths --controller rodeac,adaptive-predictive --json > scores.json"
 )]

@@ -7,6 +7,7 @@ use pages::report::columns::aligned;
 use plant::ModelError;
 use serde::Serialize;
 
+use super::roster;
 use super::study::{ControllerScore, Nominal, Scores, Study};
 
 /// Result of the benchmark.
@@ -115,6 +116,44 @@ impl Outcome {
         rows
     }
 
+    /// What coupling costs: each law that leaves it out against the same law with it, mean and largest; none where no such
+    /// pair was run.
+    #[must_use]
+    pub fn coupling(&self) -> Vec<Vec<String>> {
+        const MEASURES: [&str; 5] = ["J2_1", "J2_2", "true_J2_1", "true_J2_2", "H8"];
+        let pairs = roster::ALL.iter().filter_map(|entry| {
+            let full = entry.full?;
+            Some((
+                full,
+                self.controllers.get(entry.name)?,
+                self.controllers.get(full)?,
+            ))
+        });
+        let mut rows = Vec::new();
+        for (name, decoupled, full) in pairs {
+            if rows.is_empty() {
+                let heads = ["law", "coupling", "runs", "unstable"]
+                    .into_iter()
+                    .chain(MEASURES);
+                rows.push(heads.map(String::from).collect());
+            }
+            for (label, score) in [("left out", decoupled), ("in the model", full)] {
+                let mut row = vec![
+                    name.to_string(),
+                    label.to_string(),
+                    score.runs.to_string(),
+                    score.unstable.to_string(),
+                ];
+                row.extend(MEASURES.map(|measure| match score.mean[measure] {
+                    mean if mean.is_nan() => "-".into(),
+                    mean => format!("{mean:.2}/{:.2}", score.max[measure]),
+                }));
+                rows.push(row);
+            }
+        }
+        rows
+    }
+
     /// The classes that were run, with what they are.
     #[must_use]
     pub fn classes(&self) -> Vec<(Class, &'static str)> {
@@ -143,6 +182,11 @@ impl Outcome {
         for (class, title) in self.classes() {
             let _ = writeln!(text, "\n{title}");
             text += &aligned(&self.rows(class));
+        }
+        let coupling = self.coupling();
+        if !coupling.is_empty() {
+            let _ = writeln!(text, "\nWhat coupling costs");
+            text += &aligned(&coupling);
         }
         text
     }

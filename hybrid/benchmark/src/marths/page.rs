@@ -32,11 +32,25 @@ pub fn report(outcome: &Outcome) -> Report {
         )],
         panels: Vec::new(),
     });
+    let mut sections: Vec<Section> = sections.collect();
+    let coupling = outcome.coupling();
+    if !coupling.is_empty() {
+        sections.push(Section {
+            heading: "What coupling costs".into(),
+            text: vec![
+                "Laws that treat each actuator by its own entry of the plant, and the same laws with both actuators in \
+                 the model."
+                    .into(),
+            ],
+            tables: vec![Table::headed("Mean/largest, %", coupling)],
+            ..Section::default()
+        });
+    }
     Report {
         title: "Multi-axial real-time hybrid simulation".into(),
         summary,
         facts: Vec::new(),
-        sections: sections.collect(),
+        sections,
         identity: vec![
             identity::entry("Benchmark", "multi-axial hybrid simulation (2023)"),
             identity::entry("Controllers", outcome.controllers.len().to_string()),

@@ -14,6 +14,8 @@ pub struct Entry {
     pub about: &'static str,
     /// What it feeds to the specimen's force.
     pub class: Class,
+    /// Of a law that leaves the coupling of the actuators out: the same law with it.
+    pub full: Option<&'static str>,
     make: fn() -> Result<Box<dyn Law>, ModelError>,
 }
 
@@ -28,56 +30,68 @@ impl Entry {
 }
 
 /// All laws, the benchmark's own first.
-pub const ALL: [Entry; 6] = [
+pub const ALL: [Entry; 8] = [
     Entry {
         name: "rodeac",
         about: "the benchmark's sample controller: an adaptive filter for each actuator",
         class: Class::Raw,
+        full: None,
         make: || Ok(Box::new(DecentralisedAdaptive::default())),
     },
     Entry {
         name: "none",
         about: "the targets are the commands",
         class: Class::Raw,
+        full: None,
         make: || Ok(Box::new(NoControl)),
     },
     Entry {
         name: "decoupled-predictive",
         about: "predictive, each actuator by its own entry of the nominal plant",
         class: Class::Raw,
-        make: || {
-            let mut design = raw(false);
-            design.plant.static_gain[0][1] = 0.0;
-            design.plant.static_gain[1][0] = 0.0;
-            Ok(Box::new(Predictive::new(design)?))
-        },
+        full: Some("predictive"),
+        make: || predictive(decoupled(raw(false))),
     },
     Entry {
         name: "predictive",
         about: "predictive, both actuators by the nominal plant",
         class: Class::Raw,
-        make: || Ok(Box::new(Predictive::new(raw(false))?)),
+        full: None,
+        make: || predictive(raw(false)),
+    },
+    Entry {
+        name: "decoupled-adaptive-predictive",
+        about: "predictive, each actuator by its own entry of a plant that is estimated during the test",
+        class: Class::Raw,
+        full: Some("adaptive-predictive"),
+        make: || predictive(decoupled(raw(true))),
     },
     Entry {
         name: "adaptive-predictive",
         about: "predictive, by a plant that is estimated during the test",
         class: Class::Raw,
-        make: || Ok(Box::new(Predictive::new(raw(true))?)),
+        full: None,
+        make: || predictive(raw(true)),
+    },
+    Entry {
+        name: "decoupled-adaptive-predictive-estimate",
+        about: "the same for each actuator by its own entry, the estimated strokes make the specimen's force",
+        class: Class::Estimate,
+        full: Some("adaptive-predictive-estimate"),
+        make: || predictive(decoupled(estimate())),
     },
     Entry {
         name: "adaptive-predictive-estimate",
-        about: "the same, the estimated strokes make the specimen's force",
+        about: "the same with both actuators",
         class: Class::Estimate,
-        make: || {
-            let design = PredictiveDesign {
-                class: Class::Estimate,
-                order: 3,
-                ..raw(true)
-            };
-            Ok(Box::new(Predictive::new(design)?))
-        },
+        full: None,
+        make: || predictive(estimate()),
     },
 ];
+
+fn predictive(design: PredictiveDesign) -> Result<Box<dyn Law>, ModelError> {
+    Ok(Box::new(Predictive::new(design)?))
+}
 
 /// With measured strokes in the force the targets jitter, which asks for a lower order.
 fn raw(adaptive: bool) -> PredictiveDesign {
@@ -85,6 +99,21 @@ fn raw(adaptive: bool) -> PredictiveDesign {
         adaptive,
         ..PredictiveDesign::default()
     }
+}
+
+fn estimate() -> PredictiveDesign {
+    PredictiveDesign {
+        class: Class::Estimate,
+        order: 3,
+        ..raw(true)
+    }
+}
+
+/// A command moves the stroke of its own actuator alone, also in what is estimated.
+fn decoupled(mut design: PredictiveDesign) -> PredictiveDesign {
+    design.plant.static_gain[0][1] = 0.0;
+    design.plant.static_gain[1][0] = 0.0;
+    design
 }
 
 /// The roster's entry of a name.

@@ -87,7 +87,7 @@ fn sentence(axes: &[AxisRun<'_>; 2]) -> String {
             axis.name, tracking.time_domain_percent, tracking.displacement_percent
         ),
         (None, Some([displacement, acceleration])) => format!(
-            "{} was to rest and moved by {displacement:.2} % of the other axis' displacement and {acceleration:.2} % \
+            "Axis {} was to rest and moved by {displacement:.2} % of the other axis' displacement and {acceleration:.2} % \
              of its acceleration (RMS over peak).",
             axis.name
         ),
