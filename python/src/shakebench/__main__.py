@@ -16,6 +16,8 @@ def main() -> int:
     except Error as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    # `doctor` and OpenSees look into this environment, activated or not.
+    os.environ.setdefault("PYTHON", sys.executable)
     command = [str(path), *sys.argv[1:]]
     if os.name == "posix":
         os.execv(path, command)  # signals and the terminal are the program's then

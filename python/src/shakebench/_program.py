@@ -10,6 +10,7 @@ import os
 import platform
 import re
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any, Dict, FrozenSet, Iterable, List, Optional, Sequence, Union
 
@@ -92,6 +93,7 @@ def say(arguments: Sequence[str]) -> "subprocess.CompletedProcess[bytes]":
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
+            env={"PYTHON": sys.executable, **os.environ},
         )
     except OSError as error:
         raise ProgramMissing(

@@ -50,6 +50,10 @@ fn candidates(named: Option<&str>) -> Vec<(PathBuf, &'static str)> {
         return vec![(PathBuf::from(named), PYTHON)];
     }
     let mut all = Vec::new();
+    // The Python package names the one that started the program.
+    if let Some(own) = std::env::var_os("PYTHON").filter(|own| !own.is_empty()) {
+        all.push((PathBuf::from(own), "PYTHON"));
+    }
     if let Some(environment) = std::env::var_os("VIRTUAL_ENV") {
         let inside = if cfg!(windows) {
             "Scripts/python.exe"
