@@ -10,9 +10,11 @@ use super::quantity::{band, if_given};
 use super::rig::RigArguments;
 use super::{print_files, progress, run};
 use identification::diagnosis::called;
+use identification::diagnosis::rigs::{DriveSearch, RigDrive};
 use laboratory::error::Error;
 use laboratory::iteration::circle::{self, Circle};
 use laboratory::iteration::on_model::Search;
+use laboratory::iteration::on_rig;
 use laboratory::iteration::replay::{self, Replay};
 use laboratory::iteration::{self, Iteration, Plan};
 use laboratory::results::{Results, unused};
@@ -26,7 +28,8 @@ use pages::report::columns::aligned;
     shakebench iterate three-variable --drive shakebench-results/iteration-three-variable-synthetic-1/drive.csv --iterations 0\n\n\
     Of a diagnosed rig, on its extended model and without a run:\n  \
     shakebench diagnose my-case --out results\n  \
-    shakebench iterate my-case --model results/extended_model.toml --pga 0.15\n\n\
+    shakebench iterate my-case --model results/extended_model.toml --pga 0.15\n  \
+    shakebench iterate --model results/extended_model.toml --reference wanted.csv --command-limit \"10 V\"\n\n\
     Of a laboratory's recorded rounds, without a system of ours:\n  \
     shakebench iterate --replay round_0.csv round_1.csv --command-limit \"10 V\" --out next")]
 pub struct Arguments {
@@ -34,8 +37,9 @@ pub struct Arguments {
     /// with nominal.toml, which states the control law
     #[arg(value_name = "SYSTEM|CASE")]
     system: Option<String>,
-    /// Compute the drive on this extended model from `shakebench diagnose`, instead of from runs
-    #[arg(long, value_name = "MODEL.toml", requires = "system", conflicts_with_all = [
+    /// Compute the drive on this extended model from `shakebench diagnose`, instead of from runs; of a described rig
+    /// without a case, for the output in the file of --reference
+    #[arg(long, value_name = "MODEL.toml", conflicts_with_all = [
         "plant", "specimen", "tuning", "control_model", "set", "gain", "target", "exposure", "measurement_delay", "dummy_mass", "drive",
         "record_y", "reference_y", "drive_y",
     ])]
@@ -86,8 +90,8 @@ pub struct Arguments {
     /// unit = "mm" }`
     #[arg(long, value_name = "MAP.toml", requires = "replay")]
     columns: Option<PathBuf>,
-    /// Rail of the recorded command, such as "10 V" [default: where the record stays at its largest value]
-    #[arg(long, value_name = "U", requires = "replay")]
+    /// Rail of the command, such as "10 V" [default: with --replay where the record stays at its largest value]
+    #[arg(long, value_name = "U")]
     command_limit: Option<String>,
     /// Folder for drive.csv, iteration.json and report.html; with --model for drive.csv and drive.json [default:
     /// shakebench-results/iteration-SYSTEM-MOTION or drive-CASE-MOTION]
@@ -107,7 +111,22 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return replayed(arguments);
     }
     if let (Some(case), Some(model)) = (&arguments.system, &arguments.model) {
+        if arguments.command_limit.is_some() {
+            return Err(Error::Option {
+                option: "--command-limit",
+                reason: "the case's control law states the limit; omit the option".into(),
+            });
+        }
         return on_model(arguments, case, model);
+    }
+    if let Some(model) = &arguments.model {
+        return on_rig(arguments, model);
+    }
+    if arguments.command_limit.is_some() {
+        return Err(Error::Option {
+            option: "--command-limit",
+            reason: "expected --replay, or --model of a described rig, with it".into(),
+        });
     }
     let plan = plan(arguments)?;
     if let Some(folder) = &arguments.out {
@@ -227,6 +246,50 @@ fn on_model(arguments: &Arguments, case: &str, model: &Path) -> Result<ExitCode,
         println!("{}", serde_json::json!(found));
     } else {
         print!("{}", text_on_model(&found));
+        println!();
+        print_files(&files);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Computes the drive of a described rig on its extended model and writes it.
+fn on_rig(arguments: &Arguments, model: &Path) -> Result<ExitCode, Error> {
+    let Some(wanted) = &arguments.motion.reference else {
+        return Err(Error::Option {
+            option: "--model",
+            reason: "expected --reference with a file of the wanted output, under the headings of the model's \
+                     columns; or a case, whose nominal.toml states the control law of a shake table"
+                .into(),
+        });
+    };
+    if let Some(folder) = &arguments.out {
+        Results::check(folder)?;
+    }
+    let [_, highest] = match arguments.band.as_slice() {
+        [] => [0.1, 10.0],
+        given => band(given)?,
+    };
+    let usual = Search::default();
+    let plan = on_rig::Plan {
+        model: model.to_path_buf(),
+        wanted: wanted.clone(),
+        search: DriveSearch {
+            limit: if_given("--command-limit", &arguments.command_limit, "V")?,
+            highest,
+            corrections: arguments.iterations.unwrap_or(usual.corrections),
+        },
+    };
+    let found = on_rig::drive(&plan)?;
+    let folder = arguments.out.clone().unwrap_or_else(|| {
+        let name = wanted.file_stem().unwrap_or_default().to_string_lossy();
+        let name = format!("drive-{}-{name}", found.rig).replace(['/', '\\', ' '], "-");
+        unused(&Path::new("shakebench-results").join(name), |_| false)
+    });
+    let files = on_rig::write(&plan, &found, &folder)?;
+    if arguments.json {
+        println!("{}", serde_json::json!(on_rig::figures(&plan, &found)));
+    } else {
+        print!("{}", text_on_rig(&found));
         println!();
         print_files(&files);
     }
@@ -370,6 +433,33 @@ fn text_of_rounds(found: &Replay) -> String {
         found.wanted,
         found.coherence,
         aligned(&rows),
+    )
+}
+
+fn text_on_rig(found: &RigDrive) -> String {
+    let named = match found.effects.as_slice() {
+        [] => "which has no effect".to_string(),
+        some => format!("with {}", some.join(", ")),
+    };
+    let last = found.errors.last().copied().unwrap_or(f64::NAN);
+    let first = found.errors.first().copied().unwrap_or(f64::NAN);
+    let (head, unit) = &found.columns[1];
+    let rail = if found.at_rail > 0.0 {
+        format!(
+            ", at its limit for {:.1} % of the time",
+            100.0 * found.at_rail
+        )
+    } else {
+        String::new()
+    };
+    format!(
+        "drive of {} on the extended model, {named}: the error of {} falls from {first:.2} to {last:.2} % in {} \
+         corrections; largest `{head}` {:.4} {unit}{rail}\n\
+         The model's own error on other records comes on top: shakebench diagnose --model MODEL --validate OTHER.csv\n",
+        found.rig,
+        found.columns[2].0,
+        found.errors.len() - 1,
+        found.peak,
     )
 }
 

@@ -26,6 +26,11 @@ impl Cause {
         clear.then_some(Self { found, stated })
     }
 
+    /// Standard errors between what was found and what was stated.
+    pub(super) fn deviations(&self) -> f64 {
+        (self.found.value - self.stated).abs() / self.found.standard_error
+    }
+
     /// The cause in words, with value, unit and 95 % interval.
     pub fn words(&self) -> String {
         let NamedValue {

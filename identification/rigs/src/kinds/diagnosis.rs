@@ -20,6 +20,10 @@ use diagnosis::{
 /// these, or this small.
 const AGREE: f64 = 2.0;
 const NEAR: f64 = 0.01;
+/// Share of the described model's error that is left, in both parts, where a nominal parameter that is so many
+/// standard errors from what was stated is a cause although the errors do not agree.
+const MOST: f64 = 0.5;
+const FAR: f64 = 5.0;
 /// Share of the squared error beyond which what is explained is all of it.
 const ALL: f64 = 0.98;
 
@@ -244,10 +248,21 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let holds = tests
         .into_iter()
         .all(|(error, fitted)| error < LOST && (error < NEAR || error < AGREE * fitted));
+    // Where they do not agree so well, since friction or the like is missed, what either part predicts of
+    // the other still shows a zero or a delay that is far from what was stated in both.
+    let explains = [
+        (confirmed.error, as_described.nominal_error),
+        (confirmed.swapped_error, swapped.nominal_error),
+    ];
+    let explains = explains
+        .into_iter()
+        .all(|(error, nominal)| error < LOST && error < MOST * nominal);
+    let believed = |cause: &Cause| holds || (explains && cause.deviations() > FAR);
     let values = confirmed.parameters.iter().enumerate();
     let causes: Vec<Cause> = values
-        .filter(|(i, _)| holds && measured.is_cause(*i))
+        .filter(|(i, _)| measured.is_cause(*i))
         .filter_map(|(i, value)| Cause::of(value.clone(), measured.stated(i)))
+        .filter(believed)
         .chain(measured.contradictions())
         .collect();
     let verdict = match (named.is_empty() || !pays, rivalled) {
@@ -411,6 +426,7 @@ impl RigDiagnosis {
                 let share = match (all.len(), left > ALL) {
                     (1, true) => "that is all of the error".to_owned(),
                     (_, true) => "together they are all of the error".to_owned(),
+                    (1, _) => format!("it explains {:.0} % of the squared error", 100.0 * left),
                     (..) => format!("they explain {:.0} % of the squared error", 100.0 * left),
                 };
                 format!("{name}: {}; {share}; {falls}.", joined(&all))

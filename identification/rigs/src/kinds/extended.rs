@@ -251,7 +251,7 @@ impl ExtendedRig {
     }
 
     /// A description with these nominal values, all of them exact.
-    fn description(&self, nominal: &BTreeMap<String, Quantity>) -> Description {
+    pub(super) fn description(&self, nominal: &BTreeMap<String, Quantity>) -> Description {
         let mut nominal = nominal.clone();
         for quantity in nominal.values_mut() {
             quantity.plus_minus = 0.0;
@@ -273,7 +273,7 @@ impl ExtendedRig {
         }
     }
 
-    fn wrong(&self, what: String) -> DescriptionError {
+    pub(super) fn wrong(&self, what: String) -> DescriptionError {
         DescriptionError::Description {
             path: self.path.clone(),
             what,
@@ -348,7 +348,7 @@ impl ExtendedRig {
 
     /// The model as the engine sees it, and its point. `nominal` are its values of the nominal
     /// parameters; without `with_effects` there is none.
-    fn measured<'a>(
+    pub(super) fn measured<'a>(
         &self,
         measurement: &'a Measurement,
         nominal: &BTreeMap<String, Quantity>,

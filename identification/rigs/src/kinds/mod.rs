@@ -13,6 +13,7 @@ pub mod curves;
 mod cyclic_material;
 mod description;
 mod diagnosis;
+mod drive;
 mod extended;
 mod fitted;
 pub mod foreign;
@@ -41,6 +42,7 @@ pub use description::{
     Column, Description, DescriptionError, LeftOut, Quantity, Windows, column_map, renamed,
 };
 pub use diagnosis::{PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
+pub use drive::{DriveSearch, RigDrive};
 pub use extended::{ExtendedRig, FileErrors, Prediction};
 pub use fitted::{FittedNominal, fit_nominal};
 pub use named_value::NamedValue;

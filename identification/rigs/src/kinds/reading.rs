@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::description::{Description, DescriptionError, LeftOut, listed};
-use super::{KINDS, Rig, RigRecording};
+use super::{Begin, KINDS, Rig, RigRecording};
 use recordings::IdentificationError;
 use recordings::{
     Channel, DataError, Pick, Recording, RoundedStamps, Sheet, TimeBase, Wanted, is_called,
@@ -219,20 +219,7 @@ impl Description {
             let what = format!("{samples} samples: expected at least {least}");
             return Err(DataError::file(path, what).into());
         }
-        let period = match (read.stamps(), &self.time_step) {
-            (Some(stamps), _) => even_period(stamps).map_err(|row| {
-                DataError::line(path, sheet.line(row), "the times are not evenly spaced")
-            })?,
-            (None, Some(step)) => match self.si("time_step", step, "s")?.0 {
-                step if step > 0.0 => step,
-                _ => return Err(self.wrong("`time_step`: expected more than 0 s".to_owned())),
-            },
-            (None, None) => {
-                return Err(
-                    self.wrong("neither `columns.time` nor `time_step` is given".to_owned())
-                );
-            }
-        };
+        let period = self.period(path, &sheet, &read)?;
         if rig.inputs().contains(&Channel::Velocity)
             && channels.iter().all(|own| own.0 != Channel::Velocity)
             && let Some((_, way)) = channels.iter().find(|own| own.0 == Channel::Displacement)
@@ -256,6 +243,64 @@ impl Description {
         let mut recording = RigRecording::new(recording, rig.inputs(), rig.output());
         self.begin(&mut recording, rig, may_lack)?;
         Ok((recording, rows))
+    }
+
+    /// Time between samples, s.
+    fn period(
+        &self,
+        path: &Path,
+        sheet: &Sheet,
+        read: &Recording,
+    ) -> Result<f64, DescriptionError> {
+        match (read.stamps(), &self.time_step) {
+            (Some(stamps), _) => even_period(stamps).map_err(|row| {
+                DataError::line(path, sheet.line(row), "the times are not evenly spaced").into()
+            }),
+            (None, Some(step)) => match self.si("time_step", step, "s")?.0 {
+                step if step > 0.0 => Ok(step),
+                _ => Err(self.wrong("`time_step`: expected more than 0 s".to_owned())),
+            },
+            (None, None) => {
+                Err(self.wrong("neither `columns.time` nor `time_step` is given".to_owned()))
+            }
+        }
+    }
+
+    /// A motion of the output alone, from rest, with inputs that are zero.
+    ///
+    /// # Errors
+    /// A file without that column or with cells that are empty.
+    pub(super) fn motion(
+        &self,
+        path: &Path,
+        rig: &dyn Rig,
+    ) -> Result<RigRecording, DescriptionError> {
+        let mut picks = self.picks(rig)?;
+        picks.retain(|pick| [rig.output(), Channel::Time].contains(&pick.channel));
+        let heads: Vec<&str> = picks.iter().map(|pick| pick.head).collect();
+        let wanted = Wanted {
+            is_column: &|cell| heads.iter().any(|head| is_called(cell, head)),
+            header: &heads.join(","),
+        };
+        let sheet = Sheet::read(path, wanted)?;
+        let read = Recording::pick(&sheet, "wanted", &picks)?;
+        let period = self.period(path, &sheet, &read)?;
+        let values = read.samples(rig.output()).to_vec();
+        if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+            let what = format!(
+                "`{}` has no number, expected one in every row",
+                rig.output().name()
+            );
+            return Err(DataError::line(path, sheet.line(row), what).into());
+        }
+        let rest = vec![0.0; values.len()];
+        let inputs = rig.inputs().iter().map(|input| (*input, rest.clone()));
+        let channels = inputs.chain([(rig.output(), values)]).collect();
+        let recording = Recording::new("wanted", period, channels)
+            .map_err(|error| DataError::file(path, error.to_string()))?;
+        let mut recording = RigRecording::new(recording, rig.inputs(), rig.output());
+        recording.begins = vec![Begin { at: 0, known: 1 }];
+        Ok(recording)
     }
 
     /// Where the simulation of `recording` begins.

@@ -1,5 +1,6 @@
 //! What a transfer function explains of the displacement, what the coherence with the command allows, and
-//! where the difference lies.
+//! where the difference lies. Of a rig that integrates its command the velocity is what counts: the drift that
+//! friction and offsets leave of its displacement would outweigh every motion.
 
 use std::f64::consts::TAU;
 
@@ -24,6 +25,8 @@ const APART: f64 = 1.3;
 /// What is explained of data that were not fitted; root mean squares over that of the displacement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Explained {
+    /// Whether all shares are of the velocity and not of the displacement.
+    pub of_velocity: bool,
     /// What the model leaves.
     pub left: f64,
     /// What the command does not explain linearly.
@@ -52,16 +55,22 @@ impl Explained {
         let mut lacking = Vec::new();
         let mut unexplained = Vec::new();
         let mut worst = (0.0, (0.0, 1.0, 1.0));
+        let of_velocity = model.denominator.last() == Some(&0.0);
         for own in unseen {
             let lines = own.band.omega.len() as f64;
             let unit = own.bands.scale[1];
-            let power = (own.band.projected(1) * unit).norm_sqr();
-            let floor = own.band.noise[(1, 1)].re * unit * unit * lines;
-            let error = missed(model, *own);
+            let weight = if of_velocity {
+                own.band.middle().powi(2)
+            } else {
+                1.0
+            };
+            let power = weight * (own.band.projected(1) * unit).norm_sqr();
+            let floor = weight * own.band.noise[(1, 1)].re * unit * unit * lines;
+            let error = weight * missed(model, *own);
             size += power + floor;
             left += error + floor;
             incoherent += floor;
-            white += noise * noise * lines;
+            white += weight * noise * noise * lines;
             let frequency = own.band.middle() / TAU;
             lacking.push((frequency, error));
             unexplained.push((frequency, floor));
@@ -73,6 +82,7 @@ impl Explained {
         }
         let share = |power: f64| (power / size.max(f64::MIN_POSITIVE)).sqrt();
         let mut found = Self {
+            of_velocity,
             left: share(left),
             incoherent: share(incoherent),
             noise: share(white).min(share(incoherent)),
@@ -103,6 +113,11 @@ impl Explained {
     /// The sentence for a reader; none where nothing is to be said.
     pub(super) fn sentence(&self) -> Option<String> {
         let percent = |left: f64| 100.0 * (1.0 - left);
+        let what = if self.of_velocity {
+            "velocity"
+        } else {
+            "displacement"
+        };
         let (low, high) = self.band;
         let size = self.by_size.map_or_else(String::new, |(quiet, lively)| {
             format!(
@@ -115,7 +130,7 @@ impl Explained {
         if self.lacks_dynamics() {
             let (frequency, real, modelled) = self.worst;
             return Some(format!(
-                "the model explains {:.1} % of the displacement that was not fitted, and the coherence with \
+                "the model explains {:.1} % of the {what} that was not fitted, and the coherence with \
                  the command allows {:.1} %: most of the difference is at {low:.1} to {high:.1} Hz (at \
                  {frequency:.1} Hz the gain is {real:.2}, the model's {modelled:.2}); the rest includes \
                  what is not linear{size}",
@@ -125,7 +140,7 @@ impl Explained {
         }
         self.is_nonlinear().then(|| {
             format!(
-                "the model explains {:.1} % of the displacement that was not fitted, and no transfer function \
+                "the model explains {:.1} % of the {what} that was not fitted, and no transfer function \
                  more than {:.1} %, though the sensor's noise would allow {:.1} %: the rig does something that \
                  is not linear, such as friction, a dead band or unequal areas; most of the rest is at \
                  {low:.1} to {high:.1} Hz{size}",

@@ -5,6 +5,7 @@ pub mod circle;
 mod correction;
 mod drive;
 pub mod on_model;
+pub mod on_rig;
 mod page;
 pub mod replay;
 
