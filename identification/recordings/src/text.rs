@@ -1,5 +1,6 @@
 //! The text of a file, whatever the program that wrote it: byte-order marks, line ends, encodings.
 
+use std::io;
 use std::path::Path;
 
 use super::DataError;
@@ -21,12 +22,51 @@ pub struct Text {
 pub fn read_text(file: &Path) -> Result<Text, DataError> {
     let bytes = std::fs::read(file).map_err(|error| DataError::Unreadable {
         file: file.to_path_buf(),
-        reason: match error.kind() {
-            std::io::ErrorKind::NotFound => "no such file".to_string(),
-            _ => error.to_string(),
-        },
+        reason: why(&error),
     })?;
     decode(file, &bytes)
+}
+
+/// Why a file cannot be read, in words.
+#[must_use]
+pub fn why(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "no such file".to_string(),
+        io::ErrorKind::IsADirectory => "it is a folder; expected a file".to_string(),
+        io::ErrorKind::NotADirectory => {
+            "no such file: a part of its path is a file, not a folder".to_string()
+        }
+        io::ErrorKind::PermissionDenied => {
+            "you may not read it; change its permissions, or copy it".to_string()
+        }
+        _ => error.to_string(),
+    }
+}
+
+/// Reads a file that a person wrote for this program, such as a system in TOML: UTF-8, or UTF-16 with
+/// its mark, as some editors save it.
+///
+/// # Errors
+/// Why it cannot be read, as [`why`] puts it, or the line that is not UTF-8.
+pub fn read_written(file: &Path) -> io::Result<String> {
+    let bytes = std::fs::read(file).map_err(|error| io::Error::new(error.kind(), why(&error)))?;
+    let fault = |reason: String| io::Error::new(io::ErrorKind::InvalidData, reason);
+    let binary = || fault("holds binary data, text was expected".to_string());
+    match &bytes[..] {
+        [0xef, 0xbb, 0xbf, rest @ ..] => utf8(rest).map_err(fault),
+        [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes).ok_or_else(binary),
+        [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes).ok_or_else(binary),
+        all => utf8(all).map_err(fault),
+    }
+}
+
+fn utf8(bytes: &[u8]) -> Result<String, String> {
+    let read = std::str::from_utf8(bytes).map_err(|error| {
+        let before = &bytes[..error.valid_up_to()];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        format!("line {line} is not UTF-8; save the file as UTF-8")
+    })?;
+    Ok(read.to_string())
 }
 
 /// The text of `bytes`, of a MAT file its table; `file` is what messages call them.
@@ -99,6 +139,39 @@ mod tests {
             Ok(wanted.clone())
         );
         assert_eq!(read(&[&[0xfe, 0xff], &big[..]].concat()), Ok(wanted));
+    }
+
+    #[test]
+    fn files_for_this_program_are_read_as_editors_save_them() {
+        let folder = std::env::temp_dir().join(format!("read-written-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = folder.join("a.toml");
+        let read = |bytes: &[u8]| {
+            std::fs::write(&file, bytes).unwrap();
+            read_written(&file).map_err(|error| error.to_string())
+        };
+        let units: Vec<u8> = "a = 1\n"
+            .encode_utf16()
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        for bytes in [
+            &b"a = 1\n"[..],
+            b"\xef\xbb\xbfa = 1\n",
+            &[&[0xff, 0xfe], &units[..]].concat(),
+        ] {
+            assert_eq!(read(bytes), Ok("a = 1\n".to_string()));
+        }
+        let reason = read(b"a = 1\n# M\xfcller\n").unwrap_err();
+        assert_eq!(reason, "line 2 is not UTF-8; save the file as UTF-8");
+        let reason = |path: &Path| read_written(path).unwrap_err().to_string();
+        assert_eq!(reason(&folder), "it is a folder; expected a file");
+        assert_eq!(reason(&folder.join("b.toml")), "no such file");
+        let below = reason(&file.join("b.toml"));
+        assert!(
+            below.starts_with("no such file: a part of its path"),
+            "{below}"
+        );
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

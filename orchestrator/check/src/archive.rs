@@ -21,13 +21,10 @@ pub(super) fn check(findings: &mut Findings, path: &Path) -> Option<String> {
             return None;
         }
     };
-    let mut archive = match ZipArchive::new(Cursor::new(bytes)) {
+    let mut archive = match ZipArchive::new(Cursor::new(&bytes[..])) {
         Ok(archive) => archive,
         Err(error) => {
-            findings.error(
-                "archive",
-                format!("the zip archive cannot be read ({error})"),
-            );
+            findings.error("archive", fmi_import::archive::unreadable(&bytes, &error));
             return None;
         }
     };

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use fmi_rs::{SHARED_LIBRARY_EXTENSION, fmi2, fmi3};
 use zip::ZipArchive;
+use zip::result::ZipError;
 
 use super::folder::Folder;
 use super::{FmiVersion, FmuError};
@@ -36,6 +37,18 @@ pub(super) const FMU: Sort = Sort {
     file: "modelDescription.xml",
 };
 
+/// Why `bytes` are not an archive that can be read, and what to do.
+#[must_use]
+pub fn unreadable(bytes: &[u8], error: &ZipError) -> String {
+    match bytes {
+        [] => "the file is empty".to_string(),
+        [b'P', b'K', ..] => {
+            format!("the zip archive is damaged or cut short ({error}); copy or download it again")
+        }
+        _ => "it is not a zip archive; expected a file that an exporting tool wrote".to_string(),
+    }
+}
+
 /// Unpacks `bytes` (the file at `fmu`) into a new temporary directory.
 ///
 /// # Errors
@@ -49,8 +62,8 @@ pub fn unpack(sort: Sort, fmu: &Path, bytes: &[u8]) -> Result<Folder, FmuError> 
     if bytes.is_empty() {
         return Err(broken("the file is empty".to_string()));
     }
-    let mut archive = ZipArchive::new(Cursor::new(bytes))
-        .map_err(|error| broken(format!("the zip archive cannot be read ({error})")))?;
+    let mut archive =
+        ZipArchive::new(Cursor::new(bytes)).map_err(|error| broken(unreadable(bytes, &error)))?;
     check_overlaps(&mut archive).map_err(broken)?;
     let mut names = Vec::with_capacity(archive.len());
     let mut total = 0;

@@ -36,7 +36,14 @@ pub fn fmus_in(folder: &Path) -> Result<Vec<PackedFmu>, PackError> {
     for version in FmiVersion::ALL {
         let below = folder.join(version.folder());
         let entries = match fs::read_dir(&below) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+                ) =>
+            {
+                continue;
+            }
             entries => entries.map_err(file_error(&below))?,
         };
         for entry in entries {

@@ -435,7 +435,7 @@ impl SystemFile {
     /// # Errors
     /// A file that cannot be read, or what [`SystemFile::parse`] finds.
     pub fn read(path: &Path) -> Result<Self, SystemError> {
-        let text = std::fs::read_to_string(path).map_err(|error| SystemError::Unreadable {
+        let text = recordings::read_written(path).map_err(|error| SystemError::Unreadable {
             path: path.to_path_buf(),
             reason: error.to_string(),
         })?;

@@ -91,7 +91,7 @@ impl Case {
                         .into(),
             });
         }
-        let text = std::fs::read_to_string(&file).map_err(|error| match error.kind() {
+        let text = recordings::read_written(&file).map_err(|error| match error.kind() {
             std::io::ErrorKind::NotFound => fail(
                 "not found; it describes the nominal rig. `shakebench diagnose --template table` \
                  prints one to fill in"

@@ -26,7 +26,7 @@ pub fn read(path: &Path) -> Result<LinearSpecimen, IdentificationError> {
         what,
         expected: "[specimen] mass > 0, damping >= 0 and stiffness > 0, and units",
     };
-    let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+    let text = recordings::read_written(path).map_err(|error| wrong(error.to_string()))?;
     let file: SpecimenFile =
         toml::from_str(&text).map_err(|error| wrong(error.message().to_string()))?;
     let units = Units::named(file.units.as_deref().unwrap_or(INCH_POUND), &name)?;

@@ -121,7 +121,10 @@ pub enum DescriptionError {
 
 /// A column as a map names it: by its header, or with a unit of its own.
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "expected \"header\", or { column = \"header\", unit = \"mm\" }"
+)]
 enum Renamed {
     Header(String),
     Column(Column),
@@ -135,7 +138,7 @@ enum Renamed {
 pub fn column_map(
     map: &Path,
 ) -> Result<BTreeMap<String, (String, Option<String>)>, DescriptionError> {
-    let text = std::fs::read_to_string(map).map_err(|source| DescriptionError::Read {
+    let text = recordings::read_written(map).map_err(|source| DescriptionError::Read {
         path: map.to_owned(),
         source,
     })?;
@@ -198,7 +201,7 @@ impl Description {
     /// A file that cannot be read; what is not TOML or has an unknown key, with line and column; an
     /// unknown kind.
     pub fn read(path: &Path) -> Result<Self, DescriptionError> {
-        let text = std::fs::read_to_string(path).map_err(|source| DescriptionError::Read {
+        let text = recordings::read_written(path).map_err(|source| DescriptionError::Read {
             path: path.to_owned(),
             source,
         })?;

@@ -226,7 +226,7 @@ impl ExtendedRig {
     /// A file that cannot be read; what is not an extended model, with line and column; an unknown
     /// kind, effect or parameter, a unit of another quantity.
     pub fn read(path: &Path) -> Result<Self, DescriptionError> {
-        let text = std::fs::read_to_string(path).map_err(|source| DescriptionError::Read {
+        let text = recordings::read_written(path).map_err(|source| DescriptionError::Read {
             path: path.to_owned(),
             source,
         })?;

@@ -90,7 +90,7 @@ impl ModelFile {
     pub fn read(path: &Path) -> Result<Self, IdentificationError> {
         let name = path.display().to_string();
         let text =
-            std::fs::read_to_string(path).map_err(|error| IdentificationError::ModelFile {
+            recordings::read_written(path).map_err(|error| IdentificationError::ModelFile {
                 path: name.clone(),
                 what: error.to_string(),
                 expected: "a model file from `shakebench identify`",

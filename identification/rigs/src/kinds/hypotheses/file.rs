@@ -20,7 +20,7 @@ pub(super) fn listed(names: &[&str]) -> String {
 /// # Errors
 /// A file that cannot be read, is not TOML, has an unknown key, or has no effect; by line.
 pub fn read(path: &Path) -> Result<Hypotheses, DescriptionError> {
-    let text = std::fs::read_to_string(path).map_err(|source| DescriptionError::Read {
+    let text = recordings::read_written(path).map_err(|source| DescriptionError::Read {
         path: path.to_owned(),
         source,
     })?;

@@ -57,7 +57,10 @@ pub struct Parameter {
 
 /// One start or several.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "expected a number, or a list of numbers such as [0.1, 1.0]"
+)]
 pub enum Starts {
     /// One.
     One(f64),

@@ -99,7 +99,7 @@ impl ExtendedTable {
             file: path.to_owned(),
             reason,
         };
-        let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
+        let text = recordings::read_written(path).map_err(|error| fail(error.to_string()))?;
         let extended = Nominal::parse(&text).map_err(|error| fail(error.to_string()))?;
         let mut all: toml::Table =
             toml::from_str(&text).map_err(|error| fail(error.to_string()))?;
