@@ -49,7 +49,7 @@ impl Description {
         names: &Names,
     ) -> Result<(Model, Pins, Vec<Recording>), Error> {
         let place = path.display().to_string();
-        let text = std::fs::read_to_string(path)
+        let text = recordings::read_written(path)
             .map_err(|error| Error::at(place.clone(), error.to_string()))?;
         let own: Self =
             toml::from_str(&text).map_err(|error| Error::at(place.clone(), error.to_string()))?;

@@ -78,7 +78,7 @@ impl Model {
     /// A file that cannot be read or is not such a model.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let place = path.display().to_string();
-        let text = std::fs::read_to_string(path)
+        let text = recordings::read_written(path)
             .map_err(|error| Error::at(place.clone(), error.to_string()))?;
         let model: Self = toml::from_str(&text).map_err(|error| {
             Error::at(

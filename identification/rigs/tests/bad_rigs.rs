@@ -490,7 +490,7 @@ fn models_and_maps_are_refused_by_place_with_a_cure() {
         (
             "a map that is none",
             mapped("force = 3\n"),
-            &["map.toml", "expected `channel = \"header\"`"],
+            &["map.toml", "expected \"header\", or { column = \"header\""],
         ),
     ]);
 }

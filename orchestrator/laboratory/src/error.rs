@@ -80,15 +80,34 @@ impl Error {
     }
 }
 
+/// A line in which numbers of more than 40 digits, such as 1e308 written out, are cut short.
+fn short_numbers(line: &str) -> String {
+    const LONGEST: usize = 40;
+    let mut short = String::with_capacity(line.len());
+    let mut rest = line;
+    while let Some(begin) = rest.find(|c: char| c.is_ascii_digit()) {
+        let digits = &rest[begin..];
+        let end = digits.find(|c: char| !c.is_ascii_digit());
+        let end = end.unwrap_or(digits.len());
+        short += &rest[..begin];
+        match end > LONGEST {
+            true => short += &format!("{}... ({end} digits)", &digits[..6]),
+            false => short += &digits[..end],
+        }
+        rest = &digits[end..];
+    }
+    short + rest
+}
+
 /// A message without the middle of lines that are longer than anyone reads: those that quote a file
-/// whose lines do not end.
+/// whose lines do not end, or a number of hundreds of digits.
 #[must_use]
 pub fn clipped(message: &str) -> String {
     const LONGEST: usize = 600;
     let lines = message.lines().map(|line| {
-        let characters: Vec<char> = line.chars().collect();
+        let characters: Vec<char> = short_numbers(line).chars().collect();
         if characters.len() <= LONGEST {
-            return line.to_string();
+            return characters.into_iter().collect();
         }
         let part = |of: &[char]| of.iter().collect::<String>();
         let left_out = characters.len() - LONGEST;
@@ -112,5 +131,10 @@ mod tests {
         let long = clipped(&format!("file.toml\n{}end", "x".repeat(100_000)));
         assert!(long.len() < 700 && long.starts_with("file.toml\nxxx") && long.ends_with("xend"));
         assert!(long.contains("[99403 characters]"), "{long}");
+        let number = clipped(&format!("runs = {:.1}; expected at most 12345", 1e308));
+        assert_eq!(
+            number,
+            "runs = 100000... (309 digits).0; expected at most 12345"
+        );
     }
 }

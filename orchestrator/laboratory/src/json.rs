@@ -15,6 +15,7 @@ pub fn read<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T, Error> {
         path: path.to_path_buf(),
         reason,
     };
-    let text = std::fs::read_to_string(path).map_err(|error| fault(error.to_string()))?;
+    let text =
+        identification::data::read_written(path).map_err(|error| fault(error.to_string()))?;
     serde_json::from_str(&text).map_err(|error| fault(format!("not {what}: {error}")))
 }

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::OneVersion;
+use super::quantity::whole;
 use laboratory::commission::{self, Request, Verdict};
 use laboratory::error::Error;
 use laboratory::results::Results;
@@ -44,7 +45,7 @@ pub struct Arguments {
     #[arg(long, value_name = "T", default_value = "60 s")]
     duration: String,
     /// Seed of the motions
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
     /// Part of the loop's delay that is the sensors'; the valve's is the rest, and the motion leads by it
     #[arg(long, value_name = "T", default_value = "2 ms")]

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::quantity::if_given;
+use super::quantity::{if_given, whole};
 use super::rig::RigArguments;
 use super::{figures, print_files, progress};
 use laboratory::comparison::{self, Plan, Played, Progress};
@@ -50,7 +50,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", requires = "reference")]
     reference_y: Option<PathBuf>,
     /// Built-in motion with this seed alone
-    #[arg(long, value_name = "N", conflicts_with_all = ["records", "reference"])]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>, conflicts_with_all = ["records", "reference"])]
     seed: Option<u64>,
     /// Play only the beginning of each motion, such as "10 s"
     #[arg(long, value_name = "T")]

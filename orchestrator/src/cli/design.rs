@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::quantity::whole;
 use super::{figures, multivariable};
 use laboratory::design::{self, LoopName, Options, Synthesis, model};
 use laboratory::error::Error;
@@ -42,7 +43,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = model::DRAWS, requires = "model")]
     draws: u64,
     /// With --model: seed of the draws
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "model")]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>, requires = "model")]
     seed: u64,
     /// Specimen on the table: none, linear [default: none]
     #[arg(long, value_name = "NAME")]

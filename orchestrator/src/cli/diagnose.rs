@@ -116,6 +116,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         print!("{text}");
         return Ok(ExitCode::SUCCESS);
     }
+    for files in [&arguments.cases, &arguments.data] {
+        if let Some(path) = super::settings::twice(files) {
+            return Err(Error::File {
+                path: path.clone(),
+                reason: "is given twice, and a fit cannot be tested on its own data; expected \
+                         different files"
+                    .to_string(),
+            });
+        }
+    }
     if let Some(path) = &arguments.model {
         return with_model(arguments, path);
     }

@@ -14,7 +14,7 @@ use fmi_import::FmiVersion;
 use fmi_master::Algorithm;
 use laboratory::error::Error;
 use laboratory::export::{Experiment, write, write_model};
-use laboratory::results::Results;
+use laboratory::results::{self, Results};
 use laboratory::run::experiment::{Request, prepare};
 
 /// Options of `shakebench export`.
@@ -103,6 +103,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     };
     let prepared = prepare(&request)?;
     let ssp = arguments.ssp.as_deref().unwrap_or(Path::new("system.ssp"));
+    check_archive(ssp, Path::new(&arguments.system))?;
     let parent = ssp.parent().filter(|parent| !parent.as_os_str().is_empty());
     Results::check(parent.unwrap_or(Path::new(".")))?;
     if let Some(parent) = parent {
@@ -124,6 +125,26 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         notes.push("the system does not use a motion, so the archive has none".to_string());
     }
     Ok(exported(arguments, ssp, &notes))
+}
+
+/// Refuses a file for the archive that is another thing.
+fn check_archive(ssp: &Path, system: &Path) -> Result<(), Error> {
+    let fault = |reason: &str| {
+        Err(Error::Option {
+            option: "--ssp",
+            reason: format!("{}{reason}", ssp.display()),
+        })
+    };
+    if ssp.extension().is_none_or(|ending| ending != "ssp") {
+        return fault("; expected a file name that ends in .ssp");
+    }
+    if matches!((ssp.canonicalize(), system.canonicalize()), (Ok(a), Ok(b)) if a == b) {
+        return fault(" is the system to export; expected another file for the archive");
+    }
+    if !results::may_overwrite() && !run::may_be_replaced(ssp, |begin| begin.starts_with(b"PK")) {
+        return fault(" exists and is not an archive; name another file, or add --force");
+    }
+    Ok(())
 }
 
 /// Prints what was written.

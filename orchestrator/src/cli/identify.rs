@@ -127,6 +127,13 @@ fn check_place(arguments: &Arguments) -> Result<(), Error> {
             folder.display()
         )));
     }
+    let given = &arguments.data;
+    if let Some(path) = super::settings::twice(given) {
+        return Err(Error::File {
+            path: path.clone(),
+            reason: "is given twice; expected different recordings".to_string(),
+        });
+    }
     let same =
         |path: &Path| matches!((path.canonicalize(), out.canonicalize()), (Ok(a), Ok(b)) if a == b);
     let read = arguments

@@ -45,6 +45,7 @@ pub mod report;
 mod rig;
 pub mod run;
 pub mod serve;
+mod settings;
 mod terminal;
 pub mod trs;
 pub mod tune;
@@ -230,6 +231,10 @@ pub fn main() -> ExitCode {
     interrupt::survive_full_disks();
     let words = program().get_matches_from(negative::joined(std::env::args_os()));
     let cli = Cli::from_arg_matches(&words).unwrap_or_else(|error| error.exit());
+    if let Err(reason) = settings::agree(&words) {
+        eprintln!("error: {reason}");
+        return ExitCode::from(2);
+    }
     progress::choose(match (cli.quiet, cli.verbose) {
         (true, _) => Detail::Quiet,
         (_, true) => Detail::Verbose,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::quantity::positive;
+use super::quantity::{positive, whole};
 use laboratory::error::Error;
 use motion::{self, Scaling};
 use units::STANDARD_GRAVITY;
@@ -39,7 +39,7 @@ pub struct MotionArguments {
     #[arg(long, value_name = "L", group = "scaling")]
     pub peak: Option<String>,
     /// Seed of the built-in motion [default: 1]
-    #[arg(long, conflicts_with_all = ["record", "reference"])]
+    #[arg(long, value_parser = whole::<u64>, conflicts_with_all = ["record", "reference"])]
     pub seed: Option<u64>,
 }
 

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 
 use super::motion::MotionArguments;
+use super::quantity::whole;
 use super::rig::RigArguments;
 use super::{progress, run};
 use laboratory::error::Error;
@@ -56,7 +57,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", conflicts_with = "seed")]
     record: Option<PathBuf>,
     /// Seed of the random phases
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>)]
     seed: u64,
     /// Make the motion and stop
     #[arg(long)]

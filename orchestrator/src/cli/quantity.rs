@@ -8,11 +8,27 @@ use laboratory::error::Error;
 /// Another thing.
 pub fn positive(option: &'static str, text: &str, unit: &'static str) -> Result<f64, Error> {
     let fault = |reason: String| Error::Option { option, reason };
-    let value = units::value_in(text, unit).map_err(|error| fault(error.to_string()))?;
-    if value > 0.0 {
-        return Ok(value);
+    let value = units::value_in(text, unit).map_err(|error| match error {
+        units::UnitError::NotANumber { .. } => fault(format!(
+            "cannot read `{text}`; expected a number with a unit, such as `{}`",
+            example(unit)
+        )),
+        error => fault(error.to_string()),
+    })?;
+    if value <= 0.0 || !value.is_finite() {
+        return Err(fault(format!("`{text}` is not positive")));
     }
-    Err(fault(format!("`{text}` is not positive")))
+    Ok(value)
+}
+
+/// What is usual in a unit.
+fn example(unit: &str) -> &'static str {
+    match unit {
+        "s" => "10 s",
+        "g" => "0.3 g",
+        "m" => "30 mm",
+        _ => "1.5 in",
+    }
 }
 
 /// The positive quantity, where one is given.
@@ -50,6 +66,15 @@ pub fn band(given: &[f64]) -> Result<[f64; 2], Error> {
         option: "--band",
         reason: format!("{low} to {high} Hz; expected 0 < LOW < HIGH <= 100"),
     })
+}
+
+/// A whole number, such as a seed.
+///
+/// # Errors
+/// Another thing.
+pub fn whole<T: std::str::FromStr>(text: &str) -> Result<T, String> {
+    let expected = format!("expected a whole number from 0 to {}", u64::MAX);
+    text.parse().map_err(|_| expected)
 }
 
 /// A whole number above 0.

@@ -1,5 +1,6 @@
 //! `shakebench run`
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -15,8 +16,9 @@ use super::rig::RigArguments;
 use super::{print_files, progress};
 use fmi_import::{Isolation, Options, Trace};
 use fmi_master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Simulation};
+use identification::data::why;
 use laboratory::error::Error;
-use laboratory::results::{Results, allow_overwriting, unused};
+use laboratory::results::{Results, allow_overwriting, may_overwrite, unused};
 use laboratory::run::checkpoint::{self, Checkpoints, Unfinished};
 use laboratory::run::experiment::{Prepared, Request, is_file, prepare};
 use laboratory::run::manifest::Manifest;
@@ -369,16 +371,38 @@ fn watch(
     Ok((server, tap))
 }
 
+/// Whether nothing is lost if `path` is written: it is not a file, an empty one, or `is_own` of its
+/// first bytes, as an earlier command left it.
+pub(super) fn may_be_replaced(path: &Path, is_own: impl Fn(&[u8]) -> bool) -> bool {
+    if !path.is_file() {
+        return true;
+    }
+    let mut begin = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(4096).read_to_end(&mut begin));
+    read.is_ok() && (begin.is_empty() || is_own(&begin))
+}
+
+fn holds(bytes: &[u8], word: &str) -> bool {
+    bytes
+        .windows(word.len())
+        .any(|part| part == word.as_bytes())
+}
+
 /// How FMUs are run.
 ///
 /// # Errors
 /// A trace that cannot be written.
 fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
     let trace = arguments.trace.as_deref().map(|path| {
-        let created = Trace::create(path).map_err(|error| Error::File {
+        let fault = |reason: String| Error::File {
             path: path.to_path_buf(),
-            reason: error.to_string(),
-        });
+            reason,
+        };
+        if !may_overwrite() && !may_be_replaced(path, |begin| holds(begin, "Instantiate")) {
+            let reason = "exists and is not a trace; name another file for --trace, or add --force";
+            return Err(fault(reason.to_string()));
+        }
+        let created = Trace::create(path).map_err(|error| fault(why(&error)));
         created.map(Arc::new)
     });
     let limit = arguments.call_limit.as_deref();

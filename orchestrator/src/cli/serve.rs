@@ -42,6 +42,14 @@ enum Move {
     Commit,
 }
 
+/// An address of this machine with a port; `localhost` is 127.0.0.1.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let port = text.strip_prefix("localhost:");
+    let whole = port.map_or(text.to_string(), |port| format!("127.0.0.1:{port}"));
+    let expected = "expected an address and a port up to 65535, such as 127.0.0.1:8090";
+    whole.parse().map_err(|_| expected.to_string())
+}
+
 /// Options of `shakebench serve`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
@@ -54,7 +62,7 @@ pub struct Arguments {
     /// Answer OpenFresco's protocol at this address, over TCP and UDP; other machines reach it only
     /// where --allow names them
     #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, required = true,
-        default_missing_value = "127.0.0.1:8090")]
+        default_missing_value = "127.0.0.1:8090", value_parser = address)]
     openfresco: SocketAddr,
     /// What a trial is answered: `rig` moves once a step and takes nothing back, `ideal` answers any
     /// trial from the state at the last commit

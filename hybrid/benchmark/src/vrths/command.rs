@@ -268,12 +268,12 @@ fn controllers(names: &[String]) -> Result<Vec<roster::Entry>, Error> {
             roster::entry(name).ok_or_else(|| {
                 let known = || roster::ALL.iter().map(|entry| entry.name);
                 let hint = nearest(name, known())
-                    .map_or(String::new(), |near| format!(", did you mean `{near}`"));
+                    .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
                 let known: Vec<_> = known().collect();
                 Error::Option {
                     option: "--controller",
                     reason: format!(
-                        "`{name}` is not a controller{hint}? Expected {}",
+                        "`{name}` is not a controller; expected {}{hint}",
                         known.join(", ")
                     ),
                 }

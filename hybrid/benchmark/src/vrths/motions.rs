@@ -100,11 +100,11 @@ pub fn records(names: &[String], folder: Option<&Path>) -> Result<Vec<Named>, Er
             let path = Path::new(name);
             if !path.exists() && path.extension().is_none() {
                 let hint = nearest(name, RECORDS)
-                    .map_or(String::new(), |near| format!(", did you mean `{near}`?"));
+                    .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
                 return Err(Error::Option {
                     option: "--motion",
                     reason: format!(
-                        "`{name}` is not a motion{hint} Expected {}, built-in or a file",
+                        "`{name}` is not a motion; expected {}, built-in or a file{hint}",
                         RECORDS.join(", ")
                     ),
                 });

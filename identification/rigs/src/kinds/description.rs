@@ -145,10 +145,7 @@ pub fn column_map(
     let names: BTreeMap<String, Renamed> =
         toml::from_str(&text).map_err(|error| DescriptionError::Description {
             path: map.to_owned(),
-            what: format!(
-                "expected `channel = \"header\"` or `channel = {{ column = \"header\", unit = \"mm\" \
-                 }}`: {error}"
-            ),
+            what: format!("not a map of columns: {}", error.to_string().trim_end()),
         })?;
     let parts = |renamed| match renamed {
         Renamed::Header(header) => (header, None),

@@ -170,6 +170,20 @@ const STROKE_PART: f64 = 0.4;
 /// Band of the excitation, Hz.
 const BAND: (f64, f64) = (0.05, 30.0);
 
+/// Reads the motion that will be played at the end, so that its faults are reported at the start.
+fn check_motion(request: &Request) -> Result<(), Error> {
+    if let Some(path) = &request.record {
+        ::motion::read_record(path)?;
+    }
+    if let Some(path) = &request.reference
+        && let Err(error @ ::motion::MotionError::Data(_)) =
+            ::motion::load_reference(path, &::motion::Options::default())
+    {
+        return Err(error.into());
+    }
+    Ok(())
+}
+
 /// Commissions a rig; `tell` hears of each step.
 ///
 /// # Errors
@@ -177,6 +191,7 @@ const BAND: (f64, f64) = (0.05, 30.0);
 /// finds no controller.
 pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned, Error> {
     let started = Instant::now();
+    check_motion(request)?;
     let mut bench = Bench::new(request)?;
     let dt = bench.dt();
     let excitation = excitation(request, dt);

@@ -105,7 +105,8 @@ pub fn close(plan: &Plan) -> Result<Circle, Error> {
         path: path.clone(),
         reason,
     };
-    let text = std::fs::read_to_string(&path).map_err(|error| fault(error.to_string()))?;
+    let text =
+        identification::data::read_written(&path).map_err(|error| fault(error.to_string()))?;
     let nominal = Nominal::parse(&text).map_err(|error| fault(error.to_string()))?;
     let law = nominal
         .controller

@@ -122,12 +122,28 @@ pub fn check(name: &str) -> Result<(), SystemError> {
     let mut parts = name.split('+');
     let controller = parts.next().unwrap_or_default();
     if !names().any(|known| known == controller) {
-        return Err(unknown("system", controller, hint(controller, names())));
+        return Err(unknown("system", controller, other_file(controller)));
     }
     match parts.find(|part| !aids().any(|known| known == *part)) {
         Some(aid) => Err(unknown("aid", aid, hint(aid, aids()))),
         None => Ok(()),
     }
+}
+
+/// What `name` could be where it is not a system.
+fn other_file(name: &str) -> String {
+    let path = Path::new(name);
+    let is_motion = path.extension().is_some_and(|ending| {
+        ["csv", "at2"].map(|own| ending.eq_ignore_ascii_case(own)) != [false; 2]
+    });
+    if is_motion {
+        return "; pass a motion with --record or --reference".to_string();
+    }
+    if path.is_dir() {
+        return ": it is a folder; expected a built-in system, or a .toml, .ssp or .fmu file"
+            .to_string();
+    }
+    hint(name, names())
 }
 
 /// Puts the aids between the controller in `file` and the valve.
@@ -268,6 +284,12 @@ pub fn system(
     }
     let mut on_table = None;
     if let Some(model) = opensees::model_of(specimen) {
+        if model.as_os_str().is_empty() {
+            return Err(SystemError::Unreadable {
+                path: specimen.into(),
+                reason: "no model is named; expected opensees:MODEL.py".to_string(),
+            });
+        }
         let mut part = read("specimen", Some(&OPENSEES), specimen, specimens())?;
         if let Some(component) = part.components.get_mut("specimen") {
             component.set(super::opensees::MODEL, model.display().to_string().as_str());

@@ -121,12 +121,9 @@ impl Study {
         if let (Some((_, text)), false) = (built_in, path.exists()) {
             return Self::parse(path, (*text).to_string());
         }
-        let text = std::fs::read_to_string(path).map_err(|error| Error::File {
+        let text = recordings::read_written(path).map_err(|error| Error::File {
             path: path.to_path_buf(),
-            reason: match error.kind() {
-                std::io::ErrorKind::InvalidData => "is not UTF-8 text".to_string(),
-                _ => format!("cannot be read: {error}"),
-            },
+            reason: error.to_string(),
         })?;
         Self::parse(path, text)
     }
@@ -155,7 +152,7 @@ impl Study {
         let mut factors: Vec<Factor> = Vec::new();
         for (name, value) in written.factors {
             let at = at("factors", &name);
-            let (mut values, of) = Values::read(&value).map_err(&at)?;
+            let (mut values, of) = Values::read(&alone(&name, value, &folder)).map_err(&at)?;
             let key = match of {
                 Some(variables) => Key::together(&name, variables),
                 None => Key::of(&name),
@@ -444,6 +441,16 @@ pub(super) const PEAK: &str = "peak.";
 fn folder(path: &Path) -> PathBuf {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     absolute.parent().map(Path::to_path_buf).unwrap_or_default()
+}
+
+/// A factor as written; a single folder of records as a list of it.
+fn alone(name: &str, value: toml::Value, folder: &Path) -> toml::Value {
+    match &value {
+        toml::Value::String(path) if name == "record" && folder.join(path).is_dir() => {
+            toml::Value::Array(vec![value])
+        }
+        _ => value,
+    }
 }
 
 /// Folders in a list of records stand for all records in them.

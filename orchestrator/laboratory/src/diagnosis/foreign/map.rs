@@ -96,7 +96,8 @@ impl Map {
     /// # Errors
     /// A file that cannot be read or is not a map, with line and column; one without an output.
     pub(super) fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| file_fault(path, error))?;
+        let text =
+            identification::data::read_written(path).map_err(|error| file_fault(path, error))?;
         let map: Self = toml::from_str(&text)
             .map_err(|error| file_fault(path, format!("not a map of a model: {error}")))?;
         if map.outputs.is_empty() {

@@ -49,7 +49,8 @@ pub fn diagnose(
     Results::check(folder)?;
     let place = map;
     let map = Map::read(place)?;
-    let written_map = std::fs::read_to_string(place).map_err(|error| file_fault(place, error))?;
+    let written_map =
+        identification::data::read_written(place).map_err(|error| file_fault(place, error))?;
     let Mapped {
         alone,
         inputs,
