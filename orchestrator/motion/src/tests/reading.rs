@@ -262,7 +262,7 @@ fn a_missing_file_is_named() {
     let error = read_record(Path::new(env!("CARGO_MANIFEST_DIR")))
         .unwrap_err()
         .to_string();
-    assert!(error.contains("directory"), "{error}");
+    assert!(error.contains("it is a folder; expected a file"), "{error}");
 }
 
 fn sine_reference(dt: f64, points: usize, inches: f64) -> String {
