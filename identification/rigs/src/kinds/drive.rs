@@ -21,12 +21,8 @@ const MOST_KNOTS: usize = 1200;
 const RESIDUALS: f64 = 20.0;
 /// Steps of a knot for a derivative, over the drive's reach: the first ones overcome friction at rest.
 const STEPS: [f64; 4] = [0.5, 0.25, 0.1, 0.05];
-/// Sizes of the first drive of a rig on a voltage, and what it has more in the direction of the motion, both over
-/// the drive's reach.
+/// Sizes of the first drive of a rig on a voltage, over the drive's reach.
 const STARTS: [f64; 8] = [0.1, 0.2, 0.4, 0.8, -0.1, -0.2, -0.4, -0.8];
-const OFFSETS: [f64; 5] = [0.0, 0.1, 0.2, 0.4, 0.7];
-/// Share of the largest rate below which the direction of the motion does not count.
-const AT_REST: f64 = 0.02;
 /// Damping of the first step over the mean of the squared derivatives, and what changes it.
 const DAMPING: f64 = 1e-3;
 const MORE: f64 = 10.0;
@@ -269,34 +265,24 @@ impl Problem<'_> {
         };
         let mut missed = self.missed(&knots)?;
         if !follows {
-            // From rest no small change overcomes friction: begin from the motion or its rate, by size, with what
-            // overcomes friction in the direction of the rate.
-            let rate: Vec<f64> = (0..count)
-                .map(|i| own(i + 1) - own(i.saturating_sub(1)))
-                .collect();
-            let unit = |all: &[f64]| -> Vec<f64> {
-                let most = all
-                    .iter()
-                    .fold(f64::MIN_POSITIVE, |most, own| most.max(own.abs()));
-                all.iter().map(|own| own / most).collect()
-            };
-            let motion: Vec<f64> = (0..count).map(own).collect();
-            let (motion, rate) = (unit(&motion), unit(&rate));
-            let direction = |i: usize| match rate[i].abs() > AT_REST {
-                true => rate[i].signum(),
-                false => 0.0,
-            };
-            for (shape, size, offset) in [&motion, &rate].into_iter().flat_map(|shape| {
-                let sizes = STARTS.into_iter();
-                sizes.flat_map(move |size| OFFSETS.map(|offset| (shape, size, offset)))
-            }) {
-                let (by, more) = (size * self.reach, offset * size.signum() * self.reach);
-                let tried: Vec<f64> = (0..count)
-                    .map(|i| (by * shape[i] + more * direction(i)).clamp(-self.limit, self.limit))
-                    .collect();
-                let after = self.missed(&tried)?;
-                if after.norm() < missed.norm() {
-                    (knots, missed) = (tried, after);
+            // From rest no small change overcomes friction: begin from the motion or its rate, by size.
+            let rate = |i: usize| own(i + 1) - own(i.saturating_sub(1));
+            let shapes: [Vec<f64>; 2] = [
+                (0..count).map(own).collect(),
+                (0..count).map(rate).collect(),
+            ];
+            for shape in shapes {
+                let most = shape.iter().fold(0.0f64, |most, own| most.max(own.abs()));
+                for size in STARTS {
+                    let by = size * self.reach / most.max(f64::MIN_POSITIVE);
+                    let tried: Vec<f64> = shape
+                        .iter()
+                        .map(|own| (by * own).clamp(-self.limit, self.limit))
+                        .collect();
+                    let after = self.missed(&tried)?;
+                    if after.norm() < missed.norm() {
+                        (knots, missed) = (tried, after);
+                    }
                 }
             }
         }
