@@ -101,8 +101,8 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) 
     }
 }
 
-/// Central differences of all unknowns by one known, which gets its value back, each with what rounding makes of it; none
-/// for an unknown that is not smooth there. None at all where the library refuses.
+/// Central differences of all unknowns by one known, which gets its value back, each with its uncertainty by rounding;
+/// none for an unknown that is not smooth there. None at all where the library refuses.
 fn differences(
     instance: &mut Instance,
     unknowns: &[u32],
