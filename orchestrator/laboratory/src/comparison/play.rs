@@ -52,21 +52,14 @@ pub struct Progress {
 impl Played {
     /// What a request plays.
     pub fn of(request: &Request) -> Self {
-        let Request {
-            record,
-            record_y,
-            reference,
-            reference_y,
-            ..
-        } = request.clone();
-        match (record, reference) {
-            (Some(x), _) => match record_y {
-                Some(y) => Self::Records([x, y]),
-                None => Self::Record(x),
+        match (&request.record, &request.reference) {
+            (Some(x), _) => match &request.record_y {
+                Some(y) => Self::Records([x.clone(), y.clone()]),
+                None => Self::Record(x.clone()),
             },
-            (None, Some(x)) => match reference_y {
-                Some(y) => Self::References([x, y]),
-                None => Self::Reference(x),
+            (None, Some(x)) => match &request.reference_y {
+                Some(y) => Self::References([x.clone(), y.clone()]),
+                None => Self::Reference(x.clone()),
             },
             (None, None) => Self::Seed(request.seed),
         }
@@ -245,7 +238,7 @@ fn run(request: &Request, label: &str, keep_history: bool) -> Result<Row, Error>
     let histories = column("displacement").zip(column("acceleration"));
     let tracking = histories
         .as_ref()
-        .filter(|_| outcome.ended.is_regular())
+        .filter(|_| is_measured)
         .and_then(|(x, a)| metrics::tracking(motion, x, a).ok());
     let difference = |got: &[f64], wanted: &[f64]| {
         let pairs = got.iter().zip(wanted);

@@ -1,5 +1,6 @@
 //! The drive of a described rig, such as an axis on a voltage, computed on its extended model.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use identification::diagnosis::rigs::{DriveSearch, ExtendedRig, RigDrive};
@@ -82,28 +83,21 @@ pub fn write(plan: &Plan, found: &RigDrive, folder: &Path) -> Result<Vec<PathBuf
     let mut results = Results::begin(folder)?;
     let figures = serde_json::json!(figures(plan, found)).to_string();
     results.write_text(FIGURES, &(figures + "\n"))?;
-    results.write_text(DRIVE, &text(found))?;
+    results.write(DRIVE, |file| write_csv(found, file))?;
     Ok(results.finish()?)
 }
 
-fn text(found: &RigDrive) -> String {
-    let heading = |(head, unit): &(String, String)| {
-        let all = if head.contains(unit.as_str()) {
-            head.clone()
-        } else {
-            format!("{head} [{unit}]")
-        };
-        if all.contains([',', '"']) {
-            format!("\"{}\"", all.replace('"', "\"\""))
-        } else {
-            all
-        }
+fn write_csv(found: &RigDrive, file: impl io::Write) -> io::Result<()> {
+    let heading = |(head, unit): &(String, String)| match head.contains(unit.as_str()) {
+        true => head.clone(),
+        false => format!("{head} [{unit}]"),
     };
-    let [time, drive, output] = found.columns.each_ref().map(heading);
+    let mut csv = csv::Writer::from_writer(file);
+    csv.write_record(found.columns.each_ref().map(heading))?;
     let second = if found.columns[0].1 == "ms" { 1e3 } else { 1.0 };
-    let mut text = format!("{time},{drive},{output}\n");
     for (k, (u, y)) in found.drive.iter().zip(&found.expected).enumerate() {
-        text += &format!("{},{u},{y}\n", second * found.period * k as f64);
+        let time = second * found.period * k as f64;
+        csv.write_record([time, *u, *y].map(|value| value.to_string()))?;
     }
-    text
+    csv.flush()
 }
