@@ -95,8 +95,16 @@ fn measure(fmu: &Path, steps: usize) -> Result<Vec<f64>, Box<dyn Error>> {
                 instance.set(&Kind::Float64, &[input], &values)?;
             }
         }
-        for instance in &mut instances {
-            instance.do_step(tick as f64 * STEP, STEP)?;
+        let time = tick as f64 * STEP;
+        let mut requested = [false; INSTANCES];
+        for (instance, requested) in instances.iter_mut().zip(&mut requested) {
+            *requested = instance.request_step(time, STEP, false);
+            if !*requested {
+                instance.do_step(time, STEP)?;
+            }
+        }
+        for (instance, _) in instances.iter_mut().zip(requested).filter(|(_, asked)| *asked) {
+            instance.finish_step()?;
         }
         for instance in &mut instances {
             if let Some(output) = output {

@@ -143,8 +143,9 @@ functions! {
     /// Gives `flags`: again, terminate, nominals changed, states changed, next event defined;
     /// `numbers`: next event.
     UpdateDiscreteStates = 10, "NewDiscreteStates", "UpdateDiscreteStates";
-    /// `numbers`: time, step; `flags`: no state is set that lies before. Gives `numbers`: last
-    /// successful time; `flags`: event handling needed, terminate, early return.
+    /// `numbers`: time, step; `flags`: no state is set that lies before; the last: whether another
+    /// process shall measure it. Gives `numbers`: last successful time, and third how long a measured
+    /// one took, s; `flags`: event handling needed, terminate, early return.
     DoStep = 11, "DoStep", "DoStep";
     /// `handle`: the state.
     GetState = 12, "GetFMUstate", "GetFMUState";
@@ -197,6 +198,9 @@ fn kind(scalar: Scalar, version: FmiVersion) -> &'static str {
         _ => scalar.name(),
     }
 }
+
+/// The flag of a step that asks another process to measure it.
+pub(super) const MEASURED: usize = 4;
 
 /// Texts and binaries, which have lengths of their own.
 pub(super) type Texts = Vec<Vec<u8>>;
@@ -297,6 +301,20 @@ pub(super) trait Endpoint: Send {
     #[inline]
     fn step(&mut self, _time: f64, _step: f64) -> Option<Stepped> {
         None
+    }
+
+    /// Takes a step as a request that travels with those of other instances, at the latest when
+    /// [`Endpoint::answer`] asks for its outcome; false where [`Endpoint::call`] has to step.
+    fn request(&mut self, _call: &Call) -> bool {
+        false
+    }
+
+    /// The outcome of the step that was requested.
+    ///
+    /// # Errors
+    /// No status came back.
+    fn answer(&mut self, _call: &mut Call) -> Result<i32, Lost> {
+        Err(Lost("was not requested".to_string()))
     }
 }
 

@@ -162,6 +162,8 @@ impl Simulation {
                 })
                 .transpose()?;
             parts.push(Part {
+                is_apart: instance.is_apart(),
+                is_requested: false,
                 instance,
                 every: every.map(|steps| divisions * steps),
                 inputs: plan.inputs(&mut reference, index, |_| true),

@@ -43,7 +43,10 @@ pub(super) fn step(
     {
         part.inputs
             .transfer_between(now, last, -0.5 * ratio, &mut part.instance)?;
-        part.step(time, length)?;
+        part.begin_step(time, length)?;
+    }
+    for part in &mut simulation.parts {
+        part.finish_step()?;
     }
     Ok(())
 }

@@ -173,15 +173,21 @@ impl Round for Pass<'_> {
         for (value, &signal) in values.iter().zip(self.sources) {
             self.next.numbers[signal] = *value;
         }
-        let repeated = self.parts.iter_mut().zip(self.repeats);
-        for (part, _) in repeated.filter(|(_, repeats)| **repeats) {
-            if !is_first {
+        let repeats = self.repeats;
+        let repeated = move |(at, _): &(usize, &mut Part)| repeats[*at];
+        if !is_first {
+            for (_, part) in self.parts.iter_mut().enumerate().filter(repeated) {
                 part.go_back()?;
             }
+        }
+        for (_, part) in self.parts.iter_mut().enumerate().filter(repeated) {
             let (now, next) = (self.signals, &*self.next);
             part.inputs
                 .transfer_between(now, next, 0.5, &mut part.instance)?;
-            part.step(self.start, self.length)?;
+            part.begin_step(self.start, self.length)?;
+        }
+        for part in self.parts.iter_mut() {
+            part.finish_step()?;
         }
         let continuous = self.actions.iter_mut();
         for action in continuous.filter(|action| action.is_continuous()) {

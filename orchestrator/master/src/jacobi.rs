@@ -16,7 +16,10 @@ pub(super) fn advance(simulation: &mut Simulation) -> Result<(), MasterError> {
     }
     for part in parts.iter_mut().filter(|part| part.is_due(tick)) {
         let ticks = part.every.unwrap_or(1);
-        part.step(time, ticks as f64 * step)?;
+        part.begin_step(time, ticks as f64 * step)?;
+    }
+    for part in parts.iter_mut() {
+        part.finish_step()?;
     }
     // A sampled component's outputs are seen by the others at the next tick.
     for part in parts.iter_mut().filter(|part| part.failure.is_none()) {

@@ -47,7 +47,7 @@ pub use stepwise::{Saved, Stepwise};
 pub use variable::{StepsTaken, VariableStep};
 
 use action::{Action, Moment};
-use fmi_import::{Diverted, Instance, Item, Progress, State};
+use fmi_import::{CallError, Diverted, Instance, Item, Progress, State};
 use reference::Reference;
 use signals::Signals;
 use transfer::{Inputs, Outputs};
@@ -167,6 +167,10 @@ struct Part {
     failure: Option<MasterError>,
     /// When it asked to end the run, s.
     ended: Option<f64>,
+    /// Whether it is in another process.
+    is_apart: bool,
+    /// A step was requested whose outcome is not known yet.
+    is_requested: bool,
     /// Its steps so far.
     steps: u32,
     /// Time that its timed steps took.
@@ -194,6 +198,12 @@ impl Part {
         if let Some(begun) = begun {
             self.spent += begun.elapsed();
         }
+        self.stepped(stepped)
+    }
+
+    /// Notes what came of a step.
+    #[inline]
+    fn stepped(&mut self, stepped: Result<Progress, Box<CallError>>) -> Result<(), MasterError> {
         self.steps = self.steps.wrapping_add(1);
         match stepped {
             Err(error) if self.may_fail => self.failure = Some(error.into()),
@@ -204,6 +214,35 @@ impl Part {
             }
         }
         Ok(())
+    }
+
+    /// As [`Part::step`]; what came of it may be known only after [`Part::finish_step`], so that steps of
+    /// several FMUs in another process travel there together.
+    fn begin_step(&mut self, time: f64, length: f64) -> Result<(), MasterError> {
+        if !self.is_apart || self.failure.is_some() || self.ended.is_some() {
+            return self.step(time, length);
+        }
+        let is_timed = self.steps.is_multiple_of(TIMED);
+        if !self.instance.request_step(time, length, is_timed) {
+            return self.step(time, length);
+        }
+        self.is_requested = true;
+        Ok(())
+    }
+
+    /// Ends what [`Part::begin_step`] began.
+    fn finish_step(&mut self) -> Result<(), MasterError> {
+        if !std::mem::take(&mut self.is_requested) {
+            return Ok(());
+        }
+        let is_timed = self.steps.is_multiple_of(TIMED);
+        let stepped = self.instance.finish_step().map(|(progress, taken)| {
+            if is_timed {
+                self.spent += Duration::try_from_secs_f64(taken).unwrap_or_default();
+            }
+            progress
+        });
+        self.stepped(stepped)
     }
 
     /// Goes back to the state that was kept, to repeat its step.

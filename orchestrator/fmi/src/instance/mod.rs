@@ -34,6 +34,7 @@ pub struct Instance {
     /// What it is an instance of.
     pub fmu: Arc<Fmu>,
     endpoint: Box<dyn Endpoint>,
+    is_apart: bool,
     messages: Arc<Messages>,
     trace: Option<Arc<Trace>>,
     time: f64,
@@ -172,6 +173,7 @@ impl Instance {
         let trace = options.trace.clone();
         let mut instance = Self::around(fmu, name, endpoint, messages, trace, clocks);
         instance.has_events = has_events;
+        instance.is_apart = place.is_some();
         if setup.logging {
             instance.log_categories(&told);
         }
@@ -195,6 +197,7 @@ impl Instance {
             name: name.to_string(),
             fmu: fmu.clone(),
             endpoint,
+            is_apart: false,
             messages,
             trace,
             time: 0.0,
@@ -220,6 +223,11 @@ impl Instance {
         };
         let text = format!("the log categories were not accepted: the call {refused}");
         self.messages.message(1, "", &text);
+    }
+
+    /// Whether another process carries out its calls.
+    pub fn is_apart(&self) -> bool {
+        self.is_apart
     }
 
     /// What the FMU logged since this was last asked.

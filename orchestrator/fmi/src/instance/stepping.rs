@@ -1,7 +1,7 @@
 //! Steps, and the events on the way.
 
 use super::super::FmiVersion;
-use super::super::call::{Call, Function, Lost, Stepped};
+use super::super::call::{Call, Function, Lost, MEASURED, Stepped};
 use super::{Instance, Outcome, Phase};
 
 /// How often events may follow each other at one moment.
@@ -36,6 +36,33 @@ impl Instance {
             return self.stepped_otherwise(stepped);
         }
         self.step_by_call(time, step)
+    }
+
+    /// Requests a step from `time` to `time + step`, s, whose outcome [`Instance::finish_step`] gives:
+    /// the steps of all instances in one other process travel there together. False where
+    /// [`Instance::do_step`] has to be called. `measured`: how long it takes is asked for.
+    pub fn request_step(&mut self, time: f64, step: f64, measured: bool) -> bool {
+        if self.has_events || self.trace.is_some() {
+            return false;
+        }
+        self.time = time;
+        let mut call = Call::plain(Function::DoStep);
+        call.numbers = [time, step, 0.0];
+        call.flags[MEASURED] = measured;
+        self.endpoint.request(&call)
+    }
+
+    /// What came of the step that was requested, and how long it took, s, where that was asked for.
+    ///
+    /// # Errors
+    /// A step that was not completed.
+    pub fn finish_step(&mut self) -> Outcome<(Progress, f64)> {
+        let mut call = Call::plain(Function::DoStep);
+        let done = self.endpoint.answer(&mut call);
+        let [_, end, early, ..] = call.flags;
+        let [last, _, taken] = call.numbers;
+        let progress = self.stepped(done, (end, early, last), &call)?;
+        Ok((progress, taken))
     }
 
     #[inline(never)]

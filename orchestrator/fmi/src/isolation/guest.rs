@@ -5,9 +5,9 @@ use std::io::Read;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use super::super::call::{Call, Endpoint, Function, Lost, Values};
+use super::super::call::{Call, Endpoint, Function, Lost, MEASURED, Values};
 use super::super::native::{self, Setup, Sink};
 use super::frame::Frame;
 use super::parcel;
@@ -84,6 +84,12 @@ fn carry_out(
             Ok(0)
         }
         _ => match instances.get_mut(&number) {
+            Some(endpoint) if call.function == Function::DoStep && call.flags[MEASURED] => {
+                let begin = Instant::now();
+                let outcome = endpoint.call(call);
+                call.numbers[2] = begin.elapsed().as_secs_f64();
+                outcome
+            }
             Some(endpoint) => endpoint.call(call),
             None => Err(Lost("is for an instance that does not exist".to_string())),
         },

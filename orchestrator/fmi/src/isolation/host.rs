@@ -3,7 +3,7 @@
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -23,6 +23,8 @@ const FAREWELL: Duration = Duration::from_millis(500);
 const LAST_WORDS: Duration = Duration::from_millis(500);
 /// Messages that are passed on after a call; an FMU may log faster than anybody can read.
 const MESSAGES: usize = 10_000;
+/// Bytes of steps that travel together.
+const MOST_REQUESTS: usize = 512 << 10;
 /// Lines that FMUs may print before the rest is passed over.
 const LINES: usize = 1000;
 
@@ -40,6 +42,32 @@ pub(in super::super) struct Host {
     readers: Vec<JoinHandle<()>>,
     /// What became of the guest, once it is gone.
     gone: Option<String>,
+    requests: Requests,
+}
+
+/// Steps of several instances that travel together.
+#[derive(Default)]
+struct Requests {
+    /// Their parcels, as they are sent and as they came back.
+    sent: Vec<u8>,
+    answers: Vec<u8>,
+    are_sent: bool,
+    /// Those whose outcome nobody has fetched.
+    open: usize,
+    /// Where the last parcel begins that was carried out, or begun.
+    last: usize,
+    /// Why there are no answers from there on.
+    lost: Option<Lost>,
+}
+
+/// A step among those that travel together: its parcels, first what is set before it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Request {
+    begin: usize,
+    /// The step itself, among the parcels.
+    step: usize,
+    end: usize,
+    instance: u32,
 }
 
 /// Where each instance's messages go, and whose call was the last.
@@ -47,6 +75,8 @@ pub(in super::super) struct Host {
 struct Sinks {
     all: Arc<Mutex<Vec<Arc<dyn Sink>>>>,
     current: Arc<AtomicUsize>,
+    /// Something was printed.
+    heard: Arc<AtomicBool>,
 }
 
 impl Sinks {
@@ -122,6 +152,7 @@ impl Host {
             sinks,
             readers: readers.into_iter().flatten().collect(),
             gone: None,
+            requests: Requests::default(),
         };
         take_short_turns();
         // The first answer says that the memory is mapped there; then its name can go.
@@ -153,8 +184,9 @@ impl Host {
         call: &mut Call,
         after: &mut Vec<u8>,
     ) -> Answer {
+        self.send_requests();
         if let Some(gone) = &self.gone {
-            return Answer::Called(Err(Lost(format!("cannot be made: its process {gone}"))));
+            return Answer::Called(Err(is_gone(gone)));
         }
         let next = before.len() + parcel::size(call);
         let length = next + after.len();
@@ -192,43 +224,122 @@ impl Host {
                 None => Answer::Called(Err(lost)),
             };
         }
-        self.read(before.len(), call, after)
+        read(self.frame.room(), before.len(), call, after)
     }
 
-    /// What came of the calls, of which the one that was asked for begins at `place`.
-    fn read(&mut self, place: usize, call: &mut Call, after: &mut Vec<u8>) -> Answer {
-        let room = self.frame.room();
-        let strange = || Answer::Called(Err(Lost("received an answer out of order".to_string())));
-        let mut at = 0;
-        while at < place {
-            let Some(head) = parcel::head(&room[at..]) else {
-                return strange();
-            };
-            let outcome = parcel::outcome(&room[at..], &head);
-            let next = at + head.size as usize;
-            if !matches!(outcome, Ok(0 | 1)) {
-                return Answer::Other(room[at..next].to_vec(), outcome);
+    /// Takes a step that shall travel with others: what is set before, the step, what is read after it.
+    /// None where it has to be called. Where FMUs print each is called by itself, so that their lines
+    /// bear their names.
+    pub(super) fn request(
+        &mut self,
+        instance: u32,
+        before: &[u8],
+        call: &Call,
+        after: &[u8],
+    ) -> Option<Request> {
+        let requests = &mut self.requests;
+        if requests.are_sent && requests.open == 0 {
+            requests.sent.clear();
+            requests.are_sent = false;
+        }
+        let begin = requests.sent.len();
+        let is_full = begin + before.len() + parcel::size(call) + after.len() > MOST_REQUESTS;
+        if requests.are_sent
+            || is_full
+            || self.gone.is_some()
+            || self.sinks.heard.load(Ordering::Relaxed)
+        {
+            return None;
+        }
+        requests.sent.extend_from_slice(before);
+        parcel::append(&mut requests.sent, instance, call);
+        requests.sent.extend_from_slice(after);
+        requests.open += 1;
+        Some(Request {
+            begin,
+            step: begin + before.len(),
+            end: requests.sent.len(),
+            instance,
+        })
+    }
+
+    /// The outcome of a step that was requested; `after` is replaced by what was read after it, or emptied.
+    pub(super) fn answer(
+        &mut self,
+        request: Request,
+        call: &mut Call,
+        after: &mut Vec<u8>,
+    ) -> Answer {
+        self.send_requests();
+        self.requests.open = self.requests.open.saturating_sub(1);
+        let Request {
+            begin,
+            step,
+            end,
+            instance,
+        } = request;
+        let requests = &mut self.requests;
+        let (last, sent) = (requests.last, begin..end);
+        if last < begin {
+            // One before did not go well.
+            if let Some(lost) = &requests.lost {
+                return Answer::Called(Err(lost.clone()));
             }
-            at = next;
+            let sent = requests.sent[sent].to_vec();
+            self.requests.lost = self.exchange(instance, &sent).err();
+            let room = &self.frame.room()[..sent.len()];
+            self.requests.answers[begin..end].copy_from_slice(room);
+            self.requests.last = begin + self.frame.began_at().min(sent.len());
         }
-        let Some(head) = room.get(place..).and_then(parcel::head) else {
-            return strange();
-        };
-        let outcome = parcel::outcome(&room[place..], &head);
-        if outcome.is_ok() {
-            parcel::give_back(&room[place..], &head, call);
+        let requests = &self.requests;
+        if let Some(lost) = requests.lost.clone().filter(|_| requests.last < end) {
+            let parcel = requests.answers.get(requests.last..end);
+            return match parcel.filter(|_| requests.last != step).and_then(parcel::head) {
+                Some(head) => {
+                    let size = head.size as usize;
+                    Answer::Other(requests.answers[requests.last..][..size].to_vec(), Err(lost))
+                }
+                None => Answer::Called(Err(lost)),
+            };
         }
-        let next = place + head.size as usize;
-        let answer = &room[next..(next + after.len()).min(room.len())];
-        let is_sound = matches!(outcome, Ok(0 | 1))
-            && answer.len() == after.len()
-            && parcel::head(answer)
-                .is_some_and(|head| matches!(parcel::outcome(answer, &head), Ok(0 | 1)));
-        match is_sound {
-            true => after.copy_from_slice(answer),
-            false => after.clear(),
+        read(&requests.answers[begin..end], step - begin, call, after)
+    }
+
+    /// A step that was requested will not be fetched.
+    pub(super) fn forget_request(&mut self) {
+        self.requests.open = self.requests.open.saturating_sub(1);
+    }
+
+    /// Sends the steps that wait.
+    fn send_requests(&mut self) {
+        if self.requests.are_sent || self.requests.sent.is_empty() {
+            return;
         }
-        Answer::Called(outcome)
+        let mut requests = std::mem::take(&mut self.requests);
+        let first = parcel::head(&requests.sent).map_or(0, |head| head.instance);
+        requests.lost = self.exchange(first, &requests.sent).err();
+        requests.last = self.frame.began_at();
+        let room = &self.frame.room()[..requests.sent.len()];
+        requests.answers.clear();
+        requests.answers.extend_from_slice(room);
+        requests.are_sent = true;
+        self.requests = requests;
+    }
+
+    /// Lets the guest carry out calls, and waits for it.
+    fn exchange(&mut self, instance: u32, parcels: &[u8]) -> Result<(), Lost> {
+        if let Some(gone) = &self.gone {
+            return Err(is_gone(gone));
+        }
+        self.frame.room()[..parcels.len()].copy_from_slice(parcels);
+        self.frame.set_length(parcels.len());
+        self.sinks
+            .current
+            .store(instance as usize, Ordering::Relaxed);
+        self.frame.turn().give(GUEST);
+        let done = self.wait(self.limit);
+        self.hear();
+        done
     }
 
     /// Waits for the guest's answer.
@@ -264,6 +375,12 @@ impl Host {
 
     fn lose(&mut self, how: String) -> Lost {
         self.gone = Some(how.clone());
+        let at = self.frame.began_at();
+        if let Some(head) = self.frame.room().get(at..).and_then(parcel::head) {
+            // Its last words are those of the FMU that was called.
+            let instance = head.instance as usize;
+            self.sinks.current.store(instance, Ordering::Relaxed);
+        }
         self.kill();
         self.hear_last_words();
         Lost(how)
@@ -334,6 +451,45 @@ impl Drop for Host {
     }
 }
 
+/// What came of the calls in `room`, of which the one that was asked for begins at `place`.
+fn read(room: &[u8], place: usize, call: &mut Call, after: &mut Vec<u8>) -> Answer {
+    let strange = || Answer::Called(Err(Lost("received an answer out of order".to_string())));
+    let mut at = 0;
+    while at < place {
+        let Some(head) = parcel::head(&room[at..]) else {
+            return strange();
+        };
+        let outcome = parcel::outcome(&room[at..], &head);
+        let next = at + head.size as usize;
+        if !matches!(outcome, Ok(0 | 1)) {
+            return Answer::Other(room[at..next].to_vec(), outcome);
+        }
+        at = next;
+    }
+    let Some(head) = room.get(place..).and_then(parcel::head) else {
+        return strange();
+    };
+    let outcome = parcel::outcome(&room[place..], &head);
+    if outcome.is_ok() {
+        parcel::give_back(&room[place..], &head, call);
+    }
+    let next = place + head.size as usize;
+    let answer = &room[next..(next + after.len()).min(room.len())];
+    let is_sound = matches!(outcome, Ok(0 | 1))
+        && answer.len() == after.len()
+        && parcel::head(answer)
+            .is_some_and(|head| matches!(parcel::outcome(answer, &head), Ok(0 | 1)));
+    match is_sound {
+        true => after.copy_from_slice(answer),
+        false => after.clear(),
+    }
+    Answer::Called(outcome)
+}
+
+fn is_gone(how: &str) -> Lost {
+    Lost(format!("cannot be made: its process {how}"))
+}
+
 /// Passes on what a guest prints, line by line, as words of the FMU that was called last.
 fn listen(
     stream: Option<impl Read + Send + 'static>,
@@ -352,6 +508,7 @@ fn listen(
                 return;
             }
             count += 1;
+            sinks.heard.store(true, Ordering::Relaxed);
             if count <= LINES {
                 let text = String::from_utf8_lossy(&line);
                 let text = format!("printed on {name}: {}", text.trim_end());

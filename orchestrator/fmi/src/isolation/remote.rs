@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::super::call::{Call, Culprit, Endpoint, Function, Lost, Values};
 use super::super::native::{Setup, Sink};
-use super::host::{Answer, Host};
+use super::host::{Answer, Host, Request};
 use super::parcel;
 
 /// Bytes of settings that are kept until the next call that gives something.
@@ -19,6 +19,8 @@ pub(in super::super) struct Remote {
     /// Whether settings may wait.
     keeps: bool,
     ahead: Ahead,
+    /// The step whose outcome has not been fetched.
+    request: Option<Request>,
 }
 
 /// What is read right after each step travels with the step: one way to the guest instead of two.
@@ -94,6 +96,7 @@ impl Remote {
             kept: Vec::new(),
             keeps: !is_traced,
             ahead: Ahead::default(),
+            request: None,
         })
     }
 }
@@ -124,9 +127,47 @@ impl Endpoint for Remote {
             }
         }
         let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.request.take().is_some() {
+            host.forget_request();
+        }
         let answer = host.call(self.instance, &self.kept, call, &mut after);
         drop(host);
         self.kept.clear();
+        self.came(answer, call, after)
+    }
+
+    fn request(&mut self, call: &Call) -> bool {
+        if !self.keeps || self.request.is_some() {
+            return false;
+        }
+        let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+        self.request = host.request(self.instance, &self.kept, call, &self.ahead.habit);
+        drop(host);
+        if self.request.is_none() {
+            return false;
+        }
+        self.ahead.learn(self.instance, call);
+        self.kept.clear();
+        true
+    }
+
+    fn answer(&mut self, call: &mut Call) -> Result<i32, Lost> {
+        let Some(request) = self.request.take() else {
+            return Err(Lost("was not requested".to_string()));
+        };
+        let mut after = std::mem::take(&mut self.ahead.answer);
+        after.clear();
+        after.extend_from_slice(&self.ahead.habit);
+        let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+        let answer = host.answer(request, call, &mut after);
+        drop(host);
+        self.came(answer, call, after)
+    }
+}
+
+impl Remote {
+    /// The outcome of a call, with what was read after it.
+    fn came(&mut self, answer: Answer, call: &mut Call, after: Vec<u8>) -> Result<i32, Lost> {
         self.ahead.answer = after;
         self.ahead.is_after_step = call.function == Function::DoStep;
         match answer {
