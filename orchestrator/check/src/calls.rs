@@ -126,7 +126,7 @@ fn read(findings: &mut Findings, instance: &mut Instance) -> Result<Vec<Datum>, 
     let fmu = instance.fmu.clone();
     let mut row = Vec::new();
     let variables = fmu.description.variables.iter();
-    let whole = variables.filter(|variable| variable.element.0 == 0 && variable.kind.travels());
+    let whole = variables.filter(|variable| variable.element.0 == 0 && variable.kind.has_values());
     let whole: Vec<&Variable> = whole.collect();
     // Numbers of one type in one call: one for each would take a while where there are many.
     for alike in whole.chunk_by(|one, other| one.kind == other.kind && !one.kind.is_exact()) {

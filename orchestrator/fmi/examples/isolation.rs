@@ -103,7 +103,11 @@ fn measure(fmu: &Path, steps: usize) -> Result<Vec<f64>, Box<dyn Error>> {
                 instance.do_step(time, STEP)?;
             }
         }
-        for (instance, _) in instances.iter_mut().zip(requested).filter(|(_, asked)| *asked) {
+        for (instance, _) in instances
+            .iter_mut()
+            .zip(requested)
+            .filter(|(_, asked)| *asked)
+        {
             instance.finish_step()?;
         }
         for instance in &mut instances {

@@ -117,7 +117,7 @@ fn kept(saved: &[PathBuf], file: &Path) -> String {
     };
     let rows = match part {
         Some(part) => format!(
-            "; `{}` holds the first rows of `{}`",
+            "; `{}` holds the first lines of `{}`",
             part.display(),
             file.file_name().unwrap_or_default().to_string_lossy()
         ),

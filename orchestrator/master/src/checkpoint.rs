@@ -96,7 +96,8 @@ impl Simulation {
         self.go_to(checkpoint)?;
         self.notes.push(format!(
             "the run continues from its checkpoint at {} s",
-            checkpoint.time
+            // Sums of steps have rounding errors behind the nanoseconds.
+            (1e9 * checkpoint.time).round() / 1e9
         ));
         self.resumed = Some(Resumed {
             record,

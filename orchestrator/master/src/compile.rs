@@ -371,8 +371,7 @@ impl<'a> Places<'a> {
             Operation::Call { component } => {
                 let description = &self.system.components[*component].fmu.description;
                 let outputs = description.of(Causality::Output);
-                let travelling = outputs.filter(|&v| description.variables[v].kind.travels());
-                (*component, travelling.collect())
+                (*component, outputs.collect())
             }
         };
         let variables = &self.system.components[component].fmu.description.variables;

@@ -13,6 +13,8 @@ type Outcome = Result<(), Box<CallError>>;
 pub(super) struct Inputs {
     groups: Vec<InputGroup>,
     exact: Vec<ExactGroup>,
+    /// Whether some of it may only change at events; they change in one.
+    is_discrete: bool,
 }
 
 struct InputGroup {
@@ -25,8 +27,6 @@ struct InputGroup {
     /// The other driven values.
     sources: Vec<InputSource>,
     values: Vec<f64>,
-    /// Whether some of it may only change at events.
-    is_discrete: bool,
 }
 
 /// Values side by side that are those of signals side by side.
@@ -97,25 +97,32 @@ impl Inputs {
     /// Adds a variable (all elements of an array): how each element is driven, if it is, and its
     /// value if it is not.
     pub(super) fn add(&mut self, variable: &Variable, elements: &[(Option<Drive>, Datum)]) {
+        self.is_discrete |= variable.variability != Variability::Continuous;
         if variable.kind.is_exact() {
             return self.add_exact(variable, elements);
         }
         let fits = |group: &InputGroup| group.kind == variable.kind;
         let place = self.groups.iter().position(fits).unwrap_or_else(|| {
-            self.groups.push(InputGroup {
-                kind: variable.kind.clone(),
-                references: Vec::new(),
-                copies: Vec::new(),
-                smooth: Vec::new(),
-                sources: Vec::new(),
-                values: Vec::new(),
-                is_discrete: false,
-            });
-            self.groups.len() - 1
+            // What a clock lets in is set when it ticks.
+            let place = match variable.kind {
+                Kind::Clock => 0,
+                _ => self.groups.len(),
+            };
+            self.groups.insert(
+                place,
+                InputGroup {
+                    kind: variable.kind.clone(),
+                    references: Vec::new(),
+                    copies: Vec::new(),
+                    smooth: Vec::new(),
+                    sources: Vec::new(),
+                    values: Vec::new(),
+                },
+            );
+            place
         });
         let group = &mut self.groups[place];
         group.references.push(variable.reference);
-        group.is_discrete |= variable.variability != Variability::Continuous;
         for (drive, value) in elements {
             if let Some(drive) = drive {
                 group.drive(drive);
@@ -158,9 +165,8 @@ impl Inputs {
             for source in &group.sources {
                 group.values[source.place] = source.passage.of(source.now(signals));
             }
-            group.set(instance)?;
         }
-        self.transfer_exact(signals, instance)
+        self.set(signals, instance)
     }
 
     /// As [`Inputs::transfer`], but inputs that change between samples are set to
@@ -184,9 +190,35 @@ impl Inputs {
                 let share = if source.is_smooth { share } else { 0.0 };
                 group.values[source.place] = source.passage.of(at + share * change);
             }
-            group.set(instance)?;
         }
-        self.transfer_exact(now, instance)
+        self.set(now, instance)
+    }
+
+    /// Sets all values, in an event where some of them need one.
+    #[inline]
+    fn set(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
+        if self.is_discrete {
+            return self.set_in_event(signals, instance);
+        }
+        for group in &self.groups {
+            instance.set(&group.kind, &group.references, &group.values)?;
+        }
+        self.transfer_exact(signals, instance)
+    }
+
+    #[inline(never)]
+    fn set_in_event(&mut self, signals: &Signals, instance: &mut Instance) -> Outcome {
+        let is_clock = |group: &&InputGroup| group.kind == Kind::Clock;
+        if let Some(clocks) = self.groups.first().filter(is_clock) {
+            instance.set(&clocks.kind, &clocks.references, &clocks.values)?;
+        }
+        instance.begin_event()?;
+        for group in self.groups.iter().filter(|group| !is_clock(group)) {
+            instance.set(&group.kind, &group.references, &group.values)?;
+        }
+        self.transfer_exact(signals, instance)?;
+        instance.end_event()?;
+        Ok(())
     }
 
     /// The numbers that drive it.
@@ -256,9 +288,7 @@ impl Inputs {
                     }
                 };
             }
-            instance.begin_event()?;
             instance.set_exact(&group.kind, &group.references, &group.data)?;
-            instance.end_event()?;
         }
         Ok(())
     }
@@ -308,18 +338,6 @@ impl InputGroup {
             let from = &signals.numbers[it.signal..it.signal + it.count];
             self.values[it.place..it.place + it.count].copy_from_slice(from);
         }
-    }
-
-    #[inline]
-    fn set(&self, instance: &mut Instance) -> Outcome {
-        if self.is_discrete {
-            instance.begin_event()?;
-        }
-        instance.set(&self.kind, &self.references, &self.values)?;
-        if self.is_discrete {
-            instance.end_event()?;
-        }
-        Ok(())
     }
 }
 

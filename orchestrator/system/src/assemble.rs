@@ -17,7 +17,7 @@ use super::lookup::{find, find_settable};
 use super::table::InputTable;
 use super::terminals;
 use super::value;
-use fmi_import::{Causality, Fmu, Variability};
+use fmi_import::{Causality, Fmu, Ticks, Variability};
 use units::hint;
 
 /// Checks the system `file` against the FMUs that `library` gives, with `settings` (as in
@@ -91,14 +91,26 @@ pub fn assemble(
         part.inputs
             .retain(|(input, _)| !driven.contains_key(&(index, *input)));
         let given: HashSet<usize> = part.inputs.iter().map(|(input, _)| *input).collect();
-        let open = part.fmu.description.of(Causality::Input).filter(|input| {
-            variables[*input].kind.travels()
-                && !given.contains(input)
-                && !driven.contains_key(&(index, *input))
-        });
-        let open: Vec<usize> = open.collect();
+        let open = part
+            .fmu
+            .description
+            .of(Causality::Input)
+            .filter(|input| !given.contains(input) && !driven.contains_key(&(index, *input)));
+        let (clocks, open): (Vec<usize>, Vec<usize>) =
+            open.partition(|&input| !variables[input].kind.has_values());
         if !open.is_empty() {
             notes.push(left_open(part, &open));
+        }
+        let description = &part.fmu.description;
+        for clock in clocks {
+            let name = &variables[clock].name;
+            if description.ticks(clock) == Some(Ticks::Triggered) {
+                notes.push(format!(
+                    "`{}`: nothing triggers the input clock `{name}`: it never ticks; connect an \
+                     output clock to it",
+                    part.name
+                ));
+            }
         }
     }
     let end = end(file, &components)?;
@@ -297,7 +309,7 @@ fn with_locals(
     });
     let is_local = |at: &usize| {
         let variable = &description.variables[*at];
-        variable.causality == Causality::Local && variable.kind.travels()
+        variable.causality == Causality::Local && variable.kind.has_values()
     };
     let mut locals: Vec<usize> = found.filter(is_local).collect();
     let is_mute = description.of(Causality::Output).next().is_none();

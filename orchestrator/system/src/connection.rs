@@ -5,7 +5,7 @@ use super::link::{Link, Origin};
 use super::lookup::{component_index, find};
 use super::passage::End;
 use super::table::InputTable;
-use fmi_import::{Causality, Kind, Variable};
+use fmi_import::{Causality, Kind, Ticks, Variable};
 
 /// The connection of a link, after its names, types and units were checked.
 ///
@@ -20,6 +20,9 @@ pub(super) fn connect(
     let component = component_index(components, &to.component)?;
     let input = find(&components[component].fmu, &to.variable, Causality::Input)?;
     let target = &components[component].fmu.description.variables[input];
+    if target.kind == Kind::Clock {
+        triggers(&components[component], input)?;
+    }
 
     let (source, start) = match from {
         Origin::Reference { quantity, ahead } => {
@@ -53,6 +56,9 @@ pub(super) fn connect(
                 let fmu = &components[component].fmu;
                 let variable = find(fmu, &name.variable, Causality::Output)?;
                 let output = &fmu.description.variables[variable];
+                if output.kind == Kind::Clock {
+                    has_events(&components[component], variable)?;
+                }
                 let source = Source::Output {
                     component,
                     variable,
@@ -83,6 +89,32 @@ fn end(variable: &Variable) -> End<'_> {
         unit: variable.unit.as_deref(),
         base: variable.base_unit,
     }
+}
+
+/// Whether an input clock ticks when another one does.
+fn triggers(component: &Component, input: usize) -> Result<(), String> {
+    has_events(component, input)?;
+    let description = &component.fmu.description;
+    if description.ticks(input) == Some(Ticks::Triggered) {
+        return Ok(());
+    }
+    let (name, clock) = (&component.name, &description.variables[input].name);
+    Err(format!(
+        "the clock `{name}.{clock}` ticks at its own times, expected one with \
+         intervalVariability=\"triggered\"; remove the connection"
+    ))
+}
+
+fn has_events(component: &Component, clock: usize) -> Result<(), String> {
+    let description = &component.fmu.description;
+    if description.has_stepped_events() {
+        return Ok(());
+    }
+    let (name, clock) = (&component.name, &description.variables[clock].name);
+    Err(format!(
+        "the clock `{name}.{clock}` can be connected in co-simulation with hasEventMode=\"true\" only; \
+         export the FMU with event mode"
+    ))
 }
 
 fn fits(kind: &Kind, target: &Variable) -> Result<(), String> {

@@ -151,9 +151,6 @@ fn nodes(system: &System) -> Vec<Node> {
         let mut alike: HashMap<*const usize, usize> = HashMap::new();
         for output in description.of(Causality::Output) {
             let variable = &description.variables[output];
-            if !variable.kind.travels() {
-                continue;
-            }
             let place = *alike
                 .entry(variable.dependencies.as_ptr())
                 .or_insert_with(|| {

@@ -124,6 +124,104 @@ fn a_run_that_is_killed_fifty_times_goes_on_to_the_bit() {
     killed(50);
 }
 
+/// In a file system of `$1` kB: a run, then, with room again, the same run resumed. Prints both statuses, and
+/// `lost` where a part of the results is not the beginning of the whole.
+#[cfg(target_os = "linux")]
+const ON_A_SMALL_DISK: &str = r#"
+mkdir -p disk && mount -t tmpfs -o size=${1}k tmpfs disk || exit 99
+program=$2; whole=$3; shift 3
+cd disk
+"$program" "$@" > ../said 2>&1; first=$?
+for part in out/results.csv.part out/results.csv; do
+    [ -f $part ] || continue
+    head -c $(stat -c %s $part) "$whole" | cmp -s - $part || echo lost
+done
+mount -o remount,size=64m "$PWD"
+again=none
+if [ -f out/checkpoint/state ]; then
+    "$program" run --resume out > ../again 2>&1; again=$?
+    cmp -s out/results.csv "$whole" || echo lost
+fi
+echo $first $again
+"#;
+
+/// Runs whose disk is full at a moment drawn over all that they write.
+#[cfg(target_os = "linux")]
+fn on_full_disks(trials: usize) {
+    let may_mount = Command::new("unshare").args(["-rm", "true"]).output();
+    if !may_mount.is_ok_and(|done| done.status.success()) {
+        println!("no file system can be mounted here: nothing was tried");
+        return;
+    }
+    println!("seed {SEED}");
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let run = [&RUN[..6], &["--duration", "0.6 s"]].concat();
+    let output = shakebench(folder, &[&run[..], &["--out", "whole"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let whole = folder.join("whole/results.csv");
+    let all = fs::read_dir(folder.join("whole")).unwrap();
+    let bytes: u64 = all
+        .map(|file| file.unwrap().metadata().unwrap().len())
+        .sum();
+    let (mut full, mut resumed) = (0, 0);
+    for trial in 0..trials {
+        let size = random.random_range(40..bytes / 1024 + 200);
+        let mut command = Command::new("unshare");
+        command.args(["-rm", "sh", "-c", ON_A_SMALL_DISK, "sh", &size.to_string()]);
+        command.args([Path::new(env!("CARGO_BIN_EXE_shakebench")), &whole]);
+        command
+            .args(&run)
+            .args(["--checkpoint-every", "0.05 s", "--out", "out"]);
+        let done = command.current_dir(folder).output().unwrap();
+        let said = fs::read_to_string(folder.join("said")).unwrap();
+        let found = crate::stdout(&done);
+        let place = format!("trial {trial}, {size} kB: {found}{said}{}", stderr(&done));
+        assert!(!found.contains("lost"), "{place}");
+        let (first, again) = found
+            .trim()
+            .split_once(' ')
+            .unwrap_or_else(|| panic!("{place}"));
+        match first {
+            "0" => continue,
+            "1" => full += 1,
+            _ => panic!("{place}"),
+        }
+        for words in [
+            "cannot be written",
+            "No space left",
+            "complete",
+            "Free some space",
+        ] {
+            assert!(said.contains(words), "`{words}` is not in {place}");
+        }
+        // What was kept is named, and goes on.
+        assert_eq!(
+            again != "none",
+            said.contains("run --resume out"),
+            "{place}"
+        );
+        assert!(["none", "0"].contains(&again), "{place}");
+        resumed += usize::from(again == "0");
+    }
+    println!("{trials} trials, {full} disks were full, {resumed} runs resumed");
+    assert!(full > trials / 2 && resumed > trials / 3);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_whose_disk_is_full_goes_on_to_the_bit() {
+    on_full_disks(3);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "takes half a minute"]
+fn a_run_whose_disk_is_full_fifty_times_goes_on_to_the_bit() {
+    on_full_disks(50);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_run_that_is_interrupted_goes_on_to_the_bit_in_whatever_process() {

@@ -30,18 +30,28 @@ fn pack(folder: &Path, attributes: &str) {
 <Clock name="countdown" valueReference="3" causality="input" intervalVariability="countdown"/>
 <Clock name="changing" valueReference="4" causality="input" intervalVariability="changing"/>
 <Clock name="triggered" valueReference="5" causality="input" intervalVariability="triggered"/>
+<Clock name="ticks" valueReference="6" causality="output" intervalVariability="triggered"/>
+<Clock name="relay" valueReference="7" causality="output" intervalVariability="triggered"/>
+<Clock name="early" valueReference="8" causality="output" intervalVariability="triggered"/>
 <Int32 name="n_periodic" valueReference="11" causality="output"/>
 <Int32 name="n_later" valueReference="12" causality="output"/>
 <Int32 name="n_countdown" valueReference="13" causality="output"/>
 <Int32 name="n_changing" valueReference="14" causality="output"/>
 <Float64 name="sampled" valueReference="15" causality="output" variability="discrete" clocks="1"/>
 <Float64 name="at" valueReference="16" causality="output" variability="discrete" clocks="1"/>
+<Int32 name="n_triggered" valueReference="17" causality="output" variability="discrete" clocks="5"/>
+<Int32 name="held" valueReference="18" causality="output" variability="discrete" clocks="5"/>
+<Float64 name="triggered_at" valueReference="19" causality="output" variability="discrete" clocks="5"/>
+<Int32 name="v" valueReference="21" causality="input" variability="discrete" clocks="5" start="0"/>
 <Float64 name="u" valueReference="20" causality="input" variability="discrete" clocks="1" start="0"/>
 </ModelVariables>
 <ModelStructure>
 <Output valueReference="11" dependencies="1"/><Output valueReference="12" dependencies="2"/>
 <Output valueReference="13" dependencies="3"/><Output valueReference="14" dependencies="4"/>
 <Output valueReference="15" dependencies="1 20"/><Output valueReference="16" dependencies="1"/>
+<Output valueReference="6" dependencies="1"/><Output valueReference="7" dependencies="5"/>
+<Output valueReference="8" dependencies=""/><Output valueReference="17" dependencies="5"/>
+<Output valueReference="18" dependencies="5 21"/><Output valueReference="19" dependencies="5"/>
 </ModelStructure>
 </fmiModelDescription>"#
     );
@@ -147,4 +157,76 @@ fn clocks_that_cannot_be_ticked_are_refused_by_name() {
         said.contains("clock `") && said.contains("--step"),
         "{said}"
     );
+}
+
+#[test]
+fn clocks_trigger_clocks_along_connections() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let attributes = r#"hasEventMode="true" mightReturnEarlyFromDoStep="true" canHandleVariableCommunicationStepSize="true""#;
+    pack(folder, attributes);
+    let system = |connections: &str| {
+        format!(
+            "connections = [{connections}]\n[components.a]\nfmu = \"clocks.fmu\"\n[components.b]\n\
+             fmu = \"clocks.fmu\"\n[components.c]\nfmu = \"clocks.fmu\"\n[experiment]\nduration = \"1.1 s\"\n"
+        )
+    };
+    let chain = r#""a.ticks -> b.triggered", "a.n_periodic -> b.v", "b.relay -> c.triggered", "b.held -> c.v""#;
+    fs::write(folder.join("chain.toml"), system(chain)).unwrap();
+    for isolate in ["none", "foreign"] {
+        let arguments = [
+            "run",
+            "chain.toml",
+            "--out",
+            "out",
+            "--force",
+            "--step",
+            "50 ms",
+            "--isolate",
+            isolate,
+        ];
+        let output = shakebench(folder, &arguments);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        // `early` ticks within a step, and `a.triggered` is not connected.
+        assert!(said.contains("`early` ticked at 0.33 s"), "{said}");
+        assert!(said.contains("`a`: nothing triggers") && !said.contains("`b`: nothing triggers"));
+        let results = fs::read_to_string(folder.join("out/results.csv")).unwrap();
+        let mut lines = results.lines();
+        let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+        let column = |name: &str| names.iter().position(|one| *one == name).unwrap();
+        for line in lines {
+            let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+            let value = |name: &str| cells[column(name)];
+            let time = cells[0];
+            let ticks = (time / 0.2 + 1e-6).floor() + 1.0;
+            let is_now = (time / 0.2 - (ticks - 1.0)).abs() < 1e-6;
+            assert_eq!(value("a.ticks"), f64::from(u8::from(is_now)), "{time}");
+            assert_eq!(value("b.relay"), value("a.ticks"), "{time}");
+            for part in ["b", "c"] {
+                // At the same moments, with what was given then.
+                assert_eq!(
+                    value(&format!("{part}.n_triggered")),
+                    ticks,
+                    "{time}: {line}"
+                );
+                assert_eq!(value(&format!("{part}.held")), ticks, "{time}: {line}");
+                let at = value(&format!("{part}.triggered_at"));
+                assert!((at - 0.2 * (ticks - 1.0)).abs() < 1e-9, "{time}: {line}");
+            }
+            // A tick at 0.33 s is seen at 0.35 s.
+            let early = (time - 0.35).abs() < 1e-9;
+            assert_eq!(value("a.early"), f64::from(u8::from(early)), "{time}");
+        }
+    }
+    for (connection, words) in [
+        (r#""a.ticks -> b.periodic""#, "ticks at its own times"),
+        (r#""a.ticks -> b.v""#, "is a Clock and cannot drive"),
+        (r#""a.n_periodic -> b.triggered""#, "cannot drive the Clock"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        pack(folder.path(), attributes);
+        fs::write(folder.path().join("wrong.toml"), system(connection)).unwrap();
+        crate::refused(folder.path(), &["run", "wrong.toml"], &[words]);
+    }
 }

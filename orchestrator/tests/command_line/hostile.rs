@@ -511,6 +511,45 @@ fn a_process_of_its_own_changes_no_bit() {
     }
 }
 
+/// The steps of several FMUs in another process travel there together; what one of them does there is its
+/// own, and the others do what they would do here.
+#[test]
+fn an_fmu_among_others_in_a_process_is_named_and_changes_nothing_of_theirs() {
+    let system = r#"
+        connections = ["reference.displacement -> a.u", "a.y -> b.u", "b.y -> c.u"]
+        [components.a]
+        fmu = "honest.fmu"
+        [components.b]
+        fmu = "hostile.fmu"
+        [components.c]
+        fmu = "honest.fmu"
+        [experiment]
+        duration = "2 s"
+    "#;
+    for behaviour in ["HONEST", "ENDS", "UNKNOWN_STATUS", "DISCARDS", "SEGFAULT"] {
+        let folder = tempfile::tempdir().unwrap();
+        pack_as(folder.path(), "honest.fmu", "HONEST", "", "");
+        pack(folder.path(), behaviour, "");
+        for algorithm in ["jacobi", "gauss-seidel"] {
+            let more = ["--algorithm", algorithm, "--isolate"];
+            let apart = run(folder.path(), system, &[&more[..], &["foreign"]].concat());
+            if !["HONEST", "ENDS"].contains(&behaviour) {
+                for word in ["`b`", "hostile.fmu", "fmi2DoStep", "at 1 s"] {
+                    assert!(apart.said.contains(word), "{behaviour}: {}", apart.said);
+                }
+            }
+            let rows = apart.rows.len();
+            assert!([501, 1000, 1001].contains(&rows), "{behaviour}: {rows}");
+            if behaviour == "SEGFAULT" {
+                continue;
+            }
+            let here = run(folder.path(), system, &[&more[..], &["none"]].concat());
+            assert_eq!(here.status, apart.status, "{behaviour}: {}", apart.said);
+            assert_eq!(here.rows, apart.rows, "{behaviour}, {algorithm}");
+        }
+    }
+}
+
 #[test]
 fn an_fmu_that_refuses_get_after_set_runs_and_says_so_once() {
     for isolate in ["none", "foreign"] {

@@ -84,8 +84,8 @@ impl Kind {
         )
     }
 
-    /// Whether values of it can travel along a connection.
-    pub fn travels(&self) -> bool {
+    /// Whether it has values: a clock has ticks only.
+    pub fn has_values(&self) -> bool {
         *self != Self::Clock
     }
 
@@ -110,7 +110,7 @@ impl Kind {
     pub fn drives(&self, target: &Self) -> bool {
         let floating = |kind: &Self| matches!(kind, Self::Float64 | Self::Float32);
         if self.name() == target.name() {
-            return self.travels();
+            return true;
         }
         if let (Self::Enumeration(items), other) | (other, Self::Enumeration(items)) =
             (self, target)

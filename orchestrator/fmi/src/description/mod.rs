@@ -271,6 +271,20 @@ impl Description {
     pub fn of(&self, causality: Causality) -> impl Iterator<Item = usize> + '_ {
         (0..self.variables.len()).filter(move |&index| self.variables[index].causality == causality)
     }
+
+    /// When the input clock at a position ticks; none where there is none.
+    pub fn ticks(&self, position: usize) -> Option<Ticks> {
+        let variable = self.variables.get(position)?;
+        let is_clock = variable.kind == Kind::Clock && variable.causality == Causality::Input;
+        let mut clocks = self.input_clocks.iter().filter(|_| is_clock);
+        let found = clocks.find(|clock| clock.reference == variable.reference);
+        found.map(|clock| clock.ticks)
+    }
+
+    /// Whether its clocks can be ticked and read.
+    pub fn has_stepped_events(&self) -> bool {
+        self.has_event_mode && self.interface == Interface::CoSimulation
+    }
 }
 
 /// Characters of a remark at most.

@@ -1,10 +1,13 @@
-//! Input clocks (FMI 3.0): each ticks when its time has come, in event mode.
+//! Clocks (FMI 3.0). Input clocks tick in event mode, when their time has come or when another clock
+//! triggers them; output clocks are read there.
 //!
 //! A tick at a communication point waits until inputs are set or outputs are read there, so that it
-//! takes the newest inputs.
+//! takes the newest inputs. An output clock that ticks within a step is seen by others at its end.
 
 use super::super::call::{Call, Function, Scalar, Values};
-use super::super::{Description, InputClock, Interface, Ticks};
+use super::super::messages::Messages;
+use super::super::native::Sink;
+use super::super::{Causality, Description, InputClock, Interface, Kind, Ticks};
 use super::{Instance, Outcome, Phase};
 
 /// The clocks of an instance.
@@ -15,6 +18,25 @@ pub(super) struct Clocks {
     pub due: Vec<usize>,
     /// The FMU asked to end the run in a tick.
     pub is_over: bool,
+    outputs: Vec<OutputClock>,
+}
+
+/// An output clock, and what is known of it since the last communication point.
+#[derive(Debug)]
+struct OutputClock {
+    name: String,
+    reference: u32,
+    ticked: Ticked,
+    /// A tick within a step has been reported.
+    is_reported: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ticked {
+    No,
+    /// Nobody has read it yet.
+    Unread,
+    Read,
 }
 
 #[derive(Debug)]
@@ -24,47 +46,93 @@ struct Scheduled {
     interval: f64,
     /// The next tick of one that is not, s.
     next: Option<f64>,
+    /// When another clock triggered it last, s.
+    triggered: Option<f64>,
 }
 
 impl Clocks {
-    /// The clocks that somebody has to tick.
+    /// The clocks that somebody has to tick, and those that the FMU ticks.
     ///
     /// # Errors
     /// Clocks that cannot be ticked: what there is instead.
     pub(super) fn of(description: &Description, has_events: bool) -> Result<Self, String> {
-        let ticking = |clock: &&InputClock| clock.ticks != Ticks::Triggered;
-        let all: Vec<InputClock> = description
-            .input_clocks
-            .iter()
-            .filter(ticking)
-            .cloned()
-            .collect();
-        if let Some(clock) = all.first()
-            && (!has_events || description.interface != Interface::CoSimulation)
-        {
+        let is_stepped = has_events && description.interface == Interface::CoSimulation;
+        let mut all = description.input_clocks.iter();
+        if !is_stepped && let Some(clock) = all.find(|clock| clock.ticks != Ticks::Triggered) {
             return Err(format!(
                 "its input clock `{}` has to be ticked from outside, which is possible in \
                  co-simulation with hasEventMode=\"true\" only; export it with event mode",
                 clock.name
             ));
         }
-        let all = all.into_iter().map(|clock| Scheduled {
-            clock,
+        if !is_stepped {
+            return Ok(Self::default());
+        }
+        let all = description.input_clocks.iter().map(|clock| Scheduled {
+            clock: clock.clone(),
             interval: f64::INFINITY,
             next: None,
+            triggered: None,
         });
+        let outputs = description.of(Causality::Output);
+        let outputs = outputs.map(|at| &description.variables[at]);
+        let outputs = outputs.filter(|variable| variable.kind == Kind::Clock);
         Ok(Self {
             all: all.collect(),
             due: Vec::new(),
             is_over: false,
+            outputs: outputs
+                .map(|variable| OutputClock {
+                    name: variable.name.clone(),
+                    reference: variable.reference,
+                    ticked: Ticked::No,
+                    is_reported: false,
+                })
+                .collect(),
         })
     }
 
-    /// Triggered input clocks, which nothing ticks.
-    pub(super) fn silent(description: &Description) -> Vec<&str> {
-        let clocks = description.input_clocks.iter();
-        let silent = clocks.filter(|clock| clock.ticks == Ticks::Triggered);
-        silent.map(|clock| clock.name.as_str()).collect()
+    /// At the beginning of a step: ticks that were read are over.
+    pub(super) fn begin_step(&mut self) {
+        for clock in &mut self.outputs {
+            if clock.ticked == Ticked::Read {
+                clock.ticked = Ticked::No;
+            }
+        }
+    }
+
+    /// Everything here that a saved state has to hold, as numbers.
+    pub(super) fn save(&self, into: &mut Vec<f64>) {
+        into.clear();
+        for one in &self.all {
+            into.push(one.next.unwrap_or(f64::NAN));
+            into.push(one.triggered.unwrap_or(f64::NAN));
+        }
+        let ticked = self.outputs.iter().map(|clock| clock.ticked);
+        into.extend(ticked.map(|ticked| f64::from(ticked as u8)));
+    }
+
+    /// How many numbers [`Clocks::save`] gives.
+    pub(super) fn saved(&self) -> usize {
+        2 * self.all.len() + self.outputs.len()
+    }
+
+    /// Takes what [`Clocks::save`] gave.
+    pub(super) fn restore(&mut self, from: &[f64]) {
+        self.due.clear();
+        self.is_over = false;
+        let known = |number: f64| Some(number).filter(|number| !number.is_nan());
+        let (inputs, outputs) = from.split_at((2 * self.all.len()).min(from.len()));
+        for (one, numbers) in self.all.iter_mut().zip(inputs.chunks_exact(2)) {
+            (one.next, one.triggered) = (known(numbers[0]), known(numbers[1]));
+        }
+        for (clock, number) in self.outputs.iter_mut().zip(outputs) {
+            clock.ticked = match number {
+                1.0 => Ticked::Unread,
+                2.0 => Ticked::Read,
+                _ => Ticked::No,
+            };
+        }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -112,6 +180,59 @@ impl Scheduled {
 }
 
 impl Instance {
+    /// Lets others tick triggered clocks at the present communication point: each once there.
+    pub(super) fn trigger(&mut self, references: &[u32], values: &[f64]) {
+        if self.phase != Phase::Stepping {
+            return;
+        }
+        for (reference, _) in references.iter().zip(values).filter(|(_, v)| **v != 0.0) {
+            let mut all = self.clocks.all.iter_mut().enumerate();
+            let found = all.find(|(_, one)| one.clock.reference == *reference);
+            if let Some((at, one)) = found
+                && one.triggered != Some(self.time)
+            {
+                one.triggered = Some(self.time);
+                self.clocks.due.push(at);
+            }
+        }
+    }
+
+    /// Whether output clocks have ticked since the communication point before.
+    pub(super) fn have_ticked(&mut self, references: &[u32], values: &mut [f64]) {
+        for (reference, value) in references.iter().zip(values) {
+            let mut all = self.clocks.outputs.iter_mut();
+            let clock = all.find(|clock| clock.reference == *reference);
+            *value = f64::from(u8::from(clock.is_some_and(|clock| {
+                if clock.ticked == Ticked::Unread {
+                    clock.ticked = Ticked::Read;
+                }
+                clock.ticked == Ticked::Read
+            })));
+        }
+    }
+
+    /// In event mode, before its update: which output clocks tick. `within`: a step is under way.
+    pub(super) fn read_output_clocks(&mut self, within: bool) -> Outcome {
+        if self.clocks.outputs.is_empty() {
+            return Ok(());
+        }
+        let references: Vec<u32> = self.clocks.outputs.iter().map(|it| it.reference).collect();
+        let mut ticks = vec![0_u8; references.len()];
+        let mut call = Call::plain(Function::Get(Scalar::Clock));
+        call.references = &references;
+        call.count = ticks.len();
+        call.values = Values::Out(&mut ticks);
+        self.call(&mut call)?;
+        let clocks = self.clocks.outputs.iter_mut();
+        for (clock, _) in clocks.zip(ticks).filter(|(_, tick)| *tick != 0) {
+            clock.ticked = Ticked::Unread;
+            if within && !std::mem::replace(&mut clock.is_reported, true) {
+                report_tick(&self.messages, &clock.name, self.time);
+            }
+        }
+        Ok(())
+    }
+
     /// In initialization's event mode: asks for the periods, and ticks what ticks at the start.
     pub(super) fn begin_clocks(&mut self) -> Outcome {
         let mut due = Vec::new();
@@ -154,7 +275,7 @@ impl Instance {
             return Ok(false);
         }
         self.enter_event()?;
-        let end = self.update_discrete_states()?;
+        let end = self.update_discrete_states(false)?;
         self.clocks.is_over = end;
         if !end {
             self.plain(Function::EnterStepMode)?;
@@ -229,6 +350,16 @@ impl Instance {
     }
 }
 
+/// A tick that others see late.
+#[cold]
+fn report_tick(messages: &Messages, clock: &str, time: f64) {
+    let text = format!(
+        "its clock `{clock}` ticked at {time} s, between communication points: others see such ticks \
+         at the next point; a shorter --step brings it nearer"
+    );
+    messages.message(1, "", &text);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -244,6 +375,7 @@ mod tests {
             clock,
             interval,
             next: None,
+            triggered: None,
         }
     }
 
@@ -256,8 +388,7 @@ mod tests {
                 scheduled(periodic, 0.3, 0.1),
                 scheduled(Ticks::Countdown, f64::INFINITY, 0.0),
             ],
-            due: Vec::new(),
-            is_over: false,
+            ..Clocks::default()
         };
         let (mut now, mut ticks) = (0.0, Vec::new());
         for _ in 0..6 {

@@ -15,7 +15,8 @@ use super::native::{self, Mode, Setup, Sink};
 use super::processes::{Processes, refused};
 use super::stand_in::Computed;
 use super::{
-    CURE, CallError, FmiVersion, Fmu, FmuError, Interface, Kind, Message, Options, Trace, archive,
+    CURE, CallError, Causality, FmiVersion, Fmu, FmuError, Interface, Kind, Message, Options,
+    Trace, archive,
 };
 use calling::words;
 use clocks::Clocks;
@@ -63,7 +64,10 @@ const MOST_STATE: usize = 1 << 30;
 
 /// A state that an instance was asked to keep; it is given back with [`Instance::free_state`].
 #[derive(Debug, Default)]
-pub struct State(u64);
+pub struct State {
+    handle: u64,
+    clocks: Vec<f64>,
+}
 
 impl Instance {
     /// Loads the FMU's library and makes an instance of that name.
@@ -173,13 +177,21 @@ impl Instance {
         let trace = options.trace.clone();
         let mut instance = Self::around(fmu, name, endpoint, messages, trace, clocks);
         instance.has_events = has_events;
+        if !has_events {
+            let outputs = description.of(Causality::Output);
+            let mut outputs = outputs.map(|at| &description.variables[at]);
+            if let Some(clock) = outputs.find(|variable| variable.kind == Kind::Clock) {
+                let text = format!(
+                    "its output clock `{}` is not read, which is possible in co-simulation with \
+                     hasEventMode=\"true\" only",
+                    clock.name
+                );
+                instance.messages.message(1, "", &text);
+            }
+        }
         instance.is_apart = place.is_some();
         if setup.logging {
             instance.log_categories(&told);
-        }
-        for clock in Clocks::silent(description) {
-            let text = format!("nothing triggers the input clock `{clock}`: it never ticks");
-            instance.messages.message(1, "", &text);
         }
         Ok(instance)
     }
@@ -268,7 +280,7 @@ impl Instance {
         self.plain(Function::ExitInitializationMode)?;
         if self.has_events {
             self.begin_clocks()?;
-            self.update_discrete_states()?;
+            self.update_discrete_states(false)?;
             self.plain(Function::EnterStepMode)?;
         }
         self.phase = Phase::Stepping;
@@ -300,9 +312,10 @@ impl Instance {
             self.tick_now()?;
         }
         let mut call = Call::plain(Function::GetState);
-        call.handle = state.0;
+        call.handle = state.handle;
         self.call(&mut call)?;
-        state.0 = call.handle;
+        state.handle = call.handle;
+        self.clocks.save(&mut state.clocks);
         Ok(())
     }
 
@@ -311,9 +324,9 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal.
     pub fn restore_state(&mut self, state: &State) -> Outcome {
-        self.clocks.due.clear();
+        self.clocks.restore(&state.clocks);
         let mut call = Call::plain(Function::SetState);
-        call.handle = state.0;
+        call.handle = state.handle;
         self.call(&mut call)
     }
 
@@ -323,7 +336,7 @@ impl Instance {
     /// The FMU's refusal; a state that is too large to be real.
     pub fn state_as_bytes(&mut self, state: &State) -> Outcome<Vec<u8>> {
         let mut call = Call::plain(Function::SizeOfState);
-        call.handle = state.0;
+        call.handle = state.handle;
         self.call(&mut call)?;
         let size = usize::try_from(call.handle).unwrap_or(usize::MAX);
         if size > MOST_STATE {
@@ -334,11 +347,13 @@ impl Instance {
         let mut words = vec![0_u64; size.div_ceil(8)];
         let bytes = &mut bytemuck::cast_slice_mut(&mut words)[..size];
         let mut call = Call::plain(Function::WriteState);
-        call.handle = state.0;
+        call.handle = state.handle;
         call.count = size;
         call.values = Values::Out(bytes);
         self.call(&mut call)?;
-        Ok(bytemuck::cast_slice::<u64, u8>(&words)[..size].to_vec())
+        let mut bytes = bytemuck::cast_slice::<u64, u8>(&words)[..size].to_vec();
+        bytes.extend(state.clocks.iter().flat_map(|number| number.to_le_bytes()));
+        Ok(bytes)
     }
 
     /// A state from its bytes.
@@ -346,13 +361,19 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal: of bytes that are not a state of it.
     pub fn state_of_bytes(&mut self, bytes: &[u8]) -> Outcome<State> {
+        let clocks = bytes.len().checked_sub(8 * self.clocks.saved());
+        let (bytes, clocks) = bytes.split_at(clocks.unwrap_or(bytes.len()));
         let mut words = vec![0_u64; bytes.len().div_ceil(8)];
         bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
         let mut call = Call::plain(Function::ReadState);
         call.count = bytes.len();
         call.values = Values::In(&bytemuck::cast_slice(&words)[..bytes.len()]);
         self.call(&mut call)?;
-        Ok(State(call.handle))
+        let number = |eight: &[u8]| f64::from_le_bytes(std::array::from_fn(|at| eight[at]));
+        Ok(State {
+            handle: call.handle,
+            clocks: clocks.chunks_exact(8).map(number).collect(),
+        })
     }
 
     /// Lets go of a kept state.
@@ -360,11 +381,11 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal.
     pub fn free_state(&mut self, state: State) -> Outcome {
-        if state.0 == 0 || self.phase == Phase::Over {
+        if state.handle == 0 || self.phase == Phase::Over {
             return Ok(());
         }
         let mut call = Call::plain(Function::FreeState);
-        call.handle = state.0;
+        call.handle = state.handle;
         self.call(&mut call)
     }
 

@@ -109,6 +109,7 @@ impl Instance {
         if self.clocks.is_over || (!self.clocks.due.is_empty() && self.tick_now()?) {
             return Ok(Progress::Ended(now));
         }
+        self.clocks.begin_step();
         let small = 1e-9 * step;
         let mut standing = 0;
         loop {
@@ -147,7 +148,7 @@ impl Instance {
             // A tick at the end waits for the inputs there.
             if event || early || (ticks && !is_end) {
                 self.enter_event()?;
-                if self.update_discrete_states()? {
+                if self.update_discrete_states(!is_end)? {
                     return Ok(Progress::Ended(last));
                 }
                 self.plain(Function::EnterStepMode)?;
@@ -204,16 +205,18 @@ impl Instance {
         if !self.has_events || self.phase != Phase::Stepping {
             return Ok(false);
         }
-        let end = self.update_discrete_states()?;
+        let end = self.update_discrete_states(false)?;
         if !end {
             self.plain(Function::EnterStepMode)?;
         }
         Ok(end)
     }
 
-    /// Until nothing changes any more; gives whether the FMU asked to end the run.
-    pub(super) fn update_discrete_states(&mut self) -> Outcome<bool> {
+    /// Until nothing changes any more; gives whether the FMU asked to end the run. `within`: a step is
+    /// under way.
+    pub(super) fn update_discrete_states(&mut self, within: bool) -> Outcome<bool> {
         for _ in 0..MOST_EVENT_ITERATIONS {
+            self.read_output_clocks(within)?;
             let mut call = Call::plain(Function::UpdateDiscreteStates);
             self.call(&mut call)?;
             let [again, end, ..] = call.flags;

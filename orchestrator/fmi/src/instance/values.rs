@@ -12,7 +12,8 @@ fn are_finite(values: &[f64]) -> bool {
 }
 
 impl Instance {
-    /// Reads the variables `references`, all of type `kind`, into `values`.
+    /// Reads the variables `references`, all of type `kind`, into `values`. A clock is 1 if it has ticked
+    /// since the communication point before.
     ///
     /// # Errors
     /// The FMU's refusal, or a value that is not finite.
@@ -44,6 +45,10 @@ impl Instance {
     #[inline(never)]
     fn get_by_call(&mut self, kind: &Kind, references: &[u32], values: &mut [f64]) -> Outcome {
         let scalar = self.scalar(kind);
+        if scalar == Scalar::Clock {
+            self.have_ticked(references, values);
+            return Ok(());
+        }
         let mut call = Call::plain(Function::Get(scalar));
         call.references = references;
         call.count = values.len();
@@ -81,7 +86,8 @@ impl Instance {
         Err(error)
     }
 
-    /// Sets the variables `references`, all of type `kind`.
+    /// Sets the variables `references`, all of type `kind`. A clock that is set ticks at the next event
+    /// of the present communication point.
     ///
     /// # Errors
     /// The FMU's refusal.
@@ -109,6 +115,10 @@ impl Instance {
     #[inline(never)]
     fn set_by_call(&mut self, kind: &Kind, references: &[u32], values: &[f64]) -> Outcome {
         let scalar = self.scalar(kind);
+        if scalar == Scalar::Clock {
+            self.trigger(references, values);
+            return Ok(());
+        }
         let mut call = Call::plain(Function::Set(scalar));
         call.references = references;
         call.count = values.len();

@@ -294,10 +294,16 @@ impl Host {
         let requests = &self.requests;
         if let Some(lost) = requests.lost.clone().filter(|_| requests.last < end) {
             let parcel = requests.answers.get(requests.last..end);
-            return match parcel.filter(|_| requests.last != step).and_then(parcel::head) {
+            return match parcel
+                .filter(|_| requests.last != step)
+                .and_then(parcel::head)
+            {
                 Some(head) => {
                     let size = head.size as usize;
-                    Answer::Other(requests.answers[requests.last..][..size].to_vec(), Err(lost))
+                    Answer::Other(
+                        requests.answers[requests.last..][..size].to_vec(),
+                        Err(lost),
+                    )
                 }
                 None => Answer::Called(Err(lost)),
             };

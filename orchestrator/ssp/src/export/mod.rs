@@ -309,7 +309,7 @@ impl Writer<'_> {
         };
         // Inputs and outputs that other systems may want, connected or not.
         for position in part.fmu.description.of(Causality::Input) {
-            if variables[position].kind.travels() {
+            if variables[position].kind.has_values() {
                 add(position, "input");
             }
         }
@@ -325,7 +325,7 @@ impl Writer<'_> {
         for position in part.fmu.description.of(Causality::Output) {
             let kind = &variables[position].kind;
             let is_choice = matches!(kind, Kind::Enumeration(_));
-            if kind.travels() && (!is_choice || is_connected(position)) {
+            if kind.has_values() && (!is_choice || is_connected(position)) {
                 add(position, "output");
             }
         }
