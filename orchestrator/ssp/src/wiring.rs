@@ -3,7 +3,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::structure::{Connection, Kind, System};
+use super::structure::{Connection, Element, Kind, System};
 use fmi_system::{DeclaredUnit, Hop, Way};
 use units::hint;
 
@@ -166,20 +166,22 @@ impl Wiring {
             )
         })?;
         let own = found.connectors().iter().find(|own| own.name == *connector);
-        let own = own.ok_or_else(|| {
+        // Some tools list no connectors: the FMU has them.
+        let is_listed = !found.connectors().is_empty() || !matches!(found, Element::Component(_));
+        if own.is_none() && is_listed {
             let known = found.connectors().iter().map(|own| own.name.as_str());
-            format!(
+            return Err(format!(
                 "`{element}` has no connector `{connector}`{}",
                 hint(connector, known)
-            )
-        })?;
+            ));
+        }
         let below = [path, std::slice::from_ref(element)].concat();
         let (port, is_signal) = self.port(below, connector);
         Ok(Found {
             label: format!("{element}.{connector}"),
             port,
-            unit: own.unit.clone(),
-            gives: match own.kind {
+            unit: own.and_then(|own| own.unit.clone()),
+            gives: match own.map_or(Kind::Any, |own| own.kind) {
                 // A signal of a dictionary goes either way.
                 _ if is_signal => None,
                 Kind::In => Some(false),

@@ -12,10 +12,10 @@ use crate::{shakebench, stderr};
 
 /// What an FMU of `tests/importers/loop/loop.c` gives.
 #[derive(Clone, Copy)]
-struct Offer {
-    is_fmi3: bool,
+pub(crate) struct Offer {
+    pub is_fmi3: bool,
     /// As the source numbers them.
-    derivatives: usize,
+    pub derivatives: usize,
 }
 
 const NONE: Offer = Offer {
@@ -23,7 +23,7 @@ const NONE: Offer = Offer {
     derivatives: 0,
 };
 
-fn pack(folder: &Path, name: &str, offer: Offer) {
+pub(crate) fn pack(folder: &Path, name: &str, offer: Offer) {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/importers/loop/loop.c");
     let library = folder.join(format!("{name}.so"));
     let mut compiler = Command::new("cc");

@@ -25,8 +25,10 @@ mod physical_rig;
 mod qualification;
 mod reports;
 mod rigs;
+mod ssp_of_others;
 mod systems;
 mod tuning;
+mod validation;
 mod variable_step;
 
 use std::path::Path;

@@ -23,14 +23,22 @@ static double slope(const Instance *i) {
     return DERIVATIVES == 3 ? -by : by;
 }
 
-static void get(Instance *i, const unsigned vr[], size_t n, double value[]) {
+static Status get(Instance *i, const unsigned vr[], size_t n, double value[]) {
     double u = i->v[1];
     i->v[0] = i->v[4] + i->v[2] * u + i->v[3] * u * u;
-    for (size_t k = 0; k < n; k++) value[k] = i->v[vr[k]];
+    for (size_t k = 0; k < n; k++) {
+        if (vr[k] > 4) return 3;
+        value[k] = i->v[vr[k]];
+    }
+    return 0;
 }
 
-static void set(Instance *i, const unsigned vr[], size_t n, const double value[]) {
-    for (size_t k = 0; k < n; k++) i->v[vr[k]] = value[k];
+static Status set(Instance *i, const unsigned vr[], size_t n, const double value[]) {
+    for (size_t k = 0; k < n; k++) {
+        if (vr[k] > 4) return 3;
+        i->v[vr[k]] = value[k];
+    }
+    return 0;
 }
 
 /* Of `y` by `u` alone; everything else stays as it is. */
@@ -59,13 +67,11 @@ Status fmi3Terminate(void *c) { (void)c; return 0; }
 void fmi3FreeInstance(void *c) { free(c); }
 Status fmi3GetFloat64(void *c, const unsigned vr[], size_t n, double value[], size_t m) {
     (void)m;
-    get(c, vr, n, value);
-    return 0;
+    return get(c, vr, n, value);
 }
 Status fmi3SetFloat64(void *c, const unsigned vr[], size_t n, const double value[], size_t m) {
     (void)m;
-    set(c, vr, n, value);
-    return 0;
+    return set(c, vr, n, value);
 }
 Status fmi3DoStep(void *c, double time, double step, bool no, bool *event, bool *end, bool *early, double *last) {
     (void)c; (void)no;
@@ -100,12 +106,10 @@ Status fmi2EnterInitializationMode(void *c) { (void)c; return 0; }
 Status fmi2ExitInitializationMode(void *c) { (void)c; return 0; }
 Status fmi2Terminate(void *c) { (void)c; return 0; }
 Status fmi2GetReal(void *c, const unsigned vr[], size_t n, double value[]) {
-    get(c, vr, n, value);
-    return 0;
+    return get(c, vr, n, value);
 }
 Status fmi2SetReal(void *c, const unsigned vr[], size_t n, const double value[]) {
-    set(c, vr, n, value);
-    return 0;
+    return set(c, vr, n, value);
 }
 Status fmi2DoStep(void *c, double time, double step, int no) {
     (void)c; (void)time; (void)step; (void)no;
