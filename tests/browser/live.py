@@ -1,19 +1,24 @@
 """Watches a run that goes on, from its first samples to its end.
 
-Usage: live.py URL [PICTURE]. Exit status as of pages.py.
+Usage: live.py [--axe axe.min.js] URL [PICTURE]. Exit status as of pages.py.
 """
 
+import pathlib
 import sys
 import time
 
 import devtools
-from pages import LAYOUT, PLOTS
+from pages import AXE, LAYOUT, PLOTS
 
 
 def main(arguments):
     if devtools.program() is None:
         print("SKIPPED: there is no Chromium (Debian: apt-get install chromium)")
         return 3
+    axe = None
+    if arguments[:1] == ["--axe"]:
+        axe = pathlib.Path(arguments[1]).read_text(encoding="utf-8")
+        arguments = arguments[2:]
     url = arguments[0]
     faults = []
     with devtools.Browser() as browser:
@@ -32,6 +37,9 @@ def main(arguments):
             if state in ("ended", "tripped"):
                 break
             time.sleep(0.1)
+        if axe:
+            browser.run(axe + "; true")
+            faults += browser.run(AXE)
         words = browser.run("document.getElementById('state').textContent")
         print(f"{sorted(seen)}: {words}")
         if "running" not in seen or not seen & {"ended", "tripped"}:

@@ -122,7 +122,14 @@ CONTROLS = r"""(async () => {
     const svg = new DOMParser().parseFromString(drawing ? await drawing.text() : "", "image/svg+xml").documentElement;
     const curves = svg.querySelectorAll("g path[d]").length;
     if (svg.nodeName !== "svg" || Math.round(svg.getAttribute("width")) !== 321 || !curves) faults.push(`the SVG is ${svg.nodeName}, ${svg.getAttribute("width")} px, ${curves} curves`);
-    faults.push(...await keyboard(figures[0]));
+    // A plot with room between two cursors: twelve samples at least.
+    const panels = JSON.parse(document.getElementById("panels").textContent);
+    const samples = (figure) => {
+      const panel = panels[figure.querySelector(".chart").dataset.panel];
+      // Four bytes each, in base64.
+      return panel ? Math.max(0, ...panel.series.map((one) => one.y.length * 3 / 16)) : 0;
+    };
+    faults.push(...await keyboard(figures.find((figure) => samples(figure) > 12) || figures[0]));
   }
   URL.createObjectURL = make;
   return faults;

@@ -87,11 +87,14 @@ pub fn companion(name: &str, package: &str) -> Result<PathBuf, PackError> {
     {
         return workspace.program(name, package);
     }
+    beside(name).ok_or_else(|| PackError::NoCompanion(name.into()))
+}
+
+/// Another program in the folder of this one, if it is there.
+pub fn beside(name: &str) -> Option<PathBuf> {
     let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
-    let beside = own.map(|own| own.with_file_name(file));
-    beside
-        .filter(|path| path.is_file())
-        .ok_or_else(|| PackError::NoCompanion(name.into()))
+    let path = program::file().ok()?.with_file_name(file);
+    path.is_file().then_some(path)
 }
 
 /// The licences of everything that this program is linked with.

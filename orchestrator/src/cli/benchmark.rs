@@ -36,6 +36,9 @@ pub fn execute(
     units: Option<UnitSystem>,
     force: bool,
 ) -> Result<ExitCode, Error> {
+    if pack::beside(PROGRAM).is_none() {
+        note!("note: building {PROGRAM}, the program of the benchmarks");
+    }
     let program = pack::companion(PROGRAM, PACKAGE)?;
     let mut command = Command::new(&program);
     if let Some(units) = units.and_then(|units| units.to_possible_value()) {

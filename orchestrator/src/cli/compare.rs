@@ -133,6 +133,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     for name in named.into_iter().chain(&arguments.controllers) {
         systems.push(system(name.trim())?);
     }
+    if let (Some(file), true) = (
+        systems.first(),
+        systems.iter().all(|system| is_file(system)),
+    ) {
+        arguments.rig.refuse_of_file(file, None)?;
+    }
     if folders.is_empty() {
         return systems_on_motions(arguments, systems);
     }

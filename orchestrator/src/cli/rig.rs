@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use laboratory::error::Error;
 use laboratory::systems::built_in;
 use laboratory::systems::tuning::Tuning;
 
@@ -31,6 +32,31 @@ impl RigArguments {
     pub fn plant(&self) -> String {
         let plant = self.plant.as_deref();
         built_in::plant_path(plant.unwrap_or(built_in::DEFAULT_PLANT))
+    }
+
+    /// Refuses what applies to built-in systems only, for a system that is a file.
+    ///
+    /// # Errors
+    /// The first such option.
+    pub fn refuse_of_file(&self, file: &str, structure: Option<&String>) -> Result<(), Error> {
+        let given = [
+            ("--plant", self.plant.is_some(), "plant and specimen"),
+            ("--specimen", self.specimen.is_some(), "plant and specimen"),
+            ("--structure", structure.is_some(), "plant and specimen"),
+            ("--tuning", self.tuning.is_some(), "parameters"),
+            (
+                "--control-model",
+                self.control_model.is_some(),
+                "parameters",
+            ),
+        ];
+        match given.into_iter().find(|(_, is_given, _)| *is_given) {
+            None => Ok(()),
+            Some((option, _, own)) => Err(Error::Option {
+                option,
+                reason: format!("{file} is a file with its own {own}; edit it instead"),
+            }),
+        }
     }
 
     /// The specimen, chosen or not.

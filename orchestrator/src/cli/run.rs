@@ -432,18 +432,10 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
         .clone()
         .unwrap_or(built_in::DEFAULT_SYSTEM.to_string());
     let is_file = is_file(&system);
-    for (option, given) in [
-        ("--plant", &arguments.rig.plant),
-        ("--specimen", &arguments.rig.specimen),
-        ("--structure", &arguments.structure),
-    ] {
-        if let (true, Some(_)) = (is_file, given) {
-            let reason = format!(
-                "{system} is a file with its own plant and specimen; edit it \
-                instead"
-            );
-            return Err(Error::Option { option, reason });
-        }
+    if is_file {
+        arguments
+            .rig
+            .refuse_of_file(&system, arguments.structure.as_ref())?;
     }
     Ok(Request {
         system: if is_file {

@@ -444,7 +444,15 @@ const REFUSED: &[(&str, &[&str])] = &[
         "run --out file/below",
         &["file/below", "cannot be written here"],
     ),
+    (
+        "run rig.toml --tuning tuned",
+        &["--tuning", "rig.toml", "its own parameters", "edit it"],
+    ),
     // Comparisons, designs, exports.
+    (
+        "compare --controllers rig.toml --control-model m.toml",
+        &["--control-model", "rig.toml", "its own parameters"],
+    ),
     (
         "compare folder",
         &["folder", "contains no run", "manifest.json"],

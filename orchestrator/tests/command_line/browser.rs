@@ -52,7 +52,7 @@ fn look_at(pages: &[PathBuf]) {
     let mut arguments: Vec<&str> = pages.iter().map(String::as_str).collect();
     // To look at them: SHAKEBENCH_PICTURES=FOLDER.
     let pictures = std::env::var("SHAKEBENCH_PICTURES").ok();
-    // axe-core, which `.ci/run` takes from its package.
+    // axe-core, which `.ci/run` takes from a package that carries it.
     let axe = std::env::var("SHAKEBENCH_AXE").ok();
     match &axe {
         Some(axe) => drop(arguments.splice(0..0, ["--axe", axe])),
@@ -136,9 +136,17 @@ fn pages_are_drawn_whole_and_tell_the_figures_of_their_files() {
     done(folder, &["campaign", "study.toml", "--out", "study"], 0);
     let oscillator = described(folder).display().to_string();
     done(folder, &["diagnose", &oscillator, "--out", "rig"], 0);
+    let iterate = ["iterate", "three-variable", "--iterations", "1"];
+    let brief = ["--out", "iterate"];
+    done(folder, &[&iterate[..], &rig, &brief].concat(), 0);
+    let qualify = ["qualify", "ac156", "--set", "s_ds=0.3", "--set", "z_h=0"];
+    let motion = ["--motion-only", "--out", "qualify"];
+    done(folder, &[&qualify[..], &motion].concat(), 0);
     look_at(
-        &["mpc", "lost", "runs", "design", "figures", "rig", "study"]
-            .map(|name| folder.join(name).join("report.html")),
+        &[
+            "mpc", "lost", "runs", "design", "figures", "rig", "study", "iterate", "qualify",
+        ]
+        .map(|name| folder.join(name).join("report.html")),
     );
 }
 
@@ -191,7 +199,12 @@ fn a_run_is_watched_until_its_end() {
         .find_map(|line| Some(line.strip_prefix("watch it at ")?.to_string()))
         .unwrap();
     assert!(url.starts_with("http://127.0.0.1:"), "{url}");
-    let said = script("live.py", &[&url]);
+    let axe = std::env::var("SHAKEBENCH_AXE").ok();
+    let mut arguments = vec![url.as_str()];
+    if let Some(axe) = &axe {
+        arguments.splice(0..0, ["--axe", axe]);
+    }
+    let said = script("live.py", &arguments);
     assert!(run.wait().unwrap().success());
     assert!(folder.path().join("out/report.html").is_file());
     assert!(

@@ -103,6 +103,11 @@ pub fn cell(value: &serde_json::Value, units: &Units) -> Cell {
     match value {
         serde_json::Value::Number(number) => {
             let number = number.as_f64().unwrap_or(f64::NAN);
+            // A seed or a count.
+            let is_whole = number.fract() == 0.0 && number.abs() < 1e15;
+            if is_whole && units.si.is_empty() {
+                return format!("{number}").into();
+            }
             let digits = [UnitSystem::Us, UnitSystem::Si].map(|system| {
                 let (shown, _) = units.shown(number, system);
                 needed(shown)

@@ -197,7 +197,7 @@ fn facts(run: &Run) -> Vec<Fact> {
         facts.push(fact(
             "Delay",
             Cell::Quantity(1e3 * tracking.delay, Units::same("ms"), 3),
-            "of the table behind its reference",
+            "at which the accelerations agree best over the whole motion",
         ));
     }
     facts.push(fact(

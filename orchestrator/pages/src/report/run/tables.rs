@@ -6,6 +6,9 @@ use motion::metrics::Tracking;
 use motion::metrics::laboratory::Laboratory;
 use motion::peak;
 
+/// Coherence below which the phase of a band is not a delay.
+const LEAST_COHERENCE: f64 = 0.9;
+
 /// Peaks and errors, over what was played.
 pub(super) fn tracking(run: &Run, tracking: &Tracking) -> Table {
     let played = run.acceleration.len().min(run.motion.len());
@@ -57,14 +60,15 @@ pub(super) fn bands(own: &Laboratory) -> Table {
         "Response spectrum at 5 % damping, at least 24 oscillators an octave: how far the table's is from \
          the reference's, and the natural frequency of the largest error. \
          Transfer function from the reference's to the table's acceleration, each frequency \
-         weighted by the reference's power.",
+         weighted by the reference's power. The phase delay is the phase lag over the frequency; it is \
+         left out if the coherence is below 0.9, since a resonance or noise then sets the phase.",
         [
             "band, Hz",
             "spectrum, largest",
             "at, Hz",
             "spectrum, mean",
             "gain",
-            "delay, ms",
+            "phase delay, ms",
             "coherence",
         ],
         rows.map(|(n, spectrum)| {
@@ -79,7 +83,11 @@ pub(super) fn bands(own: &Laboratory) -> Table {
                 Cell::Number(spectrum.largest_at_hz, 3),
                 percent(spectrum.mean),
                 number(band.map(|band| band.gain), 4),
-                number(band.map(|band| 1e3 * band.delay_s), 3),
+                number(
+                    band.filter(|band| band.coherence >= LEAST_COHERENCE)
+                        .map(|band| 1e3 * band.delay_s),
+                    3,
+                ),
                 number(band.map(|band| band.coherence), 4),
             ]
         }),

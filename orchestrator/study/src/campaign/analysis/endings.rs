@@ -125,7 +125,14 @@ impl<'a> Runs<'a> {
             numbers.dedup();
             let few = (2..=MOST_VALUES).contains(&numbers.len()) && 2 * numbers.len() <= self.len();
             return few.then(|| List {
-                values: numbers.iter().map(|own| significant(*own, 4)).collect(),
+                values: numbers
+                    .iter()
+                    .map(|own| match own.fract() == 0.0 && own.abs() < 1e6 {
+                        // A seed or a count.
+                        true => format!("{own}"),
+                        false => significant(*own, 4),
+                    })
+                    .collect(),
                 places: cells()
                     .map(|cell| {
                         let own = cell.number()?;
