@@ -39,24 +39,30 @@ impl RigArguments {
     /// # Errors
     /// The first such option.
     pub fn refuse_of_file(&self, file: &str, structure: Option<&String>) -> Result<(), Error> {
-        let given = [
-            ("--plant", self.plant.is_some(), "plant and specimen"),
-            ("--specimen", self.specimen.is_some(), "plant and specimen"),
-            ("--structure", structure.is_some(), "plant and specimen"),
-            ("--tuning", self.tuning.is_some(), "parameters"),
-            (
-                "--control-model",
-                self.control_model.is_some(),
-                "parameters",
-            ),
+        let of_rig = [
+            ("--plant", self.plant.is_some()),
+            ("--specimen", self.specimen.is_some()),
+            ("--structure", structure.is_some()),
         ];
-        match given.into_iter().find(|(_, is_given, _)| *is_given) {
-            None => Ok(()),
-            Some((option, _, own)) => Err(Error::Option {
-                option,
-                reason: format!("{file} is a file with its own {own}; edit it instead"),
-            }),
+        let of_controllers = [
+            ("--tuning", self.tuning.is_some()),
+            ("--control-model", self.control_model.is_some()),
+        ];
+        let first = |options: &[(&'static str, bool)]| {
+            let given = options.iter().find(|(_, is_given)| *is_given);
+            given.map(|(option, _)| *option)
+        };
+        let fault = |option, reason| Err(Error::Option { option, reason });
+        if let Some(option) = first(&of_rig) {
+            let reason =
+                format!("{file} is a file with its own plant and specimen; edit it instead");
+            return fault(option, reason);
         }
+        if let Some(option) = first(&of_controllers) {
+            let reason = format!("{file} is a file with its own parameters; edit it instead");
+            return fault(option, reason);
+        }
+        Ok(())
     }
 
     /// The specimen, chosen or not.
