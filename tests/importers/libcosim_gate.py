@@ -14,13 +14,13 @@ STEPS = 100
 
 
 def steps_in_libcosim(archive):
-    nanoseconds = archive.step * 1e9
-    if nanoseconds != round(nanoseconds):
-        return f"left out: libcosim counts whole nanoseconds, and a step is {nanoseconds} of them"
+    # libcosim counts whole nanoseconds, and 1/4096 s is none; FMUs take multiples of their step.
+    several = next(n for n in range(1, 1025) if (n * archive.step * 1e9).is_integer())
+    nanoseconds = several * archive.step * 1e9
     inputs, outputs = archive.variables("input"), archive.variables("output")
     row = [0.02 * (i + 1) * float(v.nominal or 1.0) for i, v in enumerate(inputs)]
     references = [v.valueReference for v in outputs]
-    expected = run_without_fmi(archive, np.tile(row, (STEPS, 1)), references)[-1]
+    expected = run_without_fmi(archive, np.tile(row, (several * STEPS, 1)), references)[-1]
     execution = CosimExecution.from_step_size(round(nanoseconds))
     slave = execution.add_local_slave(CosimLocalSlave(fmu_path=archive.path, instance_name="it"))
     observer = CosimObserver.create_last_value()
@@ -32,8 +32,13 @@ def steps_in_libcosim(archive):
     values = np.array(observer.last_real_values(slave, references))
     check(np.any(expected != 0), "the excitation does nothing")
     error = np.abs(values - expected).max() / np.abs(expected).max()
-    check(error < 1e-9, f"{values} against {expected}")
-    return f"largest difference {error:.1g}"
+    # Noise is drawn once a step, however long it is: values of another number of steps are others.
+    if several > 1 and "seed" in archive.references:
+        check(np.isfinite(values).all(), f"{values}")
+        return f"{several} of its steps at a time, with noise of its own"
+    # Longer steps are not several shorter ones for a component that integrates over any step.
+    check(error < (1e-9 if several == 1 else 5e-3), f"{values} against {expected}")
+    return f"{several} of its steps at a time, largest difference {error:.1g}"
 
 
 if __name__ == "__main__":

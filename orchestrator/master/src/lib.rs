@@ -231,10 +231,16 @@ impl Part {
     }
 
     /// Ends what [`Part::begin_step`] began.
+    #[inline]
     fn finish_step(&mut self) -> Result<(), MasterError> {
-        if !std::mem::take(&mut self.is_requested) {
-            return Ok(());
+        match std::mem::take(&mut self.is_requested) {
+            true => self.take_answer(),
+            false => Ok(()),
         }
+    }
+
+    #[inline(never)]
+    fn take_answer(&mut self) -> Result<(), MasterError> {
         let is_timed = self.steps.is_multiple_of(TIMED);
         let stepped = self.instance.finish_step().map(|(progress, taken)| {
             if is_timed {

@@ -331,7 +331,8 @@ pub(super) fn read(
         Some("1.0") => {
             let tool = root.attribute("generationTool");
             return Err(wrong(format!(
-                "FMI 1.0 is not supported; export the model again for FMI 2.0 or 3.0 from {}",
+                "FMI 1.0 is not supported; export the model again for FMI 2.0 or 3.0 from {}, or convert \
+                 it: PythonFMU builds an FMI 2.0 FMU from a script that steps this one by fmpy",
                 tool.map_or("its tool".to_string(), |tool| format!("`{tool}`"))
             )));
         }
