@@ -1,7 +1,9 @@
 //! The tracking laws that the benchmark compares.
 
+use hybrid::marths::PlantParameters;
 use hybrid::marths::laws::{
-    Class, DecentralisedAdaptive, Law, NoControl, Predictive, PredictiveDesign,
+    Class, DecentralisedAdaptive, Inverse, Law, LinearQuadratic, LinearQuadraticDesign, NoControl,
+    Predictive, PredictiveDesign, SingleAxis,
 };
 use plant::ModelError;
 
@@ -30,7 +32,7 @@ impl Entry {
 }
 
 /// All laws, the benchmark's own first.
-pub const ALL: [Entry; 8] = [
+pub const ALL: [Entry; 12] = [
     Entry {
         name: "rodeac",
         about: "the benchmark's sample controller: an adaptive filter for each actuator",
@@ -44,6 +46,46 @@ pub const ALL: [Entry; 8] = [
         class: Class::Raw,
         full: None,
         make: || Ok(Box::new(NoControl)),
+    },
+    Entry {
+        name: "single-axis",
+        about: "the best law of the single-axis benchmark, an adaptive inverse, for each actuator",
+        class: Class::Raw,
+        full: None,
+        make: || {
+            Ok(Box::new(SingleAxis::new(
+                &PlantParameters::default(),
+                0.1,
+                3,
+                16,
+                0.5,
+            )?))
+        },
+    },
+    Entry {
+        name: "decoupled-inverse",
+        about: "the inverse of each actuator's own entry of the nominal plant",
+        class: Class::Raw,
+        full: Some("inverse"),
+        make: || inverse(alone(PlantParameters::default())),
+    },
+    Entry {
+        name: "inverse",
+        about: "the inverse of the nominal plant",
+        class: Class::Raw,
+        full: None,
+        make: || inverse(PlantParameters::default()),
+    },
+    Entry {
+        name: "linear-quadratic",
+        about: "the inverse with state feedback, a Kalman filter and integral action",
+        class: Class::Raw,
+        full: None,
+        make: || {
+            let design = LinearQuadraticDesign::default();
+            let plant = PlantParameters::default();
+            Ok(Box::new(LinearQuadratic::new(plant, &design, 2, 12)?))
+        },
     },
     Entry {
         name: "decoupled-predictive",
@@ -111,9 +153,18 @@ fn estimate() -> PredictiveDesign {
 
 /// A command moves the stroke of its own actuator alone, also in what is estimated.
 fn decoupled(mut design: PredictiveDesign) -> PredictiveDesign {
-    design.plant.static_gain[0][1] = 0.0;
-    design.plant.static_gain[1][0] = 0.0;
+    design.plant = alone(design.plant);
     design
+}
+
+fn alone(mut plant: PlantParameters) -> PlantParameters {
+    plant.static_gain[0][1] = 0.0;
+    plant.static_gain[1][0] = 0.0;
+    plant
+}
+
+fn inverse(plant: PlantParameters) -> Result<Box<dyn Law>, ModelError> {
+    Ok(Box::new(Inverse::new(plant, 2, 12)?))
 }
 
 /// The roster's entry of a name.

@@ -1,12 +1,18 @@
 //! Tracking laws for two actuators: from targets and measured strokes to commands.
 
 mod estimator;
+mod inverse;
+mod linear_quadratic;
 mod predictive;
 mod rodeac;
+mod single_axis;
 
 pub use estimator::{Estimator, Prior};
+pub use inverse::Inverse;
+pub use linear_quadratic::{LinearQuadratic, LinearQuadraticDesign};
 pub use predictive::{Predictive, PredictiveDesign};
 pub use rodeac::DecentralisedAdaptive;
+pub use single_axis::SingleAxis;
 
 use super::Pair;
 
