@@ -59,7 +59,8 @@ fn laws() -> Result<Vec<(&'static str, Law)>, Box<dyn Error>> {
 /// The laws for two actuators, on their nominal plant with the benchmark's noise.
 fn two_actuators() -> Result<(), Box<dyn Error>> {
     use hybrid::marths::laws::{
-        DecentralisedAdaptive, Law as Tracking, Predictive, PredictiveDesign,
+        DecentralisedAdaptive, Inverse, Law as Tracking, LinearQuadratic, LinearQuadraticDesign,
+        Predictive, PredictiveDesign, SingleAxis,
     };
     use hybrid::marths::{Plant, PlantParameters, RATE, independent_noise};
     let noise = independent_noise(1, 0, STEPS);
@@ -68,14 +69,26 @@ fn two_actuators() -> Result<(), Box<dyn Error>> {
         adaptive: false,
         ..adaptive
     };
+    let plant = PlantParameters::default();
+    let weights = LinearQuadraticDesign::default();
     let make = |name: &str| -> Result<Box<dyn Tracking>, Box<dyn Error>> {
         Ok(match name {
             "rodeac" => Box::new(DecentralisedAdaptive::default()),
+            "single-axis" => Box::new(SingleAxis::new(&plant, 0.1, 3, 16, 0.0)?),
+            "full inverse" => Box::new(Inverse::new(plant, 2, 12)?),
+            "quadratic, both" => Box::new(LinearQuadratic::new(plant, &weights, 2, 12)?),
             "predictive" => Box::new(Predictive::new(fixed)?),
             _ => Box::new(Predictive::new(adaptive)?),
         })
     };
-    for name in ["rodeac", "predictive", "adaptive-predictive"] {
+    for name in [
+        "rodeac",
+        "single-axis",
+        "full inverse",
+        "quadratic, both",
+        "predictive",
+        "adaptive-predictive",
+    ] {
         let mut times = vec![u128::MAX; STEPS];
         for _ in 0..REPEATS {
             let mut law = make(name)?;

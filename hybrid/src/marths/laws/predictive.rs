@@ -90,43 +90,61 @@ impl Predictive {
         })
     }
 
-    /// Strokes over the horizon under commands of both actuators by the sample.
-    fn predict(
-        &self,
-        states: [[f64; 4]; 2],
-        before: Pair,
-        command: impl Fn(usize) -> Pair,
-    ) -> [Pair; LONGEST] {
+    /// Strokes over the horizon without commands.
+    fn free(&self) -> [Pair; LONGEST] {
         let plant = self.estimator.plant();
-        let (delay, _) = self.estimator.pending();
-        let (mut states, mut last) = (states, before);
+        let (delay, mut last) = self.estimator.pending();
+        let mut states = *self.estimator.states();
         let mut strokes = [[0.0; 2]; LONGEST];
-        for (k, stroke) in strokes[..self.design.horizon].iter_mut().enumerate() {
-            let now = command(k);
+        for stroke in &mut strokes[..self.design.horizon] {
             for i in 0..2 {
-                let arrives = (1.0 - delay) * now[i] + delay * last[i];
-                states[i] = plant.columns[i].after(states[i], arrives);
+                states[i] = plant.columns[i].after(states[i], delay * last[i]);
             }
-            last = now;
+            last = [0.0; 2];
             *stroke = plant.strokes(&states);
         }
         strokes
     }
 
+    /// Strokes over the horizon under each term of a command alone, from rest: the term's convolution with the
+    /// strokes that one sample of the command makes.
+    fn forced(&self) -> [[Pair; LONGEST]; 2 * TERMS] {
+        let plant = self.estimator.plant();
+        let (delay, _) = self.estimator.pending();
+        let horizon = self.design.horizon;
+        let mut forced = [[[0.0; 2]; LONGEST]; 2 * TERMS];
+        for (i, column) in plant.columns.iter().enumerate() {
+            let mut states = [[0.0; 4]; 2];
+            let mut pulse = [[0.0; 2]; LONGEST];
+            for (k, stroke) in pulse[..horizon].iter_mut().enumerate() {
+                let arrives = match k {
+                    0 => 1.0 - delay,
+                    1 => delay,
+                    _ => 0.0,
+                };
+                states[i] = column.after(states[i], arrives);
+                *stroke = plant.strokes(&states);
+            }
+            for from in 0..horizon {
+                let ahead = from as f64 / horizon as f64;
+                let mut size = 1.0;
+                for term in &mut forced[i * TERMS..(i + 1) * TERMS] {
+                    for (sum, [one, other]) in term[from..horizon].iter_mut().zip(&pulse) {
+                        sum[0] += size * one;
+                        sum[1] += size * other;
+                    }
+                    size *= ahead;
+                }
+            }
+        }
+        forced
+    }
+
     fn command(&self, wanted: &[Pair; LONGEST]) -> Pair {
         let horizon = self.design.horizon;
         let (_, last) = self.estimator.pending();
-        let free = self.predict(*self.estimator.states(), last, |_| [0.0; 2]);
-        let rest = [[0.0; 4]; 2];
-        let mut forced = [[[0.0; 2]; LONGEST]; 2 * TERMS];
-        for (place, forced) in forced.iter_mut().enumerate() {
-            *forced = self.predict(rest, [0.0; 2], |k| {
-                let mut command = [0.0; 2];
-                let ahead = k as f64 / horizon as f64;
-                command[place / TERMS] = ahead.powi((place % TERMS) as i32);
-                command
-            });
-        }
+        let free = self.free();
+        let forced = self.forced();
         let mut matrix = SMatrix::<f64, 6, 6>::identity() * self.design.effort;
         let mut right = SVector::<f64, 6>::zeros();
         for k in 0..horizon {
