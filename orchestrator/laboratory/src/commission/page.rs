@@ -95,6 +95,12 @@ fn identity(own: &Commissioned) -> Vec<(String, Cell)> {
         entry("Plant", own.plant.as_str()),
         entry("Specimen", own.specimen.as_str()),
     ];
+    if own.plant == crate::systems::biaxial::PLANT {
+        all.push(entry(
+            "Axis",
+            "x is excited and y rests; both get its model",
+        ));
+    }
     if !request.set.is_empty() {
         all.push(entry("Set", request.set.join(", ")));
     }
