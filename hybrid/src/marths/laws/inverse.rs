@@ -137,10 +137,12 @@ mod tests {
 
     #[test]
     fn a_plant_without_a_stable_inverse_is_refused() {
-        let mut plant = PlantParameters::default();
         // The cross entries dominate at high frequency only.
-        plant.static_gain = [[1.0, 0.9], [0.9, 1.0]];
-        plant.second_zeros = [2.0, 200.0];
+        let plant = PlantParameters {
+            static_gain: [[1.0, 0.9], [0.9, 1.0]],
+            second_zeros: [2.0, 200.0],
+            ..PlantParameters::default()
+        };
         let said = Inverse::new(plant, 2, 12).unwrap_err().to_string();
         assert!(said.contains("inverse is stable"), "{said}");
     }
