@@ -56,7 +56,7 @@ struct Requests {
     open: usize,
     /// Where the last parcel begins that was carried out, or begun.
     last: usize,
-    /// Why there are no answers from there on.
+    /// The loss after which there are no more answers.
     lost: Option<Lost>,
 }
 
@@ -207,14 +207,7 @@ impl Host {
         room[..before.len()].copy_from_slice(before);
         parcel::place(&mut room[before.len()..], instance, call);
         room[next..length].copy_from_slice(after);
-        self.frame.set_length(length);
-        self.sinks
-            .current
-            .store(instance as usize, Ordering::Relaxed);
-        self.frame.turn().give(GUEST);
-        let done = self.wait(self.limit);
-        self.hear();
-        if let Err(lost) = done {
+        if let Err(lost) = self.take_turn(instance, length) {
             // Which of them was it?
             let at = self.frame.began_at();
             let room = self.frame.room();
@@ -338,7 +331,12 @@ impl Host {
             return Err(is_gone(gone));
         }
         self.frame.room()[..parcels.len()].copy_from_slice(parcels);
-        self.frame.set_length(parcels.len());
+        self.take_turn(instance, parcels.len())
+    }
+
+    /// Gives the guest its turn with the first `length` bytes of the room, and waits for it.
+    fn take_turn(&mut self, instance: u32, length: usize) -> Result<(), Lost> {
+        self.frame.set_length(length);
         self.sinks
             .current
             .store(instance as usize, Ordering::Relaxed);
