@@ -9,7 +9,6 @@ import pickle
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 from pathlib import Path
 
@@ -255,42 +254,6 @@ class Functions(Folder):
         ).run()
         self.assertEqual(run.ended, "interlock")
         self.assertIsNone(run.tracking)
-
-
-class Speed(unittest.TestCase):
-    """Ratios of one process; the figures are printed."""
-
-    def test_stepping_is_as_fast_as_the_loop_inside(self):
-        # The physical rig: controller, interlock, table, sensors and specimen.
-        sim = shakebench.Simulation("three-variable", plant="servohydraulic", duration="120 s")
-        inside, stepped = [], []
-        for _ in range(5):
-            begin = time.process_time()
-            sim.step(5000)
-            inside.append(time.process_time() - begin)
-            begin = time.process_time()
-            for _ in range(5000):
-                sim.step()
-                sim["table.displacement"]
-            stepped.append(time.process_time() - begin)
-        loop, more = min(inside) / 5000, (min(stepped) - min(inside)) / 5000
-        print(f"a step: {loop * 1e6:.2f} us inside, {more * 1e6:.2f} us more from Python")
-        self.assertLess(more, 2e-6)
-
-    def test_a_controller_of_python_is_much_faster_than_real_time(self):
-        sim = shakebench.Simulation("three-variable", duration="20 s", functions={"control": follower()})
-        begin = time.process_time()
-        sim.run()
-        factor = 20 / (time.process_time() - begin)
-        print(f"a controller of Python at 500 Hz: {factor:.0f} times real time")
-        self.assertGreater(factor, 50)
-
-    def test_a_short_run_takes_less_than_a_process(self):
-        shakebench.Simulation("mpc", duration="2 s").run()
-        begin = time.process_time()
-        shakebench.Simulation("mpc", duration="2 s").run()
-        print(f"a run of 2 s: {time.process_time() - begin:.3f} s")
-        self.assertLess(time.process_time() - begin, 0.33)
 
 
 class Examples(Folder):
