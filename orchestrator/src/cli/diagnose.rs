@@ -201,13 +201,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         unused(&folder, |_| false)
     });
     let bar = progress::spinner("reading");
-    let tell = |event: &Progress| {
-        if progress::is_verbose() {
-            eprintln!("{event}");
-        } else {
-            let words = event.to_string();
-            bar.set_message(words.lines().next().unwrap_or_default().to_string());
-        }
+    let tell = |event: &Progress| match progress::is_verbose() {
+        true => eprintln!("{event}"),
+        false => bar.set_message(short(event)),
     };
     let columns = arguments.columns.as_deref();
     let effects = arguments.effects.as_deref();
@@ -239,6 +235,19 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What happens, in a few words without figures.
+fn short(event: &Progress) -> String {
+    match event {
+        Progress::Fitting(_) | Progress::Trying(_) => event.to_string().trim().to_string(),
+        Progress::Noise { .. } => "learning the noise".to_string(),
+        Progress::Model { effects, .. } if effects.is_empty() => "fitted the nominal model".into(),
+        Progress::Model { effects, .. } => {
+            let names: Vec<&str> = effects.iter().map(|(name, _)| *name).collect();
+            format!("fitted {}", names.join(" and "))
+        }
+    }
 }
 
 /// Prints what was guessed; to standard error where standard output is for JSON.

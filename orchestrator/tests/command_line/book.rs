@@ -261,6 +261,20 @@ fn from_your_csv_to_a_diagnosis() {
     run_page("from-csv-to-diagnosis.md");
 }
 
+/// The recorded terminal of the book's first page shows what the program prints.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_recording_shows_what_the_program_prints() {
+    let house = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let output = Command::new("python3")
+        .arg(house.join("dist/recording"))
+        .args(["--check", "--program", env!("CARGO_BIN_EXE_shakebench")])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}
+
 /// Every page is in the summary, every link leads somewhere within the book, and the summary names nothing
 /// else.
 #[test]

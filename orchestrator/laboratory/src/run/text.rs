@@ -190,10 +190,7 @@ fn followed(tracking: &Tracking, motion: &Motion, heading: &str, samples: usize)
             "normalised RMS displacement error",
             percent(tracking.displacement_percent),
         ),
-        pair(
-            "delay of the table",
-            format!("{:.1} ms", 1e3 * tracking.delay),
-        ),
+        pair("delay of the table", milliseconds(tracking.delay, 1)),
     ]);
     if let Some(own) = &tracking.laboratory {
         text += "\n";
@@ -213,6 +210,14 @@ fn followed(tracking: &Tracking, motion: &Motion, heading: &str, samples: usize)
         ]);
     }
     text
+}
+
+/// A delay in seconds as milliseconds; a rounded zero has no sign.
+fn milliseconds(delay: f64, decimals: usize) -> String {
+    let unit = 10_f64.powi(decimals as i32);
+    // Adding zero makes -0 a 0.
+    let rounded = (1e3 * delay * unit).round() / unit + 0.0;
+    format!("{rounded:.decimals$} ms")
 }
 
 /// Response spectra and transfer function, a row for each band.
@@ -239,7 +244,7 @@ fn bands(own: &Laboratory) -> Vec<Vec<String>> {
             match own.coherence.as_ref().and_then(|bands| bands.get(n)) {
                 Some(band) => [
                     format!("{:.4}", band.gain),
-                    format!("{:.2} ms", 1e3 * band.delay_s),
+                    milliseconds(band.delay_s, 2),
                     format!("{:.4}", band.coherence),
                 ],
                 None => ["-", "-", "-"].map(str::to_string),
