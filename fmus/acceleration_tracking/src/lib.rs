@@ -3,7 +3,7 @@
 
 use controllers::Controller;
 use controllers::acceleration_tracking::{
-    AccelerationTracking as Law, AccelerationTrackingInput as Input,
+    AccelerationLoop, AccelerationTracking as Law, AccelerationTrackingInput as Input,
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,13 @@ impl Component for AccelerationTracking {
             input(vocabulary::MEASURED_FORCE, s.input.force, "Force of the actuator", "N" => "lbf").nominal(200.0);
             output(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0).depends_on_inputs(Dependent);
-            group(s.law);
+            group(s.law).tunable(&[
+                Law::DISPLACEMENT_GAIN,
+                AccelerationLoop::ACCELERATION_GAIN,
+                AccelerationLoop::ACCELERATION_INTEGRAL_GAIN,
+                AccelerationLoop::ACCELERATION_DOUBLE_INTEGRAL_GAIN,
+                vocabulary::FORCE_GAIN,
+            ]);
             parameter(vocabulary::VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }

@@ -52,10 +52,10 @@ impl Component for ForcePid {
             output(vocabulary::VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0)
                 .depends_on_inputs(Dependent);
-            parameter(vocabulary::PROPORTIONAL_GAIN, s.law.proportional, "Proportional gain", "V/N" => "V/lbf");
-            parameter(vocabulary::INTEGRAL_GAIN, s.law.integral, "Integral gain", "V/(N.s)" => "V/(lbf.s)");
+            parameter(vocabulary::PROPORTIONAL_GAIN, s.law.proportional, "Proportional gain", "V/N" => "V/lbf").tunable();
+            parameter(vocabulary::INTEGRAL_GAIN, s.law.integral, "Integral gain", "V/(N.s)" => "V/(lbf.s)").tunable();
             parameter(Pid::INTEGRAL_LEAK, s.law.integral_leak, "Rate at which the integral leaks away", "1/s");
-            parameter(Pid::DERIVATIVE_GAIN, s.law.derivative, "Derivative gain", "V.s/N" => "V.s/lbf");
+            parameter(Pid::DERIVATIVE_GAIN, s.law.derivative, "Derivative gain", "V.s/N" => "V.s/lbf").tunable();
             parameter(Pid::DERIVATIVE_LAG, s.law.derivative_lag, "Time constant of the derivative's lag", "s");
             parameter(vocabulary::VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
         }

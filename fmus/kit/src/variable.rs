@@ -386,6 +386,9 @@ pub trait Rows: Sized {
     /// Leaves out those with these names.
     #[must_use]
     fn without(self, names: &[&str]) -> Self;
+    /// Lets those with these names be changed between steps.
+    #[must_use]
+    fn tunable(self, names: &[&str]) -> Self;
 }
 
 impl<C> Rows for Vec<Variable<C>> {
@@ -415,6 +418,15 @@ impl<C> Rows for Vec<Variable<C>> {
 
     fn without(mut self, names: &[&str]) -> Self {
         self.retain(|row| !names.contains(&row.name.as_str()));
+        self
+    }
+
+    fn tunable(mut self, names: &[&str]) -> Self {
+        for row in &mut self {
+            if names.contains(&row.name.as_str()) {
+                row.declaration.variability = Variability::Tunable;
+            }
+        }
         self
     }
 }

@@ -51,7 +51,11 @@ impl Component for MinimalControlSynthesis {
                 .discrete().nominal(300.0).depends_on_inputs(Dependent);
             output("feedforward_gain", s.gains[1], "Kr as learnt so far", "V/m" => "V/in")
                 .discrete().nominal(300.0).depends_on_inputs(Dependent);
-            group(s.law);
+            group(s.law).tunable(&[
+                Law::INTEGRAL_ADAPTATION,
+                Law::PROPORTIONAL_ADAPTATION,
+                Law::LEAK,
+            ]);
             parameter(vocabulary::VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
         }
     }

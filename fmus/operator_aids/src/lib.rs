@@ -2,6 +2,8 @@
 //! What operators switch on between controller and valve, as an FMU.
 
 use controllers::Controller;
+use controllers::aids::delta_pressure::DeltaPressure;
+use controllers::aids::friction::FrictionCompensation;
 use controllers::aids::{AidsInput as Input, OperatorAids as Law};
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
@@ -61,9 +63,9 @@ impl Component for OperatorAids {
             parameter(LOOP_DELAY_SAMPLES, s.law.rig.delay, "Samples by which measurements are late").min(0.0).max(4.0);
             parameter(VALVE_LIMIT, s.law.limit, "Largest magnitude of the valve command", "V");
             group(s.law.rig);
-            group(s.law.friction);
+            group(s.law.friction).tunable(&[FrictionCompensation::SEAL_FRICTION]);
             group(s.law.specimen);
-            group(s.law.pressure);
+            group(s.law.pressure).tunable(&[DeltaPressure::PRESSURE_GAIN]);
             group(s.law.valve);
             group(s.law.harmonics);
         }
@@ -89,8 +91,6 @@ fmu_kit::export!(OperatorAids);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use controllers::aids::delta_pressure::DeltaPressure;
-    use controllers::aids::friction::FrictionCompensation;
     use controllers::aids::harmonics::HarmonicControl;
     use controllers::aids::specimen_force::SpecimenForceCompensation;
     use controllers::aids::valve::ValveCompensation;

@@ -3,11 +3,24 @@
 
 use controllers::{
     Controller, Motion,
-    three_variable::{ThreeVariableControl as Law, ThreeVariableInput},
+    three_variable::{
+        ThreeVariableControl as Law, ThreeVariableGains as Gains, ThreeVariableInput,
+    },
 };
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Terminal, Variable};
 use serde::{Deserialize, Serialize};
-use units::vocabulary::VALVE_COMMAND;
+use units::vocabulary::{INTEGRAL_GAIN, PROPORTIONAL_GAIN, VALVE_COMMAND};
+
+/// What the law reads at each sample; its integral is a voltage, which no gain changes afterwards.
+const GAINS: [&str; 7] = [
+    PROPORTIONAL_GAIN,
+    INTEGRAL_GAIN,
+    Gains::VELOCITY_FEEDBACK_GAIN,
+    Gains::ACCELERATION_FEEDBACK_GAIN,
+    Gains::DISPLACEMENT_FEEDFORWARD_GAIN,
+    Gains::VELOCITY_FEEDFORWARD_GAIN,
+    Gains::ACCELERATION_FEEDFORWARD_GAIN,
+];
 
 /// Three-variable control from motion to valve command.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -30,7 +43,7 @@ impl Component for ThreeVariableControl {
             include(fmu_kit::tracking_inputs!(Self, s: s.reference, s.measured));
             output(VALVE_COMMAND, s.valve_command, "Voltage to the servo valve", "V")
                 .discrete().nominal(10.0).depends_on_inputs(Dependent);
-            group(s.law);
+            group(s.law).tunable(&GAINS);
         }
     }
 

@@ -57,7 +57,7 @@ fn run(prepared: &Prepared, watched: Watched) -> f64 {
         let tap = Arc::new(Tap::new(places, prepared.samples));
         simulation.watch(tap.clone());
         if watched == Watched::Read {
-            server = Some(Server::start(&scene, tap, 0).unwrap());
+            server = Some(Server::start(&scene, tap, None, 0).unwrap());
         }
     }
     let url = server.as_ref().map(Server::url);

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::run::Tripped;
 use super::variable::Progress as StepProgress;
-use super::{MasterError, Record, Simulation};
+use super::{Change, MasterError, Record, Simulation};
 use fmi_import::{Datum, State};
 
 /// Everything that the rest of a run depends on, with the states of its FMUs as they write them.
@@ -23,6 +23,7 @@ pub struct Checkpoint {
     parts: Vec<PartState>,
     /// Time that the stepping has taken, s.
     wall: f64,
+    changes: Vec<Change>,
 }
 
 /// A component between two steps.
@@ -94,6 +95,7 @@ impl Simulation {
             return Err(MasterError::OtherCheckpoint);
         }
         self.go_to(checkpoint)?;
+        self.repeat(&checkpoint.changes)?;
         self.notes.push(format!(
             "the run continues from its checkpoint at {} s",
             // Sums of steps have rounding errors behind the nanoseconds.
@@ -183,6 +185,7 @@ impl Simulation {
                 .map(|control| control.progress.clone()),
             parts,
             wall,
+            changes: self.tuning.changes(),
         }))
     }
 

@@ -258,6 +258,7 @@ impl Simulation {
             last_signals: signals.clone(),
             signals,
             observer: None,
+            tuning: super::tuning::Tuning::default(),
             tripped: None,
             keeper: None,
             resumed: None,

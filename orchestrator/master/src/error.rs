@@ -38,6 +38,14 @@ pub enum MasterError {
          --checkpoint-every"
     )]
     NoWrittenState(String),
+    /// A parameter that cannot be changed during a run.
+    #[error("`{variable}` cannot be changed during a run: {reason}")]
+    NotTunable {
+        /// The parameter.
+        variable: String,
+        /// Why.
+        reason: String,
+    },
     /// A checkpoint of another system.
     #[error("the checkpoint belongs to another run: its components or signals differ")]
     OtherCheckpoint,

@@ -26,6 +26,7 @@ mod signals;
 mod start;
 mod stepwise;
 mod transfer;
+mod tuning;
 mod variable;
 
 use std::fmt;
@@ -44,6 +45,7 @@ pub use record::Record;
 pub use run::{Ended, Ending, LogLine, Outcome, Pace};
 pub use samples::{Column, Samples};
 pub use stepwise::{Saved, Stepwise};
+pub use tuning::{Change, Panel, Refused, Tunable};
 pub use variable::{StepsTaken, VariableStep};
 
 use action::{Action, Moment};
@@ -138,6 +140,8 @@ pub struct Simulation {
     resumed: Option<checkpoint::Resumed>,
     /// The tick at which this process began.
     first_tick: usize,
+    /// Parameters that change during the run.
+    tuning: tuning::Tuning,
 }
 
 /// What ends a run early.

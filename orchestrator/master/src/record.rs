@@ -91,6 +91,17 @@ impl Record {
         self.exact.extend_from_slice(exact);
     }
 
+    /// Adds a column behind the others, with a value for each row.
+    pub(crate) fn add_column(&mut self, name: &str, values: &[f64]) {
+        let width = self.columns.len().max(1);
+        let rows = self.values.chunks_exact(width).zip(values);
+        self.values = rows
+            .flat_map(|(row, value)| row.iter().chain(std::iter::once(value)))
+            .copied()
+            .collect();
+        self.columns.push(name.to_string());
+    }
+
     /// Forgets all rows but the first `rows`.
     pub(crate) fn truncate(&mut self, rows: usize) {
         self.values.truncate(rows * self.columns.len());

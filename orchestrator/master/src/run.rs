@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::action::Moment;
 use super::clock::{Clock, RealTime};
-use super::{EndSignals, MasterError, Record, Simulation, StepsTaken, comes};
+use super::{Change, EndSignals, MasterError, Record, Simulation, StepsTaken, comes};
 use fmi_import::{Kind, Message};
 
 /// A run with a value of this size diverges.
@@ -162,6 +162,8 @@ pub struct Outcome {
     pub notes: Vec<String>,
     /// How real time was kept; of a run in real time.
     pub real_time: Option<RealTime>,
+    /// Parameters that were changed during the run, in order.
+    pub changes: Vec<Change>,
 }
 
 /// A line logged by a component's FMU.
@@ -208,7 +210,9 @@ impl Simulation {
     }
 
     /// What came of it; the instances are freed.
-    pub(super) fn outcome(mut self, record: Record, ended: Ended, wall: f64) -> Outcome {
+    pub(super) fn outcome(mut self, mut record: Record, ended: Ended, wall: f64) -> Outcome {
+        self.record_changes(&mut record);
+        let changes = self.tuning.changes();
         let control = self.variable.as_ref();
         let variable = control.map(|control| control.taken(self.step, &self.names));
         self.close();
@@ -243,6 +247,7 @@ impl Simulation {
             messages: messages.collect(),
             notes,
             real_time: self.clock.take().map(Clock::statistics),
+            changes,
             ended,
         }
     }
@@ -309,6 +314,9 @@ impl Simulation {
     /// # Errors
     /// A call that an FMU did not complete, or a run that diverges.
     pub(super) fn arrive(&mut self, record: &mut Record) -> Result<bool, MasterError> {
+        if let Some(sample) = self.whole_sample() {
+            self.change_parameters(sample)?;
+        }
         self.observe()?;
         if let Some(sample) = self.whole_sample() {
             if comes(sample, self.keep_every) {
@@ -485,6 +493,7 @@ impl Simulation {
             part.instance.close();
         }
         self.diverted = None;
+        self.end_tuning();
     }
 }
 

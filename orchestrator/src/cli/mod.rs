@@ -50,6 +50,7 @@ mod terminal;
 pub mod trs;
 pub mod tune;
 pub mod validate;
+mod watch;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

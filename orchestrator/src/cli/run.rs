@@ -3,7 +3,6 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
@@ -13,6 +12,7 @@ use super::interrupt;
 use super::motion::MotionArguments;
 use super::quantity::{at_least_one, if_given, percent, positive};
 use super::rig::RigArguments;
+use super::watch::watch;
 use super::{print_files, progress};
 use fmi_import::{Isolation, Options, Trace};
 use fmi_master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Simulation};
@@ -28,7 +28,6 @@ use laboratory::run::summary::Summary;
 use laboratory::run::text::text;
 use laboratory::systems::built_in;
 use pack::program;
-use pages::live::{Scene, Server, Tap};
 
 /// Options of `shakebench run`.
 #[derive(Debug, Default, Args)]
@@ -97,6 +96,16 @@ pub struct Arguments {
     /// with real time
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
     watch: Option<u16>,
+    /// Parameter that the page of --watch may change during the run, with its bounds, such as
+    /// control.proportional_gain="2 V/in..8 V/in" [default bounds: half and twice its value]; `all`
+    /// for all tunable ones; repeatable
+    #[arg(
+        long,
+        value_name = "INSTANCE.VARIABLE[=LOW..HIGH]",
+        requires = "watch",
+        conflicts_with = "manifest"
+    )]
+    tune: Vec<String>,
     /// Folder for the results [default: shakebench-results/SYSTEM-MOTION]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -191,7 +200,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     } = &prepared;
     let is_same = |place: &Path| {
         let before = Manifest::read(&place.join("manifest.json"));
-        before.is_ok_and(|before| before.request == request)
+        before.is_ok_and(|before| {
+            // A run whose parameters were changed by hand is not repeated by its request alone.
+            let same = match known {
+                Some(known) => before.changes == known.changes,
+                None => before.changes.is_empty() && arguments.tune.is_empty(),
+            };
+            same && before.request == request
+        })
     };
     let folder = arguments.resume.as_ref().or(arguments.out.as_ref());
     let folder = folder.cloned().unwrap_or_else(|| {
@@ -223,8 +239,11 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             }
         }
     }
+    if let Some(written) = &written {
+        simulation.repeat(&written.changes)?;
+    }
     let live = match arguments.watch {
-        Some(port) => Some(watch(&prepared, &mut simulation, port)?),
+        Some(port) => Some(watch(&prepared, &mut simulation, port, &arguments.tune)?),
         None => None,
     };
     let bar = progress::bar(*samples, "{bar:40} {percent} %, {eta} left");
@@ -351,26 +370,6 @@ fn keep(
     Ok(simulation.keep_checkpoints(every, keep)?)
 }
 
-/// Serves the page of the run and says where.
-///
-/// # Errors
-/// A port that is taken.
-fn watch(
-    prepared: &Prepared,
-    simulation: &mut Simulation,
-    port: u16,
-) -> Result<(Server, Arc<Tap>), Error> {
-    let (scene, places) = Scene::new(prepared.shown(), simulation.names());
-    let tap = Arc::new(Tap::new(places, prepared.samples));
-    let server = Server::start(&scene, Arc::clone(&tap), port).map_err(|error| Error::Option {
-        option: "--watch",
-        reason: error.to_string(),
-    })?;
-    simulation.watch(tap.clone());
-    eprintln!("watch it at {}", server.url());
-    Ok((server, tap))
-}
-
 /// Whether nothing is lost if `path` is written: it is not a file, an empty one, or `is_own` of its
 /// first bytes, as an earlier command left it.
 pub(super) fn may_be_replaced(path: &Path, is_own: impl Fn(&[u8]) -> bool) -> bool {
@@ -403,7 +402,7 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
             return Err(fault(reason.to_string()));
         }
         let created = Trace::create(path).map_err(|error| fault(why(&error)));
-        created.map(Arc::new)
+        created.map(std::sync::Arc::new)
     });
     let limit = arguments.call_limit.as_deref();
     let limit = limit.map(|text| {

@@ -170,6 +170,23 @@ fn pages_of_a_practice_case_are_drawn_whole() {
 #[needs::browser]
 #[test]
 fn a_run_is_watched_until_its_end() {
+    let said = watched("watch it at ", &[], &[]);
+    assert!(!said.contains("changed"), "{said}");
+}
+
+#[needs::browser]
+#[test]
+fn a_gain_is_changed_on_the_page_of_a_run() {
+    let gain = "control.proportional_gain";
+    let bounds = format!("{gain}=2 V/in..40 V/in");
+    let tune = ["--tune", "all", "--tune", &bounds];
+    let said = watched("tune it at ", &tune, &["--tune", gain, "12"]);
+    assert!(said.contains(&format!("s: {gain} from")), "{said}");
+    assert!(said.contains("to 12 V/in"), "{said}");
+}
+
+/// What the browser says of a run's page at the address behind `words`.
+fn watched(words: &str, more: &[&str], wish: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let arguments = [
         "run",
@@ -186,6 +203,7 @@ fn a_run_is_watched_until_its_end() {
     ];
     let mut run = Command::new(env!("CARGO_BIN_EXE_shakebench"))
         .args(arguments)
+        .args(more)
         .current_dir(folder.path())
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
@@ -196,11 +214,14 @@ fn a_run_is_watched_until_its_end() {
     let url = lines
         .by_ref()
         .map_while(Result::ok)
-        .find_map(|line| Some(line.strip_prefix("watch it at ")?.to_string()))
+        .find_map(|line| Some(line.strip_prefix(words)?.to_string()))
         .unwrap();
     assert!(url.starts_with("http://127.0.0.1:"), "{url}");
     let axe = std::env::var("SHAKEBENCH_AXE").ok();
-    let mut arguments = vec![url.as_str()];
+    let picture = std::env::var("SHAKEBENCH_PICTURES").ok();
+    let picture = picture.map(|folder| format!("{folder}/live{}.png", wish.len()));
+    let mut arguments = [wish, &[url.as_str()]].concat();
+    arguments.extend(picture.as_deref());
     if let Some(axe) = &axe {
         arguments.splice(0..0, ["--axe", axe]);
     }
@@ -211,4 +232,5 @@ fn a_run_is_watched_until_its_end() {
         said.contains("'running'") && said.contains("complete"),
         "{said}"
     );
+    said
 }

@@ -44,14 +44,19 @@ pub(super) fn read(text: &str, root: Node, exchange: bool) -> Result<Description
     for variable in &file.modelVariables {
         use fmi2::{Causality as C, Initial as I, Variability as V, VariableType as T};
         let (mut unit, mut display_unit, mut is_relative) = (None, None, false);
+        let mut bounds = [None; 2];
         if let T::Real {
             unit: own,
             displayUnit,
             declaredType,
             relativeQuantity,
+            min,
+            max,
             ..
         } = &variable.variableType
         {
+            let number = |text: Option<&str>| text?.trim().parse::<f64>().ok();
+            bounds = [min, max].map(|own| number(own.as_deref()));
             (unit, display_unit, is_relative) =
                 (own.clone(), displayUnit.clone(), *relativeQuantity);
             if let Some(declared) = declaredType.as_deref().and_then(|name| types.get(name)) {
@@ -59,6 +64,8 @@ pub(super) fn read(text: &str, root: Node, exchange: bool) -> Result<Description
                 unit = unit.or_else(|| text("unit"));
                 display_unit = display_unit.or_else(|| text("displayUnit"));
                 is_relative |= matches!(declared.attribute("relativeQuantity"), Some("true" | "1"));
+                let declared = ["min", "max"].map(|name| number(declared.attribute(name)));
+                bounds = [0, 1].map(|side: usize| bounds[side].or(declared[side]));
             }
         }
         let start = variable.variableType.start().clone();
@@ -103,6 +110,7 @@ pub(super) fn read(text: &str, root: Node, exchange: bool) -> Result<Description
                 .map(|base| base.of_variable(is_relative)),
             unit,
             display_unit,
+            bounds,
             start,
             clocks: Vec::new(),
             element: (0, 1),

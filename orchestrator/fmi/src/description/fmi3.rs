@@ -248,6 +248,35 @@ fn starts(variable: &fmi3::ModelVariable, count: usize) -> Vec<Option<String>> {
     }
 }
 
+/// The smallest and the largest value of a real variable, its own or its type's.
+fn bounds(
+    kind: &fmi3::VariableType,
+    types: &HashMap<&str, &fmi3::TypeDefinition>,
+) -> [Option<f64>; 2] {
+    use fmi3::{TypeDefinition as D, VariableType as T};
+    let (own, declared) = match kind {
+        T::Float32 {
+            min,
+            max,
+            declaredType,
+            ..
+        } => ([min.map(f64::from), max.map(f64::from)], declaredType),
+        T::Float64 {
+            min,
+            max,
+            declaredType,
+            ..
+        } => ([*min, *max], declaredType),
+        _ => return [None; 2],
+    };
+    let of_type = match declared.as_deref().and_then(|name| types.get(name)) {
+        Some(D::Float32 { min, max, .. }) => [min.map(f64::from), max.map(f64::from)],
+        Some(D::Float64 { min, max, .. }) => [*min, *max],
+        _ => [None; 2],
+    };
+    [own[0].or(of_type[0]), own[1].or(of_type[1])]
+}
+
 /// A variable without its start value and elements.
 fn scalar(
     variable: &fmi3::ModelVariable,
@@ -350,6 +379,7 @@ fn scalar(
             .map(|base| base.of_variable(is_relative)),
         unit,
         display_unit,
+        bounds: bounds(&variable.variableType, types),
         start: None,
         clocks: variable.clocks.clone(),
         element: (0, 1),

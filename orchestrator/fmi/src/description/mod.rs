@@ -113,6 +113,8 @@ pub struct Variable {
     pub base_unit: Option<BaseUnit>,
     /// Unit in which people want to see it.
     pub display_unit: Option<String>,
+    /// Smallest and largest value that it accepts, where the description says so.
+    pub bounds: [Option<f64>; 2],
     /// Start value as written.
     pub start: Option<String>,
     /// Whether a start value can be set before the run.
@@ -256,6 +258,7 @@ impl Description {
             unit: None,
             base_unit: None,
             display_unit: None,
+            bounds: [None; 2],
             start: Some("0".to_string()),
             is_settable: true,
             is_structural: false,

@@ -30,7 +30,7 @@ const NEW: &str = ".new";
 /// First bytes of `state`.
 const MAGIC: &[u8; 16] = b"shakebench state";
 /// Version of the layout behind them.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// What `state` holds behind its first bytes and its checksum.
 #[derive(Debug, Serialize, Deserialize)]

@@ -4,6 +4,7 @@ use super::experiment::is_file;
 use super::manifest::Manifest;
 use super::request::Request;
 use super::summary::{MotionSummary, Summary};
+use super::tuning::in_words;
 use crate::systems::built_in;
 use crate::systems::tuning::Tuning;
 use pages::report::identity::entry;
@@ -39,6 +40,20 @@ pub fn of_run(manifest: &Manifest, summary: &Summary) -> Vec<(String, Cell)> {
     }
     for axis in &summary.axes {
         played(&format!(" along {}", axis.axis), &axis.motion);
+    }
+    if !manifest.changes.is_empty() {
+        let changes = manifest.changes.iter().map(|change| {
+            let parameter = change
+                .variable
+                .split_once('.')
+                .and_then(|(name, variable)| {
+                    manifest.components.get(name)?.parameters.get(variable)
+                });
+            let unit = parameter.and_then(|(_, unit)| unit.as_deref());
+            in_words(change, unit.unwrap_or_default())
+        });
+        let changes: Vec<String> = changes.collect();
+        entries.push(entry("Changed during the run", changes.join("; ")));
     }
     entries.push(entry(
         "Stepped by",

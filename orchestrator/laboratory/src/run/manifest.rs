@@ -7,10 +7,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::request::Request;
+use super::tuning::in_words;
 use crate::error::Error;
 use crate::json;
 use fmi_import::{Causality, hexadecimal};
-use fmi_master::Algorithm;
+use fmi_master::{Algorithm, Change};
 use fmi_system::{Link, System};
 use motion::Motion;
 
@@ -35,6 +36,9 @@ pub struct Manifest {
     pub components: BTreeMap<String, ComponentEntry>,
     /// The connections, as in a system file.
     pub connections: Vec<Link>,
+    /// Parameters that were changed during the run, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub changes: Vec<Change>,
     /// SHA-256 of `results.csv`.
     pub results_sha256: String,
 }
@@ -140,6 +144,7 @@ impl Manifest {
             motion: MotionEntry::of(motion),
             components: components.collect(),
             connections: system.links().collect(),
+            changes: Vec::new(),
             results_sha256: String::new(),
         }
     }
@@ -184,6 +189,14 @@ impl Manifest {
                 }
             }
         }
+        let changes = |own: &Self| match own.changes.as_slice() {
+            [] => "none".to_string(),
+            all => {
+                let all = all.iter().map(|change| in_words(change, ""));
+                all.collect::<Vec<_>>().join("; ")
+            }
+        };
+        compare("changes during the run", &changes(self), &changes(again));
         let all = |links: &[Link]| {
             let links: Vec<String> = links.iter().map(ToString::to_string).collect();
             links.join(", ")

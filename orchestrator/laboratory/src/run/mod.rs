@@ -13,6 +13,7 @@ pub mod signals;
 pub mod summary;
 pub mod table;
 pub mod text;
+pub mod tuning;
 mod warned;
 
 use std::path::{Path, PathBuf};

@@ -36,6 +36,7 @@ pub fn write(
     manifest: &mut Manifest,
     parquet: bool,
 ) -> Result<Vec<PathBuf>, Error> {
+    manifest.changes.clone_from(&outcome.changes);
     let mut results = Results::begin(folder)?;
     let mut sum = Sha256::new();
     results.write(RESULTS, |file| {

@@ -12,7 +12,7 @@ use super::refinement::CouplingError;
 use super::table::Table;
 use crate::error::Error;
 use crate::json;
-use fmi_master::{Ended, Ending, Outcome, RealTime, Record, StepsTaken};
+use fmi_master::{Change, Ended, Ending, Outcome, RealTime, Record, StepsTaken};
 use motion::Motion;
 use motion::metrics::{self, Tracking};
 use units::{self, INCH};
@@ -53,6 +53,9 @@ pub struct Summary {
     /// Each axis of a table with two of them; `motion` and `tracking` are then those of the first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub axes: Vec<Axis>,
+    /// Parameters that were changed during the run, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub changes: Vec<Change>,
     /// What the user should know.
     pub warnings: Vec<String>,
     /// How real time was kept; of a run in real time.
@@ -214,6 +217,7 @@ impl Summary {
                 .collect(),
             tracking,
             axes,
+            changes: outcome.changes.clone(),
             warnings,
             real_time: outcome.real_time.clone(),
             coupling_error: None,

@@ -37,7 +37,7 @@ impl Watched {
         let signals = HEAD - 1 + 3 * degrees_of_freedom;
         let tap = Arc::new(Tap::new((0..signals).collect(), ROWS));
         let server =
-            Server::start(&scene, Arc::clone(&tap), port).map_err(|error| Error::Option {
+            Server::start(&scene, Arc::clone(&tap), None, port).map_err(|error| Error::Option {
                 option: "--watch",
                 reason: error.to_string(),
             })?;

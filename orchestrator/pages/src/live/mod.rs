@@ -3,7 +3,9 @@
 mod scene;
 mod server;
 mod tap;
+mod tuning;
 
 pub use scene::{Plot, Run, Scene};
 pub use server::Server;
 pub use tap::Tap;
+pub use tuning::Tuning;

@@ -9,9 +9,11 @@ use std::time::{Duration, Instant};
 
 use super::scene::Scene;
 use super::tap::Tap;
+use super::tuning::Tuning;
 
 const PAGE: &str = include_str!("assets/live.html");
 const SCRIPT: &str = include_str!("assets/live.js");
+const HTML: &str = "text/html; charset=utf-8";
 const STYLE: &str = include_str!("../report/assets/report.css");
 const UPLOT_STYLE: &str = include_str!("../report/assets/uPlot.min.css");
 const UPLOT_SCRIPT: &str = include_str!("../report/assets/uPlot.iife.min.js");
@@ -31,12 +33,15 @@ pub struct Server {
     address: SocketAddr,
     /// What an address begins with: other accounts of this machine do not know it.
     token: Arc<str>,
+    tuning_token: Option<Arc<str>>,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
 struct Shared {
     token: Arc<str>,
+    /// Parameters that may be changed, and what the address of those who may begins with.
+    tuning: Option<(Arc<str>, Tuning)>,
     scene: String,
     tap: Arc<Tap>,
     stop: AtomicBool,
@@ -48,24 +53,43 @@ struct Shared {
 }
 
 impl Server {
-    /// Serves the page of `tap` at a port of 127.0.0.1, any free one for 0.
+    /// Serves the page of `tap` at a port of 127.0.0.1, any free one for 0; with `tuning` also a page that
+    /// changes parameters, at an address of its own.
     ///
     /// # Errors
     /// A port that is taken, or a system that has no random numbers; the message names the port.
-    pub fn start(scene: &Scene, tap: Arc<Tap>, port: u16) -> io::Result<Self> {
-        Self::listening(scene, tap, port).map_err(|error| {
+    pub fn start(
+        scene: &Scene,
+        tap: Arc<Tap>,
+        tuning: Option<Tuning>,
+        port: u16,
+    ) -> io::Result<Self> {
+        Self::listening(scene, tap, tuning, port).map_err(|error| {
             let reason = format!("cannot listen on port {port} of 127.0.0.1: {error}");
             io::Error::new(error.kind(), reason)
         })
     }
 
-    fn listening(scene: &Scene, tap: Arc<Tap>, port: u16) -> io::Result<Self> {
+    fn listening(
+        scene: &Scene,
+        tap: Arc<Tap>,
+        tuning: Option<Tuning>,
+        port: u16,
+    ) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         let address = listener.local_addr()?;
         let word = || getrandom::u64().map_err(|error| io::Error::other(error.to_string()));
-        let token: Arc<str> = format!("{:016x}{:016x}", word()?, word()?).into();
+        let token =
+            || -> io::Result<Arc<str>> { Ok(format!("{:016x}{:016x}", word()?, word()?).into()) };
+        let tuning = match tuning {
+            Some(tuning) => Some((token()?, tuning)),
+            None => None,
+        };
+        let tuning_token = tuning.as_ref().map(|(token, _)| Arc::clone(token));
+        let token = token()?;
         let shared = Arc::new(Shared {
             token: Arc::clone(&token),
+            tuning,
             scene: serde_json::json!(scene).to_string(),
             tap,
             stop: AtomicBool::new(false),
@@ -78,6 +102,7 @@ impl Server {
         Ok(Self {
             address,
             token,
+            tuning_token,
             shared,
             thread: Some(thread),
         })
@@ -87,6 +112,13 @@ impl Server {
     #[must_use]
     pub fn url(&self) -> String {
         format!("http://{}/{}/", self.address, self.token)
+    }
+
+    /// Where the page is that changes parameters; none where nothing may be changed.
+    #[must_use]
+    pub fn tuning_url(&self) -> Option<String> {
+        let token = self.tuning_token.as_ref()?;
+        Some(format!("http://{}/{token}/", self.address))
     }
 
     /// Waits until a client that has been watching knows of the end; not long.
@@ -131,70 +163,109 @@ fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
     }
 }
 
-/// The lines of a request up to the empty one. However slowly it comes: no longer than [`PATIENCE`].
-fn request(mut stream: &TcpStream) -> io::Result<Vec<String>> {
-    let (begun, mut bytes) = (Instant::now(), Vec::new());
-    while !bytes.windows(4).any(|end| end == b"\r\n\r\n") {
-        let left = PATIENCE.saturating_sub(begun.elapsed());
-        if left.is_zero() || bytes.len() > LONGEST {
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        stream.set_read_timeout(Some(left))?;
-        let mut some = [0; 1024];
-        match stream.read(&mut some)? {
-            0 => return Err(io::ErrorKind::UnexpectedEof.into()),
-            count => bytes.extend(&some[..count]),
-        }
-    }
-    let text = String::from_utf8_lossy(&bytes);
-    let lines = text.split("\r\n").take_while(|line| !line.is_empty());
-    Ok(lines.map(str::to_string).collect())
+/// What a client asks for.
+struct Asked {
+    method: String,
+    target: String,
+    headers: Vec<(String, String)>,
+    body: String,
 }
 
-fn answer(stream: &TcpStream, shared: &Shared) -> io::Result<()> {
-    stream.set_write_timeout(Some(PATIENCE))?;
-    let lines = request(stream)?;
-    let hosts: Vec<&str> = lines
-        .iter()
-        .filter_map(|line| line.split_once(':'))
-        .filter(|(name, _)| name.eq_ignore_ascii_case("host"))
-        .map(|(_, value)| value.trim())
-        .collect();
-    let mut words = lines.first().map_or("", String::as_str).split(' ');
-    let (method, target) = (words.next().unwrap_or(""), words.next().unwrap_or(""));
-    // Another name for this address is a page from elsewhere that wants to read the run.
-    let port = stream.local_addr()?.port();
-    let own = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
-    let is_own = matches!(hosts[..], [host] if own.iter().any(|own| own == host));
-    let (path, query) = target.split_once('?').unwrap_or((target, ""));
-    let path = path
-        .strip_prefix('/')
-        .and_then(|path| path.strip_prefix(&*shared.token));
-    let Some(path) = path.filter(|_| method == "GET" && is_own) else {
-        return reply(
-            stream,
-            "403 Forbidden",
-            "text/plain",
-            "only at the address that --watch printed",
-        );
-    };
-    match path {
-        "/" => reply(stream, "200 OK", "text/html; charset=utf-8", &page(shared)),
-        "/rows" => {
-            let from = query.strip_prefix("from=").and_then(|n| n.parse().ok());
-            reply(
-                stream,
-                "200 OK",
-                "application/json",
-                &rows(shared, from.unwrap_or(0)),
-            )
+impl Asked {
+    /// Reads it, however slowly it comes: no longer than [`PATIENCE`].
+    fn read(mut stream: &TcpStream) -> io::Result<Self> {
+        let (begun, mut bytes) = (Instant::now(), Vec::new());
+        let mut more = |bytes: &mut Vec<u8>| {
+            let left = PATIENCE.saturating_sub(begun.elapsed());
+            if left.is_zero() || bytes.len() > LONGEST {
+                return Err(io::Error::from(io::ErrorKind::TimedOut));
+            }
+            stream.set_read_timeout(Some(left))?;
+            let mut some = [0; 1024];
+            match stream.read(&mut some)? {
+                0 => Err(io::ErrorKind::UnexpectedEof.into()),
+                count => {
+                    bytes.extend(&some[..count]);
+                    Ok(())
+                }
+            }
+        };
+        let end = loop {
+            let found = bytes.windows(4).position(|end| end == b"\r\n\r\n");
+            match found {
+                Some(found) => break found,
+                None => more(&mut bytes)?,
+            }
+        };
+        let head = String::from_utf8_lossy(&bytes[..end]).into_owned();
+        let mut lines = head.split("\r\n");
+        let mut words = lines.next().unwrap_or("").split(' ');
+        let (method, target) = (words.next().unwrap_or(""), words.next().unwrap_or(""));
+        let headers = lines.filter_map(|line| line.split_once(':'));
+        let headers = headers
+            .map(|(name, value)| (name.trim().to_ascii_lowercase(), value.trim().to_string()));
+        let headers: Vec<(String, String)> = headers.collect();
+        let length = headers.iter().find(|(name, _)| name == "content-length");
+        let length = length.map_or(Some(0), |(_, value)| value.parse::<usize>().ok());
+        let length = length.filter(|length| *length <= LONGEST);
+        let length = length.ok_or(io::ErrorKind::InvalidData)?;
+        while bytes.len() < end + 4 + length {
+            more(&mut bytes)?;
         }
-        _ => reply(
-            stream,
-            "404 Not Found",
-            "text/plain",
-            "there is / and /rows",
-        ),
+        let body = String::from_utf8_lossy(&bytes[end + 4..end + 4 + length]).into_owned();
+        Ok(Self {
+            method: method.to_string(),
+            target: target.to_string(),
+            headers,
+            body,
+        })
+    }
+
+    /// The values of a header.
+    fn all(&self, name: &str) -> Vec<&str> {
+        let own = self.headers.iter().filter(|(own, _)| own == name);
+        own.map(|(_, value)| value.as_str()).collect()
+    }
+
+    /// Whether it comes from a page of this server or from no page: another name for this address is a
+    /// page from elsewhere that wants to read the run.
+    fn is_own(&self, port: u16) -> bool {
+        let own = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
+        let is_host = matches!(self.all("host")[..], [host] if own.iter().any(|own| own == host));
+        let origins = self.all("origin");
+        let mut origins = origins.iter().map(|origin| origin.strip_prefix("http://"));
+        is_host && origins.all(|origin| own.iter().any(|own| origin == Some(own)))
+    }
+}
+
+const REFUSED: &str = "only at the address that --watch printed";
+
+fn answer(stream: &TcpStream, shared: &Shared) -> io::Result<()> {
+    const TEXT: &str = "text/plain; charset=utf-8";
+    const JSON: &str = "application/json";
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let asked = Asked::read(stream)?;
+    let is_own = asked.is_own(stream.local_addr()?.port());
+    let (path, query) = asked.target.split_once('?').unwrap_or((&asked.target, ""));
+    let below = |token: &str| path.strip_prefix('/')?.strip_prefix(token);
+    let tuned = shared.tuning.as_ref();
+    let tuned = tuned.and_then(|(token, tuning)| Some((below(token)?, tuning)));
+    let page_of = |may_change| page(shared, may_change);
+    match (asked.method.as_str(), below(&shared.token), tuned) {
+        _ if !is_own => reply(stream, "403 Forbidden", TEXT, REFUSED),
+        ("GET", Some("/"), _) => reply(stream, "200 OK", HTML, &page_of(false)),
+        ("GET", _, Some(("/", _))) => reply(stream, "200 OK", HTML, &page_of(true)),
+        ("GET", Some("/rows"), _) | ("GET", _, Some(("/rows", _))) => {
+            let from = query.strip_prefix("from=").and_then(|n| n.parse().ok());
+            reply(stream, "200 OK", JSON, &rows(shared, from.unwrap_or(0)))
+        }
+        ("POST", _, Some(("/tune", tuning))) => match tuning.ask(&asked.body) {
+            Ok(done) => reply(stream, "200 OK", JSON, &done),
+            Err((status, reason)) => reply(stream, status, TEXT, &reason),
+        },
+        ("GET", None, None) | ("POST", _, None) => reply(stream, "403 Forbidden", TEXT, REFUSED),
+        ("GET" | "POST", _, _) => reply(stream, "404 Not Found", TEXT, "there is / and /rows"),
+        _ => reply(stream, "403 Forbidden", TEXT, REFUSED),
     }
 }
 
@@ -208,13 +279,21 @@ fn rows(shared: &Shared, from: usize) -> String {
     if ended.is_some() {
         shared.told.store(true, Ordering::Relaxed);
     }
-    serde_json::json!({"rows": rows, "ended": ended}).to_string()
+    let mut all = serde_json::json!({"rows": rows, "ended": ended});
+    if let Some((_, tuning)) = &shared.tuning {
+        all["tuning"] = tuning.state();
+    }
+    all.to_string()
 }
 
-fn page(shared: &Shared) -> String {
+fn page(shared: &Shared, may_change: bool) -> String {
+    let tuning = shared.tuning.as_ref();
+    let tuning = tuning.map_or("null".to_string(), |(_, own)| own.controls(may_change));
+    let inside = |json: &str| json.replace('<', "\\u003c");
     PAGE.replace("/*style*/", &format!("{UPLOT_STYLE}\n{STYLE}"))
         .replace("/*plots*/", UPLOT_SCRIPT)
-        .replace("/*scene*/", &shared.scene.replace('<', "\\u003c"))
+        .replace("/*tuning*/", &inside(&tuning))
+        .replace("/*scene*/", &inside(&shared.scene))
         .replace("/*script*/", SCRIPT)
 }
 
@@ -232,6 +311,8 @@ fn reply(mut stream: &TcpStream, status: &str, kind: &str, body: &str) -> io::Re
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fmi_master::{Panel, Tunable};
+    use fmi_system::System;
 
     fn ask(server: &Server, request: &str) -> String {
         let mut stream = TcpStream::connect(server.address).unwrap();
@@ -255,7 +336,7 @@ mod tests {
     #[test]
     fn rows_are_served_to_this_machine_only() {
         let tap = Arc::new(Tap::new(vec![0], 3));
-        let server = Server::start(&scene(), Arc::clone(&tap), 0).unwrap();
+        let server = Server::start(&scene(), Arc::clone(&tap), None, 0).unwrap();
         assert!(server.address.ip().is_loopback());
         let host = server.address;
         let token = server.token.to_string();
@@ -296,8 +377,8 @@ mod tests {
     #[test]
     fn clients_that_never_end_their_request_shut_nobody_out() {
         let tap = Arc::new(Tap::new(vec![0], 3));
-        let server = Server::start(&scene(), Arc::clone(&tap), 0).unwrap();
-        let other = Server::start(&scene(), tap, 0).unwrap();
+        let server = Server::start(&scene(), Arc::clone(&tap), None, 0).unwrap();
+        let other = Server::start(&scene(), tap, None, 0).unwrap();
         assert_ne!(server.token, other.token);
         let host = server.address;
         let is_cut = || {
@@ -315,5 +396,91 @@ mod tests {
         });
         let get = format!("GET /{}/ HTTP/1.1\r\nHost: {host}\r\n\r\n", server.token);
         assert!(ask(&server, &get).starts_with("HTTP/1.1 200"));
+    }
+    #[test]
+    fn parameters_are_changed_at_the_address_of_their_own_only() {
+        let gain = Tunable {
+            variable: "control.gain".into(),
+            start: 2.0,
+            low: 1.0,
+            high: 4.0,
+        };
+        let panel = Arc::new(Panel::new(vec![gain], 500));
+        let none = System {
+            name: "none".into(),
+            description: String::new(),
+            components: Vec::new(),
+            connections: Vec::new(),
+            tables: Vec::new(),
+            start: 0.0,
+            end: None,
+            notes: Vec::new(),
+            stop: None,
+        };
+        let tuning = Tuning::new(&none, Arc::clone(&panel), 1.0);
+        let tap = Arc::new(Tap::new(vec![0], 3));
+        let server = Server::start(&scene(), tap, Some(tuning), 0).unwrap();
+        let host = server.address;
+        let (watching, tuning) = (server.url(), server.tuning_url().unwrap());
+        assert_ne!(watching, tuning);
+        let post = |url: &str, path: &str, body: &str, headers: &str| {
+            let token = url.rsplit('/').nth(1).unwrap();
+            let length = body.len();
+            ask(
+                &server,
+                &format!(
+                    "POST /{token}{path} HTTP/1.1\r\nHost: {host}\r\n{headers}Content-Length: {length}\r\n\r\n{body}"
+                ),
+            )
+        };
+        let three = r#"{"variable": "control.gain", "value": 3}"#;
+        let own = format!("Origin: http://{host}\r\n");
+        let done = post(&tuning, "/tune", three, &own);
+        assert!(
+            done.starts_with("HTTP/1.1 200") && done.ends_with(r#""variable":"control.gain"}"#),
+            "{done}"
+        );
+        let elsewhere = "Origin: http://elsewhere.example\r\n";
+        for (said, status, words) in [
+            (post(&watching, "/tune", three, ""), 403, "--watch"),
+            (post(&tuning, "/tune", three, elsewhere), 403, "--watch"),
+            (post(&tuning, "/rows", three, ""), 404, "/rows"),
+            (
+                post(&tuning, "/tune", &three.replace('3', "4.1"), ""),
+                409,
+                "expected 1.000 to 4.000",
+            ),
+            (
+                post(&tuning, "/tune", &three.replace("gain", "mass"), ""),
+                409,
+                "`control.mass`",
+            ),
+            (
+                post(&tuning, "/tune", &three.replace('3', "\"3\""), ""),
+                400,
+                "NUMBER",
+            ),
+            (post(&tuning, "/tune", "{}", ""), 400, "variable"),
+        ] {
+            assert!(said.starts_with(&format!("HTTP/1.1 {status}")), "{said}");
+            assert!(said.contains(words), "{said}");
+        }
+        let token = watching.rsplit('/').nth(1).unwrap();
+        let rows = ask(
+            &server,
+            &format!("GET /{token}/rows HTTP/1.1\r\nHost: {host}\r\n\r\n"),
+        );
+        assert!(
+            rows.contains(r#""tuning":{"changes":[],"values":[2.0]}"#),
+            "{rows}"
+        );
+        let page = |token: &str| {
+            ask(
+                &server,
+                &format!("GET /{token}/ HTTP/1.1\r\nHost: {host}\r\n\r\n"),
+            )
+        };
+        assert!(page(token).contains(r#""may_change":false"#));
+        assert!(page(tuning.rsplit('/').nth(1).unwrap()).contains(r#""may_change":true"#));
     }
 }

@@ -51,6 +51,77 @@
     return { plot, place, chart, data, limits, value, largest: 0 };
   });
 
+  const element = (tag, words, parent) => {
+    const made = document.createElement(tag);
+    made.textContent = words;
+    parent.append(made);
+    return made;
+  };
+  // Parameters that may change during the run.
+  const controls = JSON.parse(document.getElementById("controls").textContent);
+  const tuning = controls && (() => {
+    const place = document.getElementById("tuning");
+    place.hidden = false;
+    element("h2", "Parameters", place);
+    element("p", controls.may_change
+      ? `A change takes ${Number(controls.seconds.toPrecision(3))} s and is part of the record.`
+      : "They are changed at the other address that the command printed.", place);
+    const shown = (knob, value, digits = 4) => String(Number((value / knob.unit[1]).toPrecision(digits)));
+    const fault = document.createElement("p");
+    fault.setAttribute("role", "alert");
+    const knobs = controls.knobs.map((knob, n) => {
+      const row = element(controls.may_change ? "form" : "div", "", place);
+      row.className = "knob";
+      const name = element(controls.may_change ? "label" : "span", "", row);
+      element("strong", knob.variable, name);
+      const range = `${shown(knob, knob.low)} to ${shown(knob, knob.high)} ${knob.unit[0]}`;
+      element("small", `${knob.about}${knob.about && "; "}${range}`, name);
+      const now = element("output", "", row);
+      if (!controls.may_change) return { knob, now };
+      const input = element("input", "", row);
+      input.id = `knob-${n}`;
+      name.htmlFor = input.id;
+      input.type = "text";
+      input.inputMode = "decimal";
+      input.value = shown(knob, knob.start, 6);
+      const button = element("button", "Change", row);
+      button.setAttribute("aria-label", `Change ${knob.variable}`);
+      row.addEventListener("submit", async (event) => {
+        event.preventDefault();
+        const value = input.value.trim() === "" ? NaN : Number(input.value.replace(",", "."));
+        const si = value * knob.unit[1];
+        const rounding = 1e-6 * Math.max(Math.abs(knob.low), Math.abs(knob.high));
+        if (!(si >= knob.low - rounding && si <= knob.high + rounding)) {
+          fault.textContent = `${knob.variable} = ${input.value}: expected a number from ${range}`;
+          return;
+        }
+        try {
+          const answer = await fetch("tune", {
+            method: "POST", body: JSON.stringify({ variable: knob.variable, value: Math.min(Math.max(si, knob.low), knob.high) }),
+          });
+          fault.textContent = answer.ok ? "" : await answer.text();
+        } catch {
+          fault.textContent = `The run is over; ${knob.variable} keeps its value.`;
+        }
+      });
+      return { knob, now, input, button };
+    });
+    place.append(fault);
+    const log = element("ol", "", place);
+    let logged = 0;
+    return {
+      show: ({ values, changes }) => {
+        knobs.forEach(({ knob, now }, n) => { now.textContent = `${shown(knob, values[n])} ${knob.unit[0]}`; });
+        for (const change of changes.slice(logged)) {
+          const { knob } = knobs.find((own) => own.knob.variable === change.variable);
+          element("li", `${change.time_s.toFixed(2)} s: ${change.variable} from ${shown(knob, change.from)} to ${shown(knob, change.to)} ${knob.unit[0]}`, log);
+        }
+        logged = changes.length;
+      },
+      end: () => knobs.forEach(({ input, button }) => [input, button].forEach((own) => { if (own) own.disabled = true; })),
+    };
+  })();
+
   let next = 0;
   let time = 0;
   const take = (rows) => {
@@ -97,10 +168,13 @@
       answer = await (await fetch(`rows?from=${next}`)).json();
     } catch {
       say("ended", "The run is over; its results lie where the command says.");
+      tuning?.end();
       return;
     }
     if (answer.rows.length > 0) take(answer.rows);
+    if (answer.tuning) tuning?.show(answer.tuning);
     if (answer.ended != null) {
+      tuning?.end();
       if (state.dataset.state !== "tripped") say("ended", `Ended: ${answer.ended}`);
       else state.textContent += ` — ${answer.ended}`;
       return;
