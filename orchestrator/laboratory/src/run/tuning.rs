@@ -115,7 +115,7 @@ fn one(system: &System, text: &str) -> Result<Tunable, String> {
         Some(bounds) => stated(variable, name, bounds)?,
         None => usual_bounds(variable, start).ok_or_else(|| {
             format!(
-                "`{name}` is {start} at the beginning, so that half and twice its value are no bounds; \
+                "`{name}` is {start} at the beginning, so half and twice its value cannot be its bounds; \
                  expected {name}=LOW..HIGH"
             )
         })?,
