@@ -141,8 +141,10 @@ def wrong_calls_are_refused_with_a_reason(archive):
     for value in (float("nan"), float("inf"), float("-inf")):
         for reference in inputs:
             refuse("input not finite", lambda: instance.set([reference], [value]), "finite")
-    if parameters:
-        refuse("fixed parameter", lambda: instance.set(parameters[:1], [1.0]), "cannot be set")
+    variables = archive.description.modelVariables
+    fixed = [v.valueReference for v in variables if v.valueReference in parameters and v.variability == "fixed"]
+    if fixed:
+        refuse("fixed parameter", lambda: instance.set(fixed[:1], [1.0]), "cannot be set")
     refuse("wrong communication point", lambda: instance.step(1.0 + archive.step / 2), "communication point")
     refuse("communication point not a number", lambda: instance.step(float("nan")), "communication")
     refuse("backwards", lambda: instance.step(1.0, -archive.step), "step size")
