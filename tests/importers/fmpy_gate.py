@@ -120,7 +120,6 @@ def instances_do_not_disturb_each_other(archive):
 def wrong_calls_are_refused_with_a_reason(archive):
     inputs = [v.valueReference for v in archive.variables("input")]
     outputs = outputs_of(archive)
-    parameters = [v.valueReference for v in archive.variables("parameter")]
     unlike = archive.open(instantiate=False)
     wrong = archive.open(token="{wrong}", instantiate=False)
     for what, action, expected in (
@@ -141,8 +140,7 @@ def wrong_calls_are_refused_with_a_reason(archive):
     for value in (float("nan"), float("inf"), float("-inf")):
         for reference in inputs:
             refuse("input not finite", lambda: instance.set([reference], [value]), "finite")
-    variables = archive.description.modelVariables
-    fixed = [v.valueReference for v in variables if v.valueReference in parameters and v.variability == "fixed"]
+    fixed = [v.valueReference for v in archive.variables("parameter") if v.variability == "fixed"]
     if fixed:
         refuse("fixed parameter", lambda: instance.set(fixed[:1], [1.0]), "cannot be set")
     refuse("wrong communication point", lambda: instance.step(1.0 + archive.step / 2), "communication point")

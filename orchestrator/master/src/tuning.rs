@@ -216,12 +216,17 @@ struct Place {
 }
 
 impl Tuning {
-    /// The value of the parameter at a sample.
-    fn value(&self, place: usize, sample: usize) -> f64 {
+    /// The change of the parameter that rules at a sample.
+    fn latest(&self, place: usize, sample: usize) -> Option<&Change> {
         let own = self.changes.iter().rev();
         let mut own = own.filter(|(at, change)| *at == place && change.sample <= sample);
-        own.next()
-            .map_or(self.places[place].start, |(_, change)| change.at(sample))
+        own.next().map(|(_, change)| change)
+    }
+
+    /// The value of the parameter at a sample.
+    fn value(&self, place: usize, sample: usize) -> f64 {
+        let latest = self.latest(place, sample);
+        latest.map_or(self.places[place].start, |change| change.at(sample))
     }
 
     fn add(&mut self, place: usize, change: Change) {
@@ -344,9 +349,9 @@ impl Simulation {
             return Ok(());
         }
         for (at, place) in tuning.places.iter().enumerate() {
-            let mut own = tuning.changes.iter().rev();
-            let own = own.find(|(of, change)| *of == at && change.sample <= sample);
-            let Some((_, change)) = own else { continue };
+            let Some(change) = tuning.latest(at, sample) else {
+                continue;
+            };
             // At its own sample a change has not moved anything yet.
             if sample == change.sample || sample > change.sample + change.samples {
                 continue;

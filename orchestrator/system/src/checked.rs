@@ -130,6 +130,14 @@ pub enum Source {
 }
 
 impl System {
+    /// Component and position of a variable called `component.variable`.
+    pub fn variable(&self, name: &str) -> Option<(&Component, usize)> {
+        self.components.iter().find_map(|component| {
+            let variable = name.strip_prefix(&component.name)?.strip_prefix('.')?;
+            Some((component, component.fmu.description.position(variable)?))
+        })
+    }
+
     /// The name of an output or input.
     pub fn variable_name(&self, component: usize, variable: usize) -> VariableName {
         let component = &self.components[component];

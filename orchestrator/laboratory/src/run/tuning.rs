@@ -1,7 +1,5 @@
 //! Which parameters may be changed during a run, and between which bounds.
 
-use std::ops::ControlFlow;
-
 use crate::error::Error;
 use fmi_import::{Causality, Kind, Variability, Variable};
 use fmi_master::{Change, Panel, Tunable};
@@ -101,12 +99,11 @@ fn one(system: &System, text: &str) -> Result<Tunable, String> {
         Some((name, bounds)) => (name.trim(), Some(bounds)),
         None => (text.trim(), None),
     };
-    let full = |component: &Component, variable: &Variable| {
-        format!("{}.{}", component.name, variable.name)
-    };
-    let mut all = tunable(system);
-    let found = all.find(|(component, variable)| full(component, variable) == name);
-    let Some((component, variable)) = found else {
+    let found = system.variable(name).map(|(component, position)| {
+        let variable = &component.fmu.description.variables[position];
+        (component, variable)
+    });
+    let Some((component, variable)) = found.filter(|(_, variable)| is_tunable(variable)) else {
         return Err(not_tunable(system, name));
     };
     let start = start(component, variable)
@@ -184,20 +181,11 @@ fn not_tunable(system: &System, name: &str) -> String {
     let known: Vec<String> = tunable(system)
         .map(|(component, variable)| format!("{}.{}", component.name, variable.name))
         .collect();
-    let mut components = system.components.iter();
-    let exists = components.try_for_each(|component| {
-        let own = name.strip_prefix(&component.name);
-        let own = own.and_then(|own| own.strip_prefix('.'));
-        match own.and_then(|own| component.fmu.description.position(own)) {
-            Some(_) => ControlFlow::Break(()),
-            None => ControlFlow::Continue(()),
-        }
-    });
-    let reason = match exists.is_break() {
-        true => {
+    let reason = match system.variable(name) {
+        Some(_) => {
             format!("`{name}` is not a tunable parameter: its FMU takes it before the run only")
         }
-        false => format!(
+        None => format!(
             "the system has no parameter `{name}`{}",
             hint(name, known.iter().map(String::as_str))
         ),

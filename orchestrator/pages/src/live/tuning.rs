@@ -42,10 +42,8 @@ impl Tuning {
     #[must_use]
     pub fn new(system: &System, panel: Arc<Panel>, seconds: f64) -> Self {
         let knobs = panel.tunables().iter().map(|own| {
-            let found = system.components.iter().find_map(|component| {
-                let name = own.variable.strip_prefix(&component.name)?;
-                component.fmu.description.variable(name.strip_prefix('.')?)
-            });
+            let found = system.variable(&own.variable);
+            let found = found.map(|(component, at)| &component.fmu.description.variables[at]);
             let unit = found.and_then(|variable| variable.unit.as_deref());
             let unit = unit.unwrap_or_default();
             let units = Units::of(unit);

@@ -29,7 +29,7 @@ pub(super) const FIGURES: [(&str, &str); 11] = [
 
 /// The unit of a variable that is a number, empty where it has none; none for other variables.
 pub(super) fn number_unit(system: &System, name: &str) -> Option<String> {
-    let (component, position) = variable(system, name)?;
+    let (component, position) = system.variable(name)?;
     let variable = &component.fmu.description.variables[position];
     let is_number = variable.kind.is_numeric()
         && !matches!(variable.kind, Kind::Enumeration(_) | Kind::Boolean);
@@ -91,17 +91,9 @@ pub(super) fn figures(prepared: &Prepared, outcome: &Outcome) -> [Cell; FIGURES.
     cells
 }
 
-/// Component and position of a variable called `instance.variable`.
-fn variable<'a>(system: &'a System, name: &str) -> Option<(&'a Component, usize)> {
-    system.components.iter().find_map(|component| {
-        let variable = name.strip_prefix(&component.name)?.strip_prefix('.')?;
-        Some((component, component.fmu.description.position(variable)?))
-    })
-}
-
-/// As [`variable`], of an output.
+/// As [`System::variable`], of an output.
 pub(super) fn output<'a>(system: &'a System, name: &str) -> Option<(&'a Component, usize)> {
-    variable(system, name).filter(|(component, position)| {
+    system.variable(name).filter(|(component, position)| {
         component.fmu.description.variables[*position].causality == Causality::Output
     })
 }
@@ -134,7 +126,7 @@ pub(super) fn times(system: &System, name: &str, factor: &Setting) -> Result<Str
 
 /// What a variable is when the study does not vary it, and its unit.
 pub(super) fn nominal(system: &System, name: &str) -> Result<(f64, String), String> {
-    let (component, position) = variable(system, name).ok_or_else(|| {
+    let (component, position) = system.variable(name).ok_or_else(|| {
         let known = system.components.iter().flat_map(|component| {
             let variables = component.fmu.description.variables.iter();
             variables.map(|variable| format!("{}.{}", component.name, variable.name))
