@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 use plant::identified::valve_curve::ValveCurve;
-use plant::integration::{inner_steps, runge_kutta_4};
+use plant::integration::inner_steps;
 
 use super::equations::HydraulicRig;
 use super::friction::SealShape;
@@ -10,9 +10,12 @@ use super::specimen::SpecimenOverMass;
 
 /// Longest inner step, s.
 const LONGEST_STEP: f64 = 1e-4;
-/// States beside the spool: part of the inner step that is over, oil's force, displacement, velocity, drift, drift
-/// velocity, hysteretic deformation.
-const STATES: usize = 7;
+/// States beside the spool: oil's force, displacement, velocity; under a specimen also its drift, drift velocity
+/// and hysteretic deformation.
+const BARE: usize = 3;
+const STATES: usize = 6;
+/// Stribeck velocities from which on a seal that slides has its Coulomb force, to rounding.
+const FAST: f64 = 6.0;
 
 /// What a spool that follows a constant command is away from it, and its rate, after `time` (s) over those before.
 pub(super) fn spool_transition(rig: &HydraulicRig, time: f64) -> Matrix2<f64> {
@@ -113,40 +116,76 @@ impl Simulation {
     /// The same at rest at `displacement` (m).
     #[must_use]
     pub fn starting_at(mut self, displacement: f64) -> Self {
-        self.state[2] = displacement;
+        self.state[1] = displacement;
         self
     }
 
-    fn seal_force(&self, v: f64) -> f64 {
-        self.rig.seal_damping * v + self.rig.seal_friction * self.shape.force(self.seal, v)
+    #[inline]
+    fn is_fast(&self, v: f64) -> bool {
+        v.abs() > FAST * self.shape.stribeck_velocity
     }
 
-    fn accelerations(&self, s: &[f64; STATES]) -> (f64, f64, f64) {
-        let force = s[1] - self.seal_force(s[3]);
-        let carried = self
-            .specimen
-            .map_or(0.0, |own| own.force([s[4], s[5], s[6]]));
+    #[inline]
+    fn seal_force(&self, v: f64) -> f64 {
+        let share = match self.is_fast(v) {
+            true => self.seal,
+            false => self.shape.force(self.seal, v),
+        };
+        self.rig.seal_damping * v + self.rig.seal_friction * share
+    }
+
+    /// Moves the seals on.
+    #[inline]
+    fn advance_seal(&mut self, step: f64) {
+        const ROUNDING: f64 = 1e-12;
+        let v = self.state[2];
+        let slides = (self.seal * v.signum() - 1.0).abs() < ROUNDING;
+        if !(slides && self.is_fast(v)) {
+            self.seal = self.shape.advance(self.seal, v, step);
+        }
+    }
+
+    #[inline]
+    fn accelerations<const N: usize>(&self, s: &[f64; N]) -> (f64, f64, f64) {
+        let force = s[0] - self.seal_force(s[2]);
+        let carried = match &self.specimen {
+            Some(own) if N == STATES => own.force([s[3], s[4], s[5]]),
+            _ => 0.0,
+        };
         let pushed = force + self.rig.specimen_mass * carried
-            - self.rig.damping * s[3]
-            - self.rig.stiffness * s[2];
+            - self.rig.damping * s[2]
+            - self.rig.stiffness * s[1];
         (pushed / self.mass, -carried, force)
     }
 
-    fn rates(&self, s: &[f64; STATES], inner: f64, openings: &[f64; 3]) -> [f64; STATES] {
+    #[inline]
+    fn rates<const N: usize>(&self, s: &[f64; N], opening: f64) -> [f64; N] {
         let r = &self.rig;
         let (a, carried, _) = self.accelerations(s);
-        let opening = openings[(2.0 * s[0]).round().clamp(0.0, 2.0) as usize];
-        let mut rates = [0.0; STATES];
-        rates[0] = 1.0 / inner;
-        rates[1] = r.force_rate * opening - r.oil_stiffness * s[3] - r.leakage_rate * s[1];
-        rates[2] = s[3];
-        rates[3] = a;
-        if let Some(own) = self.specimen {
-            rates[4] = s[5];
-            rates[5] = carried - a;
-            rates[6] = own.hysteretic_rate(s[5], s[6]);
+        let mut rates = [0.0; N];
+        rates[0] = r.force_rate * opening - r.oil_stiffness * s[2] - r.leakage_rate * s[0];
+        rates[1] = s[2];
+        rates[2] = a;
+        if let Some(own) = &self.specimen
+            && N == STATES
+        {
+            rates[3] = s[4];
+            rates[4] = carried - a;
+            rates[5] = own.hysteretic_rate(s[4], s[5]);
         }
         rates
+    }
+
+    /// The state after a step of `h` s under the openings at its beginning, middle and end (classical
+    /// Runge-Kutta).
+    #[inline]
+    fn moved<const N: usize>(&self, x: &[f64; N], h: f64, openings: &[f64; 3]) -> [f64; N] {
+        let along = |k: &[f64; N], h: f64| -> [f64; N] { std::array::from_fn(|i| x[i] + h * k[i]) };
+        let k1 = self.rates(x, openings[0]);
+        let k2 = self.rates(&along(&k1, 0.5 * h), openings[1]);
+        let k3 = self.rates(&along(&k2, 0.5 * h), openings[1]);
+        let k4 = self.rates(&along(&k3, h), openings[2]);
+        std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]))
     }
 
     /// What the sensors show now. Call it once a sample, before [`Self::step`].
@@ -156,7 +195,7 @@ impl Simulation {
         let part = (self.rig.accelerometer_delay / self.period).clamp(0.0, 1.0);
         let late = |now: f64, before: f64| now + part * (before - now);
         let shown = Shown {
-            displacement: self.state[2],
+            displacement: self.state[1],
             acceleration: self.rig.accelerometer_scale * late(a, self.before[0]),
             actuator_force: force,
             specimen_acceleration: self.rig.accelerometer_scale * late(carried, self.before[1]),
@@ -204,12 +243,16 @@ impl Simulation {
                 // The seals are stiff: they move on by themselves, half a step to either
                 // side (Strang).
                 let half = 0.5 * piece.inner;
-                self.seal = self.shape.advance(self.seal, self.state[3], half);
-                self.state[0] = 0.0;
-                self.state = runge_kutta_4(&self.state, piece.inner, |s| {
-                    self.rates(s, piece.inner, &openings)
-                });
-                self.seal = self.shape.advance(self.seal, self.state[3], half);
+                self.advance_seal(half);
+                if self.specimen.is_some() {
+                    self.state = self.moved(&self.state, piece.inner, &openings);
+                } else {
+                    let [force, way, velocity, ..] = self.state;
+                    let bare = [force, way, velocity];
+                    let bare: [f64; BARE] = self.moved(&bare, piece.inner, &openings);
+                    self.state[..BARE].copy_from_slice(&bare);
+                }
+                self.advance_seal(half);
             }
         }
     }
