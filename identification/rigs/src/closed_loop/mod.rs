@@ -41,6 +41,8 @@ pub struct Settings {
     pub band: (f64, f64),
     /// Whether a dry friction of the seals is looked for.
     pub friction: bool,
+    /// Whether the recorded command is replayed for the friction and the valve; otherwise the equations say all.
+    pub replay: bool,
 }
 
 impl Default for Settings {
@@ -48,6 +50,7 @@ impl Default for Settings {
         Self {
             band: (0.05, 35.0),
             friction: true,
+            replay: true,
         }
     }
 }
@@ -262,7 +265,7 @@ pub fn identify(
     let fit = fitting.with_friction(first);
     let equations = fit.equations.clone();
     let mut found = fitting.found(fit);
-    if settings.friction {
+    if settings.friction && settings.replay {
         let lapped = fitting.lapped(&equations, &found.rig);
         if let (Err(_), Some((rig, _))) = (refuse_nonsense(&found.rig), lapped.first()) {
             // Lost flow was taken for soft oil: there is a rig only if its valve is found.

@@ -52,6 +52,10 @@ impl HydraulicIdentification {
         let rest: Vec<Recording> = rest.collect();
         let found = closed_loop::identify(&fitted, settings)?;
         if !found.holds() && recordings.len() > 1 {
+            let settings = Settings {
+                replay: false,
+                ..settings
+            };
             let alone = |r: &Recording| closed_loop::identify(std::slice::from_ref(r), settings);
             if fitted.iter().all(|r| alone(r).is_ok_and(|own| own.holds())) {
                 return Err(IdentificationError::Unstable {
