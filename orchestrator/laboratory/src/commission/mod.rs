@@ -3,6 +3,7 @@
 //! recordings alone.
 
 mod experiment;
+mod missed;
 pub mod motions;
 mod page;
 mod rig_model;
@@ -20,6 +21,7 @@ use identification::data::{Channel, Recording};
 use serde::Serialize;
 
 use self::experiment::{Bench, Played};
+use self::missed::Missed;
 
 use self::motions::{Sines, motion, triangle};
 use crate::design::model::{self, ModelDesign};
@@ -288,9 +290,9 @@ pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned
         if let Form::Hydraulic(own) = &identified.form {
             tell("predicting the tracking error");
             let rules = Rules::new(model);
-            let missed = validation_percent.unwrap_or(0.0);
+            let missed = Missed::of(&predictions);
             for name in names(&design) {
-                match rig_model::predicted(request, &own.found, missed, &rules, name) {
+                match rig_model::predicted(request, &own.found, &missed, &rules, name) {
                     Ok(found) => {
                         predicted_percent.insert(name.to_string(), found);
                     }

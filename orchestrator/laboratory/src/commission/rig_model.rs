@@ -11,6 +11,7 @@ use plant::identified::valve_curve::ValveCurve;
 use plant::servo_hydraulic::ServoHydraulicTable;
 
 use super::Request;
+use super::missed::Missed;
 use crate::error::Error;
 use crate::run::experiment::{self, prepare_file};
 use crate::systems::built_in;
@@ -83,15 +84,14 @@ fn parameters(
 }
 
 /// `time_domain_percent` of `controller` on the identified rig; none where it is stopped. What the model misses on
-/// other motions, `missed_percent` of their acceleration (RMS), is missed on this one, too, and independent of the
-/// rest.
+/// other motions is `missed` on this one, too, and independent of the rest.
 ///
 /// # Errors
 /// A motion at fault.
 pub(super) fn predicted(
     request: &Request,
     found: &Found,
-    missed_percent: f64,
+    missed: &Missed,
     rules: &Rules,
     controller: &str,
 ) -> Result<Option<f64>, Error> {
@@ -138,21 +138,22 @@ pub(super) fn predicted(
     let error = histories.and_then(|(x, a)| {
         let tracking = metrics::tracking(&prepared.motion, &x, &a).ok()?;
         let wanted = &prepared.motion.acceleration;
-        let missed = missed_percent * rms_over_peak(&wanted[..a.len().min(wanted.len())]);
-        Some(tracking.time_domain_percent.hypot(missed))
+        let (rms, peak) = rms_and_peak(&wanted[..a.len().min(wanted.len())]);
+        let missed = if peak > 0.0 {
+            missed.at(rms) / peak
+        } else {
+            0.0
+        };
+        Some(tracking.time_domain_percent.hypot(100.0 * missed))
     });
     Ok(error)
 }
 
-/// Root mean square over the peak; zero at rest.
-fn rms_over_peak(values: &[f64]) -> f64 {
+/// Root mean square, and peak.
+fn rms_and_peak(values: &[f64]) -> (f64, f64) {
     let square = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
     let peak = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    if peak > 0.0 {
-        square.sqrt() / peak
-    } else {
-        0.0
-    }
+    (square.sqrt(), peak)
 }
 
 fn replace(file: &mut SystemFile, found: &Found, sensor_delay: f64) {
@@ -192,8 +193,9 @@ mod tests {
         let sine: Vec<f64> = (0..1000)
             .map(|k| 3.0 * (TAU * 0.01 * f64::from(k)).sin())
             .collect();
-        assert!((rms_over_peak(&sine) - 0.5_f64.sqrt()).abs() < 1e-3);
-        assert_eq!(rms_over_peak(&[0.0; 4]), 0.0);
+        let (rms, peak) = rms_and_peak(&sine);
+        assert!((rms / peak - 0.5_f64.sqrt()).abs() < 1e-3);
+        assert_eq!(rms_and_peak(&[0.0; 4]), (0.0, 0.0));
     }
 
     /// What recordings say of the physical rig leads back to the numbers of its valve, oil and seals.
