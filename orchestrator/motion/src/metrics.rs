@@ -16,6 +16,8 @@ use crate::{Motion, peak};
 
 /// Highest frequency of the frequency-domain error, Hz.
 pub const HIGHEST_FREQUENCY: f64 = 25.0;
+/// Longest rest after a motion that belongs to it, s.
+pub const LONGEST_REST: f64 = 1.0;
 /// Largest delay that is looked for, s.
 const LONGEST_DELAY: f64 = 0.5;
 
@@ -34,11 +36,17 @@ pub enum MetricsError {
         /// Samples of the reference.
         reference: usize,
     },
-    /// Fewer than two samples.
-    #[error("fewer than two samples")]
-    TooShort,
+    /// Less than a period of the highest frequency that is compared.
+    #[error(
+        "a motion of {samples} samples is shorter than a period of {HIGHEST_FREQUENCY} Hz; play at least {} s",
+        1.0 / HIGHEST_FREQUENCY
+    )]
+    TooShort {
+        /// Samples of both histories.
+        samples: usize,
+    },
     /// The reference does not move.
-    #[error("the reference does not move")]
+    #[error("the reference has no acceleration or no displacement")]
     AtRest,
     /// The table's motion is not finite.
     #[error("the table's motion is not finite at sample {0}")]
@@ -85,7 +93,8 @@ fn nan_if_null<'de, D: serde::Deserializer<'de>>(json: D) -> Result<f64, D::Erro
 }
 
 /// Compares the table's motion with the reference, sample by sample. Where less than the motion was
-/// played, errors are relative to the peaks of what was.
+/// played, errors are relative to the peaks of what was. A rest of more than [`LONGEST_REST`] after the motion
+/// is in the peaks, but not in the means, which would fall with every second of waiting.
 ///
 /// # Errors
 /// Histories that do not fit together, a reference at rest, a table motion that is not finite.
@@ -117,8 +126,8 @@ pub fn errors(
             reference: reference.len(),
         });
     }
-    if samples < 2 {
-        return Err(MetricsError::TooShort);
+    if samples < 2 || samples as f64 * reference.dt * HIGHEST_FREQUENCY < 1.0 {
+        return Err(MetricsError::TooShort { samples });
     }
     let infinite = |n: &usize| !(displacement[*n].is_finite() && acceleration[*n].is_finite());
     if let Some(n) = (0..samples).find(infinite) {
@@ -132,11 +141,12 @@ pub fn errors(
     }
     let x_error = difference(x_ref, displacement);
     let a_error = difference(a_ref, acceleration);
+    let moving = moving(x_ref, a_ref, reference.dt);
+    let amplitudes = amplitude_error(&a_ref[..moving], &acceleration[..moving], reference.dt);
     Ok(Tracking {
-        time_domain_percent: 100.0 * rms(&a_error) / a_peak,
-        frequency_domain_percent: 100.0 * amplitude_error(a_ref, acceleration, reference.dt)
-            / a_peak,
-        displacement_percent: 100.0 * rms(&x_error) / x_peak,
+        time_domain_percent: 100.0 * rms(&a_error[..moving]) / a_peak,
+        frequency_domain_percent: 100.0 * amplitudes / a_peak,
+        displacement_percent: 100.0 * rms(&x_error[..moving]) / x_peak,
         peak_displacement: peak(displacement),
         peak_displacement_error: peak(&x_error),
         peak_acceleration: peak(acceleration),
@@ -145,6 +155,18 @@ pub fn errors(
         delay: delay(a_ref, acceleration, reference.dt),
         laboratory: None,
     })
+}
+
+/// Samples of a reference until it rests for good, at least [`LONGEST_REST`]; all if it rests for less than that.
+fn moving(displacement: &[f64], acceleration: &[f64], dt: f64) -> usize {
+    let (samples, end) = (acceleration.len(), displacement.last());
+    let moves = |n: &usize| acceleration[*n] != 0.0 || Some(&displacement[*n]) != end;
+    let moving = (0..samples).rev().find(moves).map_or(0, |last| last + 1);
+    let rest = (LONGEST_REST / dt) as usize;
+    match samples - moving > rest {
+        true => moving.max(rest),
+        false => samples,
+    }
 }
 
 /// Amplitudes of a Fourier series: `|2 A_k / N|` at `k/(N dt)` for `0 < f <= highest`.
@@ -319,6 +341,39 @@ mod tests {
         }
     }
 
+    /// Constant velocity is not rest, and a pulse counts with what follows it.
+    #[test]
+    fn a_rest_begins_where_the_displacement_ends() {
+        let ends = |x: &[f64], a: &[f64]| moving(x, a, 0.01);
+        let ramp: Vec<f64> = (0..300).map(f64::from).collect();
+        let pulse = |at: u32| -> Vec<f64> { (0..300).map(|n| f64::from(n == at)).collect() };
+        assert_eq!(ends(&ramp, &pulse(1)), 300);
+        assert_eq!(ends(&[7.0; 300], &pulse(1)), 100);
+        assert_eq!(ends(&[7.0; 300], &pulse(150)), 151);
+        assert_eq!(ends(&[7.0; 300], &pulse(250)), 300);
+    }
+
+    /// Waiting after a motion does not make the table better.
+    #[test]
+    fn a_long_rest_after_the_motion_changes_no_error() {
+        let wave = |t: f64| (TAU * 3.0 * t).sin();
+        let ends = |t: f64| if t < 4.0 { wave(t) } else { 0.0 };
+        let [short, long] = [2000, 20_000].map(|samples| {
+            let reference = motion(samples, 0.002, ends);
+            let table = motion(samples, 0.002, |t| 0.8 * ends(t));
+            errors(&reference, &table.displacement, &table.acceleration).unwrap()
+        });
+        // The last sample of the wave is the first zero of the rest.
+        close(long.time_domain_percent, short.time_domain_percent, 0.01);
+        close(
+            long.frequency_domain_percent,
+            short.frequency_domain_percent,
+            0.01,
+        );
+        close(long.displacement_percent, short.displacement_percent, 0.01);
+        assert_eq!(long.peak_acceleration, short.peak_acceleration);
+    }
+
     #[test]
     fn a_perfect_table_has_no_error() {
         let reference = built_in(3, &Options::default()).unwrap();
@@ -354,7 +409,10 @@ mod tests {
             error(&a[..50], a),
             "50 samples of displacement, 100 of acceleration, 100 of the reference"
         );
-        assert_eq!(error(&a[..1], &a[..1]), "fewer than two samples");
+        assert_eq!(
+            error(&a[..1], &a[..1]),
+            "a motion of 1 samples is shorter than a period of 25 Hz; play at least 0.04 s"
+        );
         let mut broken = a.clone();
         broken[7] = f64::NAN;
         assert_eq!(

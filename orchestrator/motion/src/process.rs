@@ -118,7 +118,8 @@ impl Unscaled {
             across: None,
         };
         motion.notes.push(format!(
-            "scaled by {factor:.4} ({}): peak {:.3} g, {:.2} in/s ({:.1} mm/s), {:.3} in ({:.2} mm)",
+            "scaled by {} ({}): peak {:.3} g, {:.2} in/s ({:.1} mm/s), {:.3} in ({:.2} mm)",
+            shown(factor),
             words,
             motion.peak_acceleration() / STANDARD_GRAVITY,
             peak(&motion.velocity) / INCH,
@@ -370,6 +371,14 @@ impl Scaling {
             }
             Scaling::PeakDisplacement(d) => format!("to a peak of {} in", rounded(d / INCH)),
         }
+    }
+}
+
+/// A factor with four decimals, and a small one with four digits.
+fn shown(factor: f64) -> String {
+    match factor < 0.001 {
+        true => format!("{factor:.3e}"),
+        false => format!("{factor:.4}"),
     }
 }
 

@@ -21,6 +21,7 @@ use fmi_system::{
     assemble,
 };
 use motion::Motion;
+use motion::metrics::LONGEST_REST;
 use pack::library::FmuLibrary;
 use pack::program;
 use pages::live::Run as Shown;
@@ -278,7 +279,13 @@ pub fn prepare_shared(
             samples += 1;
         } else if samples > motion.len() {
             let ends = motion.len() as f64 * motion.dt;
-            let note = format!("the motion ends at {ends:.3} s; afterwards the table rests");
+            let long = samples as f64 * motion.dt - ends > LONGEST_REST;
+            let means = if long {
+                ", which is not in the means of errors"
+            } else {
+                ""
+            };
+            let note = format!("the motion ends at {ends:.3} s; afterwards the table rests{means}");
             motion.rest_until(samples);
             motion.notes.push(note.clone());
             system.notes.push(note);

@@ -4,7 +4,7 @@ use super::axes::{self, Axis};
 use super::summary::{Summary, asked};
 use fmi_master::Record;
 use motion::metrics::Tracking;
-use motion::metrics::laboratory::Laboratory;
+use motion::metrics::laboratory::{LEAST_COHERENCE, Laboratory};
 use motion::{Motion, peak};
 use pages::report::columns::aligned;
 use pages::report::number::significant;
@@ -244,7 +244,10 @@ fn bands(own: &Laboratory) -> Vec<Vec<String>> {
             match own.coherence.as_ref().and_then(|bands| bands.get(n)) {
                 Some(band) => [
                     format!("{:.4}", band.gain),
-                    milliseconds(band.delay_s, 2),
+                    match band.coherence >= LEAST_COHERENCE {
+                        true => milliseconds(band.delay_s, 2),
+                        false => "-".to_string(),
+                    },
                     format!("{:.4}", band.coherence),
                 ],
                 None => ["-", "-", "-"].map(str::to_string),

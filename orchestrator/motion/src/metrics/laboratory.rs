@@ -13,6 +13,8 @@ pub const BANDS: [[f64; 2]; 5] = [[0.5, 1.0], [1.0, 2.0], [2.0, 4.0], [4.0, 8.0]
 /// Bands above them in which response spectra are compared, Hz. The transfer function is not: the motions have
 /// no power there.
 pub const HIGH_BANDS: [[f64; 2]; 2] = [[15.0, 30.0], [30.0, 50.0]];
+/// Least coherence at which the phase of a band is a delay: below it, noise or a resonance sets the phase.
+pub const LEAST_COHERENCE: f64 = 0.9;
 /// Oscillators an octave at least.
 const PER_OCTAVE: f64 = 24.0;
 /// Oscillators between the two neighbours of the one that is farthest off.

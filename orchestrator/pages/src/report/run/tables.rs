@@ -3,11 +3,8 @@
 use super::Run;
 use crate::report::{Cell, Table, Units};
 use motion::metrics::Tracking;
-use motion::metrics::laboratory::Laboratory;
+use motion::metrics::laboratory::{LEAST_COHERENCE, Laboratory};
 use motion::peak;
-
-/// Coherence below which the phase of a band is not a delay.
-const LEAST_COHERENCE: f64 = 0.9;
 
 /// Peaks and errors, over what was played.
 pub(super) fn tracking(run: &Run, tracking: &Tracking) -> Table {
