@@ -25,8 +25,10 @@ pub enum Interpolation {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Point {
     /// Frequency, Hz.
+    #[serde(rename = "frequency_hz")]
     pub frequency: f64,
     /// Required acceleration, g.
+    #[serde(rename = "level_g")]
     pub level: f64,
     /// How it goes on to the next point.
     pub next: Interpolation,

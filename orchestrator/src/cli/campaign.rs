@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long, conflicts_with_all = ["shard", "rows"])]
     plan: bool,
     /// Run the runs A to B - 1 and print them as journal entries
-    #[arg(long, value_name = "A-B", value_parser = range, conflicts_with = "shard")]
+    #[arg(long, value_name = "A-B", value_parser = range, conflicts_with_all = ["shard", "json"])]
     rows: Option<std::ops::Range<u64>>,
     /// Print one JSON object
     #[arg(long)]
@@ -116,7 +116,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
     }
     if arguments.json {
-        println!("{}", serde_json::json!(summary));
+        super::print_json(serde_json::json!(summary), &folder);
     } else {
         println!(
             "{} runs: {} complete, {} stopped by the interlock, {} failed{}; {:.1} s",

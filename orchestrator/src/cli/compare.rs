@@ -124,6 +124,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         .iter()
         .partition(|what| Path::new(what).is_dir());
     let folders: Vec<PathBuf> = folders.iter().map(PathBuf::from).collect();
+    for (option, files) in [("compare", &folders), ("--records", &arguments.records)] {
+        if let Some(path) = super::settings::twice(files) {
+            return Err(Error::Option {
+                option,
+                reason: format!("{}: is given twice; expected it once", path.display()),
+            });
+        }
+    }
     for folder in folders.iter().filter_map(|folder| folder.to_str()) {
         if built_in::check(folder).is_ok() {
             note!("note: `{folder}` is a folder here; --controllers {folder} runs the system");
@@ -131,7 +139,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     let mut systems = Vec::new();
     for name in named.into_iter().chain(&arguments.controllers) {
-        systems.push(system(name.trim())?);
+        let name = system(name.trim())?;
+        if systems.contains(&name) {
+            return Err(Error::Option {
+                option: "compare",
+                reason: format!("system `{name}` is given twice; expected it once"),
+            });
+        }
+        systems.push(name);
     }
     if let (Some(file), true) = (
         systems.first(),
@@ -204,9 +219,10 @@ fn systems_on_motions(arguments: &Arguments, systems: Vec<String>) -> Result<Exi
     bar.finish_and_clear();
     let found = found?;
 
-    let files = comparison::write(&found, &arguments.out("comparison"))?;
+    let folder = arguments.out("comparison");
+    let files = comparison::write(&found, &folder)?;
     if arguments.json {
-        println!("{}", serde_json::json!(found));
+        super::print_json(serde_json::json!(found), &folder);
     } else {
         println!("plant {}, specimen {}\n", found.plant, found.specimen);
         for table in comparison::tables(&found) {
@@ -307,7 +323,7 @@ fn report_runs(
 ) -> Result<ExitCode, Error> {
     let files = comparison.write(folder)?;
     if arguments.json {
-        println!("{}", serde_json::json!(comparison));
+        super::print_json(serde_json::json!(comparison), folder);
         return Ok(ExitCode::SUCCESS);
     }
     println!("{}", aligned(&comparison.figures()));

@@ -94,7 +94,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.json {
         let mut json = serde_json::json!(design);
         json["report"] = report.display().to_string().into();
-        println!("{json}");
+        super::print_json(json, &folder);
         return Ok(ExitCode::SUCCESS);
     }
     print!("{}", aligned(&design::table(&design.loops)));
@@ -136,7 +136,7 @@ fn on_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
     if arguments.json {
         let mut json = serde_json::json!(design);
         json["report"] = report.display().to_string().into();
-        println!("{json}");
+        super::print_json(json, &folder);
         return Ok(ExitCode::SUCCESS);
     }
     for warning in &design.warnings {

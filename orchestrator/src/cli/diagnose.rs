@@ -113,7 +113,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 None => template(kind)?,
             },
         };
-        print!("{text}");
+        match arguments.json {
+            true => println!("{}", serde_json::json!({"kind": kind, "template": text})),
+            false => print!("{text}"),
+        }
         return Ok(ExitCode::SUCCESS);
     }
     for files in [&arguments.cases, &arguments.data] {
@@ -226,7 +229,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     bar.finish_and_clear();
     let report = report?;
     if arguments.json {
-        println!("{}", serde_json::json!(report));
+        super::print_json(serde_json::json!(report), &folder);
     } else {
         print!("{}", text::text(&report));
         println!("\nwritten ({:.1} s):", report.wall_s);

@@ -164,6 +164,14 @@ fn fmu(fmu: &Fmu) -> Content {
             "depends_on": v.dependencies.iter().map(|&on| &d.variables[on].name).collect::<Vec<_>>(),
         })
     });
+    let terminals = d.terminals.iter().map(|terminal| {
+        let members = terminal.members.iter();
+        json!({
+            "name": terminal.name,
+            "kind": terminal.kind,
+            "members": members.map(|own| json!({"name": own.name, "variable": own.variable})).collect::<Vec<_>>(),
+        })
+    });
     let json = json!({
         "kind": "fmu",
         "name": d.model_name,
@@ -178,6 +186,7 @@ fn fmu(fmu: &Fmu) -> Content {
         "preferred_step_s": d.preferred_step,
         "sha256": fmu.sha256,
         "variables": variables.collect::<Vec<_>>(),
+        "terminals": terminals.collect::<Vec<_>>(),
         "remarks": d.remarks,
     });
     (text, json)
@@ -202,8 +211,14 @@ fn system(file: &SystemFile) -> Result<Content, Error> {
         .map(|link| vec![format!("  {}", link.from), format!("-> {}", link.to)]);
     text += &last_left(rows.collect());
     text += "\norder of calls at a sample\n";
-    for (number, operation) in system.schedule(true)?.operations.iter().enumerate() {
-        text += &format!("  {}. {}\n", number + 1, words(&system, operation));
+    let schedule = system.schedule(true)?;
+    let order: Vec<String> = schedule
+        .operations
+        .iter()
+        .map(|own| words(&system, own))
+        .collect();
+    for (number, operation) in order.iter().enumerate() {
+        text += &format!("  {}. {operation}\n", number + 1);
     }
     text += "  then the continuous components step\n";
     let components = system.components.iter().map(|component| {
@@ -222,6 +237,7 @@ fn system(file: &SystemFile) -> Result<Content, Error> {
         "description": system.description,
         "components": components.collect::<Vec<_>>(),
         "connections": connections.collect::<Vec<_>>(),
+        "order_of_calls": order,
         "notes": system.notes,
     });
     Ok((text, json))

@@ -143,7 +143,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     });
     let files = iteration::write(&plan, &found, &folder)?;
     if arguments.json {
-        println!("{}", serde_json::json!(found));
+        super::print_json(serde_json::json!(found), &folder);
     } else {
         print!("{}", text(&found));
         println!();
@@ -194,7 +194,7 @@ fn replayed(arguments: &Arguments) -> Result<ExitCode, Error> {
     });
     let files = replay::write(&found, &folder)?;
     if arguments.json {
-        println!("{}", serde_json::json!(found));
+        super::print_json(serde_json::json!(found), &folder);
     } else {
         print!("{}", text_of_rounds(&found));
         println!();
@@ -243,7 +243,7 @@ fn on_model(arguments: &Arguments, case: &str, model: &Path) -> Result<ExitCode,
     });
     let files = circle::write(&found, &folder)?;
     if arguments.json {
-        println!("{}", serde_json::json!(found));
+        super::print_json(serde_json::json!(found), &folder);
     } else {
         print!("{}", text_on_model(&found));
         println!();
@@ -287,7 +287,7 @@ fn on_rig(arguments: &Arguments, model: &Path) -> Result<ExitCode, Error> {
     });
     let files = on_rig::write(&plan, &found, &folder)?;
     if arguments.json {
-        println!("{}", serde_json::json!(on_rig::figures(&plan, &found)));
+        super::print_json(serde_json::json!(on_rig::figures(&plan, &found)), &folder);
     } else {
         print!("{}", text_on_rig(&found));
         println!();

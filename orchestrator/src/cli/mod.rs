@@ -52,7 +52,7 @@ pub mod tune;
 pub mod validate;
 mod watch;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
@@ -217,6 +217,12 @@ fn program() -> clap::Command {
     Cli::command().help_template(format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{groups}Options:\n{{options}}{{after-help}}"
     ))
+}
+
+/// Prints one JSON object, with the folder of the files that were written.
+fn print_json(mut json: serde_json::Value, folder: &Path) {
+    json["folder"] = folder.display().to_string().into();
+    println!("{json}");
 }
 
 /// Prints where files were written.

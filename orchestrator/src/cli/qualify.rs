@@ -103,7 +103,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         own.file = folder.join(&own.file);
     }
     if arguments.json {
-        println!("{}", serde_json::json!(found));
+        super::print_json(serde_json::json!(found), &folder);
     } else {
         print!("{}", text(&found));
         println!();

@@ -288,7 +288,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         eprintln!("warning: {line}");
     }
     if arguments.json {
-        println!("{}", serde_json::json!(summary));
+        super::print_json(serde_json::json!(summary), &folder);
     } else {
         print!("{}", text(&summary, &outcome.record, motion));
         println!();

@@ -53,7 +53,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let tuned = tuned?;
     let files = tuned.write(&folder)?;
     if arguments.json {
-        println!("{}", serde_json::json!(tuned));
+        super::print_json(serde_json::json!(tuned), &folder);
     } else {
         println!("{}\n", tuned.sentence());
         println!("{}", aligned(&tuned.gains()));

@@ -53,7 +53,7 @@ fn json_is_one_object_with_the_fields_of_the_contract() {
     let arguments = [&arguments[..], &["5 s", "--out", "out", "--json"]].concat();
     let output = shakebench(folder.path(), &arguments);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let run: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let mut run: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert_eq!(run["system"], "displacement-pid");
     assert_eq!(run["motion"]["name"], "synthetic-1");
     for field in ["duration_s", "pga_g", "peak_displacement_m"] {
@@ -74,6 +74,11 @@ fn json_is_one_object_with_the_fields_of_the_contract() {
     ] {
         assert!(run["tracking"][field].as_f64().unwrap() > 0.0, "{field}");
     }
+    // Where the files are is not a figure of the run.
+    assert_eq!(
+        run.as_object_mut().unwrap().remove("folder").unwrap(),
+        "out"
+    );
     let summary = fs::read_to_string(folder.path().join("out/summary.json")).unwrap();
     assert_eq!(
         serde_json::from_str::<serde_json::Value>(&summary).unwrap(),

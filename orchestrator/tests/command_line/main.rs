@@ -18,6 +18,7 @@ mod figures;
 mod hostile;
 mod installation;
 mod iteration;
+mod json;
 mod loops;
 mod motions;
 mod opensees;
