@@ -2,7 +2,9 @@
 //!
 //! The drive is a polygon through evenly spaced knots. Their values minimise the squared error of the
 //! simulated output (Levenberg-Marquardt, derivatives by differences of simulations), so that friction,
-//! play and saturation of the model count. Knots at the rail that would go beyond it are left there.
+//! play and saturation of the model count. Knots at the rail that would go beyond it are left there. Of a rig
+//! on a voltage, whose friction hides every derivative at rest, the search begins from knots that were chosen
+//! one after another.
 
 use std::path::Path;
 
@@ -21,8 +23,12 @@ const MOST_KNOTS: usize = 1200;
 const RESIDUALS: f64 = 20.0;
 /// Steps of a knot for a derivative, over the drive's reach: the first ones overcome friction at rest.
 const STEPS: [f64; 4] = [0.5, 0.25, 0.1, 0.05];
-/// Sizes of the first drive of a rig on a voltage, over the drive's reach.
-const STARTS: [f64; 8] = [0.1, 0.2, 0.4, 0.8, -0.1, -0.2, -0.4, -0.8];
+/// Knots that a knot looks ahead to in the first drive of a rig on a voltage, each tried: a rig that answers
+/// late needs more.
+const AHEAD: [f64; 3] = [1.0, 2.0, 4.0];
+/// Values of a knot that are tried to either side, and halvings of their distance after that.
+const VALUES: i32 = 4;
+const HALVINGS: usize = 4;
 /// Damping of the first step over the mean of the squared derivatives, and what changes it.
 const DAMPING: f64 = 1e-3;
 const MORE: f64 = 10.0;
@@ -189,6 +195,11 @@ impl Problem<'_> {
     }
 
     fn output(&self, drive: &[f64]) -> Result<Vec<f64>, DescriptionError> {
+        self.output_until(drive, self.motion.len())
+    }
+
+    /// The first `samples` of the output.
+    fn output_until(&self, drive: &[f64], samples: usize) -> Result<Vec<f64>, DescriptionError> {
         let driven = self
             .rest
             .with_input(self.input, drive.to_vec(), self.rig.inputs());
@@ -199,12 +210,51 @@ impl Problem<'_> {
         let (measured, point) = self
             .model
             .measured(&measurement, &self.model.nominal, true)?;
-        let out = measured.simulate(&point, 0);
+        let out = measured.simulate_to(&point, 0, samples);
         if out.iter().all(|y| y.is_finite()) {
             return Ok(out);
         }
         let what = "the simulation is not finite under a drive; pass a smaller --command-limit";
         Err(self.model.wrong(what.to_owned()))
+    }
+
+    /// Knots that are chosen one after another, each so that the motion is met best until `ahead` knots on if
+    /// the drive stays there.
+    fn one_after_another(&self, ahead: f64) -> Result<Vec<f64>, DescriptionError> {
+        let mut knots = vec![0.0; self.knots()];
+        for i in 0..knots.len() {
+            let place = |knot: f64| (knot.max(0.0) * self.spacing) as usize;
+            let from = place(i as f64 - 1.0);
+            let until = (place(i as f64 + ahead) + 1).min(self.motion.len());
+            let mut error = |value: f64| {
+                knots[i..].fill(value);
+                let out = self.output_until(&self.polygon(&knots), until)?;
+                let pairs = self.motion[from..until].iter().zip(&out[from..]);
+                Ok::<f64, DescriptionError>(pairs.map(|(wanted, y)| (wanted - y).powi(2)).sum())
+            };
+            let mut distance = self.reach / f64::from(VALUES);
+            let mut best = (f64::INFINITY, 0.0);
+            let mut try_at = |value: f64, best: &mut (f64, f64)| {
+                let value = value.clamp(-self.limit, self.limit);
+                let own = error(value)?;
+                if own < best.0 {
+                    *best = (own, value);
+                }
+                Ok::<(), DescriptionError>(())
+            };
+            for step in -VALUES..=VALUES {
+                try_at(f64::from(step) * distance, &mut best)?;
+            }
+            for _ in 0..HALVINGS {
+                distance *= 0.5;
+                let middle = best.1;
+                for value in [middle - distance, middle + distance] {
+                    try_at(value, &mut best)?;
+                }
+            }
+            knots[i..].fill(best.1);
+        }
+        Ok(knots)
     }
 
     /// What the model misses of the motion, at every residual.
@@ -265,24 +315,12 @@ impl Problem<'_> {
         };
         let mut missed = self.missed(&knots)?;
         if !follows {
-            // From rest no small change overcomes friction: begin from the motion or its rate, by size.
-            let rate = |i: usize| own(i + 1) - own(i.saturating_sub(1));
-            let shapes: [Vec<f64>; 2] = [
-                (0..count).map(own).collect(),
-                (0..count).map(rate).collect(),
-            ];
-            for shape in shapes {
-                let most = shape.iter().fold(0.0f64, |most, own| most.max(own.abs()));
-                for size in STARTS {
-                    let by = size * self.reach / most.max(f64::MIN_POSITIVE);
-                    let tried: Vec<f64> = shape
-                        .iter()
-                        .map(|own| (by * own).clamp(-self.limit, self.limit))
-                        .collect();
-                    let after = self.missed(&tried)?;
-                    if after.norm() < missed.norm() {
-                        (knots, missed) = (tried, after);
-                    }
+            // From rest no small change overcomes friction.
+            for ahead in AHEAD {
+                let tried = self.one_after_another(ahead)?;
+                let after = self.missed(&tried)?;
+                if after.norm() < missed.norm() {
+                    (knots, missed) = (tried, after);
                 }
             }
         }

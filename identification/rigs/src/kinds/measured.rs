@@ -238,7 +238,8 @@ impl<'a> Measured<'a> {
         )
     }
 
-    fn simulate_to(&self, point: &Point, recording: usize, samples: usize) -> Vec<f64> {
+    /// As [`Self::simulate`], the first `samples` only.
+    pub fn simulate_to(&self, point: &Point, recording: usize, samples: usize) -> Vec<f64> {
         let mut out = vec![0.0; samples];
         let values = self.values(point, recording);
         let recording = &self.measurement.recordings[recording];
