@@ -6,6 +6,9 @@ use super::named_value::NamedValue;
 
 /// Standard deviations of an interval of 95 %.
 const CLEAR: f64 = 1.96;
+/// Half of that interval over the value above which the data do not determine the value: an interval so wide is
+/// that of a singular fit, while a value near zero with an ordinary interval is an answer.
+const WIDE: f64 = 100.0;
 
 /// A nominal parameter such as a scale or an offset that is not what was stated, or a sensor that
 /// contradicts another one.
@@ -87,8 +90,38 @@ pub(super) fn effect_in_words(name: &str, values: &[NamedValue]) -> String {
     }
 }
 
+/// Whether the interval of a value is so wide that the data do not determine it.
+pub fn is_undetermined(value: f64, standard_error: f64) -> bool {
+    value != 0.0 && CLEAR * standard_error > WIDE * value.abs()
+}
+
+/// A sentence on the parameters of `effects` that the data do not determine, and on what to record.
+pub(super) fn undetermined(effects: &[(String, Vec<NamedValue>)]) -> Option<String> {
+    let all = effects.iter().flat_map(|(effect, values)| {
+        let wide = values
+            .iter()
+            .filter(|p| is_undetermined(p.value, p.standard_error));
+        wide.map(move |p| format!("`{effect}.{}`", p.name))
+    });
+    match &all.collect::<Vec<String>>()[..] {
+        [] => None,
+        [one] => Some(format!(
+            "these records do not determine {one}: record a larger motion, or other levels of the inputs"
+        )),
+        several => Some(format!(
+            "these records do not determine {} one by one, because one compensates for another: record more \
+             levels of the inputs and of the motion",
+            joined(several)
+        )),
+    }
+}
+
 /// A value with its 95 % interval, in a unit that laboratories use.
 fn measure(value: f64, standard_error: f64, unit: &str) -> String {
+    if is_undetermined(value, standard_error) {
+        let about = measure(value, f64::NAN, unit);
+        return format!("about {about}, not determined by these records");
+    }
     let (unit, factor) = match unit {
         "m" => ("mm", 1e3),
         "s" => ("ms", 1e3),
@@ -203,6 +236,24 @@ mod tests {
             effect_in_words("cubic_stiffness", &[stiffness]),
             "cubic stiffness ((2.998 ± 0.004)e7 N/m3)"
         );
+        let [force, growth] = [
+            found("force", 50.7, 1.8e7, "N"),
+            found("growth", 1.1, 4.7e5, "1/V"),
+        ];
+        assert_eq!(
+            effect_in_words("friction", std::slice::from_ref(&force)),
+            "friction (about 50.70 N, not determined by these records)"
+        );
+        let effects = [
+            ("friction".to_owned(), vec![force]),
+            ("by_command".to_owned(), vec![growth]),
+        ];
+        let note = undetermined(&effects).unwrap();
+        assert!(
+            note.contains("`friction.force` and `by_command.growth` one by one"),
+            "{note}"
+        );
+        assert_eq!(undetermined(&[]), None);
         let parts = ["a", "b", "c"].map(String::from);
         assert_eq!(joined(&parts), "a, b and c");
     }

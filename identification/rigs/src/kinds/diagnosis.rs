@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::cause::{Cause, effect_in_words, in_own_words, joined};
+use super::cause::{Cause, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
 use super::measured::Measured;
 use super::named_value::NamedValue;
@@ -383,7 +383,10 @@ impl RigDiagnosis {
     pub fn notes(&self) -> Vec<String> {
         let aside = self.set_aside.iter();
         let aside = aside.map(|one| format!("`{}` is not named: {}", one.effect, one.reason));
-        aside.chain(self.findings.iter().cloned()).collect()
+        aside
+            .chain(self.findings.iter().cloned())
+            .chain(undetermined(&self.confirmed.effects))
+            .collect()
     }
 
     /// What was found, in a sentence.

@@ -3,7 +3,7 @@
 use identification::diagnosis::engine::Verdict;
 use identification::diagnosis::rigs::foreign::KIND;
 use identification::diagnosis::rigs::shake_table::{laboratory_unit, with_error};
-use identification::diagnosis::rigs::{PartReport, RigDiagnosis};
+use identification::diagnosis::rigs::{PartReport, RigDiagnosis, is_undetermined};
 use identification::diagnosis::{
     DiagnosisReport, Evidence, GainReport, ParameterReport, ShakeTableEvidence,
 };
@@ -14,6 +14,9 @@ use pages::report::number::significant;
 
 fn in_unit(parameter: &ParameterReport, unit: &str) -> String {
     let (value, error) = (parameter.value, parameter.standard_error);
+    if is_undetermined(value, error) {
+        return format!("about {}", with_error(value, 0.0, &parameter.unit, unit));
+    }
     with_error(value, error, &parameter.unit, unit)
 }
 
@@ -31,6 +34,9 @@ fn interval(parameter: &ParameterReport, unit: &str) -> String {
     let Ok(factor) = units::convert(1.0, &parameter.unit, unit) else {
         return "-".into();
     };
+    if is_undetermined(parameter.value, parameter.standard_error) {
+        return "not determined".into();
+    }
     let half = 1.96 * parameter.standard_error;
     if !half.is_finite() {
         return "-".into();
