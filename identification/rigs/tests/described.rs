@@ -1,10 +1,92 @@
-//! Descriptions of axes that a voltage moves: the drive of an axis whose friction takes a fifth of its voltage.
+//! Descriptions of axes that a voltage moves: what a one-input model writes is read by the diagnosis, and the drive
+//! of an axis whose friction takes a fifth of its voltage.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::f64::consts::TAU;
 use std::fmt::Write;
+use std::path::Path;
 
-use rigs::kinds::{DriveSearch, ExtendedRig};
+use plant::sensors::channel::Noise;
+use recordings::{Channel, Named, Recording};
+use rigs::kinds::{Description, DriveSearch, ExtendedRig};
+use rigs::one_input::identify;
+
+const PERIOD: f64 = 0.005;
+const SAMPLES: usize = 4000;
+const STEPS: usize = 20;
+
+/// A voltage with power to some 8 Hz and the position (m) of `m x'' + c x' + k x = g u`, over `m`; without a mass
+/// where `c` stands alone, `c x' + k x = g u`. Noise of 2 um.
+fn axis(seed: u64, [mass, viscous, stiffness, gain]: [f64; 4], file: &Path) -> Recording {
+    let noise = |channel: u64, sample: usize| {
+        let sample = sample as u64;
+        Noise {
+            seed,
+            channel,
+            sample,
+        }
+        .gaussian()
+    };
+    let step = PERIOD / STEPS as f64;
+    let (mut u, mut x, mut v) = (0.0, 0.0, 0.0);
+    let [mut voltage, mut position] = [Vec::new(), Vec::new()];
+    let mut text = String::from("time [s],drive [V],position [m]\n");
+    for k in 0..SAMPLES {
+        u += 0.2 * (2.0 * noise(1, k) - u);
+        let shown = x + 2e-6 * noise(2, k);
+        writeln!(text, "{:.4},{u:.9},{shown:.9}", k as f64 * PERIOD).unwrap();
+        voltage.push(u);
+        position.push(shown);
+        for _ in 0..STEPS {
+            let force = gain * u - stiffness * x;
+            if mass > 0.0 {
+                v += step * (force - viscous * v) / mass;
+            } else {
+                v = force / viscous;
+            }
+            x += step * v;
+        }
+    }
+    std::fs::write(file, text).unwrap();
+    let channels = vec![
+        (Channel::ValveCommand, voltage),
+        (Channel::Displacement, position),
+    ];
+    Recording::new("axis", PERIOD, channels).unwrap()
+}
+
+#[test]
+fn every_one_input_model_of_a_voltage_is_a_description_that_the_diagnosis_reads() {
+    let natural = TAU * 3.0;
+    let on_a_spring = [1.0, 0.6 * natural, natural * natural, 0.5];
+    let without_mass = [0.0, 1.0, 12.0, 0.05];
+    for (name, rig) in [("spring", on_a_spring), ("lag", without_mass)] {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
+        let recording = axis(5, rig, &file("one.csv"));
+        axis(6, rig, &file("two.csv"));
+        let named = |channel, head: &str, unit: &str| Named {
+            channel,
+            head: head.into(),
+            unit: unit.into(),
+        };
+        let columns = [
+            named(Channel::Time, "time [s]", "s"),
+            named(Channel::ValveCommand, "drive [V]", "V"),
+            named(Channel::Displacement, "position [m]", "m"),
+        ];
+        let found = identify(&[recording], 0.75).unwrap();
+        let text = found.to_toml(name, &[file("one.csv")], &columns).unwrap();
+        std::fs::write(file("model.toml"), &text).unwrap();
+        let description = Description::read(&file("model.toml")).unwrap();
+        assert_eq!(description.rig().unwrap().kind(), "linear_axis");
+        let model = ExtendedRig::read(&file("model.toml")).unwrap();
+        let scored = model.validate(&[file("two.csv")]).unwrap();
+        println!("{name}: {:.2} %", scored[0].extended_percent);
+        assert!(scored[0].extended_percent < 5.0, "{name}: {text}");
+    }
+}
 
 #[test]
 fn a_drive_overcomes_friction_that_nothing_brings_back() {

@@ -72,6 +72,8 @@ pub struct Mechanics {
     pub offset: f64,
     /// G.
     pub force_gain: f64,
+    /// Of a spring about the position zero.
+    pub stiffness: f64,
 }
 
 /// The carriage while it moves.
@@ -141,6 +143,7 @@ impl<'a> Carriage<'a> {
             coulomb,
             offset,
             force_gain,
+            stiffness,
         } = self.mechanics;
         let Effects {
             asymmetric_friction: AsymmetricFriction { viscous_asymmetry },
@@ -189,7 +192,7 @@ impl<'a> Carriage<'a> {
             let until = ((from - to.ceil().max(0.0)) * STEPS as f64).clamp(0.0, 1.0);
             let wanted = force_gain * (until * older + (1.0 - until) * newer);
             self.force = keep * self.force + (1.0 - keep) * wanted;
-            let mut drive = self.force - offset;
+            let mut drive = self.force - offset - stiffness * self.position;
             let time = time + step as f64 * h;
             if !inside.has_no_force() {
                 inside.begin(h, time, self.position, self.speed);
@@ -317,6 +320,7 @@ mod tests {
             coulomb: 5.0,
             offset: 0.0,
             force_gain: 1.0,
+            stiffness: 0.0,
         };
         let mut carriage = Carriage::new(mechanics, &effects, 1e-3, (2.0, 0.1), &[]);
         for _ in 0..2000 {

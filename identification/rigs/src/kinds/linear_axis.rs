@@ -37,6 +37,8 @@ nominal_parameters! {
     offset: "N" = 0.0,
     /// G: motor force over voltage.
     force_gain: "N/V",
+    /// k: a spring that brings it back, such as flexures, about the position zero.
+    stiffness: "N/m" = 0.0,
 }
 
 session_parameters! {
@@ -83,6 +85,7 @@ impl Equations for LinearAxis {
             coulomb: nominal.coulomb_friction,
             offset: nominal.offset,
             force_gain: nominal.force_gain,
+            stiffness: nominal.stiffness,
         };
         let carriage = |at: usize, state: (f64, f64)| {
             let before = &voltage[..at];
@@ -166,6 +169,7 @@ mod tests {
             coulomb_friction: 0.0,
             offset: 0.0,
             force_gain: 30.0,
+            stiffness: 0.0,
         };
         let errors = |recording: &RigRecording, nominal: &Nominal| -> Vec<f64> {
             let mut out = vec![0.0; n];

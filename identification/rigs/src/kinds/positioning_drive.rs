@@ -105,6 +105,7 @@ impl Equations for PositioningDrive {
             coulomb,
             offset,
             force_gain,
+            stiffness: 0.0,
         };
         let mut carriage = Carriage::new(mechanics, effects, sample, first, &[]);
         carriage.middle = recording.middle;
@@ -282,6 +283,7 @@ mod tests {
             coulomb: NOMINAL.coulomb_friction,
             offset: NOMINAL.offset,
             force_gain: NOMINAL.force_gain,
+            stiffness: 0.0,
         };
         let mut carriage = Carriage::new(mechanics, &off, 1e-3, (0.0, 0.0), &[]);
         let position = voltage.iter().map(|u| {

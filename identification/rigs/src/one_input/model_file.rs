@@ -60,8 +60,8 @@ struct Errors {
 
 impl OneInput {
     /// The text of the model file. Of a rig whose data are in `data`, with these `columns`, it is a
-    /// description for the diagnosis as well, unless its input is a voltage and it does not integrate. The
-    /// description's nominal values are fitted to all data, so that it predicts as it stands.
+    /// description for the diagnosis as well. The description's nominal values are fitted to all data, so that
+    /// it predicts as it stands.
     ///
     /// # Errors
     /// Numbers that TOML cannot hold.
@@ -150,7 +150,7 @@ impl OneInput {
         let (kind, nominal) = if has_loop {
             ("closed_loop_actuator", BTreeMap::from(self.closed_loop()))
         } else {
-            ("linear_axis", BTreeMap::from(self.axis()?))
+            ("linear_axis", self.axis().unwrap_or_default())
         };
         Some(Description {
             name: name.into(),
@@ -198,35 +198,57 @@ impl OneInput {
     }
 
     /// Nominal values of an axis of mass one (voltage and position tell forces only against it): speed over
-    /// voltage, and the slowest pole beside the one at zero.
-    fn axis(&self) -> Option<[(&'static str, Quantity); 5]> {
-        if !self.structure.integrates {
-            return None;
-        }
-        let poles = self.model.poles().into_iter().map(|pole| pole.norm());
-        let viscous = poles
-            .filter(|own| *own > 1e-6)
-            .fold(f64::INFINITY, f64::min);
-        let low = 1e-3 * viscous;
-        let speed = self.model.response(low, self.period).norm() * low;
-        let gain = speed * viscous;
+    /// voltage and the slowest pole beside the one at zero, or the poles on a spring. None where the poles
+    /// are those of no axis.
+    fn axis(&self) -> Option<BTreeMap<&'static str, Quantity>> {
+        let (viscous, stiffness, gain) = if self.structure.integrates {
+            let poles = self.model.poles().into_iter().map(|pole| pole.norm());
+            let viscous = poles
+                .filter(|own| *own > 1e-6)
+                .fold(f64::INFINITY, f64::min);
+            let low = 1e-3 * viscous;
+            let speed = self.model.response(low, self.period).norm() * low;
+            (viscous, None, speed * viscous)
+        } else {
+            let gain = *self.model.numerator.last()?;
+            match self.model.denominator[..] {
+                [.., mass, viscous, stiffness] => {
+                    (viscous / mass, Some(stiffness / mass), gain / mass)
+                }
+                [viscous, stiffness] => {
+                    // The mass of a lag is one whose pole is faster than the samples show.
+                    let slow = stiffness / viscous;
+                    let fast = (10.0 * slow).max(1.0 / self.period);
+                    (fast + slow, Some(fast * slow), gain / viscous * fast)
+                }
+                _ => return None,
+            }
+        };
         let (_, speed_found) = self.sizes();
         let force = viscous * speed_found;
-        (gain.is_finite() && gain > 0.0).then(|| {
-            [
-                ("mass", quantity(1.0, 0.0, "kg")),
-                (vocabulary::FORCE_GAIN, quantity(gain, 0.5 * gain, "N/V")),
-                (
-                    "viscous_friction",
-                    quantity(viscous, 0.5 * viscous, "N s/m"),
-                ),
-                (
-                    vocabulary::COULOMB_FRICTION,
-                    quantity(0.05 * force, 0.05 * force, "N"),
-                ),
-                ("offset", quantity(0.0, 0.1 * force, "N")),
-            ]
-        })
+        let is_an_axis = |own: f64| own.is_finite() && own > 0.0;
+        if ![viscous, gain, stiffness.unwrap_or(1.0)]
+            .into_iter()
+            .all(is_an_axis)
+        {
+            return None;
+        }
+        let mut all = BTreeMap::from([
+            ("mass", quantity(1.0, 0.0, "kg")),
+            (vocabulary::FORCE_GAIN, quantity(gain, 0.5 * gain, "N/V")),
+            (
+                "viscous_friction",
+                quantity(viscous, 0.5 * viscous, "N s/m"),
+            ),
+            (
+                vocabulary::COULOMB_FRICTION,
+                quantity(0.05 * force, 0.05 * force, "N"),
+            ),
+            ("offset", quantity(0.0, 0.1 * force, "N")),
+        ]);
+        let spring = stiffness.map(|own| ("stiffness", quantity(own, 0.5 * own, "N/m")));
+        all.extend(spring);
+        Some(all)
     }
 }
 
@@ -234,6 +256,14 @@ impl Description {
     /// Puts the values that all data give into the nominal model; none, and as it was, where it cannot be
     /// fitted.
     fn fit(&mut self) -> Option<FittedNominal> {
+        if self.nominal.is_empty() {
+            let text = toml::to_string(&self).ok()?;
+            let bare = kinds::Description::parse(Path::new(&self.name), &text).ok()?;
+            let begun = kinds::guess::begun(&bare).ok()?.into_iter();
+            let begun = begun
+                .map(|(name, value, deviation, unit)| (name, quantity(value, deviation, unit)));
+            self.nominal.extend(begun);
+        }
         let text = toml::to_string(&self).ok()?;
         let own = kinds::Description::parse(Path::new(&self.name), &text).ok()?;
         let found = fit_nominal(&own).ok()??;

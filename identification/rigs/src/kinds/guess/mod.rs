@@ -318,7 +318,16 @@ struct Guessing<'a> {
 }
 
 /// A nominal parameter: name, value, one standard deviation, unit.
-type Start = (&'static str, f64, f64, &'static str);
+pub type Start = (&'static str, f64, f64, &'static str);
+
+/// Values of the nominal model of `description`, read from its data.
+///
+/// # Errors
+/// Data that cannot be read.
+pub fn begun(description: &Description) -> Result<Vec<Start>, DescriptionError> {
+    let measurement = description.measurement(&[])?;
+    Ok(nominal(description.rig()?, &measurement))
+}
 
 impl Guessing<'_> {
     fn text(&self, nominal: &[Start]) -> String {

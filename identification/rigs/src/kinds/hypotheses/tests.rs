@@ -190,7 +190,7 @@ value = "-c * v * abs(v)"
 sentence = "drag"
 parameters.c = { start = 100, range = [0, 1e4], unit = "N s2/m2" }
 "#;
-    let axis = [2.0, 30.0, 1.0, 0.0, 40.0];
+    let axis = [2.0, 30.0, 1.0, 0.0, 40.0, 0.0];
     let all = outputs(
         "linear_axis",
         &axis,
