@@ -169,30 +169,52 @@ fn bands(recording: &Recording, input: Channel) -> Result<Bands, IdentificationE
         // A command explains itself wholly, its noise too: there nothing is told of the rig.
         const STIRRED: f64 = 10.0;
         let noise = command_noise(&bands, command);
-        let count = bands.bands.len();
         bands.bands.retain(|band| {
             band.projected(0).norm_sqr() > STIRRED * noise * band.omega.len() as f64
         });
-        if bands.bands.len() < 4 {
-            return Err(IdentificationError::NoExcitation {
-                recording: recording.name.clone(),
-                what: format!(
-                    "`{}` exceeds its noise in {} of {count} bands between {:.2} and {:.0} Hz",
-                    input.name(),
-                    bands.bands.len(),
-                    BAND.0,
-                    BAND.1.min(highest)
-                ),
-            });
-        }
     }
     Ok(bands)
+}
+
+/// Bands of all recordings: one that stirs few of them may come with others.
+fn bands_of_all(
+    recordings: &[Recording],
+    input: Channel,
+) -> Result<Vec<Bands>, IdentificationError> {
+    const FEWEST: usize = 4;
+    let all: Vec<Bands> = recordings
+        .iter()
+        .map(|own| bands(own, input))
+        .collect::<Result<_, _>>()?;
+    let count: usize = all.iter().map(|own| own.bands.len()).sum();
+    if count < FEWEST {
+        let names: Vec<&str> = recordings.iter().map(|own| own.name.as_str()).collect();
+        return Err(IdentificationError::NoExcitation {
+            recording: names.join(", "),
+            what: format!(
+                "`{}` exceeds its noise in {count} bands between {:.2} and {:.0} Hz, and a transfer \
+                 function needs {FEWEST}; `shakebench diagnose` of the same files also fits a model of mass \
+                 and friction to a sine",
+                input.name(),
+                BAND.0,
+                BAND.1
+            ),
+        });
+    }
+    Ok(all)
 }
 
 /// Power of a line of the noise on a command that is its own instrument, in units of its scale: what
 /// its fastest changes may be, and no more than what the displacement does not follow in any band.
 fn command_noise(bands: &Bands, command: &[f64]) -> f64 {
-    let fastest = (noise_floor(command) / bands.scale[0]).powi(2);
+    // A command that is nearly as rough as it is large was sent so: that is no noise.
+    const ROUGH: f64 = 0.3;
+    let (_, size) = recordings::mean_and_deviation(command);
+    let floor = noise_floor(command);
+    if floor > ROUGH * size {
+        return 0.0;
+    }
+    let fastest = (floor / bands.scale[0]).powi(2);
     let own = bands.bands.iter().map(|band| {
         let lines = band.omega.len() as f64;
         let [power, followed] = [0, 1].map(|i| band.projected(i).norm_sqr() / lines);
@@ -266,7 +288,7 @@ fn identify_from(
     let of = |all: &[Recording]| -> Result<Vec<Bands>, IdentificationError> {
         all.iter().map(|own| bands(own, input)).collect()
     };
-    let experiments = of(&fitted)?;
+    let experiments = bands_of_all(&fitted, input)?;
     let mut own = all(&experiments, false);
     let may_integrate = input == Channel::ValveCommand;
     let mut chosen = choose(between, &own, may_integrate)?;
