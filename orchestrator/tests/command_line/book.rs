@@ -132,17 +132,24 @@ fn stands_in(expected: &str, printed: &str) -> Result<(), String> {
 }
 
 fn run_page(name: &str) {
-    run_page_with(name, None);
+    run_page_with(name, None, &[]);
+}
+
+/// The pages on measured rigs need their records.
+fn run_page_on_records(name: &str, records: &Path) {
+    let files = fs::read_dir(records).unwrap();
+    let files: Vec<PathBuf> = files.map(|file| file.unwrap().path()).collect();
+    run_page_with(name, None, &files);
 }
 
 /// The pages on OpenSees need it, and are skipped with a word on it without.
 fn run_page_on_opensees(name: &str) {
     if let Some(python) = super::opensees::python() {
-        run_page_with(name, Some(python));
+        run_page_with(name, Some(python), &[]);
     }
 }
 
-fn run_page_with(name: &str, python: Option<&Path>) {
+fn run_page_with(name: &str, python: Option<&Path>, files: &[PathBuf]) {
     let page = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../docs")
         .join(name);
@@ -153,6 +160,9 @@ fn run_page_with(name: &str, python: Option<&Path>) {
     let programs = program_folder(folder.path());
     let work = folder.path().join("work");
     fs::create_dir(&work).unwrap();
+    for file in files {
+        fs::copy(file, work.join(file.file_name().unwrap())).unwrap();
+    }
     let others = std::env::var_os("PATH").unwrap_or_default();
     let paths = std::iter::once(programs).chain(std::env::split_paths(&others));
     let paths = std::env::join_paths(paths).unwrap();
@@ -214,6 +224,16 @@ fn your_own_parts() {
 #[test]
 fn your_own_rig() {
     run_page("your-own-rig.md");
+}
+
+#[needs::shared("measured")]
+#[test]
+#[ignore = "half a minute of a core"]
+fn a_motor_driven_table() {
+    run_page_on_records(
+        "motor-table.md",
+        &super::ssp_of_others::shared().join("measured/motor_table"),
+    );
 }
 
 #[test]

@@ -179,7 +179,7 @@ impl Archives {
     }
 }
 
-fn shared() -> PathBuf {
+pub(super) fn shared() -> PathBuf {
     let folder = std::env::var_os("SHAKEBENCH_SHARED").map(PathBuf::from);
     folder.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"))
 }
