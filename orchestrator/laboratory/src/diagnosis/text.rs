@@ -15,7 +15,10 @@ use pages::report::number::significant;
 fn in_unit(parameter: &ParameterReport, unit: &str) -> String {
     let (value, error) = (parameter.value, parameter.standard_error);
     if is_undetermined(value, error) {
-        return format!("about {}", with_error(value, 0.0, &parameter.unit, unit));
+        let factor = units::convert(1.0, &parameter.unit, unit).unwrap_or(1.0);
+        let unit = if unit == "1" { "" } else { unit };
+        let text = format!("about {} {unit}", significant(factor * value, 3));
+        return text.trim_end().to_owned();
     }
     with_error(value, error, &parameter.unit, unit)
 }
@@ -329,7 +332,21 @@ pub fn text(report: &DiagnosisReport) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::change;
+    use super::{ParameterReport, change, in_unit, interval};
+
+    #[test]
+    fn a_value_that_is_not_determined_has_no_interval() {
+        let found = |value, standard_error, unit: &str| ParameterReport {
+            value,
+            unit: unit.into(),
+            standard_error,
+        };
+        let force = found(50.6981, 1.8e7, "N");
+        assert_eq!(in_unit(&force, "N"), "about 50.7 N");
+        assert_eq!(interval(&force, "N"), "not determined");
+        assert_eq!(in_unit(&found(0.25, 1e4, "1"), "1"), "about 0.250");
+        assert!(interval(&found(50.0, 3.0, "N"), "N").contains("to"));
+    }
 
     #[test]
     fn a_change_is_said_by_its_sign() {
