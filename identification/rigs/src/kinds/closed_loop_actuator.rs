@@ -1,9 +1,10 @@
 //! Servo-hydraulic actuator in a closed displacement loop: command to displacement.
 //!
 //! Nominal: `τ u' = g r(t - D) + o - u`, `e = u - x`, `z' = i e`, `c = e + z + f u' / K`,
-//! `T w' = K c - w`, `P² v'' + 2 d P v' + v = w`, `x' = v` (Merritt, Hydraulic Control Systems, 1967: a
+//! `T/2 q' = K c - q`, `T/2 w' = q - w`, `P² v'' + 2 d P v' + v = w`, `x' = v` (Merritt, Hydraulic Control Systems, 1967: a
 //! valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
-//! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. The command runs
+//! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. Two lags in a row
+//! are nearer to a spool, and to a coil before a mass, than one and a delay. The command runs
 //! evenly from sample to sample; the linear equations are solved exactly, and what is not linear by steps.
 //!
 //! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
@@ -42,7 +43,7 @@ nominal_parameters! {
     offset: "m" = 0.0,
     /// D: the command arrives late by this.
     command_delay: "s" = 0.0,
-    /// T: lag of what moves the table, inside the loop.
+    /// T: lag of what moves the table, inside the loop: of two in a row, half each.
     loop_lag: "s" = 0.0,
     /// f: share of the command's speed that the controller sends ahead.
     feedforward: "1" = 0.0,
@@ -67,19 +68,25 @@ effects! {
     /// Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
     dead_band: DeadBand {
         half_width: size("m", 3e-3, (0.0, 3.0)),
-    } from [[0.02], [0.15]], like ["reduced_null_gain"];
+    } from [[0.02], [0.15]], like ["reduced_null_gain", "friction"];
+    /// Friction of the table: beside the flow, `v + K b tanh(v / s)` (Armstrong-Hélouvry and others,
+    /// Automatica 30, 1994): with `s` at zero it moves beyond a position error of `b`.
+    friction: Friction {
+        breakaway_error: size("m", 3e-3, (0.0, 3.0)),
+        sliding_speed: shape("m/s", 0.02, 1.0),
+    } from [[0.02, 0.02], [0.1, 0.05]], like [vocabulary::DEAD_BAND, "reduced_null_gain"];
     /// Lands that overlap and leak, so that the flow gain is lower around null (higher where
     /// they underlap): x' = K (e - s w tanh(e / w)) (Merritt 1967, section 5-2).
     reduced_null_gain: ReducedNullGain {
         reduction: size("1", 0.05, (-1.0, 1.0)),
         width: shape("m", 0.1, 1.0),
-    } from [[0.4, 0.1], [-0.3, 0.1]], like [vocabulary::DEAD_BAND];
+    } from [[0.4, 0.1], [-0.3, 0.1]], like [vocabulary::DEAD_BAND, "friction"];
     /// Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
     /// of Hydraulic Servosystems, 1980).
     asymmetric_gain: AsymmetricGain {
         asymmetry: size("1", 0.01, (-0.8, 0.8)),
     } from [[0.03], [-0.03]];
-    /// Spool: T w' = K e - w, x' = w.
+    /// Spool: T/2 q' = K e - q, T/2 w' = q - w, x' = w.
     valve_lag: ValveLag {
         time_constant: size("s", 0.05, (0.0, 1.0)),
     } from [[0.1], [0.3]], like ["delay"];
@@ -120,11 +127,6 @@ impl Equations for ClosedLoopActuator {
     const SAID_BY: &'static [(&'static str, &'static str)] =
         &[("delay", "command_delay"), ("valve_lag", "loop_lag")];
     const CAUSES: &'static [&'static str] = &["command_delay", "scale", "offset"];
-    // Of a drive that is not known: a motor sticks as a valve with an overlap does.
-    const LOOKS_LIKE: &'static [[&'static str; 3]] = &[
-        [vocabulary::DEAD_BAND, "friction", "resonance"],
-        ["reduced_null_gain", "friction", "resonance"],
-    ];
 
     fn natural(nominal: &Nominal, channels: Natural) -> Natural {
         Natural {
@@ -187,6 +189,11 @@ impl Equations for ClosedLoopActuator {
             dead_band: DeadBand {
                 half_width: dead_band,
             },
+            friction:
+                Friction {
+                    breakaway_error,
+                    sliding_speed,
+                },
             reduced_null_gain: null,
             asymmetric_gain: AsymmetricGain { asymmetry },
             valve_lag: ValveLag {
@@ -214,6 +221,10 @@ impl Equations for ClosedLoopActuator {
             integral,
             resonance,
             resonance_damping,
+            rubs: breakaway_error > 0.0,
+        };
+        let rub = |free: f64, share: f64| {
+            rubbing(free, share * gain * breakaway_error, sliding_speed) / share
         };
         let fastest = if slowness > 0.0 {
             1.0 / slowness
@@ -223,7 +234,7 @@ impl Equations for ClosedLoopActuator {
         let has_effect =
             dead_band != 0.0 || null.reduction != 0.0 || asymmetry != 0.0 || compression != 0.0;
         let has_effect = has_effect || !inside.valves.is_empty();
-        let is_linear = !has_effect && fastest == f64::INFINITY;
+        let is_linear = !has_effect && fastest == f64::INFINITY && !form.rubs;
         // A step ends where the delayed command bends.
         let bend = delay - delay.floor();
         let parts = [(0.0, bend), (bend, 1.0)].into_iter();
@@ -265,7 +276,7 @@ impl Equations for ClosedLoopActuator {
             flow / (1.0 + compression * flow.abs()) - gain * sent
         };
         let start = scale * first + offset;
-        let mut state = [start, start, 0.0, 0.0, 0.0, 0.0];
+        let mut state = [start, start, 0.0, 0.0, 0.0, 0.0, 0.0];
         let mut shown = state[1];
         for (k, y) in out.iter_mut().enumerate() {
             let x = state[1];
@@ -280,7 +291,7 @@ impl Equations for ClosedLoopActuator {
                     let begin = k as f64 + from + part as f64 * step.length / sample;
                     now.set(begin * sample);
                     let ends = [at(begin), at(begin + step.length / sample)];
-                    state = step.advance(state, ends, (!is_linear).then_some(&beyond));
+                    state = step.advance(state, ends, (!is_linear).then_some(&beyond), &rub);
                 }
             }
         }
@@ -296,20 +307,57 @@ struct Loop {
     integral: f64,
     resonance: f64,
     resonance_damping: f64,
+    /// Whether there is friction.
+    rubs: bool,
 }
 
-/// Lagging command, displacement, flow, integral of the error, velocity and its rate times `P`.
-type State = [f64; 6];
+/// Lagging command, displacement, flow, integral of the error, velocity and its rate times `P`, flow behind
+/// half of its lag.
+type State = [f64; 7];
+const STATES: usize = 7;
+/// The states, the command, its slope, the flow beyond the linear one, its slope and the speed that friction
+/// takes.
+const ALL: usize = STATES + 5;
+
+/// The speed, times `share`, that friction takes over a step after which it would have been `free` without:
+/// implicit, so that sticking is no matter of the step's length.
+fn rubbing(free: f64, most: f64, sliding_speed: f64) -> f64 {
+    // v + most tanh(v / s) = free has one solution, which is between free less most and free.
+    let (mut low, mut high) = ((free.abs() - most).max(0.0), free.abs());
+    let mut v = low.max(high * sliding_speed / (sliding_speed + most));
+    for _ in 0..20 {
+        let t = (v / sliding_speed).tanh();
+        let off = v + most * t - free.abs();
+        if off > 0.0 {
+            high = v;
+        } else {
+            low = v;
+        }
+        let step = off / (1.0 + most / sliding_speed * (1.0 - t * t));
+        let next = v - step;
+        v = if (low..=high).contains(&next) {
+            next
+        } else {
+            0.5 * (low + high)
+        };
+        if step.abs() <= 1e-6 * sliding_speed {
+            break;
+        }
+    }
+    (v - free.abs()).copysign(-free)
+}
 
 /// The solution over a step for a command that runs straight and a flow beyond the linear one that does
 /// (exponential time differencing; Cox and Matthews, J. Comput. Phys. 176, 2002): exact for any lag.
 struct Step {
     /// s.
     length: f64,
-    /// The state after the step of the state before, the command, its slope, the flow beyond and its slope.
-    rows: [[f64; 10]; 6],
+    /// The state after the step of everything before.
+    rows: [[f64; ALL]; STATES],
     /// What the controller sends, of the first four states, the command and its slope.
     sent: [f64; 6],
+    /// Whether there is friction, on the speed that the flow gives.
+    rubs: bool,
 }
 
 impl Loop {
@@ -328,8 +376,12 @@ impl Loop {
                 0.0
             }
         };
-        let (command_pole, pole) = (pole(self.command_lag), pole(self.loop_lag));
+        // Friction needs a speed to act on.
+        let least = if self.rubs { 0.1 * sample } else { 0.0 };
+        let lag = 0.5 * self.loop_lag.max(least);
+        let (command_pole, pole) = (pole(self.command_lag), pole(lag));
         let ahead = feedforward / gain;
+        // Of the first four states, the command and its slope.
         let error = if command_pole > 0.0 {
             [1.0, -1.0, 0.0, 0.0, 0.0, 0.0]
         } else {
@@ -342,10 +394,10 @@ impl Loop {
         };
         let mut sent: [f64; 6] = std::array::from_fn(|i| error[i] + ahead * speed[i]);
         sent[3] += 1.0;
-        // Places of the command, its slope, the flow beyond and its slope behind the six states.
-        const INPUT: [usize; 4] = [6, 7, 8, 9];
-        let column = |i: usize| if i < 4 { i } else { INPUT[i - 4] };
-        let mut a = SMatrix::<f64, 10, 10>::zeros();
+        // Places of the command, its slope, the flow beyond, its slope and friction behind the states.
+        let [command, slope, beyond, its_slope, friction] = std::array::from_fn(|i| STATES + i);
+        let column = |i: usize| [0, 1, 2, 3, command, slope, beyond][i];
+        let mut a = SMatrix::<f64, ALL, ALL>::zeros();
         let flow: [f64; 7] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| gain * s));
         let has_resonance = self.resonance > 1e-3 * sample;
         // What the flow moves: the table itself, or the mass on the oil.
@@ -356,21 +408,25 @@ impl Loop {
             1.0
         };
         for i in 0..6 {
+            let place = column(i);
             if command_pole > 0.0 {
-                a[(0, column(i))] = speed[i];
+                a[(0, place)] = speed[i];
             }
-            a[(3, column(i))] = integral * error[i];
+            a[(3, place)] = integral * error[i];
         }
         for (i, value) in flow.into_iter().enumerate() {
             let place = column(i);
             if pole > 0.0 {
-                a[(2, place)] = pole * value;
+                a[(6, place)] = pole * value;
             } else {
                 a[(moved, place)] += share * value;
             }
         }
         if pole > 0.0 {
-            a[(2, 2)] -= pole;
+            a[(6, 6)] -= pole;
+            a[(2, 6)] = pole;
+            a[(2, 2)] = -pole;
+            a[(2, friction)] = pole;
             a[(moved, 2)] += share;
         }
         if has_resonance {
@@ -379,8 +435,8 @@ impl Loop {
             a[(5, 4)] -= share;
             a[(5, 5)] -= 2.0 * self.resonance_damping * share;
         }
-        a[(6, 7)] = 1.0;
-        a[(8, 9)] = 1.0;
+        a[(command, slope)] = 1.0;
+        a[(beyond, its_slope)] = 1.0;
         let a = a * length;
         let solution = if a.iter().all(|value| value.is_finite()) {
             a.exp()
@@ -391,25 +447,35 @@ impl Loop {
             length,
             rows: std::array::from_fn(|i| std::array::from_fn(|j| solution[(i, j)])),
             sent,
+            rubs: self.rubs,
         }
     }
 }
 
 impl Step {
-    /// The state after the step; the command at its ends, and the flow beyond the linear one for what the
-    /// controller sends, where there is one.
+    /// The state after the step; the command at its ends, the flow beyond the linear one for what the
+    /// controller sends, where there is one, and what friction takes of a speed over a step.
     fn advance(
         &self,
         state: State,
         [begin, end]: [f64; 2],
         beyond: Option<&impl Fn(f64) -> f64>,
+        rub: &impl Fn(f64, f64) -> f64,
     ) -> State {
         let slope = (end - begin) / self.length;
         let after = |more: f64, its_slope: f64| -> State {
-            let [u, x, w, z, v, rate] = state;
-            let all = [u, x, w, z, v, rate, begin, slope, more, its_slope];
-            self.rows
-                .map(|row| row.iter().zip(all).map(|(a, b)| a * b).sum())
+            let [u, x, w, z, v, rate, q] = state;
+            let all = [u, x, w, z, v, rate, q, begin, slope, more, its_slope];
+            let mut free = self
+                .rows
+                .map(|row| row.iter().zip(all).map(|(a, b)| a * b).sum());
+            if self.rubs {
+                let taken = rub(free[2], self.rows[2][ALL - 1]);
+                for (value, row) in free.iter_mut().zip(&self.rows) {
+                    *value += row[ALL - 1] * taken;
+                }
+            }
+            free
         };
         let Some(beyond) = beyond else {
             return after(0.0, 0.0);
@@ -514,6 +580,59 @@ mod tests {
         assert!(last(0.0, 5.0, 0.0, 0.0).abs() < 1e-6);
         let slow = last(0.0, 0.0, 2.0, 0.0);
         assert!((slow - 0.5 * ramp[n - 1]).abs() < 0.01, "{slow}");
+    }
+
+    #[test]
+    fn friction_leaves_its_position_error_and_lags_on_the_way_back() {
+        // A triangle so slow that only friction counts: after the turn the table waits until the command has come
+        // back by twice the breakaway error, then follows at that distance.
+        let (rate, n, gain, b) = (200.0, 4000, 30.0, 1e-3);
+        let speed = 2e-3;
+        let command: Vec<f64> = (0..n)
+            .map(|k| {
+                let t = k as f64 / rate;
+                speed * if t < 10.0 { t } else { 20.0 - t }
+            })
+            .collect();
+        let channels = vec![
+            (COMMAND, command.clone()),
+            (Channel::Displacement, vec![0.0; n]),
+        ];
+        let recording = Recording::new("triangle", 1.0 / rate, channels).unwrap();
+        let recording =
+            RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
+        let nominal = Nominal {
+            loop_gain: gain,
+            command_lag: 0.0,
+            scale: 1.0,
+            offset: 0.0,
+            command_delay: 0.0,
+            loop_lag: 0.004,
+            feedforward: 0.0,
+            integral: 0.0,
+            resonance: 0.0,
+            resonance_damping: 0.5,
+        };
+        let effects = Effects {
+            friction: Friction {
+                breakaway_error: b,
+                sliding_speed: 2e-5,
+            },
+            ..Effects::off().unwrap()
+        };
+        let mut out = vec![0.0; n];
+        let session = Session::default();
+        ClosedLoopActuator.simulate(&recording, &nominal, &effects, &session, &mut out);
+        let behind = |t: f64| {
+            let k = (t * rate) as usize;
+            command[k] - out[k]
+        };
+        let expected = b + speed / gain;
+        assert!((behind(9.9) - expected).abs() < 2e-5, "{}", behind(9.9));
+        // Stuck: 1 s after the turn the command has come back by the breakaway error.
+        let stuck = out[(10.9 * rate) as usize] - out[(10.1 * rate) as usize];
+        assert!(stuck.abs() < 2e-5, "{stuck}");
+        assert!((behind(19.9) + expected).abs() < 2e-5, "{}", behind(19.9));
     }
 
     #[test]

@@ -18,6 +18,10 @@ const DIFFERS: f64 = 3.5;
 const SURPRISING: f64 = 3.0;
 /// Standard deviations of an interval of 95 %.
 const CLEAR: f64 = 1.96;
+/// Share of the least size worth a name below which an effect has none.
+const LEAST: f64 = 0.5;
+/// A nominal parameter is a cause where the squared error grows by this factor in a part with it as stated.
+const NEEDED: f64 = 1.1;
 /// Samples that a file must bring to be fitted by itself.
 const FEWEST: usize = 500;
 
@@ -68,13 +72,14 @@ pub(super) fn unfit<M: InParts>(
     let mut place = point.nuisance.len();
     for (index, internal) in &point.effects {
         let candidate = &measured.candidates()[*index];
-        let (mut clear, mut sizes) = (false, false);
+        let (mut clear, mut sizes, mut matters) = (false, false, false);
         for (parameter, &q) in candidate.parameters.iter().zip(internal) {
             let error = deviations.get(place).copied().unwrap_or(f64::NAN);
             place += 1;
             if !matches!(parameter.role, Role::Shape { .. }) {
                 sizes = true;
                 clear |= q.abs() > CLEAR * error;
+                matters |= q.abs() > LEAST;
             }
         }
         let bound = candidate.bound(internal).map(|parameter| {
@@ -89,6 +94,8 @@ pub(super) fn unfit<M: InParts>(
         });
         if let Some(reason) = bound {
             refused.push((*index, reason));
+        } else if sizes && !matters {
+            refused.push((*index, "it is too small to matter".to_owned()));
         } else if sizes && !clear && !is_missed(measured, point, *index, record) {
             refused.push((
                 *index,
@@ -109,6 +116,33 @@ fn is_missed<M: InParts>(measured: &M, point: &Point, effect: usize, record: usi
     let after = all_errors(measured, point, record);
     let before = all_errors(measured, &without.point, record);
     clearly_better(&before, &after)
+}
+
+/// Whether the data need nominal parameter `i` at another value than stated: held there, with all else fitted
+/// again, either part is predicted worse from the other, and clearly so.
+pub(super) fn is_needed<M: InParts>(measured: &M, point: &Point, i: usize) -> bool {
+    let Some(without) = measured.without_cause(i) else {
+        return true;
+    };
+    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
+    let mut clear = false;
+    for part in [Part::Fitted, Part::LeftOut] {
+        let (own, other) = (part as usize, part.other() as usize);
+        let predicted = |model: &M| -> Option<Vec<f64>> {
+            let (found, _) = refit(model, point, own)?;
+            let there = completed(model, &found.point, Some(own), other);
+            Some(all_errors(model, &there, other))
+        };
+        let (Some(before), Some(after)) = (predicted(&without), predicted(measured)) else {
+            return true;
+        };
+        let ratio = squares(&before) / squares(&after);
+        if ratio < 1.0 {
+            return false;
+        }
+        clear |= ratio > NEEDED && clearly_better(&before, &after);
+    }
+    clear
 }
 
 /// Whether the squared errors `after` are smaller than those `before` by more than chance, correlated

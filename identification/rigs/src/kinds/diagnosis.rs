@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::cause::{Cause, effect_in_words, in_own_words, joined, undetermined};
-use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
+use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, is_needed, unfit};
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, LOST, Part};
@@ -153,7 +153,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         let selected = select(measured, record, observer)?;
         Some(part_report(measured, fitted, &selected))
     };
-    let mut as_described = part(Part::Fitted)?;
+    let as_described = part(Part::Fitted)?;
     let swapped = part(Part::LeftOut)?;
     let list = |part: &PartReport| -> Vec<String> {
         part.effects
@@ -229,11 +229,6 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             },
         )
         .collect();
-    for (name, _) in &confirmed.effects {
-        let other = measured.looks_like(name);
-        let rivals = other.map(|other| (other.to_owned(), name.clone()));
-        as_described.rivals.extend(rivals);
-    }
     let pays = confirmed.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
     let is_named = |effect: &str| confirmed.effects.iter().any(|(name, _)| name == effect);
     let rivalled = as_described
@@ -261,9 +256,13 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let values = confirmed.parameters.iter().enumerate();
     let causes: Vec<Cause> = values
         .filter(|(i, _)| measured.is_cause(*i))
-        .filter_map(|(i, value)| Cause::of(value.clone(), measured.stated(i)))
-        .filter(believed)
-        .chain(measured.contradictions())
+        .filter_map(|(i, value)| Some((i, Cause::of(value.clone(), measured.stated(i))?)))
+        .filter(|(i, cause)| believed(cause) && is_needed(measured, &confirmed.point, *i))
+        .map(|(_, cause)| cause)
+        .chain(measured.contradictions().into_iter().filter(|cause| {
+            // Of records that no model explains, sensors tell less too.
+            holds || cause.deviations() > FAR
+        }))
         .collect();
     let verdict = match (named.is_empty() || !pays, rivalled) {
         (true, _) if !causes.is_empty() => Verdict::Named,
@@ -427,6 +426,14 @@ impl RigDiagnosis {
                 }
                 let left = 1.0 - self.unexplained;
                 let share = match (all.len(), left > ALL) {
+                    _ if left <= 0.0 => {
+                        return format!(
+                            "{name}: {}; the error of {} on the held-out data, {:.1} %, is not theirs.",
+                            joined(&all),
+                            self.output,
+                            100.0 * part.nominal_error
+                        );
+                    }
                     (1, true) => "that is all of the error".to_owned(),
                     (_, true) => "together they are all of the error".to_owned(),
                     (1, _) => format!("it explains {:.0} % of the squared error", 100.0 * left),

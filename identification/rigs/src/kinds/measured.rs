@@ -33,6 +33,8 @@ pub struct Measured<'a> {
     width: f64,
     /// What the rig is called.
     name: String,
+    /// The uncertain parameter that stays as stated.
+    pinned: Option<usize>,
 }
 
 impl<'a> Measured<'a> {
@@ -99,6 +101,7 @@ impl<'a> Measured<'a> {
             name: String::new(),
             holds_first: true,
             width: WEAK,
+            pinned: None,
             rig,
             measurement,
             nominal,
@@ -108,8 +111,11 @@ impl<'a> Measured<'a> {
     /// Values of the nominal parameters at `point`, SI; those that must be positive stay so.
     pub fn nominal_values(&self, point: &Point) -> Vec<f64> {
         let mut values: Vec<f64> = self.nominal.iter().map(|(value, _)| *value).collect();
-        for (&i, p) in self.uncertain.iter().zip(&point.nuisance) {
+        for (place, (&i, p)) in self.uncertain.iter().zip(&point.nuisance).enumerate() {
             let (value, deviation) = self.nominal[i];
+            if self.pinned == Some(place) {
+                continue;
+            }
             // Sizes stay positive: counted by their logarithm unless they may be zero.
             values[i] = if value > 0.0 && deviation <= value {
                 value * (p * deviation / value).exp()
@@ -320,6 +326,7 @@ impl SimulatedModel for Measured<'_> {
             holds_first: self.holds_first,
             name: self.name.clone(),
             width: HELD,
+            pinned: self.pinned,
         }
     }
 
@@ -438,11 +445,11 @@ impl InParts for Measured<'_> {
         self.rig.causes().contains(&name)
     }
 
-    fn looks_like(&self, effect: &str) -> Option<&'static str> {
-        let names = self.uncertain_names();
-        let mut all = self.rig.looks_like().iter();
-        let own = all.find(|[own, _, by]| *own == effect && names.contains(by))?;
-        Some(own[1])
+    fn without_cause(&self, i: usize) -> Option<Self> {
+        let mut same = self.held();
+        same.width = self.width;
+        same.pinned = Some(i);
+        self.is_cause(i).then_some(same)
     }
 
     fn contradictions(&self) -> Vec<Cause> {

@@ -92,9 +92,6 @@ pub trait Equations: Sync {
     const SAID_BY: &'static [(&'static str, &'static str)] = &[];
     /// Nominal parameters whose deviation from what was stated is a cause, such as a scale.
     const CAUSES: &'static [&'static str] = &[];
-    /// Effects that another cause looks like as long as a nominal parameter is uncertain: effect, cause,
-    /// parameter.
-    const LOOKS_LIKE: &'static [[&'static str; 3]] = &[];
     /// Places inside of the equations at which a user's own effect may act, beside its inputs and its output:
     /// `force` on what moves, `valve` on what the controller sends.
     const PLACES: &'static [&'static str] = &[];
@@ -209,9 +206,6 @@ pub trait Rig: Sync {
 
     /// Nominal parameters whose deviation from what was stated is a cause.
     fn causes(&self) -> &'static [&'static str];
-
-    /// Effects that another cause looks like as long as a nominal parameter is uncertain.
-    fn looks_like(&self) -> &'static [[&'static str; 3]];
 
     /// Natural units of `recordings`; `nominal` in the order of [`Self::parameters`].
     fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural;
@@ -334,10 +328,6 @@ impl<E: Equations> Rig for E {
 
     fn causes(&self) -> &'static [&'static str] {
         E::CAUSES
-    }
-
-    fn looks_like(&self) -> &'static [[&'static str; 3]] {
-        E::LOOKS_LIKE
     }
 
     fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural {

@@ -138,8 +138,11 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
         false
     }
 
-    /// What looks like an effect on such a rig and is not one that is searched.
-    fn looks_like(&self, _effect: &str) -> Option<&'static str> {
+    /// The same model with that parameter at its stated value; none where it has no cause.
+    fn without_cause(&self, _i: usize) -> Option<Self>
+    where
+        Self: Sized,
+    {
         None
     }
 

@@ -168,10 +168,6 @@ impl Rig for ExtendedKind {
         self.base.causes()
     }
 
-    fn looks_like(&self) -> &'static [[&'static str; 3]] {
-        self.base.looks_like()
-    }
-
     fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural {
         self.base.natural(nominal, recordings)
     }
