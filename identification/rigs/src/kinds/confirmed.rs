@@ -20,7 +20,7 @@ const SURPRISING: f64 = 3.0;
 const CLEAR: f64 = 1.96;
 /// Share of the least size worth a name below which an effect has none.
 const LEAST: f64 = 0.5;
-/// A nominal parameter is a cause where the squared error grows by this factor in a part with it as stated.
+/// The squared error grows by this factor at least without what the data need.
 const NEEDED: f64 = 1.1;
 /// Samples that a file must bring to be fitted by itself.
 const FEWEST: usize = 500;
@@ -94,7 +94,7 @@ pub(super) fn unfit<M: InParts>(
         });
         if let Some(reason) = bound {
             refused.push((*index, reason));
-        } else if sizes && !matters {
+        } else if sizes && !matters && !is_felt(measured, point, *index, record) {
             refused.push((*index, "it is too small to matter".to_owned()));
         } else if sizes && !clear && !is_missed(measured, point, *index, record) {
             refused.push((
@@ -106,16 +106,30 @@ pub(super) fn unfit<M: InParts>(
     refused
 }
 
-/// Whether the fit to `record` without an effect is worse by more than chance.
-fn is_missed<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize) -> bool {
+/// Errors on `record` of the fit without an effect and of the one with it.
+fn without_and_with<M: InParts>(
+    measured: &M,
+    point: &Point,
+    effect: usize,
+    record: usize,
+) -> Option<[Vec<f64>; 2]> {
     let mut without = point.clone();
     without.effects.retain(|(index, _)| *index != effect);
-    let Some((without, _)) = refit(measured, &without, record) else {
-        return false;
-    };
-    let after = all_errors(measured, point, record);
-    let before = all_errors(measured, &without.point, record);
-    clearly_better(&before, &after)
+    let (without, _) = refit(measured, &without, record)?;
+    Some([&without.point, point].map(|point| all_errors(measured, point, record)))
+}
+
+/// Whether the fit to `record` without an effect is worse by more than chance.
+fn is_missed<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize) -> bool {
+    without_and_with(measured, point, effect, record)
+        .is_some_and(|[before, after]| clearly_better(&before, &after))
+}
+
+/// Whether the squared error of the fit to `record` grows by more than a tenth without an effect.
+fn is_felt<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize) -> bool {
+    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
+    without_and_with(measured, point, effect, record)
+        .is_some_and(|[before, after]| squares(&before) > NEEDED * squares(&after))
 }
 
 /// Whether the data need nominal parameter `i` at another value than stated: held there, with all else fitted
