@@ -276,7 +276,7 @@ impl Equations for ClosedLoopActuator {
             flow / (1.0 + compression * flow.abs()) - gain * sent
         };
         let start = scale * first + offset;
-        let mut state = [start, start, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let mut state: State = [start, start, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         let mut shown = state[1];
         for (k, y) in out.iter_mut().enumerate() {
             let x = state[1];
@@ -312,9 +312,11 @@ struct Loop {
 }
 
 /// Lagging command, displacement, flow, integral of the error, velocity and its rate times `P`, flow behind
-/// half of its lag.
-type State = [f64; 7];
+/// half of its lag; nothing.
+type State = [f64; WIDTH];
 const STATES: usize = 7;
+/// As processors take numbers.
+const WIDTH: usize = 8;
 /// The states, the command, its slope, the flow beyond the linear one, its slope and the speed that friction
 /// takes.
 const ALL: usize = STATES + 5;
@@ -352,8 +354,8 @@ fn rubbing(free: f64, most: f64, sliding_speed: f64) -> f64 {
 struct Step {
     /// s.
     length: f64,
-    /// The state after the step of everything before.
-    rows: [[f64; ALL]; STATES],
+    /// The state after the step for one of everything before.
+    columns: [State; ALL],
     /// What the controller sends, of the first four states, the command and its slope.
     sent: [f64; 6],
     /// Whether there is friction, on the speed that the flow gives.
@@ -445,7 +447,9 @@ impl Loop {
         };
         Step {
             length,
-            rows: std::array::from_fn(|i| std::array::from_fn(|j| solution[(i, j)])),
+            columns: std::array::from_fn(|j| {
+                std::array::from_fn(|i| if i < STATES { solution[(i, j)] } else { 0.0 })
+            }),
             sent,
             rubs: self.rubs,
         }
@@ -463,22 +467,24 @@ impl Step {
         rub: &impl Fn(f64, f64) -> f64,
     ) -> State {
         let slope = (end - begin) / self.length;
+        let [columns @ .., beyond_column, slope_column, rubbed] = &self.columns;
+        let mut linear: State = [0.0; WIDTH];
+        let known = state[..STATES].iter().chain([&begin, &slope]);
+        for (column, value) in columns.iter().zip(known) {
+            add(&mut linear, column, *value);
+        }
         let after = |more: f64, its_slope: f64| -> State {
-            let [u, x, w, z, v, rate, q] = state;
-            let all = [u, x, w, z, v, rate, q, begin, slope, more, its_slope];
-            let mut free = self
-                .rows
-                .map(|row| row.iter().zip(all).map(|(a, b)| a * b).sum());
+            let mut free = linear;
+            add(&mut free, beyond_column, more);
+            add(&mut free, slope_column, its_slope);
             if self.rubs {
-                let taken = rub(free[2], self.rows[2][ALL - 1]);
-                for (value, row) in free.iter_mut().zip(&self.rows) {
-                    *value += row[ALL - 1] * taken;
-                }
+                let taken = rub(free[2], rubbed[2]);
+                add(&mut free, rubbed, taken);
             }
             free
         };
         let Some(beyond) = beyond else {
-            return after(0.0, 0.0);
+            return linear;
         };
         let sent = |[u, x, w, z, ..]: State, command: f64| -> f64 {
             let all = [u, x, w, z, command, slope];
@@ -487,6 +493,12 @@ impl Step {
         let now = beyond(sent(state, begin));
         let then = beyond(sent(after(now, 0.0), end));
         after(now, (then - now) / self.length)
+    }
+}
+
+fn add(to: &mut State, column: &State, value: f64) {
+    for (own, one) in to.iter_mut().zip(column) {
+        *own += one * value;
     }
 }
 
