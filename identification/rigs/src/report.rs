@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::kinds::shake_table::experiment::SeparatingExperiment;
 use super::kinds::shake_table::{self, Course, Finding, RelationReport};
-use super::kinds::{Cause, NamedValue, RigDiagnosis};
+use super::kinds::{Cause, NamedValue, Reading, RigDiagnosis};
 use diagnosis::{NamedEffect, Part, Test, Verdict, WeighedModel};
 
 /// Confidence of a parameter that is beyond its interval of 95 % and beyond what was stated.
@@ -314,6 +314,36 @@ impl From<&WeighedModel> for CandidateReport {
     }
 }
 
+impl From<&Reading> for CandidateReport {
+    fn from(own: &Reading) -> Self {
+        let report = |p: &NamedValue| ParameterReport {
+            value: p.value,
+            unit: p.unit.clone(),
+            standard_error: p.standard_error,
+        };
+        let causes = own.causes.iter().map(|cause| &cause.found);
+        let effects = own.effects.iter();
+        let of_effects = effects.clone().flat_map(|(name, values)| {
+            let values = values.iter();
+            values.map(move |p| (format!("{name}.{}", p.name), report(p)))
+        });
+        Self {
+            effects: causes
+                .clone()
+                .map(|value| &value.name)
+                .chain(effects.map(|(name, _)| name))
+                .cloned()
+                .collect(),
+            weight: own.weight,
+            parameters: causes
+                .map(|value| (value.name.clone(), report(value)))
+                .chain(of_effects)
+                .collect(),
+            explains_percent: 100.0 * own.explains,
+        }
+    }
+}
+
 impl LeftReport {
     fn of(test: &Test, period: f64) -> Option<Self> {
         let place = test.place.as_ref()?;
@@ -453,7 +483,7 @@ impl From<&RigDiagnosis> for DiagnosisReport {
             extended_model: None,
             extended_fmu: None,
             extended_fmus: Vec::new(),
-            candidates: Vec::new(),
+            candidates: found.readings.iter().map(CandidateReport::from).collect(),
             findings: found.causes.iter().map(Finding::from).collect(),
             courses: Vec::new(),
             left: Vec::new(),

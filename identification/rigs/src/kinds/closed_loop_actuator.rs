@@ -17,7 +17,7 @@ use units::vocabulary;
 use super::hypotheses::Inside;
 use super::sensors::accelerometer_scale;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
-use super::{Cause, Equations, Natural, RigRecording};
+use super::{Begun, Cause, Equations, Natural, RigRecording};
 use recordings::Channel;
 
 /// The rig.
@@ -127,12 +127,40 @@ impl Equations for ClosedLoopActuator {
     const SAID_BY: &'static [(&'static str, &'static str)] =
         &[("delay", "command_delay"), ("valve_lag", "loop_lag")];
     const CAUSES: &'static [&'static str] = &["command_delay", "scale", "offset"];
+    // Beyond, with any loop gain, it makes up for a delay.
+    const LIMITS: &'static [(&'static str, f64)] = &[("feedforward", 1.2)];
 
     fn natural(nominal: &Nominal, channels: Natural) -> Natural {
         Natural {
             time: 1.0 / nominal.loop_gain,
             ..channels
         }
+    }
+
+    fn read_off(
+        &self,
+        recording: &RigRecording,
+        places: &[usize],
+        nominal: &Nominal,
+    ) -> Vec<Begun> {
+        let rail = rail(recording.input(COMMAND), recording.output(), places);
+        let begun = rail.map(|samples| Begun {
+            nominal: vec![
+                nominal.loop_gain,
+                nominal.command_lag,
+                nominal.scale,
+                nominal.offset,
+                nominal.command_delay,
+                nominal.loop_lag,
+                nominal.feedforward,
+                nominal.integral,
+                nominal.resonance,
+                nominal.resonance_damping,
+            ],
+            session: vec![0.0],
+            effect: Some(("speed_limit", vec![samples * recording.period()])),
+        });
+        begun.into_iter().collect()
     }
 
     fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause> {
@@ -296,6 +324,27 @@ impl Equations for ClosedLoopActuator {
             }
         }
     }
+}
+
+/// Samples per metre at the speed that the table keeps to where the command is faster; none without one.
+fn rail(command: &[f64], displacement: &[f64], places: &[usize]) -> Option<f64> {
+    // Of a motion that nothing holds back, few samples are nearly as fast as the fastest.
+    const KEPT: f64 = 1.35;
+    const FASTER: f64 = 1.3;
+    // Samples on either side over which speeds are told.
+    const APART: usize = 2;
+    let quantiles = |values: &[f64]| {
+        let speed = |&k: &usize| {
+            let apart = values.get(k + APART)? - values.get(k.checked_sub(APART)?)?;
+            Some(apart.abs() / (2 * APART) as f64).filter(|own| own.is_finite())
+        };
+        let mut speeds: Vec<f64> = places.iter().filter_map(speed).collect();
+        speeds.sort_by(f64::total_cmp);
+        let at = |share: f64| speeds.get((share * speeds.len() as f64) as usize).copied();
+        Some((at(0.95)?, at(0.998)?))
+    };
+    let ((often, most), (_, asked)) = (quantiles(displacement)?, quantiles(command)?);
+    (most > 0.0 && most < KEPT * often && asked > FASTER * most).then(|| 1.0 / most)
 }
 
 /// The linear loop.
@@ -592,6 +641,24 @@ mod tests {
         assert!(last(0.0, 5.0, 0.0, 0.0).abs() < 1e-6);
         let slow = last(0.0, 0.0, 2.0, 0.0);
         assert!((slow - 0.5 * ramp[n - 1]).abs() < 0.01, "{slow}");
+    }
+
+    #[test]
+    fn a_rail_is_told_from_a_motion_that_is_only_fast() {
+        let n = 4000;
+        let places: Vec<usize> = (0..n).collect();
+        let wave = |k: usize| (0.01 * k as f64).sin() + 0.4 * (0.037 * k as f64).sin();
+        let command: Vec<f64> = (0..n).map(wave).collect();
+        assert_eq!(rail(&command, &command, &places), None);
+        let most = 4e-3;
+        let mut x = 0.0;
+        let held = command.iter().map(|r| {
+            x += (0.2 * (r - x)).clamp(-most, most);
+            x
+        });
+        let held: Vec<f64> = held.collect();
+        let found = rail(&command, &held, &places).unwrap();
+        assert!((found * most - 1.0).abs() < 1e-3, "{found}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part, file};
+use super::readings::NEEDED;
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
 use diagnosis::{Point, Role, all_errors, completed, estimates, refit};
@@ -20,8 +21,6 @@ const SURPRISING: f64 = 3.0;
 const CLEAR: f64 = 1.96;
 /// Share of the least size worth a name below which an effect has none.
 const LEAST: f64 = 0.5;
-/// The squared error grows by this factor at least without what the data need.
-const NEEDED: f64 = 1.1;
 /// Samples that a file must bring to be fitted by itself.
 const FEWEST: usize = 500;
 
@@ -52,6 +51,24 @@ pub struct Confirmed {
     /// Where the refitted nominal model is.
     #[serde(skip)]
     pub(super) refitted_point: Point,
+}
+
+impl Confirmed {
+    /// Widens standard errors to half of what an estimate differs by from that of `other`, another model of the
+    /// same data.
+    pub(super) fn widen_to(&mut self, other: &Self) {
+        let widen = |own: &mut [NamedValue], other: &[NamedValue]| {
+            for (own, other) in own.iter_mut().zip(other) {
+                let half = 0.5 * (own.value - other.value).abs();
+                own.standard_error = own.standard_error.max(half);
+            }
+        };
+        widen(&mut self.parameters, &other.parameters);
+        for (name, own) in &mut self.effects {
+            let same = other.effects.iter().find(|(known, _)| known == name);
+            widen(own, same.map_or(&[], |(_, values)| values));
+        }
+    }
 }
 
 /// An effect with a reason why it is not named.
@@ -132,38 +149,11 @@ fn is_felt<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize
         .is_some_and(|[before, after]| squares(&before) > NEEDED * squares(&after))
 }
 
-/// Whether the data need nominal parameter `i` at another value than stated: held there, with all else fitted
-/// again, either part is predicted worse from the other, and clearly so.
-pub(super) fn is_needed<M: InParts>(measured: &M, point: &Point, i: usize) -> bool {
-    let Some(without) = measured.without_cause(i) else {
-        return true;
-    };
-    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
-    let mut clear = false;
-    for part in [Part::Fitted, Part::LeftOut] {
-        let (own, other) = (part as usize, part.other() as usize);
-        let predicted = |model: &M| -> Option<Vec<f64>> {
-            let (found, _) = refit(model, point, own)?;
-            let there = completed(model, &found.point, Some(own), other);
-            Some(all_errors(model, &there, other))
-        };
-        let (Some(before), Some(after)) = (predicted(&without), predicted(measured)) else {
-            return true;
-        };
-        let ratio = squares(&before) / squares(&after);
-        if ratio < 1.0 {
-            return false;
-        }
-        clear |= ratio > NEEDED && clearly_better(&before, &after);
-    }
-    clear
-}
-
 /// Whether the squared errors `after` are smaller than those `before` by more than chance, correlated
 /// samples counted once: by the ratio of the likelihoods, or, where slow drift in both hides that, by the
 /// differences (Vuong, Econometrica 57, 1989; for nested models half the root of the ratio's chi-square
 /// at most).
-fn clearly_better(before: &[f64], after: &[f64]) -> bool {
+pub(super) fn clearly_better(before: &[f64], after: &[f64]) -> bool {
     let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
     let independent = |values: &[f64]| values.len() as f64 / correlation_time(values);
     let ratio = independent(after) * (squares(before) / squares(after)).ln();

@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::alternatives::{Item, least_needed, of_its_class, proposals, replaced};
 use super::cause::{Cause, effect_in_words, in_own_words, joined, undetermined};
-use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, is_needed, unfit};
+use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, LOST, Part};
+use super::readings::{Crossed, Reading, Weighed, in_words, ranked};
 use super::{Description, DescriptionError, Measurement};
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::gain_interval;
@@ -24,6 +26,10 @@ const NEAR: f64 = 0.01;
 /// standard errors from what was stated is a cause although the errors do not agree.
 const MOST: f64 = 0.5;
 const FAR: f64 = 5.0;
+/// Why an effect is not named that the data do not need for sure.
+const DOUBTED: &str = "the prediction of either part is hardly worse without it";
+/// Error on all data over that of a model with more nominal parameters, up to which it does as well.
+const AS_WELL: f64 = 1.2;
 /// Share of the squared error beyond which what is explained is all of it.
 const ALL: f64 = 0.98;
 
@@ -101,6 +107,9 @@ pub struct RigDiagnosis {
     /// other.
     #[serde(default)]
     pub causes: Vec<Cause>,
+    /// What the data may mean where they do not tell for sure, the likeliest first; otherwise none.
+    #[serde(default)]
+    pub readings: Vec<Reading>,
     /// Parameters that differ between parts of the data or from what was stated.
     #[serde(default)]
     pub findings: Vec<String>,
@@ -153,7 +162,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         let selected = select(measured, record, observer)?;
         Some(part_report(measured, fitted, &selected))
     };
-    let as_described = part(Part::Fitted)?;
+    let mut as_described = part(Part::Fitted)?;
     let swapped = part(Part::LeftOut)?;
     let list = |part: &PartReport| -> Vec<String> {
         part.effects
@@ -212,7 +221,61 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         }
     }
     let mut findings = Vec::new();
-    let confirmed = confirm(measured, &start.point, &mut refused, &mut findings)?;
+    let mut confirmed = confirm(measured, &start.point, &mut refused, &mut findings)?;
+    let crossed = Crossed::of(measured, &confirmed.point)?;
+    let mut of_its_class = of_its_class(measured, &confirmed.point, crossed).into_iter();
+    let (best, mut crossed) = of_its_class.next()?;
+    if replaced(&confirmed.point, &best).is_some() {
+        let mut new = refused.clone();
+        let again = confirm(measured, &best, &mut new, &mut Vec::new());
+        let as_many = |again: &Confirmed| again.effects.len() == confirmed.effects.len();
+        if let Some(again) = again.filter(as_many) {
+            crossed = Crossed::of(measured, &again.point)?;
+            (confirmed, refused) = (again, new);
+            findings.clear();
+        } else {
+            crossed = Crossed::of(measured, &confirmed.point)?;
+        }
+    }
+    // What else the data may mean: everything that is not needed for sure goes, the least needed first.
+    let mut weighed: Vec<Weighed> = Vec::new();
+    let with_all = confirmed.clone();
+    let mut asked: Option<Vec<Item>> = None;
+    let fitted = |own: &Confirmed| measured.normalised_error(&own.point, EVERYTHING);
+    let mut most = AS_WELL * fitted(&confirmed);
+    while let Some((left, without)) =
+        least_needed(measured, &confirmed.point, &crossed, most, &mut asked)
+    {
+        let gone = confirmed.point.effects.iter();
+        let mut gone = gone.filter(|(i, _)| left.effects.iter().all(|(known, _)| known != i));
+        if let Some((i, _)) = gone.next() {
+            refused.push((*i, DOUBTED.to_owned()));
+            weighed.extend(Weighed::of(measured, &confirmed.point, crossed));
+        }
+        findings.clear();
+        let had = confirmed.point.effects.len();
+        confirmed = confirm(measured, &left, &mut refused, &mut findings)?;
+        crossed = without;
+        if confirmed.point.effects.len() < had {
+            most = most.max(AS_WELL * fitted(&confirmed));
+        }
+    }
+    // Nor do they tell an effect from all of its class.
+    let own: Vec<usize> = confirmed.point.effects.iter().map(|(i, _)| *i).collect();
+    for (point, errors) in of_its_class {
+        if let Some((against, rival)) = replaced(&best, &point)
+            && own.contains(&against)
+            && !own.contains(&rival)
+        {
+            let pair = (measured.name(rival), measured.name(against));
+            if !as_described.rivals.contains(&pair) {
+                as_described.rivals.push(pair);
+            }
+            weighed.extend(Weighed::of(measured, &point, errors));
+        }
+    }
+    // What the model may lack or not changes the others by as much as is not known.
+    confirmed.widen_to(&with_all);
     for (i, reason) in refused {
         let effect = measured.name(i);
         if set_aside.iter().all(|known| known.effect != effect) {
@@ -254,16 +317,33 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         .all(|(error, nominal)| error < LOST && error < MOST * nominal);
     let believed = |cause: &Cause| holds || (explains && cause.deviations() > FAR);
     let values = confirmed.parameters.iter().enumerate();
-    let causes: Vec<Cause> = values
-        .filter(|(i, _)| measured.is_cause(*i))
-        .filter_map(|(i, value)| Some((i, Cause::of(value.clone(), measured.stated(i))?)))
-        .filter(|(i, cause)| believed(cause) && is_needed(measured, &confirmed.point, *i))
-        .map(|(_, cause)| cause)
-        .chain(measured.contradictions().into_iter().filter(|cause| {
-            // Of records that no model explains, sensors tell less too.
-            holds || cause.deviations() > FAR
-        }))
-        .collect();
+    let mut causes: Vec<Cause> = Vec::new();
+    let mut doubted: Vec<Cause> = Vec::new();
+    for (i, value) in values.filter(|(i, _)| measured.is_cause(*i)) {
+        let Some(cause) = Cause::of(value.clone(), measured.stated(i)) else {
+            continue;
+        };
+        if !believed(&cause) {
+            continue;
+        }
+        let without = measured.without_cause(i);
+        let without = without.and_then(|own| {
+            let errors = Crossed::of(&own, &confirmed.point)?;
+            Some((own, errors))
+        });
+        match without {
+            Some((own, errors)) if !crossed.needs(&errors) => {
+                doubted.push(cause);
+                weighed.extend(Weighed::of(&own, &confirmed.point, errors));
+            }
+            _ => causes.push(cause),
+        }
+    }
+    causes.extend(measured.contradictions().into_iter().filter(|cause| {
+        // Of records that no model explains, sensors tell less too.
+        holds || cause.deviations() > FAR
+    }));
+    let readings = readings(measured, weighed, &causes, &doubted, (&confirmed, crossed));
     let verdict = match (named.is_empty() || !pays, rivalled) {
         (true, _) if !causes.is_empty() => Verdict::Named,
         (true, _) if here.is_empty() && there.is_empty() && holds => Verdict::Adequate,
@@ -280,6 +360,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         not_confirmed,
         set_aside,
         causes,
+        readings,
         findings,
         sentences: BTreeMap::new(),
         unexplained: (confirmed.error / as_described.nominal_error).powi(2),
@@ -289,22 +370,28 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     })
 }
 
-/// What the two parts ask for, each alone and both together; of effects that cannot be told apart one.
-fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Vec<Point> {
-    let mut all: Vec<Point> = parts.iter().map(|part| part.point.clone()).collect();
-    for (one, other) in [(0, 1), (1, 0)] {
-        let mut both = parts[one].point.clone();
-        let more = parts[other].point.effects.iter();
-        let new = more.filter(|(i, _)| {
-            let mut own = parts[one].point.effects.iter();
-            own.all(|(known, _)| !measured.are_alike(*i, *known))
-        });
-        both.effects.extend(new.cloned());
-        if both.effects.len() > parts[one].point.effects.len() {
-            all.push(both);
-        }
+/// What is weighed against the named model, and that model with what is doubted in it.
+fn readings<M: InParts>(
+    measured: &M,
+    mut weighed: Vec<Weighed>,
+    causes: &[Cause],
+    doubted: &[Cause],
+    (named, crossed): (&Confirmed, Crossed),
+) -> Vec<Reading> {
+    if weighed.is_empty() {
+        return Vec::new();
     }
-    all
+    for own in &mut weighed {
+        own.causes.extend_from_slice(causes);
+    }
+    weighed.push(Weighed {
+        causes: causes.iter().chain(doubted).cloned().collect(),
+        effects: named.effects.clone(),
+        crossed,
+    });
+    let tested = Part::LeftOut as usize;
+    let origin = completed(measured, &measured.origin(), None, tested);
+    ranked(weighed, &all_errors(measured, &origin, tested))
 }
 
 fn no_output(description: &Description) -> DescriptionError {
@@ -388,14 +475,45 @@ impl RigDiagnosis {
             .collect()
     }
 
-    /// What was found, in a sentence.
+    /// What was found, in a sentence, and what else the data may mean.
     pub fn sentence(&self) -> String {
+        let is_named = |name: &str| {
+            let mut effects = self.confirmed.effects.iter();
+            self.causes.iter().any(|own| own.found.name == name)
+                || effects.any(|(own, _)| {
+                    own == name || self.instead_of(own).any(|(rival, _)| rival == name)
+                })
+        };
+        self.named_in_words() + &in_words(&self.readings, &is_named)
+    }
+
+    /// Effects that records cannot tell from `named`, with their parameters.
+    fn instead_of(&self, named: &str) -> impl Iterator<Item = (&str, &[NamedValue])> {
+        let rivals = self.as_described.rivals.iter();
+        rivals
+            .filter(move |(_, against)| against == named)
+            .filter_map(|(rival, against)| {
+                let mut readings = self.readings.iter();
+                let own =
+                    readings.find(|own| !own.effects.iter().any(|(name, _)| name == against))?;
+                let (name, values) = own.effects.iter().find(|(name, _)| name == rival)?;
+                Some((name.as_str(), values.as_slice()))
+            })
+    }
+
+    fn named_in_words(&self) -> String {
         let listed = |names: &[String]| names.join(", ").replace('_', " ");
         let effects = self.confirmed.effects.iter();
         let with_values: Vec<String> = effects
-            .map(|(name, values)| match self.sentences.get(name) {
-                Some(sentence) => in_own_words(sentence, values),
-                None => effect_in_words(name, values),
+            .map(|(name, values)| {
+                let own = match self.sentences.get(name) {
+                    Some(sentence) => in_own_words(sentence, values),
+                    None => effect_in_words(name, values),
+                };
+                let others = self.instead_of(name);
+                others.fold(own, |all, (rival, values)| {
+                    format!("{all} or {}", effect_in_words(rival, values))
+                })
             })
             .collect();
         let shown = joined(&with_values);

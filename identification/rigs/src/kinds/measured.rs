@@ -1,12 +1,18 @@
 //! A rig with its measurements, as the engine of the diagnosis sees it.
 
 use super::named_value::NamedValue;
-use super::parts::{self, EVERYTHING, File, InParts, LOST, NAMES, places};
+use super::parts::{self, EVERYTHING, File, InParts, NAMES, places};
 use super::{Begun, Cause, Effect, Measurement, Natural, Rig, SessionRole, Values};
 use diagnosis::{Candidate, Point, SimulatedModel, WEAK, all_errors};
 
 /// Samples up to which more may be tried.
 const CHEAP: usize = 40_000;
+
+/// Logarithm, in deviations, of a nominal parameter that is none: nothing depends on it any more.
+const GONE: f64 = -40.0;
+
+/// Error over the output's deviation from which on fits begin from what is read off as well.
+const SHAKY: f64 = 0.2;
 
 /// Width of the priors that hold: nothing moves.
 const HELD: f64 = 1e-3;
@@ -19,6 +25,8 @@ pub struct Measured<'a> {
     pub measurement: &'a Measurement,
     /// Nominal values and standard deviations.
     nominal: Vec<(f64, f64)>,
+    /// What they are at most.
+    most: Vec<f64>,
     /// Which of them are uncertain.
     uncertain: Vec<usize>,
     /// One standard deviation of each parameter of a file, SI.
@@ -76,6 +84,15 @@ impl<'a> Measured<'a> {
             })
             .collect();
         Self {
+            most: rig
+                .parameters()
+                .iter()
+                .map(|(name, _)| {
+                    let mut limits = rig.limits().iter();
+                    let limit = limits.find(|(known, _)| known == name);
+                    limit.map_or(f64::INFINITY, |(_, most)| *most)
+                })
+                .collect(),
             uncertain: (0..nominal.len()).filter(|&i| nominal[i].1 > 0.0).collect(),
             session: rig
                 .session()
@@ -118,10 +135,14 @@ impl<'a> Measured<'a> {
             }
             // Sizes stay positive: counted by their logarithm unless they may be zero.
             values[i] = if value > 0.0 && deviation <= value {
-                value * (p * deviation / value).exp()
+                value * (p * deviation / value).exp() * f64::from(*p > GONE)
             } else {
                 value + p * deviation
             };
+            // Not `min`, which takes what is not a number for the limit.
+            if values[i] > self.most[i] {
+                values[i] = self.most[i];
+            }
         }
         values
     }
@@ -318,6 +339,7 @@ impl SimulatedModel for Measured<'_> {
             rig: self.rig,
             measurement: self.measurement,
             nominal: self.nominal.clone(),
+            most: self.most.clone(),
             uncertain: self.uncertain.clone(),
             session: self.session.clone(),
             effects: self.effects.clone(),
@@ -371,7 +393,7 @@ impl SimulatedModel for Measured<'_> {
     }
 
     fn begun(&self, base: &Point, record: usize) -> Vec<Point> {
-        if self.normalised_error(base, record) < LOST {
+        if self.normalised_error(base, record) < SHAKY {
             return Vec::new();
         }
         let Some(block) = (0..self.blocks()).max_by_key(|&b| self.samples(record, b)) else {
@@ -450,6 +472,14 @@ impl InParts for Measured<'_> {
         same.width = self.width;
         same.pinned = Some(i);
         self.is_cause(i).then_some(same)
+    }
+
+    fn without(&self, point: &Point, i: usize) -> Option<Point> {
+        let (value, deviation) = self.nominal[*self.uncertain.get(i)?];
+        let may_be_nothing = value > 0.0 && deviation == value;
+        let mut without = point.clone();
+        without.nuisance[i] = GONE;
+        (may_be_nothing && point.nuisance[i] > GONE).then_some(without)
     }
 
     fn contradictions(&self) -> Vec<Cause> {

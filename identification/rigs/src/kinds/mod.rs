@@ -4,6 +4,7 @@
 //! diagnosis never asks for white residuals, which no real rig leaves: it names a cause that pays
 //! on data not fitted and that is found on each part of the data.
 
+mod alternatives;
 mod carriage;
 mod cause;
 mod closed_loop_actuator;
@@ -28,6 +29,7 @@ mod oscillator;
 mod parts;
 mod positioning_drive;
 mod reading;
+mod readings;
 mod recording;
 mod restoring_force;
 mod sensors;
@@ -49,6 +51,7 @@ pub use named_value::NamedValue;
 
 pub use natural::Natural;
 pub use reading::{Measurement, even_period};
+pub use readings::Reading;
 pub use recording::{Begin, RigRecording};
 pub use table::{Effect, EffectTable, NominalTable, SessionParameter, SessionRole, SessionTable};
 pub use template::template;
@@ -92,6 +95,8 @@ pub trait Equations: Sync {
     const SAID_BY: &'static [(&'static str, &'static str)] = &[];
     /// Nominal parameters whose deviation from what was stated is a cause, such as a scale.
     const CAUSES: &'static [&'static str] = &[];
+    /// Nominal parameters that are this at most, SI, whatever the data say.
+    const LIMITS: &'static [(&'static str, f64)] = &[];
     /// Places inside of the equations at which a user's own effect may act, beside its inputs and its output:
     /// `force` on what moves, `valve` on what the controller sends.
     const PLACES: &'static [&'static str] = &[];
@@ -206,6 +211,9 @@ pub trait Rig: Sync {
 
     /// Nominal parameters whose deviation from what was stated is a cause.
     fn causes(&self) -> &'static [&'static str];
+
+    /// Nominal parameters that are this at most, SI.
+    fn limits(&self) -> &'static [(&'static str, f64)];
 
     /// Natural units of `recordings`; `nominal` in the order of [`Self::parameters`].
     fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural;
@@ -328,6 +336,10 @@ impl<E: Equations> Rig for E {
 
     fn causes(&self) -> &'static [&'static str] {
         E::CAUSES
+    }
+
+    fn limits(&self) -> &'static [(&'static str, f64)] {
+        E::LIMITS
     }
 
     fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural {

@@ -146,6 +146,11 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
         None
     }
 
+    /// The model at `point` without the nominal parameter `i`; none where it cannot do without, or is.
+    fn without(&self, _point: &Point, _i: usize) -> Option<Point> {
+        None
+    }
+
     /// Sensors that contradict each other.
     fn contradictions(&self) -> Vec<Cause> {
         Vec::new()

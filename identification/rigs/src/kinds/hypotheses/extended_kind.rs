@@ -168,6 +168,10 @@ impl Rig for ExtendedKind {
         self.base.causes()
     }
 
+    fn limits(&self) -> &'static [(&'static str, f64)] {
+        self.base.limits()
+    }
+
     fn natural(&self, nominal: &[f64], recordings: &[RigRecording]) -> Natural {
         self.base.natural(nominal, recordings)
     }

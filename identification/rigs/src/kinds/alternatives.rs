@@ -1,0 +1,147 @@
+//! Other models of the same data: with effects that one part alone asks for, with an effect in the place of
+//! another of its class, and without what is not needed.
+
+use super::PartReport;
+use super::confirmed::unfit;
+use super::parts::{EVERYTHING, InParts};
+use super::readings::Crossed;
+use diagnosis::{Point, refit};
+use rayon::prelude::*;
+
+/// Logarithm of how much less likely a model is that does nearly as well.
+const NEARLY: f64 = 2.0;
+
+/// What the two parts ask for, each alone and both together; of effects that cannot be told apart one.
+pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Vec<Point> {
+    let mut all: Vec<Point> = parts.iter().map(|part| part.point.clone()).collect();
+    for (one, other) in [(0, 1), (1, 0)] {
+        let mut both = parts[one].point.clone();
+        let more = parts[other].point.effects.iter();
+        let new = more.filter(|(i, _)| {
+            let mut own = parts[one].point.effects.iter();
+            own.all(|(known, _)| !measured.are_alike(*i, *known))
+        });
+        both.effects.extend(new.cloned());
+        if both.effects.len() > parts[one].point.effects.len() {
+            all.push(both);
+        }
+    }
+    all
+}
+
+/// The model at `point` and those with effects in the place of others of their class, each from the best of its
+/// starts. First the one of which either part predicts the other best, or as well and its effects are more
+/// common; the rest are those that do nearly as well.
+pub(super) fn of_its_class<M: InParts>(
+    measured: &M,
+    point: &Point,
+    crossed: Crossed,
+) -> Vec<(Point, Crossed)> {
+    let mut all = vec![(point.clone(), crossed)];
+    let mut best = 0;
+    for (place, &(own, _)) in point.effects.iter().enumerate() {
+        let known = |i: usize| point.effects.iter().any(|(known, _)| *known == i);
+        let others =
+            (0..measured.candidates().len()).filter(|&i| !known(i) && measured.are_alike(i, own));
+        for other in others {
+            let (base, against) = &all[best];
+            let taken = base.effects[place].0;
+            let candidate = &measured.candidates()[other];
+            let from = |start: &Vec<f64>| {
+                let mut trial = base.clone();
+                trial.effects[place] = (other, candidate.internal(start));
+                trial
+            };
+            let error = |point: &Point| measured.normalised_error(point, EVERYTHING);
+            let trials = candidate.starts.iter().map(from);
+            let nearest = trials.min_by(|a, b| error(a).total_cmp(&error(b)));
+            let Some((found, deviations)) =
+                nearest.and_then(|trial| refit(measured, &trial, EVERYTHING))
+            else {
+                continue;
+            };
+            let mut reasons = unfit(measured, &found.point, &deviations, EVERYTHING).into_iter();
+            if reasons.any(|(i, _)| i == other) {
+                continue;
+            }
+            let Some(errors) = Crossed::of(measured, &found.point) else {
+                continue;
+            };
+            // Of those that do as well, the one that a catalogue has first, since it is more common.
+            let is_first = other < taken && !against.needs(&errors);
+            if is_first || errors.likelier_than(against) > 0.0 {
+                best = all.len();
+            }
+            all.push((found.point, errors));
+        }
+    }
+    let best = all.swap_remove(best);
+    all.retain(|own| best.1.likelier_than(&own.1) < NEARLY && replaced(&best.0, &own.0).is_some());
+    all.sort_by(|a, b| 0.0_f64.total_cmp(&a.1.likelier_than(&b.1)));
+    let mut firsts: Vec<(Point, Crossed)> = vec![best];
+    for own in all {
+        if firsts
+            .iter()
+            .all(|known| replaced(&known.0, &own.0).is_some())
+        {
+            firsts.push(own);
+        }
+    }
+    firsts
+}
+
+/// The first effect of `model` in whose place `other` has another one, and that.
+pub(super) fn replaced(model: &Point, other: &Point) -> Option<(usize, usize)> {
+    let mut pairs = model.effects.iter().zip(&other.effects);
+    let (own, new) = pairs.find(|(own, new)| own.0 != new.0)?;
+    Some((own.0, new.0))
+}
+
+/// What a model may go without.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Item {
+    Effect(usize),
+    Nominal(usize),
+}
+
+/// The model without what is needed least, if that is not needed for sure; of those in `asked` alone, which
+/// are those that were not the last time. Without a nominal parameter the error on all data stays below `most`.
+pub(super) fn least_needed<M: InParts>(
+    measured: &M,
+    point: &Point,
+    crossed: &Crossed,
+    most: f64,
+    asked: &mut Option<Vec<Item>>,
+) -> Option<(Point, Crossed)> {
+    let effects = point.effects.iter().map(|(i, _)| {
+        let mut left = point.clone();
+        left.effects.retain(|(known, _)| known != i);
+        (Item::Effect(*i), left)
+    });
+    let nominal = (0..point.nuisance.len())
+        .filter_map(|i| Some((Item::Nominal(i), measured.without(point, i)?)));
+    let items = effects.chain(nominal);
+    let items = items.filter(|(item, _)| asked.as_ref().is_none_or(|asked| asked.contains(item)));
+    let items: Vec<(Item, Point)> = items.collect();
+    let idle: Vec<(Item, Point, Crossed)> = items
+        .into_par_iter()
+        .filter_map(|(item, left)| {
+            let errors = Crossed::of(measured, &left)?;
+            // Where a part does not tell a parameter that the rig has, it may predict worse with it.
+            let fits = || {
+                refit(measured, &left, EVERYTHING).is_some_and(|(found, _)| {
+                    measured.normalised_error(&found.point, EVERYTHING) < most
+                })
+            };
+            let is_idle = !crossed.needs(&errors) && (matches!(item, Item::Effect(_)) || fits());
+            is_idle.then_some((item, left, errors))
+        })
+        .collect();
+    *asked = Some(idle.iter().map(|(item, ..)| *item).collect());
+    let (_, left, errors) = idle.into_iter().max_by(|a, b| {
+        crossed
+            .likelier_than(&b.2)
+            .total_cmp(&crossed.likelier_than(&a.2))
+    })?;
+    Some((left, errors))
+}

@@ -1,0 +1,226 @@
+//! What else the data may mean: models with and without what they do not need for sure, weighed by how either
+//! part of the data predicts the other.
+
+use serde::{Deserialize, Serialize};
+
+use super::cause::{Cause, effect_in_words, joined};
+use super::confirmed::{clearly_better, effects};
+use super::named_value::NamedValue;
+use super::parts::{EVERYTHING, InParts, Part};
+use diagnosis::resampling::correlation_time;
+use diagnosis::{Point, all_errors, completed, refit};
+
+/// The squared error grows by this factor at least without what the data need.
+pub(super) const NEEDED: f64 = 1.1;
+
+/// And shrinks to this share at most without what makes a prediction worse.
+const BETTER: f64 = 0.95;
+
+/// Most independent samples that a part counts for, halved. No model is exact: a tenth more squared error in
+/// both parts makes a reading less likely by a factor of e, however many samples show it.
+const MOST: f64 = 5.0;
+
+/// Least weight that is told in the sentence.
+const TOLD: f64 = 0.05;
+
+/// A model and what it says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reading {
+    /// Nominal parameters that are not what was stated.
+    pub causes: Vec<Cause>,
+    /// Its effects with their parameters.
+    pub effects: Vec<(String, Vec<NamedValue>)>,
+    /// Share of the described model's squared error on the held-out data that it explains.
+    pub explains: f64,
+    /// Its share among the readings, from 0 to 1.
+    pub weight: f64,
+}
+
+/// Errors on either part of a model fitted to the other.
+pub(super) struct Crossed([Vec<f64>; 2]);
+
+fn squares(errors: &[f64]) -> f64 {
+    errors.iter().map(|e| e * e).sum()
+}
+
+impl Crossed {
+    /// Of the model at `point`, fitted to either part; none where it cannot be.
+    pub(super) fn of<M: InParts>(model: &M, point: &Point) -> Option<Self> {
+        let predicted = |part: Part| -> Option<Vec<f64>> {
+            let (own, other) = (part as usize, part.other() as usize);
+            let (found, _) = refit(model, point, own)?;
+            let there = completed(model, &found.point, Some(own), other);
+            Some(all_errors(model, &there, other))
+        };
+        Some(Self([predicted(Part::LeftOut)?, predicted(Part::Fitted)?]))
+    }
+
+    /// Squared errors of `without` over those of this model, by part.
+    fn growths(&self, without: &Self) -> [f64; 2] {
+        std::array::from_fn(|i| squares(&without.0[i]) / squares(&self.0[i]))
+    }
+
+    /// Whether what the model has and `without` lacks is needed: no part is clearly predicted better without
+    /// it, and one clearly worse.
+    pub(super) fn needs(&self, without: &Self) -> bool {
+        let growths = self.growths(without);
+        let clear = |i: usize| clearly_better(&without.0[i], &self.0[i]);
+        let spoils = |i: usize| growths[i] < BETTER && clearly_better(&self.0[i], &without.0[i]);
+        !(0..2).any(spoils) && (0..2).any(|i| growths[i] > NEEDED && clear(i))
+    }
+
+    /// Logarithm of the likelihood beyond that of `other`, correlated samples counted once.
+    pub(super) fn likelier_than(&self, other: &Self) -> f64 {
+        let growths = self.growths(other);
+        let of = |i: usize| {
+            let own = &self.0[i];
+            let independent = 0.5 * own.len() as f64 / correlation_time(own);
+            independent.min(MOST) * growths[i].ln()
+        };
+        of(0) + of(1)
+    }
+
+    fn explains(&self, nominal: &[f64]) -> f64 {
+        1.0 - squares(&self.0[1]) / squares(nominal)
+    }
+}
+
+/// What is weighed: a model, what it says, and its errors.
+pub(super) struct Weighed {
+    pub causes: Vec<Cause>,
+    pub effects: Vec<(String, Vec<NamedValue>)>,
+    pub crossed: Crossed,
+}
+
+impl Weighed {
+    /// The model at `point`, fitted to all data.
+    pub(super) fn of<M: InParts>(model: &M, point: &Point, crossed: Crossed) -> Option<Self> {
+        let (found, deviations) = refit(model, point, EVERYTHING)?;
+        Some(Self {
+            causes: Vec::new(),
+            effects: effects(model, &found.point, &deviations),
+            crossed,
+        })
+    }
+}
+
+/// The readings, the likeliest first; `nominal` are the described model's errors on the held-out data.
+pub(super) fn ranked(all: Vec<Weighed>, nominal: &[f64]) -> Vec<Reading> {
+    let Some(first) = all.first() else {
+        return Vec::new();
+    };
+    let logs = all
+        .iter()
+        .map(|own| -first.crossed.likelier_than(&own.crossed));
+    let logs: Vec<f64> = logs.collect();
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let shares: Vec<f64> = logs.iter().map(|log| (log - most).exp()).collect();
+    let sum: f64 = shares.iter().sum();
+    let pairs = all.into_iter().zip(shares);
+    let mut readings: Vec<Reading> = pairs
+        .map(|(own, share)| Reading {
+            explains: own.crossed.explains(nominal),
+            causes: own.causes,
+            effects: own.effects,
+            weight: share / sum,
+        })
+        .collect();
+    readings.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    readings
+}
+
+impl Reading {
+    fn says(&self, name: &str) -> bool {
+        let mut effects = self.effects.iter();
+        self.causes.iter().any(|own| own.found.name == name) || effects.any(|own| own.0 == name)
+    }
+}
+
+/// What readings say beyond what is `named`, in a sentence; nothing where there is none.
+pub(super) fn in_words(readings: &[Reading], named: &dyn Fn(&str) -> bool) -> String {
+    let mut told: Vec<&str> = Vec::new();
+    let mut all: Vec<String> = Vec::new();
+    for own in readings {
+        let causes = own.causes.iter().map(|c| (&c.found.name, c.words()));
+        let effects = own.effects.iter();
+        let effects = effects.map(|(name, values)| (name, effect_in_words(name, values)));
+        for (name, words) in causes.chain(effects) {
+            if named(name) || told.contains(&name.as_str()) {
+                continue;
+            }
+            told.push(name);
+            let with = readings.iter().filter(|one| one.says(name));
+            let weight: f64 = with.map(|one| one.weight).sum();
+            if weight < TOLD {
+                continue;
+            }
+            all.push(format!("{words}, with a weight of {weight:.2}"));
+        }
+    }
+    if all.is_empty() {
+        return String::new();
+    }
+    format!(
+        " Perhaps, but not for sure from these data: {}.",
+        joined(&all)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn crossed(sizes: [f64; 2]) -> Crossed {
+        Crossed(sizes.map(|size| {
+            let sign = |k: usize| {
+                if (k * k * 7919 + k * 31) % 13 < 6 {
+                    1.0
+                } else {
+                    -1.0
+                }
+            };
+            (0..2000).map(|k| size * sign(k)).collect()
+        }))
+    }
+
+    #[test]
+    fn what_is_needed_makes_no_part_worse_and_one_clearly_better() {
+        let with = crossed([1.0, 1.0]);
+        assert!(with.needs(&crossed([1.2, 1.0])));
+        assert!(!with.needs(&crossed([1.02, 1.02])));
+        assert!(with.needs(&crossed([1.5, 0.99])));
+        assert!(!with.needs(&crossed([1.5, 0.8])));
+    }
+
+    #[test]
+    fn the_better_reading_comes_first_and_what_is_not_named_is_said_with_its_weight() {
+        let effect = |name: &str| {
+            let value = NamedValue {
+                name: "half_width".into(),
+                value: 1e-4,
+                unit: "m".into(),
+                standard_error: 1e-6,
+            };
+            (name.to_owned(), vec![value])
+        };
+        let of = |names: &[&str], size: f64| Weighed {
+            causes: Vec::new(),
+            effects: names.iter().map(|name| effect(name)).collect(),
+            crossed: crossed([size, size]),
+        };
+        let all = vec![
+            of(&["dead_band"], 1.0),
+            of(&["dead_band", "free_play"], 0.99),
+        ];
+        let readings = ranked(all, &vec![3.0; 2000]);
+        assert_eq!(readings[0].effects.len(), 2);
+        assert!((readings[0].weight + readings[1].weight - 1.0).abs() < 1e-12);
+        assert!((readings[1].explains - 8.0 / 9.0).abs() < 1e-12);
+        let said = in_words(&readings, &|name| name == "dead_band");
+        assert!(
+            said.contains("free play (0.100 ± 0.002 mm), with a weight of 0.55"),
+            "{said}"
+        );
+        assert!(!said.contains("dead band"), "{said}");
+    }
+}
