@@ -22,7 +22,7 @@ pub use reader::{Called, Named, Pick, columns_called, known_column, named_column
 pub use recording::{Recording, TimeBase};
 pub use rounded_stamps::RoundedStamps;
 pub use sheet::{Sheet, Wanted, is_called, name_and_unit};
-pub use text::{Text, decode, read_text, read_written, why};
+pub use text::{Text, decode, read_bytes, read_text, read_written, why};
 
 /// Mean, and root mean square about it.
 pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {

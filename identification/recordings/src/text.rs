@@ -20,11 +20,28 @@ pub struct Text {
 /// # Errors
 /// A file that is missing, unreadable, empty or binary.
 pub fn read_text(file: &Path) -> Result<Text, DataError> {
-    let bytes = std::fs::read(file).map_err(|error| DataError::Unreadable {
+    let bytes = read_bytes(file).map_err(|error| DataError::Unreadable {
         file: file.to_path_buf(),
-        reason: why(&error),
+        reason: error.to_string(),
     })?;
     decode(file, &bytes)
+}
+
+/// Reads the bytes of a file. A device such as /dev/zero, which has no end, is not read.
+///
+/// # Errors
+/// Why it cannot be read, as [`why`] puts it.
+pub fn read_bytes(file: &Path) -> io::Result<Vec<u8>> {
+    let said = |error: io::Error| io::Error::new(error.kind(), why(&error));
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = std::fs::metadata(file).map_err(said)?.file_type();
+        if kind.is_char_device() || kind.is_block_device() {
+            return Err(io::Error::other("it is a device; expected a file"));
+        }
+    }
+    std::fs::read(file).map_err(said)
 }
 
 /// Why a file cannot be read, in words.
@@ -49,7 +66,7 @@ pub fn why(error: &io::Error) -> String {
 /// # Errors
 /// Why it cannot be read, as [`why`] puts it, or the line that is not UTF-8.
 pub fn read_written(file: &Path) -> io::Result<String> {
-    let bytes = std::fs::read(file).map_err(|error| io::Error::new(error.kind(), why(&error)))?;
+    let bytes = read_bytes(file)?;
     let fault = |reason: String| io::Error::new(io::ErrorKind::InvalidData, reason);
     let binary = || fault("holds binary data, text was expected".to_string());
     match &bytes[..] {
@@ -122,6 +139,15 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_without_an_end_is_not_read() {
+        let said = |file: &str| read_text(Path::new(file)).unwrap_err().to_string();
+        assert!(said("/dev/zero").contains("it is a device; expected a file"));
+        assert!(said("/").contains("it is a folder; expected a file"));
+        assert!(said("/nothing/a.csv").contains("no such file"));
+    }
 
     #[test]
     fn what_programs_write_before_and_between_lines_is_no_content() {

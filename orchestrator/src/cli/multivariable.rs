@@ -53,7 +53,7 @@ pub fn is_description(path: &Path) -> bool {
 }
 
 fn has_kind(path: &Path, kind: &str) -> bool {
-    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let text = identification::data::read_written(path).unwrap_or_default();
     let quoted = format!("\"{kind}\"");
     text.lines().any(|line| {
         let mut parts = line.splitn(2, '=');

@@ -260,7 +260,7 @@ enum Read {
 
 fn read(asked: &Asked<'_>) -> Result<Read, Error> {
     let (model, columns) = (asked.model, asked.columns);
-    let text = std::fs::read_to_string(model).unwrap_or_default();
+    let text = identification::data::read_written(model).unwrap_or_default();
     if foreign::is_one(&text) {
         if columns.is_some() {
             return Err(Error::Option {

@@ -46,7 +46,8 @@ pub fn carrying(
     let Some((_, Value::Text(path))) = given.next().filter(|(_, value)| !is_empty(value)) else {
         return Ok(None);
     };
-    let script = std::fs::read(path).map_err(|error| format!("{path}: {error}"))?;
+    let script = identification::data::read_bytes(path.as_ref())
+        .map_err(|error| format!("{path}: {error}"))?;
     Ok(Some(Carrying {
         fmu: pack::with_resource(component.fmu.file(), CARRIED, script)?,
         parameter,
@@ -70,7 +71,7 @@ pub fn fmu_of(
     model: &Path,
     version: FmiVersion,
 ) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
-    let script = std::fs::read(model)?;
+    let script = identification::data::read_bytes(model)?;
     let component =
         pack::library::component(COMPONENT, version).map_err(|error| error.to_string())?;
     Ok(pack::with_resource(&component.path, CARRIED, script)?)

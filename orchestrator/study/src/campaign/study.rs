@@ -416,7 +416,7 @@ impl Study {
             let own = setting::files(key, value, &folder);
             for path in &own {
                 if !files.contains_key(path) {
-                    let bytes = std::fs::read(path).map_err(|error| {
+                    let bytes = recordings::read_bytes(path).map_err(|error| {
                         self.fault(&format!("`{name}`: {}: {error}", path.display()))
                     })?;
                     files.insert(path.clone(), fmi_import::digest(&bytes));
