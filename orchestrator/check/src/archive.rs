@@ -28,8 +28,8 @@ pub(super) fn check(findings: &mut Findings, path: &Path) -> Option<String> {
             return None;
         }
     };
-    if let Err(reason) = fmi_import::archive::check_overlaps(&mut archive) {
-        findings.error("archive", reason);
+    if let Err(doubt) = fmi_import::archive::check_overlaps(&mut archive) {
+        findings.error("archive", doubt.to_string());
         return None;
     }
     let mut names: Vec<String> = Vec::new();

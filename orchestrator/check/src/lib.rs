@@ -215,8 +215,8 @@ fn fmu(findings: &mut Findings, path: &Path, guest: Option<&Path>) {
         return;
     };
     findings.count_lines(&description);
-    if let Err(reason) = fmi_import::archive::check_attributes(&description) {
-        findings.error(DESCRIPTION, reason);
+    if let Err(doubt) = fmi_import::archive::check_attributes(&description) {
+        findings.error(DESCRIPTION, doubt.to_string());
         return;
     }
     schema::check(findings, &description);

@@ -26,7 +26,7 @@ use sha2::{Digest, Sha256};
 pub use datum::Datum;
 pub use description::{
     BaseUnit, Causality, Description, Flow, FmiVersion, InputClock, Interface, Item, Kind,
-    MatchingRule, Member, Terminal, Ticks, Variability, Variable,
+    MatchingRule, Member, NotANumber, Terminal, Ticks, Variability, Variable,
 };
 pub use error::{CallError, FmuError};
 pub use instance::{Instance, Progress, State};

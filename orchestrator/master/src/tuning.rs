@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 
 use super::{MasterError, Record, Simulation};
-use fmi_import::{Causality, Kind, Variability};
+use fmi_import::Kind;
 use units::hint;
 
 /// A change of a parameter during a run.
@@ -297,13 +297,10 @@ impl Simulation {
         let Some((part, found)) = found else {
             return Err(fault("the system has no such parameter"));
         };
-        let is_tunable =
-            found.causality == Causality::Parameter && found.variability == Variability::Tunable;
-        if !is_tunable {
+        if !found.is_tunable() {
             return Err(fault("its FMU does not declare it as a tunable parameter"));
         }
-        let is_one = matches!(found.kind, Kind::Float64 | Kind::Float32) && !found.is_element;
-        if !is_one {
+        if !found.is_real_number() {
             return Err(fault("only single real numbers can be changed"));
         }
         if self.parts[part].instance.has_events() {

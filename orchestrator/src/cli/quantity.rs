@@ -50,7 +50,10 @@ pub fn if_given(
 /// # Errors
 /// Another thing.
 pub fn percent(option: &'static str, text: &str) -> Result<f64, Error> {
-    fmi_system::percent(text).map_err(|reason| Error::Option { option, reason })
+    fmi_system::percent(text).map_err(|error| Error::Option {
+        option,
+        reason: error.to_string(),
+    })
 }
 
 /// Lowest and highest frequency of `--band`, Hz.

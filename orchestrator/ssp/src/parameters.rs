@@ -38,21 +38,7 @@ pub(super) fn units(root: Node) -> Result<Units, Fault> {
         let Some(base) = child(unit, "BaseUnit") else {
             continue;
         };
-        let mut exponents = [0; 7];
-        let names = ["kg", "m", "s", "A", "K", "mol", "cd"];
-        for (exponent, name) in exponents.iter_mut().zip(names) {
-            if let Some(text) = base.attribute(name) {
-                *exponent = text
-                    .trim()
-                    .parse()
-                    .map_err(|_| fault(base, format!("{name}=\"{text}\" is not a whole number")))?;
-            }
-        }
-        let base_unit = BaseUnit {
-            exponents,
-            factor: xml::number(base, "factor", 1.0)?,
-            offset: xml::number(base, "offset", 0.0)?,
-        };
+        let base_unit = BaseUnit::read(base).map_err(|error| fault(base, error.to_string()))?;
         if base_unit.factor == 0.0 {
             return Err(fault(base, format!("the factor of `{name}` is 0")));
         }

@@ -343,7 +343,7 @@ fn tables(file: &SystemFile) -> Result<Vec<InputTable>, SystemError> {
         }
         let place = file.directory.as_deref().unwrap_or(Path::new(""));
         let read = InputTable::read(name, &place.join(&table.file), table.between);
-        tables.push(read.map_err(at)?);
+        tables.push(read.map_err(|error| at(error.to_string()))?);
     }
     Ok(tables)
 }

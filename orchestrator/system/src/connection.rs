@@ -40,7 +40,8 @@ pub(super) fn connect(
         Origin::Output(name) => {
             let table = tables.iter().position(|table| table.name == name.component);
             if let Some(table) = table {
-                let column = tables[table].find(&name.variable)?;
+                let column = tables[table].find(&name.variable);
+                let column = column.map_err(|error| error.to_string())?;
                 // What a table holds, it holds for this input: whole numbers and truth values too.
                 let start = End {
                     kind: match target.kind {

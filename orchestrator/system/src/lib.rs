@@ -27,5 +27,5 @@ pub use graph::{Operation, Schedule};
 pub use library::{Archive, Files, Library};
 pub use link::{Link, Origin, Quantity, VariableName};
 pub use passage::{DeclaredUnit, Hop, Passage, Transformation, Way};
-pub use table::{Between, InputTable, TableFile};
-pub use value::{Declared, Setting, Value, percent};
+pub use table::{Between, InputTable, TableError, TableFile};
+pub use value::{Declared, NotAShare, Setting, Value, percent};

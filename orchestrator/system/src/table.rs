@@ -1,6 +1,6 @@
 //! Input tables: columns over time from a CSV file, as sources of connections.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use recordings::{Sheet, Wanted};
 use serde::Deserialize;
@@ -47,18 +47,50 @@ pub struct InputTable {
     pub between: Between,
 }
 
+/// Why a table is not read, or a column not found.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// The file, or a cell of it, cannot be read.
+    #[error(transparent)]
+    Data(#[from] recordings::DataError),
+    /// A line of the file is wrong.
+    #[error("{}:{line}: {reason}", file.display())]
+    Line {
+        /// The file.
+        file: PathBuf,
+        /// The line, from 1.
+        line: u64,
+        /// What is wrong.
+        reason: String,
+    },
+    /// There is no such column.
+    #[error("the table `{table}` has no column `{column}`{hint}")]
+    NoColumn {
+        /// The table.
+        table: String,
+        /// What was looked for.
+        column: String,
+        /// The nearest name.
+        hint: String,
+    },
+}
+
 impl InputTable {
     /// Reads a table.
     ///
     /// # Errors
     /// A file that cannot be read, with line and column; no column of time, or a time that falls.
-    pub fn read(name: &str, path: &Path, between: Between) -> Result<Self, String> {
+    pub fn read(name: &str, path: &Path, between: Between) -> Result<Self, TableError> {
         let wanted = Wanted {
             is_column: &|cell| is_time(cell),
             header: "`time [s],force [kN]` (any names and units)",
         };
-        let sheet = Sheet::read(path, wanted).map_err(|error| error.to_string())?;
-        let fault = |line: u64, reason: String| format!("{}:{line}: {reason}", path.display());
+        let sheet = Sheet::read(path, wanted)?;
+        let fault = |line: u64, reason: String| TableError::Line {
+            file: path.to_path_buf(),
+            line,
+            reason,
+        };
         let mut table = Self {
             name: name.to_string(),
             columns: Vec::new(),
@@ -71,9 +103,7 @@ impl InputTable {
             let (column, unit) = parts(head);
             let below = sheet.unit_below(place).map(|(_, unit)| unit.to_string());
             let unit = unit.map(str::to_string).or(below);
-            let values = sheet
-                .full_column(place, head)
-                .map_err(|error| error.to_string())?;
+            let values = sheet.full_column(place, head)?;
             if table.times.is_empty() && is_time(head) {
                 let factor = match &unit {
                     Some(unit) => units::convert(1.0, unit, "s")
@@ -108,15 +138,15 @@ impl InputTable {
     ///
     /// # Errors
     /// There is none; the nearest is named.
-    pub fn find(&self, column: &str) -> Result<usize, String> {
+    pub fn find(&self, column: &str) -> Result<usize, TableError> {
         let found = self.columns.iter().position(|known| known == column);
         found.ok_or_else(|| {
             let known = self.columns.iter().map(String::as_str);
-            format!(
-                "the table `{}` has no column `{column}`{}",
-                self.name,
-                hint(column, known)
-            )
+            TableError::NoColumn {
+                table: self.name.clone(),
+                column: column.to_string(),
+                hint: hint(column, known),
+            }
         })
     }
 

@@ -270,19 +270,23 @@ pub(super) fn time(written: &Setting) -> Result<f64, String> {
 /// # Errors
 /// What was expected.
 pub(super) fn share(written: &Setting) -> Result<f64, String> {
-    percent(&written.to_string())
+    percent(&written.to_string()).map_err(|error| error.to_string())
 }
+
+/// A text that is not a positive share.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not a share; expected a number above 0, such as \"0.05 %\"")]
+pub struct NotAShare(pub String);
 
 /// A positive share, per cent; `%` may follow it.
 ///
 /// # Errors
 /// What was expected.
-pub fn percent(text: &str) -> Result<f64, String> {
+pub fn percent(text: &str) -> Result<f64, NotAShare> {
     let number = text.trim().trim_end_matches('%').trim_end().parse::<f64>();
     let number = number.ok();
     let positive = number.filter(|value| *value > 0.0 && value.is_finite());
-    let expected = "expected a number above 0, such as \"0.05 %\"";
-    positive.ok_or_else(|| format!("`{text}` is not a share; {expected}"))
+    positive.ok_or_else(|| NotAShare(text.to_string()))
 }
 
 /// A number in the variable's unit, which may follow it.

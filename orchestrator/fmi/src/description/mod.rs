@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 pub use clock::{InputClock, Ticks};
 pub use kind::{Item, Kind};
-pub use structure::BaseUnit;
+pub use structure::{BaseUnit, NotANumber};
 pub use terminal::{Flow, MatchingRule, Member, Terminal};
 
 use super::FmuError;
@@ -131,6 +131,20 @@ pub struct Variable {
     pub description: String,
     /// For outputs: positions of the inputs that it depends on directly.
     pub dependencies: Arc<[usize]>,
+}
+
+impl Variable {
+    /// Whether it is a parameter that the standard lets be changed between steps.
+    #[must_use]
+    pub fn is_tunable(&self) -> bool {
+        self.causality == Causality::Parameter && self.variability == Variability::Tunable
+    }
+
+    /// Whether it is a real number of its own, not an element of an array.
+    #[must_use]
+    pub fn is_real_number(&self) -> bool {
+        matches!(self.kind, Kind::Float64 | Kind::Float32) && !self.is_element
+    }
 }
 
 /// How an FMU can be run.
@@ -311,7 +325,7 @@ pub(super) fn read(
     let bytes = fs::read(unpacked.join("modelDescription.xml"))
         .map_err(|error| wrong(format!("cannot be read ({error})")))?;
     let text = structure::decode(bytes).map_err(wrong)?;
-    super::archive::check_attributes(&text).map_err(wrong)?;
+    super::archive::check_attributes(&text).map_err(|doubt| wrong(doubt.to_string()))?;
     let xml = roxmltree::Document::parse(&text)
         .map_err(|error| wrong(format!("not well-formed XML: {error}")))?;
     let root = xml.root_element();

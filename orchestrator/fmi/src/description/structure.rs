@@ -18,24 +18,49 @@ pub struct BaseUnit {
     pub offset: f64,
 }
 
+/// An attribute of a `<BaseUnit>` that is not the number it must be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{name}=\"{text}\" is not a {expected} number")]
+pub struct NotANumber {
+    /// The attribute.
+    pub name: &'static str,
+    /// What it is.
+    pub text: String,
+    /// `whole` or `finite`.
+    pub expected: &'static str,
+}
+
 impl BaseUnit {
-    /// Attributes of a `<BaseUnit>`; none where one of them is not a number. A radian is a number here, so that `rpm`
-    /// fits `rad/s` whether or not it is declared as an angle.
-    fn read(base: Node) -> Option<Self> {
+    /// Attributes of a `<BaseUnit>`, of a description or an SSP. A radian is a number here, so that `rpm` fits
+    /// `rad/s` whether or not it is declared as an angle.
+    ///
+    /// # Errors
+    /// An attribute that is not a number.
+    pub fn read(base: Node) -> Result<Self, NotANumber> {
+        let not = |name, text: &str, expected| NotANumber {
+            name,
+            text: text.to_string(),
+            expected,
+        };
         let mut exponents = [0; 7];
         for (exponent, name) in exponents
             .iter_mut()
             .zip(["kg", "m", "s", "A", "K", "mol", "cd"])
         {
             if let Some(text) = base.attribute(name) {
-                *exponent = text.trim().parse().ok()?;
+                let whole = text.trim().parse();
+                *exponent = whole.map_err(|_| not(name, text, "whole"))?;
             }
         }
         let number = |name, absent| match base.attribute(name) {
-            Some(text) => text.trim().parse().ok(),
-            None => Some(absent),
+            Some(text) => {
+                let number = text.trim().parse().ok();
+                let finite = number.filter(|value: &f64| value.is_finite());
+                finite.ok_or_else(|| not(name, text, "finite"))
+            }
+            None => Ok(absent),
         };
-        Some(Self {
+        Ok(Self {
             exponents,
             factor: number("factor", 1.0)?,
             offset: number("offset", 0.0)?,
@@ -58,7 +83,7 @@ pub(super) fn units<'a>(root: Node<'a, 'a>) -> HashMap<&'a str, BaseUnit> {
         .filter(|node| node.has_tag_name("Unit"))
         .filter_map(|unit| {
             let base = unit.children().find(|node| node.has_tag_name("BaseUnit"))?;
-            Some((unit.attribute("name")?, BaseUnit::read(base)?))
+            Some((unit.attribute("name")?, BaseUnit::read(base).ok()?))
         })
         .collect()
 }

@@ -392,7 +392,8 @@ fn drive(file: &mut SystemFile, path: &Path) -> Result<(), Error> {
     while is_taken(&name) || name == "reference" {
         name += "_";
     }
-    let table = InputTable::read(&name, path, Between::Linear).map_err(fault)?;
+    let table =
+        InputTable::read(&name, path, Between::Linear).map_err(|error| fault(error.to_string()))?;
     let single = match file.components.len() {
         1 => file.components.keys().next().cloned(),
         _ => None,

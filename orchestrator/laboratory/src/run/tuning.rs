@@ -1,7 +1,7 @@
 //! Which parameters may be changed during a run, and between which bounds.
 
 use crate::error::Error;
-use fmi_import::{Causality, Kind, Variability, Variable};
+use fmi_import::Variable;
 use fmi_master::{Change, Panel, Tunable};
 use fmi_system::{Component, System};
 use pages::report::UnitSystem;
@@ -65,10 +65,7 @@ fn tunable(system: &System) -> impl Iterator<Item = (&Component, &Variable)> {
 }
 
 fn is_tunable(variable: &Variable) -> bool {
-    variable.causality == Causality::Parameter
-        && variable.variability == Variability::Tunable
-        && matches!(variable.kind, Kind::Float64 | Kind::Float32)
-        && !variable.is_element
+    variable.is_tunable() && variable.is_real_number()
 }
 
 /// The value at the beginning.
