@@ -124,6 +124,16 @@ class Browser:
         self.call("Page.navigate", url=url)
         self.wait_for("Page.loadEventFired")
 
+    def theme(self, theme):
+        """Chooses `light` or `dark`, of the system and by the page's own button."""
+        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}])
+        self.run(f"document.querySelector('[data-set-theme=\"{theme}\"]')?.click()")
+
+    def tab(self):
+        """Presses the tabulator."""
+        for kind in ["rawKeyDown", "keyUp"]:
+            self.call("Input.dispatchKeyEvent", type=kind, key="Tab", code="Tab", windowsVirtualKeyCode=9)
+
     def run(self, script):
         """The value of an expression in the page; a promise is waited for."""
         answer = self.call("Runtime.evaluate", expression=script, returnByValue=True,

@@ -10,7 +10,7 @@ import sys
 import time
 
 import devtools
-from pages import AXE, LAYOUT, PLOTS
+from pages import LAYOUT, PLOTS, WIDTHS, accessible, by_keyboard
 
 
 # Writes a value into the field of a parameter and submits it; gives the message.
@@ -73,9 +73,12 @@ def main(arguments):
             if state in ("ended", "tripped"):
                 break
             time.sleep(0.1)
-        if axe:
-            browser.run(axe + "; true")
-            faults += browser.run(AXE)
+        for width in WIDTHS:
+            browser.size(width)
+            found = browser.run(LAYOUT) + by_keyboard(browser)
+            if axe:
+                found += accessible(browser, axe)
+            faults += [f"at {width} px: {one}" for one in found]
         words = browser.run("document.getElementById('state').textContent")
         print(f"{sorted(seen)}: {words}")
         if "running" not in seen or not seen & {"ended", "tripped"}:

@@ -191,14 +191,45 @@ AXE = r"""(async () => {
 
 
 def accessible(browser, axe):
-    """Violations that axe-core finds, light and dark."""
+    """Violations that axe-core finds, light and dark; a page without buttons for it follows the system."""
     browser.run(axe + "; true")
     found = []
     for theme in ["light", "dark"]:
-        browser.run(f"document.querySelector('[data-set-theme=\"{theme}\"]').click()")
+        browser.theme(theme)
         found += [f"{theme}: {one}" for one in browser.run(AXE)]
-    browser.run("document.querySelector('[data-set-theme=\"light\"]').click()")
+    browser.theme("light")
     return found
+
+
+# Everything that a mouse can use, numbered; what has the focus, and whether that can be seen.
+USABLE = r"""(() => {
+  const all = [...document.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex]")]
+    .filter((one) => !one.disabled && one.tabIndex >= 0 && one.getClientRects().length
+      && getComputedStyle(one).visibility !== "hidden");
+  all.forEach((one, n) => { one.dataset.usable = n; });
+  document.activeElement?.blur();
+  return all.map((one) => (one.getAttribute("aria-label") || one.textContent || one.id || one.tagName).trim().slice(0, 40));
+})()"""
+FOCUSED = r"""(() => {
+  const one = document.activeElement, style = getComputedStyle(one);
+  const shows = style.outlineStyle !== "none" && parseFloat(style.outlineWidth) > 0 || style.boxShadow !== "none";
+  return [one.dataset.usable === undefined ? null : Number(one.dataset.usable), shows];
+})()"""
+
+
+def by_keyboard(browser):
+    """What the tabulator does not reach, and what does not show that it has the focus."""
+    names = browser.run(USABLE)
+    reached, hidden = set(), set()
+    for _ in range(len(names) + 2):
+        browser.tab()
+        number, shows = browser.run(FOCUSED)
+        if number is not None:
+            reached.add(number)
+            if not shows:
+                hidden.add(number)
+    missed = [f"the keyboard does not reach `{name}`" for n, name in enumerate(names) if n not in reached]
+    return missed + [f"`{names[n]}` does not show its focus" for n in sorted(hidden)]
 
 
 def check(browser, page, pictures, axe):
@@ -216,6 +247,7 @@ def check(browser, page, pictures, axe):
             found += browser.run(CONTROLS) + browser.run(PLOTS)
         if axe:
             found += accessible(browser, axe)
+        found += by_keyboard(browser)
         if width == WIDTHS[-1]:
             beside = page.parent / "summary.json"
             if beside.is_file():

@@ -323,7 +323,10 @@ fn the_one<'a>(
                 second.name,
                 name = channel.name()
             ),
-            _ => format!("column `{}` occurs twice", channel.name()),
+            _ => format!(
+                "column `{}` occurs twice; rename or delete one",
+                channel.name()
+            ),
         };
         DataError::line(sheet.file(), sheet.header_line(), reason)
     };

@@ -1,6 +1,7 @@
 //! `shakebench diagnose`: a case of the shake table, or the description of a rig; and what a model
 //! that came out of it makes of further records.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -204,6 +205,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         unused(&folder, |_| false)
     });
     let bar = progress::spinner("reading");
+    let guessed = RefCell::new(String::new());
     let tell = |event: &Progress| match progress::is_verbose() {
         true => eprintln!("{event}"),
         false => bar.set_message(short(event)),
@@ -221,7 +223,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 .chain(&arguments.data)
                 .cloned()
                 .collect();
-            let tell = |guess: &Guess| bar.suspend(|| show(guess, arguments.json));
+            let tell = |guess: &Guess| {
+                bar.suspend(|| note!("guessed from the files\n  {}", guess.sentences.join("\n  ")));
+                guessed.replace(guess.text.clone());
+            };
             diagnose_files(&files, columns, effects, &folder, &tell, observer)
         }
         None => diagnose_with(case, &arguments.data, columns, effects, &folder, observer),
@@ -231,6 +236,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.json {
         super::print_json(serde_json::json!(report), &folder);
     } else {
+        if guesses {
+            println!(
+                "description, to change where it is wrong:\n\n{}",
+                guessed.take()
+            );
+        }
         print!("{}", text::text(&report));
         println!("\nwritten ({:.1} s):", report.wall_s);
         for file in files(&report, &folder) {
@@ -250,25 +261,6 @@ fn short(event: &Progress) -> String {
             let names: Vec<&str> = effects.iter().map(|(name, _)| *name).collect();
             format!("fitted {}", names.join(" and "))
         }
-    }
-}
-
-/// Prints what was guessed; to standard error where standard output is for JSON.
-fn show(guess: &Guess, json: bool) {
-    let sentences: Vec<String> = guess
-        .sentences
-        .iter()
-        .map(|own| format!("  {own}\n"))
-        .collect();
-    let text = format!(
-        "guessed from the files\n{}as a description, to change where it is wrong:\n\n{}\n",
-        sentences.concat(),
-        guess.text
-    );
-    if json {
-        eprint!("{text}");
-    } else {
-        print!("{text}");
     }
 }
 

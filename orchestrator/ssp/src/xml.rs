@@ -19,8 +19,7 @@ pub(super) fn parse(text: &str) -> Result<Document<'_>, Fault> {
             "elements within elements deeper than {DEEPEST}"
         )));
     }
-    fmi_import::archive::check_attributes(text)
-        .map_err(|doubt| Fault::new(doubt.to_string()))?;
+    fmi_import::archive::check_attributes(text).map_err(|doubt| Fault::new(doubt.to_string()))?;
     let options = ParsingOptions {
         nodes_limit: MOST_NODES,
         ..ParsingOptions::default()

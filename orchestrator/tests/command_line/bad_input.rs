@@ -239,6 +239,10 @@ const REFUSED: &[(&str, &[&str])] = &[
         "run --record folder",
         &["folder", "it is a folder; expected a file"],
     ),
+    (
+        "run --record /dev/zero",
+        &["/dev/zero", "it is a device; expected a file"],
+    ),
     ("run --record good.csv/x.csv", &["x.csv", "no such file"]),
     (
         "run --record nan.csv",
@@ -457,6 +461,11 @@ const REFUSED: &[(&str, &[&str])] = &[
         "compare folder",
         &["folder", "contains no run", "manifest.json"],
     ),
+    ("compare mpc mpc", &["`mpc` is given twice"]),
+    (
+        "compare mpc --records good.csv records/../good.csv",
+        &["--records: records/../good.csv: is given twice"],
+    ),
     ("compare --controllers=", &["system `` is unknown"]),
     ("compare --controllers mpc,zzz", &["`zzz` is unknown"]),
     ("compare --records folder", &["folder", "holds no record"]),
@@ -596,6 +605,12 @@ const REFUSED: &[(&str, &[&str])] = &[
         &["folder/nominal.toml", "--template table"],
     ),
     ("diagnose case", &["case/nominal.toml", "missing field"]),
+    ("diagnose /dev/zero", &["/dev/zero"]),
+    (
+        "diagnose --model /dev/zero --validate rows.csv",
+        &["/dev/zero"],
+    ),
+    ("diagnose rows.csv --effects effect.toml", &["effect.toml"]),
     ("diagnose empty.csv", &["empty.csv", "empty"]),
     ("diagnose good.csv", &["good.csv", "--columns MAP.toml"]),
     ("diagnose rows.csv rows.csv", &["rows.csv: is given twice"]),

@@ -237,7 +237,7 @@ fn faults_of_csv_files_are_named() {
     );
     assert_eq!(
         say("t_s,t_s\n0,1\n"),
-        "a.csv, line 1: column `time` occurs twice"
+        "a.csv, line 1: column `time` occurs twice; rename or delete one"
     );
     assert_eq!(
         say("# npts=40\nt_s,a_g\n0,1\n0.01,1\n"),
