@@ -262,6 +262,8 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     // Nor do they tell an effect from all of its class.
     let own: Vec<usize> = confirmed.point.effects.iter().map(|(i, _)| *i).collect();
+    let is_own = |effect: &str| own.iter().any(|i| measured.name(*i) == effect);
+    as_described.rivals.retain(|(rival, _)| !is_own(rival));
     for (point, errors) in of_its_class {
         if let Some((against, rival)) = replaced(&best, &point)
             && own.contains(&against)
