@@ -2,8 +2,8 @@
 
 use super::{Prediction, TRIANGLE};
 
-/// Error (RMS) of the model's acceleration on a motion of any size: a part that does not grow with the motion,
-/// such as what an unseen voltage at the valve makes, and a share of the motion. They are independent.
+/// Error (RMS) of the model's acceleration on a motion of any size, in two independent parts. One does not grow
+/// with the motion, such as what an unseen voltage at the valve makes; the other is a share of the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Missed {
     /// m/s².
