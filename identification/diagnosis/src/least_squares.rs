@@ -126,7 +126,8 @@ pub struct Columns {
     columns: Vec<Vec<f64>>,
 }
 
-pub(crate) fn squares(errors: &[f64]) -> f64 {
+/// Sum of the squares of `errors`.
+pub fn squares(errors: &[f64]) -> f64 {
     errors.iter().map(|e| e * e).sum()
 }
 

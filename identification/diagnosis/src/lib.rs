@@ -21,6 +21,7 @@ pub use fit::{Fit, Jacobian, evaluate, residuals};
 pub use least_squares::WEAK;
 pub use least_squares::{
     Columns, Free, SimulatedModel, Solution, all_errors, deviations, least_squares, solution,
+    squares,
 };
 pub use likelihood::{FLOOR, Hypothesis, PRICE_OF_A_PARAMETER, PenalisedLikelihood};
 pub use model::{Candidate, EffectParameter, ExtensibleModel, Lesson, Point, Role, Scale};

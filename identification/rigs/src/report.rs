@@ -243,14 +243,20 @@ impl From<&NamedEffect> for EffectReport {
     }
 }
 
-impl From<&Cause> for EffectReport {
-    fn from(cause: &Cause) -> Self {
-        let own = &cause.found;
-        let report = ParameterReport {
+impl From<&NamedValue> for ParameterReport {
+    fn from(own: &NamedValue) -> Self {
+        Self {
             value: own.value,
             unit: own.unit.clone(),
             standard_error: own.standard_error,
-        };
+        }
+    }
+}
+
+impl From<&Cause> for EffectReport {
+    fn from(cause: &Cause) -> Self {
+        let own = &cause.found;
+        let report = ParameterReport::from(own);
         Self {
             effect: own.name.clone(),
             parameters: BTreeMap::from([(own.name.clone(), report)]),
@@ -316,16 +322,11 @@ impl From<&WeighedModel> for CandidateReport {
 
 impl From<&Reading> for CandidateReport {
     fn from(own: &Reading) -> Self {
-        let report = |p: &NamedValue| ParameterReport {
-            value: p.value,
-            unit: p.unit.clone(),
-            standard_error: p.standard_error,
-        };
         let causes = own.causes.iter().map(|cause| &cause.found);
         let effects = own.effects.iter();
         let of_effects = effects.clone().flat_map(|(name, values)| {
             let values = values.iter();
-            values.map(move |p| (format!("{name}.{}", p.name), report(p)))
+            values.map(move |p| (format!("{name}.{}", p.name), ParameterReport::from(p)))
         });
         Self {
             effects: causes
@@ -336,7 +337,7 @@ impl From<&Reading> for CandidateReport {
                 .collect(),
             weight: own.weight,
             parameters: causes
-                .map(|value| (value.name.clone(), report(value)))
+                .map(|value| (value.name.clone(), ParameterReport::from(value)))
                 .chain(of_effects)
                 .collect(),
             explains_percent: 100.0 * own.explains,
@@ -436,14 +437,9 @@ impl From<&RigDiagnosis> for DiagnosisReport {
         let part = &found.as_described;
         let confirmed = &found.confirmed;
         let effect = |(name, values): &(String, Vec<NamedValue>)| {
-            let parameters = values.iter().map(|p| {
-                let report = ParameterReport {
-                    value: p.value,
-                    unit: p.unit.clone(),
-                    standard_error: p.standard_error,
-                };
-                (p.name.clone(), report)
-            });
+            let parameters = values
+                .iter()
+                .map(|p| (p.name.clone(), ParameterReport::from(p)));
             // What one part alone proposes is tested on the other.
             let all = part.effects.iter().chain(&found.swapped.effects);
             let own = all.into_iter().find(|one| one.effect == *name);

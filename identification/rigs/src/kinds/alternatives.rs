@@ -78,16 +78,8 @@ pub(super) fn of_its_class<M: InParts>(
     let best = all.swap_remove(best);
     all.retain(|own| best.1.likelier_than(&own.1) < NEARLY && replaced(&best.0, &own.0).is_some());
     all.sort_by(|a, b| 0.0_f64.total_cmp(&a.1.likelier_than(&b.1)));
-    let mut firsts: Vec<(Point, Crossed)> = vec![best];
-    for own in all {
-        if firsts
-            .iter()
-            .all(|known| replaced(&known.0, &own.0).is_some())
-        {
-            firsts.push(own);
-        }
-    }
-    firsts
+    all.insert(0, best);
+    all
 }
 
 /// The first effect of `model` in whose place `other` has another one, and that.

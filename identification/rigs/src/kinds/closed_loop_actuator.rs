@@ -371,7 +371,7 @@ const WIDTH: usize = 8;
 const ALL: usize = STATES + 5;
 
 /// The speed, times `share`, that friction takes over a step after which it would have been `free` without:
-/// implicit, so that sticking is no matter of the step's length.
+/// implicit, so that it sticks with steps of any length.
 fn rubbing(free: f64, most: f64, sliding_speed: f64) -> f64 {
     // v + most tanh(v / s) = free has one solution, which is between free less most and free.
     let (mut low, mut high) = ((free.abs() - most).max(0.0), free.abs());

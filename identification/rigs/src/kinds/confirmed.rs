@@ -9,7 +9,7 @@ use super::parts::{EVERYTHING, InParts, Part, file};
 use super::readings::NEEDED;
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
-use diagnosis::{Point, Role, all_errors, completed, estimates, refit};
+use diagnosis::{Point, Role, all_errors, completed, estimates, refit, squares};
 use recordings::mean_and_deviation;
 
 /// A parameter differs between parts where its estimates lie this many of their standard errors
@@ -144,7 +144,6 @@ fn is_missed<M: InParts>(measured: &M, point: &Point, effect: usize, record: usi
 
 /// Whether the squared error of the fit to `record` grows by more than a tenth without an effect.
 fn is_felt<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize) -> bool {
-    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
     without_and_with(measured, point, effect, record)
         .is_some_and(|[before, after]| squares(&before) > NEEDED * squares(&after))
 }
@@ -154,7 +153,6 @@ fn is_felt<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize
 /// differences (Vuong, Econometrica 57, 1989; for nested models half the root of the ratio's chi-square
 /// at most).
 pub(super) fn clearly_better(before: &[f64], after: &[f64]) -> bool {
-    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
     let independent = |values: &[f64]| values.len() as f64 / correlation_time(values);
     let ratio = independent(after) * (squares(before) / squares(after)).ln();
     let pairs = before.iter().zip(after);

@@ -16,6 +16,7 @@ use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::gain_interval;
 use diagnosis::{
     Observer, Point, Progress, Selected, Verdict, all_errors, completed, select, select_jointly,
+    squares,
 };
 
 /// Errors on data that were not fitted that still agree with those on fitted ones: at most so many times
@@ -407,7 +408,6 @@ fn no_output(description: &Description) -> DescriptionError {
 
 fn part_report<M: InParts>(measured: &M, fitted: Part, selected: &Selected) -> PartReport {
     let (own, tested) = (fitted as usize, fitted.other() as usize);
-    let squares = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>();
     // What belongs to a file and not to the rig is fitted there, for every model alike.
     let on_tested = |point: &Point| completed(measured, point, Some(own), tested);
     let origin = completed(measured, &measured.origin(), None, tested);

@@ -8,7 +8,7 @@ use super::confirmed::{clearly_better, effects};
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part};
 use diagnosis::resampling::correlation_time;
-use diagnosis::{Point, all_errors, completed, refit};
+use diagnosis::{Point, all_errors, completed, refit, squares};
 
 /// The squared error grows by this factor at least without what the data need.
 pub(super) const NEEDED: f64 = 1.1;
@@ -38,10 +38,6 @@ pub struct Reading {
 
 /// Errors on either part of a model fitted to the other.
 pub(super) struct Crossed([Vec<f64>; 2]);
-
-fn squares(errors: &[f64]) -> f64 {
-    errors.iter().map(|e| e * e).sum()
-}
 
 impl Crossed {
     /// Of the model at `point`, fitted to either part; none where it cannot be.
