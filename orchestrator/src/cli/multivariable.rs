@@ -222,7 +222,10 @@ pub fn diagnosed(
         results.finish()?;
     }
     if json {
-        println!("{summary}");
+        match out {
+            Some(folder) => super::print_json(summary, folder),
+            None => println!("{summary}"),
+        }
         return Ok(ExitCode::SUCCESS);
     }
     println!("{}", found.sentence);
