@@ -16,6 +16,9 @@ const HOLDS: usize = 40;
 const STILL: f64 = 0.02;
 /// Steps with derivatives that learn, before the gain follows.
 const STEPS: usize = 6;
+/// Squared change of the residuals below which derivatives learn nothing from a step: beside it, rounding is no
+/// longer small.
+const SMALLEST_CHANGE: f64 = 1e-12;
 /// Expected gains below this may be outweighed by the predictor's change along the step.
 const WITHIN_GAINS_REACH: f64 = 1e3;
 
@@ -243,7 +246,7 @@ impl Jacobian {
         let n = self.columns.len();
         let weighed = DVector::from_fn(n, |i, _| self.gram[(i, i)] * step[i]);
         let size = weighed.dot(step);
-        if size.is_nan() || size <= 0.0 {
+        if size.is_nan() || size <= SMALLEST_CHANGE {
             return;
         }
         let along = weighed / size;
@@ -559,3 +562,6 @@ pub(crate) fn polish<M: ExtensibleModel>(
     }
     Some((best, jacobian))
 }
+
+#[cfg(test)]
+mod tests;
