@@ -201,6 +201,8 @@ fn kind(scalar: Scalar, version: FmiVersion) -> &'static str {
 
 /// The flag of a step that asks another process to measure it.
 pub(super) const MEASURED: usize = 4;
+/// The flag of a reading that comes before anybody has asked for it.
+pub(super) const AHEAD: usize = 3;
 
 /// Texts and binaries, which have lengths of their own.
 pub(super) type Texts = Vec<Vec<u8>>;

@@ -1,8 +1,8 @@
 //! One instance of an FMU, the same for FMI 2.0 and 3.0.
 
 mod calling;
-mod clocks;
 mod derivatives;
+mod events;
 mod stepping;
 mod values;
 
@@ -11,15 +11,15 @@ use std::sync::Arc;
 use super::call::{Call, Endpoint, Function, Lost, Values};
 use super::isolation::Remote;
 use super::messages::{Messages, TELLING};
-use super::native::{self, Mode, Setup, Sink};
+use super::native::{self, Mode, Setup, Sink, WithEvents};
 use super::processes::{Processes, refused};
 use super::stand_in::Computed;
+use super::trace::Traced;
 use super::{
     CURE, CallError, Causality, FmiVersion, Fmu, FmuError, Interface, Kind, Message, Options,
-    Trace, archive,
+    archive,
 };
 use calling::words;
-use clocks::Clocks;
 
 pub use stepping::Progress;
 
@@ -37,14 +37,10 @@ pub struct Instance {
     endpoint: Box<dyn Endpoint>,
     is_apart: bool,
     messages: Arc<Messages>,
-    trace: Option<Arc<Trace>>,
     time: f64,
     phase: Phase,
-    /// Whether its events are handled from outside.
+    /// Whether its events are handled outside of it.
     has_events: bool,
-    clocks: Clocks,
-    /// Time at which the run begins, s.
-    start: f64,
     /// Values on their way, aligned for every type.
     scratch: Vec<u64>,
 }
@@ -66,7 +62,6 @@ const MOST_STATE: usize = 1 << 30;
 #[derive(Debug, Default)]
 pub struct State {
     handle: u64,
-    clocks: Vec<f64>,
 }
 
 impl Instance {
@@ -91,12 +86,14 @@ impl Instance {
         alone: bool,
     ) -> Result<Self, FmuError> {
         let description = &fmu.description;
-        // Clocks tick in events only; without them an FMU handles its events itself.
-        let has_clocks = description.variables.iter().any(|v| v.kind == Kind::Clock);
-        let has_events = description.has_event_mode && has_clocks;
+        let events = events::of(description);
+        let events = events.map_err(|reason| refused(fmu, name, reason))?;
+        let has_events = events.is_some();
+        let is_traced = processes.options().trace.is_some();
         let mode = match description.interface {
             Interface::CoSimulation => Mode::CoSimulation {
-                event_mode: has_events,
+                events: events.clone(),
+                elsewhere: is_traced,
             },
             Interface::ModelExchange => Mode::ModelExchange {
                 states: description.states,
@@ -112,14 +109,12 @@ impl Instance {
                 return Err(refused(fmu, name, reason.to_string()));
             }
         };
-        let clocks = Clocks::of(description, has_events);
-        let clocks = clocks.map_err(|reason| refused(fmu, name, reason))?;
         if let Some(stand_in) = &fmu.stand_in {
             let computed = Computed::new(stand_in, fmu, name);
             let computed = computed.map_err(|reason| refused(fmu, name, reason))?;
             let messages = Arc::new(Messages::new(true));
             let endpoint = Box::new(computed);
-            return Ok(Self::around(fmu, name, endpoint, messages, None, clocks));
+            return Ok(Self::around(fmu, name, endpoint, messages));
         }
         let place = processes.place(fmu, alone);
         let place = place.map_err(|reason| refused(fmu, name, reason))?;
@@ -174,8 +169,22 @@ impl Instance {
             }
             refused(fmu, name, reason)
         })?;
-        let trace = options.trace.clone();
-        let mut instance = Self::around(fmu, name, endpoint, messages, trace, clocks);
+        let endpoint = match &options.trace {
+            None => endpoint,
+            Some(trace) => {
+                let traced: Box<dyn Endpoint> = Box::new(Traced {
+                    instance: name.to_string(),
+                    version,
+                    endpoint,
+                    trace: trace.clone(),
+                });
+                match events {
+                    None => traced,
+                    Some(events) => Box::new(WithEvents::new(traced, events, messages.clone())),
+                }
+            }
+        };
+        let mut instance = Self::around(fmu, name, endpoint, messages);
         instance.has_events = has_events;
         if !has_events {
             let outputs = description.of(Causality::Output);
@@ -202,8 +211,6 @@ impl Instance {
         name: &str,
         endpoint: Box<dyn Endpoint>,
         messages: Arc<Messages>,
-        trace: Option<Arc<Trace>>,
-        clocks: Clocks,
     ) -> Self {
         Self {
             name: name.to_string(),
@@ -211,12 +218,9 @@ impl Instance {
             endpoint,
             is_apart: false,
             messages,
-            trace,
             time: 0.0,
             phase: Phase::Instantiated,
             has_events: false,
-            clocks,
-            start: 0.0,
             scratch: Vec::new(),
         }
     }
@@ -267,7 +271,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Whether its clocks tick in events, the first ones at the end of initialization.
+    /// Whether its events are handled outside of it, the first ones at the end of initialization.
     pub fn has_events(&self) -> bool {
         self.has_events
     }
@@ -278,11 +282,6 @@ impl Instance {
     /// The FMU's refusal, for instance of a parameter.
     pub fn exit_initialization(&mut self) -> Outcome {
         self.plain(Function::ExitInitializationMode)?;
-        if self.has_events {
-            self.begin_clocks()?;
-            self.update_discrete_states(false)?;
-            self.plain(Function::EnterStepMode)?;
-        }
         self.phase = Phase::Stepping;
         Ok(())
     }
@@ -308,14 +307,10 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal.
     pub fn save_state(&mut self, state: &mut State) -> Outcome {
-        if !self.clocks.due.is_empty() {
-            self.tick_now()?;
-        }
         let mut call = Call::plain(Function::GetState);
         call.handle = state.handle;
         self.call(&mut call)?;
         state.handle = call.handle;
-        self.clocks.save(&mut state.clocks);
         Ok(())
     }
 
@@ -324,7 +319,6 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal.
     pub fn restore_state(&mut self, state: &State) -> Outcome {
-        self.clocks.restore(&state.clocks);
         let mut call = Call::plain(Function::SetState);
         call.handle = state.handle;
         self.call(&mut call)
@@ -351,9 +345,7 @@ impl Instance {
         call.count = size;
         call.values = Values::Out(bytes);
         self.call(&mut call)?;
-        let mut bytes = bytemuck::cast_slice::<u64, u8>(&words)[..size].to_vec();
-        bytes.extend(state.clocks.iter().flat_map(|number| number.to_le_bytes()));
-        Ok(bytes)
+        Ok(bytemuck::cast_slice::<u64, u8>(&words)[..size].to_vec())
     }
 
     /// A state from its bytes.
@@ -361,18 +353,14 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal: of bytes that are not a state of it.
     pub fn state_of_bytes(&mut self, bytes: &[u8]) -> Outcome<State> {
-        let clocks = bytes.len().checked_sub(8 * self.clocks.saved());
-        let (bytes, clocks) = bytes.split_at(clocks.unwrap_or(bytes.len()));
         let mut words = vec![0_u64; bytes.len().div_ceil(8)];
         bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
         let mut call = Call::plain(Function::ReadState);
         call.count = bytes.len();
         call.values = Values::In(&bytemuck::cast_slice(&words)[..bytes.len()]);
         self.call(&mut call)?;
-        let number = |eight: &[u8]| f64::from_le_bytes(std::array::from_fn(|at| eight[at]));
         Ok(State {
             handle: call.handle,
-            clocks: clocks.chunks_exact(8).map(number).collect(),
         })
     }
 

@@ -47,7 +47,7 @@ pub fn guest(frame: &Path) -> ExitCode {
             let next = at + head.size as usize;
             // Only the last may grow.
             let end = if next < length { next } else { room.len() };
-            let went_well = parcel::carry_out(&mut room[at..end], &head, |call| {
+            let went_well = parcel::carry_out(&mut room[at..], end - at, &head, |call| {
                 carry_out(&mut instances, head.instance, call, ring)
             });
             if !went_well {

@@ -280,9 +280,7 @@ impl Host {
             }
             let sent = requests.sent[sent].to_vec();
             self.requests.lost = self.exchange(instance, &sent).err();
-            let room = &self.frame.room()[..sent.len()];
-            self.requests.answers[begin..end].copy_from_slice(room);
-            self.requests.last = begin + self.frame.began_at().min(sent.len());
+            self.keep_answers(begin, sent.len());
         }
         let requests = &self.requests;
         if let Some(lost) = requests.lost.clone().filter(|_| requests.last < end) {
@@ -301,7 +299,19 @@ impl Host {
                 None => Answer::Called(Err(lost)),
             };
         }
-        read(&requests.answers[begin..end], step - begin, call, after)
+        read(&requests.answers[begin..], step - begin, call, after)
+    }
+
+    /// Keeps what came of the first `length` bytes that were sent, those of the requests from `begin` on.
+    fn keep_answers(&mut self, begin: usize, length: usize) {
+        let last = self.frame.began_at().min(length);
+        let room = self.frame.room();
+        // What did not go well may have taken more room to say why.
+        let end = length.max(last + parcel::answered(&room[last..]));
+        let answers = &mut self.requests.answers;
+        answers.resize(begin, 0);
+        answers.extend_from_slice(&room[..end.min(room.len())]);
+        self.requests.last = begin + last;
     }
 
     /// A step that was requested will not be fetched.
@@ -317,12 +327,10 @@ impl Host {
         let mut requests = std::mem::take(&mut self.requests);
         let first = parcel::head(&requests.sent).map_or(0, |head| head.instance);
         requests.lost = self.exchange(first, &requests.sent).err();
-        requests.last = self.frame.began_at();
-        let room = &self.frame.room()[..requests.sent.len()];
-        requests.answers.clear();
-        requests.answers.extend_from_slice(room);
         requests.are_sent = true;
+        let length = requests.sent.len();
         self.requests = requests;
+        self.keep_answers(0, length);
     }
 
     /// Lets the guest carry out calls, and waits for it.
@@ -474,8 +482,11 @@ fn read(room: &[u8], place: usize, call: &mut Call, after: &mut Vec<u8>) -> Answ
         return strange();
     };
     let outcome = parcel::outcome(&room[place..], &head);
+    call.culprit = parcel::culprit(&head, call);
     if outcome.is_ok() {
         parcel::give_back(&room[place..], &head, call);
+    } else {
+        call.numbers = head.numbers;
     }
     let next = place + head.size as usize;
     let answer = &room[next..(next + after.len()).min(room.len())];

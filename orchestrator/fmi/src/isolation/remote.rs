@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::super::call::{Call, Culprit, Endpoint, Function, Lost, Values};
+use super::super::call::{AHEAD, Call, Culprit, Endpoint, Function, Lost, Values};
 use super::super::native::{Setup, Sink};
 use super::host::{Answer, Host, Request};
 use super::parcel;
@@ -65,6 +65,7 @@ impl Ahead {
         {
             self.references.extend(call.references);
             parcel::append(&mut self.habit, instance, call);
+            parcel::mark(&mut self.habit, AHEAD);
         }
     }
 }
@@ -101,12 +102,17 @@ impl Remote {
     }
 }
 
+/// Whether a call gives nothing and may travel with the next one.
+fn may_wait(function: Function) -> bool {
+    matches!(
+        function,
+        Function::Set(_) | Function::EnterEventMode | Function::EnterStepMode
+    )
+}
+
 impl Endpoint for Remote {
     fn call(&mut self, call: &mut Call) -> Result<i32, Lost> {
-        if self.keeps
-            && matches!(call.function, Function::Set(_))
-            && self.kept.len() + parcel::size(call) < KEPT
-        {
+        if self.keeps && may_wait(call.function) && self.kept.len() + parcel::size(call) < KEPT {
             self.ahead.learn(self.instance, call);
             parcel::append(&mut self.kept, self.instance, call);
             return Ok(0);
