@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::call::{Call, Endpoint, Function, Lost, Values};
 use super::isolation::Remote;
 use super::messages::{Messages, TELLING};
-use super::native::{self, Mode, Setup, Sink, WithEvents};
+use super::native::{self, Events, Mode, Setup, Sink, WithEvents};
 use super::processes::{Processes, refused};
 use super::stand_in::Computed;
 use super::trace::Traced;
@@ -36,6 +36,8 @@ pub struct Instance {
     pub fmu: Arc<Fmu>,
     endpoint: Box<dyn Endpoint>,
     is_apart: bool,
+    /// Which other process it is in, if it is.
+    process: Option<usize>,
     messages: Arc<Messages>,
     time: f64,
     phase: Phase,
@@ -86,12 +88,16 @@ impl Instance {
         alone: bool,
     ) -> Result<Self, FmuError> {
         let description = &fmu.description;
+        if description.interface == Interface::ScheduledExecution {
+            let reason = "it supports only scheduled execution: a real-time scheduler must call its \
+                parts, which a co-simulation cannot do";
+            return Err(refused(fmu, name, reason.to_string()));
+        }
         let events = events::of(description);
-        let events = events.map_err(|reason| refused(fmu, name, reason))?;
-        let has_events = events.is_some();
+        let mut events = events.map_err(|reason| refused(fmu, name, reason))?;
         let is_traced = processes.options().trace.is_some();
         let mode = match description.interface {
-            Interface::CoSimulation => Mode::CoSimulation {
+            Interface::CoSimulation | Interface::ScheduledExecution => Mode::CoSimulation {
                 events: events.clone(),
                 elsewhere: is_traced,
             },
@@ -103,11 +109,6 @@ impl Instance {
                     false => Vec::new(),
                 },
             },
-            Interface::ScheduledExecution => {
-                let reason = "it supports only scheduled execution: a real-time scheduler must \
-                    call its parts, which a co-simulation cannot do";
-                return Err(refused(fmu, name, reason.to_string()));
-            }
         };
         if let Some(stand_in) = &fmu.stand_in {
             let computed = Computed::new(stand_in, fmu, name);
@@ -139,7 +140,7 @@ impl Instance {
         };
         let is_terse = options.log_categories.is_none() && !told.is_empty();
         let messages = Arc::new(Messages::new(is_terse));
-        let setup = Setup {
+        let mut setup = Setup {
             version,
             library,
             resources: directory.join("resources"),
@@ -148,21 +149,38 @@ impl Instance {
             mode,
             logging: options.log_categories.is_some() || !told.is_empty(),
         };
-        if let Some(trace) = &options.trace {
-            trace.begin(name, version, &Call::plain(Function::Instantiate));
-        }
-        let made = match &place {
-            None => native::instantiate(&setup, messages.clone()),
-            Some(host) => Remote::new(host, &setup, messages.clone(), options.trace.is_some())
-                .map(|remote| Box::new(remote) as Box<dyn Endpoint>),
-        };
-        if let Some(trace) = &options.trace {
-            let outcome = match &made {
-                Ok(_) => Ok(0),
-                Err(reason) => Err(Lost(reason.clone())),
+        let make = |setup: &Setup| {
+            if let Some(trace) = &options.trace {
+                trace.begin(name, version, &Call::plain(Function::Instantiate));
+            }
+            let made = match &place {
+                None => native::instantiate(setup, messages.clone()),
+                Some(host) => Remote::new(host, setup, messages.clone(), is_traced)
+                    .map(|remote| Box::new(remote) as Box<dyn Endpoint>),
             };
-            trace.end(version, &Call::plain(Function::Instantiate), &outcome);
+            if let Some(trace) = &options.trace {
+                let outcome = match &made {
+                    Ok(_) => Ok(0),
+                    Err(reason) => Err(Lost(reason.clone())),
+                };
+                trace.end(version, &Call::plain(Function::Instantiate), &outcome);
+            }
+            made
+        };
+        let mut made = make(&setup);
+        // Some FMUs declare event mode and refuse it; without clocks they can do without.
+        if made.is_err() && events.as_ref().is_some_and(Events::has_no_clocks) {
+            setup.mode = Mode::CoSimulation {
+                events: None,
+                elsewhere: is_traced,
+            };
+            if let Ok(endpoint) = make(&setup) {
+                (made, events) = (Ok(endpoint), None);
+                let text = "it declares event mode and refuses it, so it handles its events itself";
+                messages.message(1, "", text);
+            }
         }
+        let has_events = events.is_some();
         let endpoint = made.map_err(|mut reason| {
             for message in messages.take() {
                 reason += &format!("; it says: {}", message.text);
@@ -199,6 +217,7 @@ impl Instance {
             }
         }
         instance.is_apart = place.is_some();
+        instance.process = place.as_ref().map(|host| Arc::as_ptr(host).addr());
         if setup.logging {
             instance.log_categories(&told);
         }
@@ -217,6 +236,7 @@ impl Instance {
             fmu: fmu.clone(),
             endpoint,
             is_apart: false,
+            process: None,
             messages,
             time: 0.0,
             phase: Phase::Instantiated,
@@ -244,6 +264,11 @@ impl Instance {
     /// Whether another process carries out its calls.
     pub fn is_apart(&self) -> bool {
         self.is_apart
+    }
+
+    /// The other process that carries out its calls, as a number that its FMUs share.
+    pub fn process(&self) -> Option<usize> {
+        self.process
     }
 
     /// What the FMU logged since this was last asked.

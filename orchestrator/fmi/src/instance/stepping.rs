@@ -1,7 +1,7 @@
 //! Steps, and events at communication points.
 
 use super::super::FmiVersion;
-use super::super::call::{Call, Function, Lost, MEASURED, Stepped};
+use super::super::call::{Call, Foreseen, Function, Lost, MEASURED, Stepped, Wire};
 use super::{Instance, Outcome, Phase};
 
 /// How a step ended.
@@ -39,6 +39,23 @@ impl Instance {
         call.numbers = [time, step, 0.0];
         call.flags[MEASURED] = measured;
         self.endpoint.request(&call)
+    }
+
+    /// Notes that after each step the Float64 variables `set` will be set, to `values` or along `wires` from
+    /// readings noted before in the same process, and `count` values of `read` be read. Gives the number
+    /// of the reading; none where the instance is not in another process, or nothing is gained.
+    pub fn foresee(
+        &mut self,
+        (set, values, wires): (&[u32], &[f64], &[Wire]),
+        (read, count): (&[u32], usize),
+    ) -> Option<usize> {
+        self.endpoint.foresee(&Foreseen {
+            set,
+            values,
+            wires,
+            read,
+            count,
+        })
     }
 
     /// What came of the step that was requested, and how long it took, s, where that was asked for.

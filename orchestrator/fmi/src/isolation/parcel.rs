@@ -98,6 +98,16 @@ pub(super) fn mark(bytes: &mut [u8], flag: usize) {
     bytes[std::mem::offset_of!(Head, flags) + flag] = 1;
 }
 
+/// Where the values of a call begin in its parcel.
+pub(super) fn values_at(call: &Call) -> usize {
+    Head::new(0, call).values_at()
+}
+
+/// Where the values of a parcel begin.
+pub(super) fn values_of(head: &Head) -> usize {
+    head.values_at()
+}
+
 /// How many bytes a call takes.
 pub(super) fn size(call: &Call) -> usize {
     Head::new(0, call).size as usize

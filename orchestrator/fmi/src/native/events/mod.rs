@@ -30,6 +30,13 @@ pub(in super::super) struct Events {
     pub variable_step: bool,
 }
 
+impl Events {
+    /// Whether the FMU could handle its events itself.
+    pub(in super::super) fn has_no_clocks(&self) -> bool {
+        self.inputs.is_empty() && self.outputs.is_empty()
+    }
+}
+
 /// An FMU with event mode, and what drives it.
 pub(in super::super) struct WithEvents {
     fmu: Box<dyn Endpoint>,
