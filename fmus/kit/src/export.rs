@@ -1,5 +1,6 @@
 //! The symbols of a component's library, and the table of its variables.
 
+mod extended;
 mod fmi2;
 mod fmi3;
 
@@ -112,7 +113,7 @@ macro_rules! export {
         #[allow(clippy::missing_safety_doc)]
         pub mod interface {
             use super::*;
-            $crate::export_private!($component);
+            $crate::export_private!($component, $crate::native::describe::<$component>);
             $crate::export_fmi2!($component);
             $crate::export_fmi3!($component);
         }
@@ -137,10 +138,10 @@ macro_rules! export {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! export_private {
-    ($component:ty) => {
+    ($component:ty, $describe:expr) => {
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn shakebench_describe(what: i32) -> *mut std::ffi::c_char {
-            $crate::native::describe::<$component>(what)
+            $describe(what)
         }
 
         #[unsafe(no_mangle)]

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     component::Component,
+    extended::Importer,
     fault::{Fault, Outcome},
     log::Log,
     model::Model,
@@ -42,6 +43,7 @@ pub struct Instance<C: Component> {
     pub(crate) log: Log,
     pub(crate) poisoned: bool,
     pub(crate) event_mode_used: bool,
+    pub(crate) importer: Importer,
     pub(crate) texts: Vec<CString>,
 }
 
@@ -56,6 +58,7 @@ impl<C: Component> Instance<C> {
             log,
             poisoned: false,
             event_mode_used: false,
+            importer: Importer::default(),
             texts,
         }
     }

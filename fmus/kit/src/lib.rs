@@ -62,6 +62,7 @@ mod values;
 
 pub mod conformance;
 pub mod description;
+pub mod extended;
 pub mod fmi2;
 pub mod fmi3;
 pub mod model;

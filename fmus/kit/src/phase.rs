@@ -30,6 +30,8 @@ pub enum Phase {
     Failed,
     /// The simulation has ended.
     Terminated,
+    /// Structural parameters are set.
+    Configuration,
 }
 
 impl Phase {
@@ -43,6 +45,7 @@ impl Phase {
             Self::ContinuousTime => "in continuous-time mode",
             Self::Failed => "after a failed step",
             Self::Terminated => "after termination",
+            Self::Configuration => "in configuration mode",
         }
     }
 
@@ -78,7 +81,7 @@ mod tests {
     use Phase::*;
     use Variability::{Continuous, Discrete, Fixed, Tunable};
 
-    const ALL: [Phase; 7] = [
+    const ALL: [Phase; 8] = [
         Instantiated,
         Initialization,
         Step,
@@ -86,6 +89,7 @@ mod tests {
         ContinuousTime,
         Failed,
         Terminated,
+        Configuration,
     ];
 
     #[test]

@@ -189,6 +189,8 @@ functions! {
     /// As [`Function::GetDirectionalDerivative`], the values the other way round: `count` weights of the
     /// unknowns, then places for those of the knowns.
     GetAdjointDerivative = 36, "", "GetAdjointDerivative";
+    /// None of the standard: copies numbers from answers before to settings behind, in another process.
+    Copy = 37, "", "";
 }
 
 fn kind(scalar: Scalar, version: FmiVersion) -> &'static str {
@@ -201,9 +203,34 @@ fn kind(scalar: Scalar, version: FmiVersion) -> &'static str {
 
 /// The flag of a step that asks another process to measure it.
 pub(super) const MEASURED: usize = 4;
+/// The flag of a reading that comes before anybody has asked for it.
+pub(super) const AHEAD: usize = 3;
 
 /// Texts and binaries, which have lengths of their own.
 pub(super) type Texts = Vec<Vec<u8>>;
+
+/// What will be set and read after each step of an instance, all of it Float64.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Foreseen<'a> {
+    /// What is set, and to what where no wire leads there.
+    pub set: &'a [u32],
+    pub values: &'a [f64],
+    pub wires: &'a [Wire],
+    /// What is read, and how many values that are.
+    pub read: &'a [u32],
+    pub count: usize,
+}
+
+/// A number that was read before, and where it is set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wire {
+    /// The reading, as it was numbered.
+    pub reading: usize,
+    /// Which of its values.
+    pub element: usize,
+    /// Where it goes among those that are set.
+    pub place: usize,
+}
 
 /// What goes into a call and what comes out of it; [`Function`] says which fields it uses.
 #[derive(Debug)]
@@ -307,6 +334,12 @@ pub(super) trait Endpoint: Send {
     /// [`Endpoint::answer`] asks for its outcome; false where [`Endpoint::call`] has to step.
     fn request(&mut self, _call: &Call) -> bool {
         false
+    }
+
+    /// Notes what will be set and read after each step, so that it can be done together with those of
+    /// other instances; gives its number, or none where nothing can be gained.
+    fn foresee(&mut self, _foreseen: &Foreseen) -> Option<usize> {
+        None
     }
 
     /// The outcome of the step that was requested.

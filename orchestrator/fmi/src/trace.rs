@@ -3,10 +3,10 @@
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::FmiVersion;
-use super::call::{Call, Function, Lost, Scalar, Values};
+use super::call::{Call, Endpoint, Function, Lost, Scalar, Values};
 
 /// A file that calls are written to, a line each.
 #[derive(Debug)]
@@ -49,6 +49,23 @@ impl Trace {
         if flush {
             let _ = file.flush();
         }
+    }
+}
+
+/// An instance whose calls are written down.
+pub(super) struct Traced {
+    pub instance: String,
+    pub version: FmiVersion,
+    pub endpoint: Box<dyn Endpoint>,
+    pub trace: Arc<Trace>,
+}
+
+impl Endpoint for Traced {
+    fn call(&mut self, call: &mut Call) -> Result<i32, Lost> {
+        self.trace.begin(&self.instance, self.version, call);
+        let outcome = self.endpoint.call(call);
+        self.trace.end(self.version, call, &outcome);
+        outcome
     }
 }
 

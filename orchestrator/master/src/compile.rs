@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::action::Action;
 use super::algebraic::AlgebraicLoop;
+use super::foresee::foresee;
 use super::iterative::Coupling;
 use super::reference::Reference;
 use super::samples::Samples;
@@ -176,11 +177,12 @@ impl Simulation {
                 spent: Duration::ZERO,
             });
         }
-        let actions = schedule
-            .operations
-            .iter()
-            .map(|operation| plan.action(&mut reference, operation, &parts))
-            .collect();
+        let actions = schedule.operations.iter();
+        let actions = actions.map(|operation| plan.action(&mut reference, operation, &parts));
+        let actions: Vec<Action> = actions.collect();
+        if algorithm == Algorithm::GaussSeidel {
+            foresee(&mut parts, &actions);
+        }
         // What ends a run is Boolean, and its cause an enumeration: both are numbers.
         let number = |place: &(usize, usize)| match plan.places.get(place) {
             Some(Place::Number(signal)) => Some(*signal),

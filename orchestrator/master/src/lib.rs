@@ -12,6 +12,7 @@ mod clock;
 mod compile;
 mod driven;
 mod error;
+mod foresee;
 mod gauss_seidel;
 mod iterative;
 mod jacobi;

@@ -17,6 +17,9 @@ pub(super) struct Inputs {
     is_discrete: bool,
 }
 
+/// References, values, and where which signal goes among them.
+type ForeseenInputs<'a> = (&'a [u32], &'a [f64], Vec<(usize, usize)>);
+
 struct InputGroup {
     kind: Kind,
     references: Vec<u32>,
@@ -221,6 +224,29 @@ impl Inputs {
         Ok(())
     }
 
+    /// What is set where all of it is Float64 and taken as it is: the references, the values, and for each
+    /// driven value its place and signal; none otherwise.
+    pub(super) fn foreseen(&self) -> Option<ForeseenInputs<'_>> {
+        let plain = !self.is_discrete && self.exact.is_empty() && self.groups.len() <= 1;
+        if !plain {
+            return None;
+        }
+        let Some(group) = self.groups.first() else {
+            return Some((&[], &[], Vec::new()));
+        };
+        if group.kind != Kind::Float64 || !group.sources.is_empty() {
+            return None;
+        }
+        let copies = group.copies.iter();
+        let copied = copies.flat_map(|it| (0..it.count).map(|at| (it.place + at, it.signal + at)));
+        let smooth = group.smooth.iter().map(|it| (it.place, it.signal));
+        Some((
+            &group.references,
+            &group.values,
+            copied.chain(smooth).collect(),
+        ))
+    }
+
     /// The numbers that drive it.
     pub(super) fn sources(&self) -> impl Iterator<Item = usize> + '_ {
         let groups = self.groups.iter();
@@ -383,6 +409,17 @@ impl Outputs {
     pub(super) fn extend(&mut self, other: &Self) {
         self.groups.extend(other.groups.iter().cloned());
         self.exact.extend(other.exact.iter().cloned());
+    }
+
+    /// Each reading of numbers: type, references, first signal and how many there are.
+    pub(super) fn readings(&self) -> impl Iterator<Item = (&Kind, &[u32], usize, usize)> {
+        let groups = self.groups.iter();
+        groups.map(|it| (&it.kind, &it.references[..], it.first, it.values.len()))
+    }
+
+    /// Whether it gives values that numbers do not hold.
+    pub(super) fn has_exact(&self) -> bool {
+        !self.exact.is_empty()
     }
 
     /// The numbers that it gives.

@@ -303,11 +303,6 @@ impl Simulation {
         if !found.is_real_number() {
             return Err(fault("only single real numbers can be changed"));
         }
-        if self.parts[part].instance.has_events() {
-            return Err(fault(
-                "its FMU has clocks, which take changes in events only",
-            ));
-        }
         Ok(Place {
             name: variable.to_string(),
             part,
@@ -358,8 +353,10 @@ impl Simulation {
             if part.failure.is_some() {
                 continue;
             }
-            let set = part.instance.set(&place.kind, &[place.reference], &[value]);
-            match set {
+            let instance = &mut part.instance;
+            let set = instance.begin_event();
+            let set = set.and_then(|()| instance.set(&place.kind, &[place.reference], &[value]));
+            match set.and_then(|()| instance.end_event()) {
                 Err(error) if part.may_fail => part.failure = Some(error.into()),
                 done => done?,
             }

@@ -12,6 +12,7 @@ mod clocks;
 mod commissioning;
 mod contract;
 mod diagnosis;
+mod events;
 mod failures;
 mod fault_table;
 mod figures;

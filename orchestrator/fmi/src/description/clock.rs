@@ -1,7 +1,9 @@
 //! Clocks that an FMU (FMI 3.0) gets from outside.
 
+use serde::{Deserialize, Serialize};
+
 /// An input clock.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InputClock {
     /// Its name.
     pub name: String,
@@ -14,7 +16,7 @@ pub struct InputClock {
 }
 
 /// When a clock ticks.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Ticks {
     /// At a period that stays, s; where there is none the FMU says it when it is initialized.
     Periodic(Option<f64>),

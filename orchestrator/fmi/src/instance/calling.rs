@@ -32,23 +32,7 @@ impl Instance {
 
     #[inline]
     pub(super) fn carry_out(&mut self, call: &mut Call) -> Result<i32, Lost> {
-        if self.trace.is_some() {
-            return self.traced(call);
-        }
         self.endpoint.call(call)
-    }
-
-    #[cold]
-    fn traced(&mut self, call: &mut Call) -> Result<i32, Lost> {
-        let version = self.version();
-        if let Some(trace) = &self.trace {
-            trace.begin(&self.name, version, call);
-        }
-        let outcome = self.endpoint.call(call);
-        if let Some(trace) = &self.trace {
-            trace.end(version, call, &outcome);
-        }
-        outcome
     }
 
     /// An outcome that is neither OK nor a warning.

@@ -1,8 +1,8 @@
 //! One instance of an FMU, the same for FMI 2.0 and 3.0.
 
 mod calling;
-mod clocks;
 mod derivatives;
+mod events;
 mod stepping;
 mod values;
 
@@ -11,15 +11,15 @@ use std::sync::Arc;
 use super::call::{Call, Endpoint, Function, Lost, Values};
 use super::isolation::Remote;
 use super::messages::{Messages, TELLING};
-use super::native::{self, Mode, Setup, Sink};
+use super::native::{self, Events, Mode, Setup, Sink, WithEvents};
 use super::processes::{Processes, refused};
 use super::stand_in::Computed;
+use super::trace::Traced;
 use super::{
     CURE, CallError, Causality, FmiVersion, Fmu, FmuError, Interface, Kind, Message, Options,
-    Trace, archive,
+    archive,
 };
 use calling::words;
-use clocks::Clocks;
 
 pub use stepping::Progress;
 
@@ -36,15 +36,13 @@ pub struct Instance {
     pub fmu: Arc<Fmu>,
     endpoint: Box<dyn Endpoint>,
     is_apart: bool,
+    /// Which other process it is in, if it is.
+    process: Option<usize>,
     messages: Arc<Messages>,
-    trace: Option<Arc<Trace>>,
     time: f64,
     phase: Phase,
-    /// Whether its events are handled from outside.
+    /// Whether its events are handled outside of it.
     has_events: bool,
-    clocks: Clocks,
-    /// Time at which the run begins, s.
-    start: f64,
     /// Values on their way, aligned for every type.
     scratch: Vec<u64>,
 }
@@ -66,7 +64,6 @@ const MOST_STATE: usize = 1 << 30;
 #[derive(Debug, Default)]
 pub struct State {
     handle: u64,
-    clocks: Vec<f64>,
 }
 
 impl Instance {
@@ -91,12 +88,18 @@ impl Instance {
         alone: bool,
     ) -> Result<Self, FmuError> {
         let description = &fmu.description;
-        // Clocks tick in events only; without them an FMU handles its events itself.
-        let has_clocks = description.variables.iter().any(|v| v.kind == Kind::Clock);
-        let has_events = description.has_event_mode && has_clocks;
+        if description.interface == Interface::ScheduledExecution {
+            let reason = "it supports only scheduled execution: a real-time scheduler must call its \
+                parts, which a co-simulation cannot do";
+            return Err(refused(fmu, name, reason.to_string()));
+        }
+        let events = events::of(description);
+        let mut events = events.map_err(|reason| refused(fmu, name, reason))?;
+        let is_traced = processes.options().trace.is_some();
         let mode = match description.interface {
-            Interface::CoSimulation => Mode::CoSimulation {
-                event_mode: has_events,
+            Interface::CoSimulation | Interface::ScheduledExecution => Mode::CoSimulation {
+                events: events.clone(),
+                elsewhere: is_traced,
             },
             Interface::ModelExchange => Mode::ModelExchange {
                 states: description.states,
@@ -106,20 +109,13 @@ impl Instance {
                     false => Vec::new(),
                 },
             },
-            Interface::ScheduledExecution => {
-                let reason = "it supports only scheduled execution: a real-time scheduler must \
-                    call its parts, which a co-simulation cannot do";
-                return Err(refused(fmu, name, reason.to_string()));
-            }
         };
-        let clocks = Clocks::of(description, has_events);
-        let clocks = clocks.map_err(|reason| refused(fmu, name, reason))?;
         if let Some(stand_in) = &fmu.stand_in {
             let computed = Computed::new(stand_in, fmu, name);
             let computed = computed.map_err(|reason| refused(fmu, name, reason))?;
             let messages = Arc::new(Messages::new(true));
             let endpoint = Box::new(computed);
-            return Ok(Self::around(fmu, name, endpoint, messages, None, clocks));
+            return Ok(Self::around(fmu, name, endpoint, messages));
         }
         let place = processes.place(fmu, alone);
         let place = place.map_err(|reason| refused(fmu, name, reason))?;
@@ -144,7 +140,7 @@ impl Instance {
         };
         let is_terse = options.log_categories.is_none() && !told.is_empty();
         let messages = Arc::new(Messages::new(is_terse));
-        let setup = Setup {
+        let mut setup = Setup {
             version,
             library,
             resources: directory.join("resources"),
@@ -153,29 +149,60 @@ impl Instance {
             mode,
             logging: options.log_categories.is_some() || !told.is_empty(),
         };
-        if let Some(trace) = &options.trace {
-            trace.begin(name, version, &Call::plain(Function::Instantiate));
-        }
-        let made = match &place {
-            None => native::instantiate(&setup, messages.clone()),
-            Some(host) => Remote::new(host, &setup, messages.clone(), options.trace.is_some())
-                .map(|remote| Box::new(remote) as Box<dyn Endpoint>),
-        };
-        if let Some(trace) = &options.trace {
-            let outcome = match &made {
-                Ok(_) => Ok(0),
-                Err(reason) => Err(Lost(reason.clone())),
+        let make = |setup: &Setup| {
+            if let Some(trace) = &options.trace {
+                trace.begin(name, version, &Call::plain(Function::Instantiate));
+            }
+            let made = match &place {
+                None => native::instantiate(setup, messages.clone()),
+                Some(host) => Remote::new(host, setup, messages.clone(), is_traced)
+                    .map(|remote| Box::new(remote) as Box<dyn Endpoint>),
             };
-            trace.end(version, &Call::plain(Function::Instantiate), &outcome);
+            if let Some(trace) = &options.trace {
+                let outcome = match &made {
+                    Ok(_) => Ok(0),
+                    Err(reason) => Err(Lost(reason.clone())),
+                };
+                trace.end(version, &Call::plain(Function::Instantiate), &outcome);
+            }
+            made
+        };
+        let mut made = make(&setup);
+        // Some FMUs declare event mode and refuse it; without clocks they can do without.
+        if made.is_err() && events.as_ref().is_some_and(Events::has_no_clocks) {
+            setup.mode = Mode::CoSimulation {
+                events: None,
+                elsewhere: is_traced,
+            };
+            if let Ok(endpoint) = make(&setup) {
+                (made, events) = (Ok(endpoint), None);
+                let text = "it declares event mode and refuses it, so it handles its events itself";
+                messages.message(1, "", text);
+            }
         }
+        let has_events = events.is_some();
         let endpoint = made.map_err(|mut reason| {
             for message in messages.take() {
                 reason += &format!("; it says: {}", message.text);
             }
             refused(fmu, name, reason)
         })?;
-        let trace = options.trace.clone();
-        let mut instance = Self::around(fmu, name, endpoint, messages, trace, clocks);
+        let endpoint = match &options.trace {
+            None => endpoint,
+            Some(trace) => {
+                let traced: Box<dyn Endpoint> = Box::new(Traced {
+                    instance: name.to_string(),
+                    version,
+                    endpoint,
+                    trace: trace.clone(),
+                });
+                match events {
+                    None => traced,
+                    Some(events) => Box::new(WithEvents::new(traced, events, messages.clone())),
+                }
+            }
+        };
+        let mut instance = Self::around(fmu, name, endpoint, messages);
         instance.has_events = has_events;
         if !has_events {
             let outputs = description.of(Causality::Output);
@@ -190,6 +217,7 @@ impl Instance {
             }
         }
         instance.is_apart = place.is_some();
+        instance.process = place.as_ref().map(|host| Arc::as_ptr(host).addr());
         if setup.logging {
             instance.log_categories(&told);
         }
@@ -202,21 +230,17 @@ impl Instance {
         name: &str,
         endpoint: Box<dyn Endpoint>,
         messages: Arc<Messages>,
-        trace: Option<Arc<Trace>>,
-        clocks: Clocks,
     ) -> Self {
         Self {
             name: name.to_string(),
             fmu: fmu.clone(),
             endpoint,
             is_apart: false,
+            process: None,
             messages,
-            trace,
             time: 0.0,
             phase: Phase::Instantiated,
             has_events: false,
-            clocks,
-            start: 0.0,
             scratch: Vec::new(),
         }
     }
@@ -240,6 +264,11 @@ impl Instance {
     /// Whether another process carries out its calls.
     pub fn is_apart(&self) -> bool {
         self.is_apart
+    }
+
+    /// The other process that carries out its calls, as a number that its FMUs share.
+    pub fn process(&self) -> Option<usize> {
+        self.process
     }
 
     /// What the FMU logged since this was last asked.
@@ -267,7 +296,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Whether its clocks tick in events, the first ones at the end of initialization.
+    /// Whether its events are handled outside of it, the first ones at the end of initialization.
     pub fn has_events(&self) -> bool {
         self.has_events
     }
@@ -278,11 +307,6 @@ impl Instance {
     /// The FMU's refusal, for instance of a parameter.
     pub fn exit_initialization(&mut self) -> Outcome {
         self.plain(Function::ExitInitializationMode)?;
-        if self.has_events {
-            self.begin_clocks()?;
-            self.update_discrete_states(false)?;
-            self.plain(Function::EnterStepMode)?;
-        }
         self.phase = Phase::Stepping;
         Ok(())
     }
@@ -308,14 +332,10 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal.
     pub fn save_state(&mut self, state: &mut State) -> Outcome {
-        if !self.clocks.due.is_empty() {
-            self.tick_now()?;
-        }
         let mut call = Call::plain(Function::GetState);
         call.handle = state.handle;
         self.call(&mut call)?;
         state.handle = call.handle;
-        self.clocks.save(&mut state.clocks);
         Ok(())
     }
 
@@ -324,7 +344,6 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal.
     pub fn restore_state(&mut self, state: &State) -> Outcome {
-        self.clocks.restore(&state.clocks);
         let mut call = Call::plain(Function::SetState);
         call.handle = state.handle;
         self.call(&mut call)
@@ -351,9 +370,7 @@ impl Instance {
         call.count = size;
         call.values = Values::Out(bytes);
         self.call(&mut call)?;
-        let mut bytes = bytemuck::cast_slice::<u64, u8>(&words)[..size].to_vec();
-        bytes.extend(state.clocks.iter().flat_map(|number| number.to_le_bytes()));
-        Ok(bytes)
+        Ok(bytemuck::cast_slice::<u64, u8>(&words)[..size].to_vec())
     }
 
     /// A state from its bytes.
@@ -361,18 +378,14 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal: of bytes that are not a state of it.
     pub fn state_of_bytes(&mut self, bytes: &[u8]) -> Outcome<State> {
-        let clocks = bytes.len().checked_sub(8 * self.clocks.saved());
-        let (bytes, clocks) = bytes.split_at(clocks.unwrap_or(bytes.len()));
         let mut words = vec![0_u64; bytes.len().div_ceil(8)];
         bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
         let mut call = Call::plain(Function::ReadState);
         call.count = bytes.len();
         call.values = Values::In(&bytemuck::cast_slice(&words)[..bytes.len()]);
         self.call(&mut call)?;
-        let number = |eight: &[u8]| f64::from_le_bytes(std::array::from_fn(|at| eight[at]));
         Ok(State {
             handle: call.handle,
-            clocks: clocks.chunks_exact(8).map(number).collect(),
         })
     }
 

@@ -1,11 +1,8 @@
-//! Steps, and the events on the way.
+//! Steps, and events at communication points.
 
 use super::super::FmiVersion;
-use super::super::call::{Call, Function, Lost, MEASURED, Stepped};
+use super::super::call::{Call, Foreseen, Function, Lost, MEASURED, Stepped, Wire};
 use super::{Instance, Outcome, Phase};
-
-/// How often events may follow each other at one moment.
-const MOST_EVENT_ITERATIONS: usize = 1000;
 
 /// How a step ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,12 +21,7 @@ impl Instance {
     #[inline]
     pub fn do_step(&mut self, time: f64, step: f64) -> Outcome<Progress> {
         self.time = time;
-        if self.has_events {
-            return self.step_with_events(time, step);
-        }
-        if self.trace.is_none()
-            && let Some(stepped) = self.endpoint.step(time, step)
-        {
+        if let Some(stepped) = self.endpoint.step(time, step) {
             if matches!(stepped.status, 0 | 1) && !stepped.end && !stepped.early {
                 return Ok(Progress::Whole);
             }
@@ -42,14 +34,28 @@ impl Instance {
     /// the steps of all instances in one other process travel there together. False where
     /// [`Instance::do_step`] has to be called. `measured`: how long it takes is asked for.
     pub fn request_step(&mut self, time: f64, step: f64, measured: bool) -> bool {
-        if self.has_events || self.trace.is_some() {
-            return false;
-        }
         self.time = time;
         let mut call = Call::plain(Function::DoStep);
         call.numbers = [time, step, 0.0];
         call.flags[MEASURED] = measured;
         self.endpoint.request(&call)
+    }
+
+    /// Notes that after each step the Float64 variables `set` will be set, to `values` or along `wires` from
+    /// readings noted before in the same process, and `count` values of `read` be read. Gives the number
+    /// of the reading; none where the instance is not in another process, or nothing is gained.
+    pub fn foresee(
+        &mut self,
+        (set, values, wires): (&[u32], &[f64], &[Wire]),
+        (read, count): (&[u32], usize),
+    ) -> Option<usize> {
+        self.endpoint.foresee(&Foreseen {
+            set,
+            values,
+            wires,
+            read,
+            count,
+        })
     }
 
     /// What came of the step that was requested, and how long it took, s, where that was asked for.
@@ -61,6 +67,7 @@ impl Instance {
         let done = self.endpoint.answer(&mut call);
         let [_, end, early, ..] = call.flags;
         let [last, _, taken] = call.numbers;
+        self.note_failure(&done, last);
         let progress = self.stepped(done, (end, early, last), &call)?;
         Ok((progress, taken))
     }
@@ -72,7 +79,15 @@ impl Instance {
         let done = self.carry_out(&mut call);
         let [_, end, early, ..] = call.flags;
         let last = call.numbers[0];
+        self.note_failure(&done, last);
         self.stepped(done, (end, early, last), &call)
+    }
+
+    /// An FMU whose events are handled failed at an event on the way.
+    fn note_failure(&mut self, done: &Result<i32, Lost>, last: f64) {
+        if self.has_events && !matches!(done, Ok(0..=2)) && last.is_finite() {
+            self.time = last;
+        }
     }
 
     /// A step that did not go as most do.
@@ -102,69 +117,6 @@ impl Instance {
         }
     }
 
-    /// As [`Instance::do_step`], handling the events on the way.
-    #[cold]
-    fn step_with_events(&mut self, time: f64, step: f64) -> Outcome<Progress> {
-        let (end_time, mut now) = (time + step, time);
-        if self.clocks.is_over || (!self.clocks.due.is_empty() && self.tick_now()?) {
-            return Ok(Progress::Ended(now));
-        }
-        self.clocks.begin_step();
-        let small = 1e-9 * step;
-        let mut standing = 0;
-        loop {
-            let tick = self.clocks.next(self.start, now);
-            let target = if tick < end_time - small {
-                tick
-            } else {
-                end_time
-            };
-            if target < end_time && !self.fmu.description.variable_step {
-                let clock = self.clocks.name_of(self.start, now, tick);
-                let outcome = format!(
-                    "cannot end at the tick of its clock `{clock}` at {tick} s, for it takes steps of \
-                     one length only; choose a --step that divides the clock's period"
-                );
-                return Err(self.failure(Function::DoStep, &[], outcome));
-            }
-            let mut call = Call::plain(Function::DoStep);
-            call.numbers = [now, target - now, 0.0];
-            self.time = now;
-            let done = self.carry_out(&mut call);
-            let [event, end, early, ..] = call.flags;
-            let last = if early { call.numbers[0] } else { target };
-            match done {
-                Ok(0 | 1) if end => return Ok(Progress::Ended(call.numbers[0])),
-                Ok(0 | 1) => {}
-                Ok(2) => return self.discarded(end, last),
-                outcome => self.judge(outcome, &call)?,
-            }
-            self.time = last;
-            let is_end = end_time - last <= small;
-            if last >= tick - small {
-                self.clocks.arrive(self.start, now, tick);
-            }
-            let ticks = !self.clocks.due.is_empty();
-            // A tick at the end waits for the inputs there.
-            if event || early || (ticks && !is_end) {
-                self.enter_event()?;
-                if self.update_discrete_states(!is_end)? {
-                    return Ok(Progress::Ended(last));
-                }
-                self.plain(Function::EnterStepMode)?;
-            }
-            if is_end {
-                return Ok(Progress::Whole);
-            }
-            standing = if last > now { 0 } else { standing + 1 };
-            if standing > MOST_EVENT_ITERATIONS {
-                let outcome = format!("returned early repeatedly at {last} s");
-                return Err(self.failure(Function::DoStep, &[], outcome));
-            }
-            now = last;
-        }
-    }
-
     /// After a step that the FMU discarded: a regular end, or an error that says how far it came.
     #[cold]
     fn discarded(&mut self, end: bool, last: f64) -> Outcome<Progress> {
@@ -185,49 +137,27 @@ impl Instance {
         Err(error)
     }
 
-    /// Lets an instance whose events are handled from outside take in what was set, as an event at
-    /// the present time; nothing for others.
+    /// Begins an event at the present communication point, in which inputs are set; nothing for FMUs
+    /// without event mode.
     ///
     /// # Errors
     /// The FMU's refusal.
     pub fn begin_event(&mut self) -> Outcome {
-        if !self.has_events || self.phase != Phase::Stepping {
-            return Ok(());
-        }
-        self.enter_event()
+        self.in_event(Function::EnterEventMode)
     }
 
-    /// Ends what [`Instance::begin_event`] began; gives whether the FMU asked to end the run.
+    /// Ends what [`Instance::begin_event`] began.
     ///
     /// # Errors
     /// The FMU's refusal.
-    pub fn end_event(&mut self) -> Outcome<bool> {
-        if !self.has_events || self.phase != Phase::Stepping {
-            return Ok(false);
-        }
-        let end = self.update_discrete_states(false)?;
-        if !end {
-            self.plain(Function::EnterStepMode)?;
-        }
-        Ok(end)
+    pub fn end_event(&mut self) -> Outcome {
+        self.in_event(Function::EnterStepMode)
     }
 
-    /// Until nothing changes any more; gives whether the FMU asked to end the run. `within`: a step is
-    /// under way.
-    pub(super) fn update_discrete_states(&mut self, within: bool) -> Outcome<bool> {
-        for _ in 0..MOST_EVENT_ITERATIONS {
-            self.read_output_clocks(within)?;
-            let mut call = Call::plain(Function::UpdateDiscreteStates);
-            self.call(&mut call)?;
-            let [again, end, ..] = call.flags;
-            if end || !again {
-                if !end && !self.clocks.is_empty() {
-                    self.ask_for_intervals(false)?;
-                }
-                return Ok(end);
-            }
+    fn in_event(&mut self, function: Function) -> Outcome {
+        match self.has_events && self.phase == Phase::Stepping {
+            true => self.plain(function),
+            false => Ok(()),
         }
-        let outcome = format!("still iterates after {MOST_EVENT_ITERATIONS} repetitions");
-        Err(self.failure(Function::UpdateDiscreteStates, &[], outcome))
     }
 }

@@ -19,11 +19,7 @@ impl Instance {
     /// The FMU's refusal, or a value that is not finite.
     #[inline]
     pub fn get(&mut self, kind: &Kind, references: &[u32], values: &mut [f64]) -> Outcome {
-        if !self.clocks.due.is_empty() {
-            self.tick_now()?;
-        }
         if matches!(kind, Kind::Float64)
-            && self.trace.is_none()
             && let Some(status) = self.endpoint.get_reals(references, values)
         {
             if matches!(status, 0 | 1) && are_finite(values) {
@@ -45,8 +41,8 @@ impl Instance {
     #[inline(never)]
     fn get_by_call(&mut self, kind: &Kind, references: &[u32], values: &mut [f64]) -> Outcome {
         let scalar = self.scalar(kind);
-        if scalar == Scalar::Clock {
-            self.have_ticked(references, values);
+        if scalar == Scalar::Clock && !self.has_events {
+            values.fill(0.0);
             return Ok(());
         }
         let mut call = Call::plain(Function::Get(scalar));
@@ -94,7 +90,6 @@ impl Instance {
     #[inline]
     pub fn set(&mut self, kind: &Kind, references: &[u32], values: &[f64]) -> Outcome {
         if matches!(kind, Kind::Float64)
-            && self.trace.is_none()
             && let Some(status) = self.endpoint.set_reals(references, values)
         {
             if matches!(status, 0 | 1) {
@@ -115,8 +110,7 @@ impl Instance {
     #[inline(never)]
     fn set_by_call(&mut self, kind: &Kind, references: &[u32], values: &[f64]) -> Outcome {
         let scalar = self.scalar(kind);
-        if scalar == Scalar::Clock {
-            self.trigger(references, values);
+        if scalar == Scalar::Clock && !self.has_events {
             return Ok(());
         }
         let mut call = Call::plain(Function::Set(scalar));
@@ -141,9 +135,6 @@ impl Instance {
     /// # Errors
     /// The FMU's refusal.
     pub fn get_exact(&mut self, kind: &Kind, references: &[u32], data: &mut [Datum]) -> Outcome {
-        if !self.clocks.due.is_empty() {
-            self.tick_now()?;
-        }
         let scalar = self.scalar(kind);
         let mut call = Call::plain(Function::Get(scalar));
         call.references = references;

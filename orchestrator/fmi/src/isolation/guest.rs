@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 use super::super::call::{Call, Endpoint, Function, Lost, MEASURED, Values};
 use super::super::native::{self, Setup, Sink};
 use super::frame::Frame;
-use super::parcel;
 use super::turn::{GUEST, HOST, Patience, take_short_turns};
+use super::{parcel, program};
 
 /// Serves the host that made the file `frame`, until it closes the standard input. What FMUs print
 /// goes where the host listens.
@@ -45,9 +45,14 @@ pub fn guest(frame: &Path) -> ExitCode {
                 break;
             };
             let next = at + head.size as usize;
+            if head.function == Function::Copy.number() {
+                program::copy(room, at, &head);
+                at = next;
+                continue;
+            }
             // Only the last may grow.
             let end = if next < length { next } else { room.len() };
-            let went_well = parcel::carry_out(&mut room[at..end], &head, |call| {
+            let went_well = parcel::carry_out(&mut room[at..], end - at, &head, |call| {
                 carry_out(&mut instances, head.instance, call, ring)
             });
             if !went_well {

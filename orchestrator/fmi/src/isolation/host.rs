@@ -1,10 +1,9 @@
 //! The host's side: starts the guest, waits for its answers, and says what became of it.
 
-use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -12,6 +11,8 @@ use super::super::call::{Call, Lost, Values};
 use super::super::native::Sink;
 use super::frame::Frame;
 use super::leftovers::{self, Mark};
+use super::listen::{Sinks, listen};
+use super::program::{Answered, Program};
 use super::turn::{GUEST, HOST, Patience, take_short_turns};
 use super::{COMMAND, parcel};
 
@@ -25,8 +26,6 @@ const LAST_WORDS: Duration = Duration::from_millis(500);
 const MESSAGES: usize = 10_000;
 /// Bytes of steps that travel together.
 const MOST_REQUESTS: usize = 512 << 10;
-/// Lines that FMUs may print before the rest is passed over.
-const LINES: usize = 1000;
 
 /// A guest process with FMUs in it.
 pub(in super::super) struct Host {
@@ -43,6 +42,7 @@ pub(in super::super) struct Host {
     /// What became of the guest, once it is gone.
     gone: Option<String>,
     requests: Requests,
+    pub(super) program: Program,
 }
 
 /// Steps of several instances that travel together.
@@ -68,24 +68,6 @@ pub(super) struct Request {
     step: usize,
     end: usize,
     instance: u32,
-}
-
-/// Where each instance's messages go, and whose call was the last.
-#[derive(Clone, Default)]
-struct Sinks {
-    all: Arc<Mutex<Vec<Arc<dyn Sink>>>>,
-    current: Arc<AtomicUsize>,
-    /// Something was printed.
-    heard: Arc<AtomicBool>,
-}
-
-impl Sinks {
-    fn message(&self, instance: usize, status: i32, category: &str, text: &str) {
-        let all = self.all.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(sink) = all.get(instance) {
-            sink.message(status, category, text);
-        }
-    }
 }
 
 /// What came of several calls that travelled together.
@@ -153,6 +135,7 @@ impl Host {
             readers: readers.into_iter().flatten().collect(),
             gone: None,
             requests: Requests::default(),
+            program: Program::default(),
         };
         take_short_turns();
         // The first answer says that the memory is mapped there; then its name can go.
@@ -185,6 +168,7 @@ impl Host {
         after: &mut Vec<u8>,
     ) -> Answer {
         self.send_requests();
+        self.program.forget(instance);
         if let Some(gone) = &self.gone {
             return Answer::Called(Err(is_gone(gone)));
         }
@@ -230,6 +214,7 @@ impl Host {
         call: &Call,
         after: &[u8],
     ) -> Option<Request> {
+        self.program.forget(instance);
         let requests = &mut self.requests;
         if requests.are_sent && requests.open == 0 {
             requests.sent.clear();
@@ -280,9 +265,7 @@ impl Host {
             }
             let sent = requests.sent[sent].to_vec();
             self.requests.lost = self.exchange(instance, &sent).err();
-            let room = &self.frame.room()[..sent.len()];
-            self.requests.answers[begin..end].copy_from_slice(room);
-            self.requests.last = begin + self.frame.began_at().min(sent.len());
+            self.keep_answers(begin, sent.len());
         }
         let requests = &self.requests;
         if let Some(lost) = requests.lost.clone().filter(|_| requests.last < end) {
@@ -301,7 +284,36 @@ impl Host {
                 None => Answer::Called(Err(lost)),
             };
         }
-        read(&requests.answers[begin..end], step - begin, call, after)
+        read(&requests.answers[begin..], step - begin, call, after)
+    }
+
+    /// Keeps what came of the first `length` bytes that were sent, those of the requests from `begin` on.
+    fn keep_answers(&mut self, begin: usize, length: usize) {
+        let last = self.frame.began_at().min(length);
+        let room = self.frame.room();
+        // What did not go well may have taken more room to say why.
+        let end = length.max(last + parcel::answered(&room[last..]));
+        let answers = &mut self.requests.answers;
+        answers.resize(begin, 0);
+        answers.extend_from_slice(&room[..end.min(room.len())]);
+        self.requests.last = begin + last;
+    }
+
+    /// Answers a call from what was read after the steps, where it was.
+    pub(super) fn foreseen(
+        &mut self,
+        instance: u32,
+        kept: &[u8],
+        call: &mut Call,
+    ) -> Option<Result<i32, Lost>> {
+        if !self.requests.are_sent {
+            return None;
+        }
+        match self.program.answer(instance, kept, call) {
+            Answered::No => None,
+            Answered::Yes(status) => Some(Ok(status)),
+            Answered::Lost(lost) => Some(Err(lost)),
+        }
     }
 
     /// A step that was requested will not be fetched.
@@ -316,13 +328,18 @@ impl Host {
         }
         let mut requests = std::mem::take(&mut self.requests);
         let first = parcel::head(&requests.sent).map_or(0, |head| head.instance);
+        let length = requests.sent.len();
+        // What is read after the steps goes with them, and is no request.
+        requests.sent.extend_from_slice(self.program.bytes());
         requests.lost = self.exchange(first, &requests.sent).err();
-        requests.last = self.frame.began_at();
-        let room = &self.frame.room()[..requests.sent.len()];
-        requests.answers.clear();
-        requests.answers.extend_from_slice(room);
         requests.are_sent = true;
+        let (whole, lost) = (requests.sent.len(), requests.lost.clone());
+        requests.sent.truncate(length);
         self.requests = requests;
+        self.keep_answers(0, length);
+        let last = self.frame.began_at().checked_sub(length);
+        let answers = &self.frame.room()[length..whole];
+        self.program.take(answers, last, lost);
     }
 
     /// Lets the guest carry out calls, and waits for it.
@@ -474,8 +491,11 @@ fn read(room: &[u8], place: usize, call: &mut Call, after: &mut Vec<u8>) -> Answ
         return strange();
     };
     let outcome = parcel::outcome(&room[place..], &head);
+    call.culprit = parcel::culprit(&head, call);
     if outcome.is_ok() {
         parcel::give_back(&room[place..], &head, call);
+    } else {
+        call.numbers = head.numbers;
     }
     let next = place + head.size as usize;
     let answer = &room[next..(next + after.len()).min(room.len())];
@@ -492,35 +512,6 @@ fn read(room: &[u8], place: usize, call: &mut Call, after: &mut Vec<u8>) -> Answ
 
 fn is_gone(how: &str) -> Lost {
     Lost(format!("cannot be made: its process {how}"))
-}
-
-/// Passes on what a guest prints, line by line, as words of the FMU that was called last.
-fn listen(
-    stream: Option<impl Read + Send + 'static>,
-    name: &'static str,
-    sinks: Sinks,
-) -> Option<JoinHandle<()>> {
-    let stream = stream?;
-    Some(std::thread::spawn(move || {
-        let mut lines = BufReader::new(stream);
-        let mut line = Vec::new();
-        let mut count = 0;
-        loop {
-            line.clear();
-            let read = lines.by_ref().take(16_000).read_until(b'\n', &mut line);
-            if !read.is_ok_and(|length| length > 0) {
-                return;
-            }
-            count += 1;
-            sinks.heard.store(true, Ordering::Relaxed);
-            if count <= LINES {
-                let text = String::from_utf8_lossy(&line);
-                let text = format!("printed on {name}: {}", text.trim_end());
-                let instance = sinks.current.load(Ordering::Relaxed);
-                sinks.message(instance, 1, "", &text);
-            }
-        }
-    }))
 }
 
 /// How a process ended, as a clause.

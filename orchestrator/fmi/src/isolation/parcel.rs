@@ -3,7 +3,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::call::{Call, Function, Lost, Texts, Values};
+use super::super::call::{Call, Culprit, Function, Lost, Texts, Values};
 
 /// The head of a parcel.
 #[derive(Debug, Clone, Copy)]
@@ -93,6 +93,21 @@ pub(super) fn append(bytes: &mut Vec<u8>, instance: u32, call: &Call) {
     write(&mut bytes[at..], &head, call);
 }
 
+/// Sets a flag of the call at the beginning of `bytes`.
+pub(super) fn mark(bytes: &mut [u8], flag: usize) {
+    bytes[std::mem::offset_of!(Head, flags) + flag] = 1;
+}
+
+/// Where the values of a call begin in its parcel.
+pub(super) fn values_at(call: &Call) -> usize {
+    Head::new(0, call).values_at()
+}
+
+/// Where the values of a parcel begin.
+pub(super) fn values_of(head: &Head) -> usize {
+    head.values_at()
+}
+
 /// How many bytes a call takes.
 pub(super) fn size(call: &Call) -> usize {
     Head::new(0, call).size as usize
@@ -164,14 +179,16 @@ pub(super) fn references(bytes: &[u8], head: &Head) -> Vec<u32> {
 }
 
 /// In the guest: carries out the parcel at the beginning of `bytes` by `endpoint` and writes what
-/// came of it in its place; gives whether it went well.
+/// came of it in the first `end` bytes; gives whether it went well. The reason why there is no status may
+/// take more of `bytes`, for what follows is not carried out then.
 pub(super) fn carry_out(
     bytes: &mut [u8],
+    end: usize,
     head: &Head,
     endpoint: impl FnOnce(&mut Call) -> Result<i32, Lost>,
 ) -> bool {
     let at = head.values_at();
-    let (before, values) = bytes.split_at_mut(at);
+    let (before, values) = bytes[..end].split_at_mut(at);
     let references = &before[HEAD..HEAD + 4 * head.references as usize];
     let length = (head.length as usize).min(values.len());
     let (count, mut texts) = (head.count as usize, Texts::new());
@@ -209,6 +226,9 @@ pub(super) fn carry_out(
     let mut head = *head;
     head.numbers = call.numbers;
     head.handle = call.handle;
+    if let Some(culprit) = &call.culprit {
+        head.function = culprit.function.number();
+    }
     for (byte, flag) in head.flags.iter_mut().zip(call.flags) {
         *byte = u8::from(flag);
     }
@@ -244,6 +264,14 @@ fn answer(bytes: &mut [u8], mut head: Head, outcome: Result<i32, Lost>) {
     bytes[..HEAD].copy_from_slice(bytemuck::bytes_of(&head));
 }
 
+/// In the host: how many bytes the parcel at the beginning of `bytes` takes with what came of it.
+pub(super) fn answered(bytes: &[u8]) -> usize {
+    head(bytes).map_or(0, |head| {
+        let end = head.values_at() + head.length as usize;
+        end.max(head.size as usize)
+    })
+}
+
 /// In the host: what came of a parcel.
 pub(super) fn outcome(bytes: &[u8], head: &Head) -> Result<i32, Lost> {
     if head.lost == 0 {
@@ -252,6 +280,17 @@ pub(super) fn outcome(bytes: &[u8], head: &Head) -> Result<i32, Lost> {
     let at = head.values_at();
     let reason = &bytes[at..at + head.length as usize];
     Err(Lost(String::from_utf8_lossy(reason).into_owned()))
+}
+
+/// In the host: the call that the outcome belongs to, where it was made within the one that was asked for.
+pub(super) fn culprit(head: &Head, call: &Call) -> Option<Box<Culprit>> {
+    let function = Function::numbered(head.function)?;
+    (function != call.function).then(|| {
+        Box::new(Culprit {
+            function,
+            references: Vec::new(),
+        })
+    })
 }
 
 /// In the host: gives the call what came back.
@@ -277,7 +316,24 @@ pub(super) fn give_back(bytes: &[u8], head: &Head, call: &mut Call) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Call, Function, HEAD, Values, append, head};
+    use super::{Call, Function, HEAD, Lost, Values, answered, append, carry_out, head, outcome};
+
+    #[test]
+    fn a_reason_longer_than_its_parcel_comes_back_whole() {
+        let mut bytes = Vec::new();
+        append(&mut bytes, 0, &Call::plain(Function::DoStep));
+        let end = bytes.len();
+        append(&mut bytes, 1, &Call::plain(Function::Terminate));
+        bytes.resize(4096, 0);
+        let reason = Lost("cannot".repeat(100));
+        let first = head(&bytes).unwrap();
+        let went_well = carry_out(&mut bytes, end, &first, |_| Err(reason.clone()));
+        assert!(!went_well);
+        let length = answered(&bytes);
+        assert_eq!(length, end + 600);
+        let first = head(&bytes[..length]).unwrap();
+        assert_eq!(outcome(&bytes[..length], &first), Err(reason));
+    }
 
     #[test]
     fn heads_with_forged_lengths_are_refused() {

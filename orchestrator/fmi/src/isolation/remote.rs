@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::super::call::{Call, Culprit, Endpoint, Function, Lost, Values};
+use super::super::call::{AHEAD, Call, Culprit, Endpoint, Foreseen, Function, Lost, Values};
 use super::super::native::{Setup, Sink};
 use super::host::{Answer, Host, Request};
 use super::parcel;
@@ -19,6 +19,8 @@ pub(in super::super) struct Remote {
     /// Whether settings may wait.
     keeps: bool,
     ahead: Ahead,
+    /// What is read after steps is part of the program of its process.
+    is_foreseen: bool,
     /// The step whose outcome has not been fetched.
     request: Option<Request>,
 }
@@ -65,6 +67,7 @@ impl Ahead {
         {
             self.references.extend(call.references);
             parcel::append(&mut self.habit, instance, call);
+            parcel::mark(&mut self.habit, AHEAD);
         }
     }
 }
@@ -96,20 +99,33 @@ impl Remote {
             kept: Vec::new(),
             keeps: !is_traced,
             ahead: Ahead::default(),
+            is_foreseen: false,
             request: None,
         })
     }
 }
 
+/// Whether a call gives nothing and may travel with the next one.
+fn may_wait(function: Function) -> bool {
+    matches!(
+        function,
+        Function::Set(_) | Function::EnterEventMode | Function::EnterStepMode
+    )
+}
+
 impl Endpoint for Remote {
     fn call(&mut self, call: &mut Call) -> Result<i32, Lost> {
-        if self.keeps
-            && matches!(call.function, Function::Set(_))
-            && self.kept.len() + parcel::size(call) < KEPT
-        {
+        if self.keeps && may_wait(call.function) && self.kept.len() + parcel::size(call) < KEPT {
             self.ahead.learn(self.instance, call);
             parcel::append(&mut self.kept, self.instance, call);
             return Ok(0);
+        }
+        if self.is_foreseen && self.request.is_none() && matches!(call.function, Function::Get(_)) {
+            let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(outcome) = host.foreseen(self.instance, &self.kept, call) {
+                self.kept.clear();
+                return outcome;
+            }
         }
         let mut after = Vec::new();
         if self.keeps {
@@ -141,6 +157,10 @@ impl Endpoint for Remote {
             return false;
         }
         let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+        self.is_foreseen = self.is_foreseen && host.program.has(self.instance);
+        if self.is_foreseen {
+            self.ahead.habit.clear();
+        }
         self.request = host.request(self.instance, &self.kept, call, &self.ahead.habit);
         drop(host);
         if self.request.is_none() {
@@ -149,6 +169,15 @@ impl Endpoint for Remote {
         self.ahead.learn(self.instance, call);
         self.kept.clear();
         true
+    }
+
+    fn foresee(&mut self, foreseen: &Foreseen) -> Option<usize> {
+        if !self.keeps {
+            return None;
+        }
+        self.is_foreseen = true;
+        let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(host.program.add(self.instance, foreseen))
     }
 
     fn answer(&mut self, call: &mut Call) -> Result<i32, Lost> {

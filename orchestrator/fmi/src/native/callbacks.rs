@@ -43,14 +43,15 @@ impl Environment {
     /// from it.
     #[inline]
     pub(super) fn enter(&self) {
-        CALLED.set(self.address());
+        // `set` would look at each call whether the place has a value yet.
+        CALLED.with(|called| called.set(self.address()));
     }
 }
 
 /// The call has ended.
 #[inline]
 pub(super) fn leave() {
-    CALLED.set(0);
+    CALLED.with(|called| called.set(0));
 }
 
 /// From now on, an FMU that ends this process in one of its calls does not end it with the status 0 of

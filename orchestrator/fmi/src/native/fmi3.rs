@@ -190,16 +190,17 @@ impl Fmi3 {
         // SAFETY: all pointers live; the environment does until the instance is freed.
         let (instance, library) = unsafe {
             match setup.mode {
-                Mode::CoSimulation { event_mode } => {
+                Mode::CoSimulation { ref events, .. } => {
                     let make = f.needed::<InstantiateCoSimulation>("InstantiateCoSimulation");
                     let library = f.finish()?;
                     let make = make.ok_or("the library lacks functions")?;
                     // Nothing is asked for between communication points, so that no variables are
                     // required there. A step may be returned from early where events are handled
-                    // from outside.
+                    // outside and the rest of the step may be shorter.
                     let (none, callback) = (std::ptr::null(), intermediate_update);
                     let on = setup.logging;
-                    let early = event_mode;
+                    let event_mode = events.is_some();
+                    let early = events.as_ref().is_some_and(|events| events.variable_step);
                     let instance = make(
                         name, token, resources, false, on, event_mode, early, none, 0, to, log,
                         callback,

@@ -5,10 +5,12 @@
 #![allow(unsafe_code, reason = "functions of a library are called")]
 
 mod callbacks;
+mod events;
 mod exchange;
 mod floating;
 mod fmi2;
 mod fmi3;
+mod kept_states;
 mod library;
 pub(super) mod printing;
 mod state;
@@ -22,6 +24,8 @@ use serde::{Deserialize, Serialize};
 use super::FmiVersion;
 use super::call::{Call, Endpoint, Lost, Texts, Values};
 
+pub(super) use events::{Events, WithEvents};
+
 /// Where an instance's messages go.
 pub(super) trait Sink: Send + Sync {
     /// An FMU logged a text with a status, whatever number it is.
@@ -29,12 +33,14 @@ pub(super) trait Sink: Send + Sync {
 }
 
 /// What an instance is made as.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) enum Mode {
     /// It steps itself.
     CoSimulation {
-        /// FMI 3.0: its events are handled from outside.
-        event_mode: bool,
+        /// FMI 3.0: its events are handled outside of it, if it has event mode.
+        events: Option<Events>,
+        /// They are handled on the other side, which shall see every call.
+        elsewhere: bool,
     },
     /// It gives derivatives and is stepped by a solver.
     ModelExchange {
@@ -70,6 +76,7 @@ pub(super) const DISCARD: i32 = 2;
 /// # Errors
 /// The loader's reason, functions that are missing, or an FMU that refuses.
 pub(super) fn instantiate(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Box<dyn Endpoint>, String> {
+    let events_sink = sink.clone();
     let endpoint = match setup.version {
         FmiVersion::V2 => {
             fmi2::Fmi2::new(setup, sink).map(|fmu| Box::new(fmu) as Box<dyn Endpoint>)
@@ -81,6 +88,10 @@ pub(super) fn instantiate(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Box<dyn 
     leave();
     let endpoint = endpoint?;
     Ok(match &setup.mode {
+        Mode::CoSimulation {
+            events: Some(events),
+            elsewhere: false,
+        } => Box::new(WithEvents::new(endpoint, events.clone(), events_sink)),
         Mode::CoSimulation { .. } => endpoint,
         Mode::ModelExchange {
             states,

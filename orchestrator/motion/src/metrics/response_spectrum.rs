@@ -195,11 +195,24 @@ impl Lanes {
     /// Follows the load, `steps` from a sample to the next.
     fn follow(&mut self, acceleration: &[f64], steps: usize) {
         #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx512f") {
+            // SAFETY: the processor has what the function is compiled for.
+            #[allow(unsafe_code, reason = "whether the processor has it was asked")]
+            return unsafe { self.follow_by_eight(acceleration, steps) };
+        }
+        #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has what the function is compiled for.
             #[allow(unsafe_code, reason = "whether the processor has it was asked")]
             return unsafe { self.follow_by_four(acceleration, steps) };
         }
+        self.follow_plainly(acceleration, steps);
+    }
+
+    /// The same operations in the same order, eight lanes in an instruction.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f")]
+    fn follow_by_eight(&mut self, acceleration: &[f64], steps: usize) {
         self.follow_plainly(acceleration, steps);
     }
 
@@ -254,17 +267,22 @@ impl Lanes {
                         false => (after(&of_value), after(&of_rate)),
                     };
                     (x[lane], v[lane]) = (new_x, new_v);
+                    // A largest value is where the rate changes its sign, or at the end.
+                    let turns = (rate[lane] > 0.0) != (next_rate[lane] > 0.0);
                     let sizes = [value[lane].abs(), next[lane].abs()];
-                    matters |= (sizes[0] > floor[lane]) | (sizes[1] > floor[lane]);
+                    matters |= turns & ((sizes[0] > floor[lane]) | (sizes[1] > floor[lane]));
                 }
                 if matters {
                     self.note([&value, &next], [&rate, &next_rate], count);
-                    floor = self.largest.map(|largest| BETWEEN * largest.abs());
+                    for lane in 0..LANES {
+                        floor[lane] = BETWEEN * self.largest[lane].abs();
+                    }
                 }
                 (value, rate) = (next, next_rate);
                 count += 1;
             }
         }
+        self.note([&value, &value], [&zero, &zero], count);
     }
 
     /// Notes larger values between the ends of a step.
@@ -280,16 +298,16 @@ impl Lanes {
             if size <= BETWEEN * self.largest[lane].abs() {
                 continue;
             }
-            let turns = rate[lane] * next_rate[lane] < 0.0;
-            let (found, place) = if turns {
-                let rates = [rate[lane], next_rate[lane]].map(|rate| rate * self.step);
-                extremum([value[lane], next[lane]], rates)
-            } else {
-                (next[lane], 1.0)
-            };
-            if found.abs() > self.largest[lane].abs() {
-                self.largest[lane] = found;
-                self.at[lane] = (count as f64 + place) * self.step;
+            let mut found = [(value[lane], 0.0), (next[lane], 1.0), (0.0, 0.0)];
+            if rate[lane] * next_rate[lane] < 0.0 {
+                let rates = [rate[lane] * self.step, next_rate[lane] * self.step];
+                found[2] = extremum([value[lane], next[lane]], rates);
+            }
+            for (value, place) in found {
+                if value.abs() > self.largest[lane].abs() {
+                    self.largest[lane] = value;
+                    self.at[lane] = (count as f64 + place) * self.step;
+                }
             }
         }
     }

@@ -10,8 +10,9 @@ mod solver_state;
 mod step;
 
 use super::super::call::{Call, Culprit, Endpoint, Function, Lost, Scalar};
+use super::kept_states::KeptStates;
 use model::{Done, Failed, Model};
-use solver_state::{KeptStates, SolverState};
+use solver_state::SolverState;
 use step::{Start, Taken, Trial, Way};
 
 /// Error of a step relative to the states, where nothing else is asked for.
@@ -36,7 +37,7 @@ pub(super) struct Stepped {
     /// The standard's version has functions that count states and indicators.
     counts: bool,
     now: SolverState,
-    kept: KeptStates,
+    kept: KeptStates<SolverState>,
 }
 
 /// How an integration ended.

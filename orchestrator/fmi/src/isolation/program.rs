@@ -1,0 +1,321 @@
+//! What is set and read after the steps of the FMUs in a guest. Connections among them travel there as a
+//! program behind the steps, so that a communication step is one way there and back.
+//!
+//! The program is carried out before anybody asks. What it read answers a later call where that call, and
+//! what has been set before it, is just what the program did; otherwise the call is made as usual.
+
+use bytemuck::{cast_slice, cast_slice_mut};
+
+use super::super::call::{AHEAD, Call, Foreseen, Function, Lost, Scalar, Values};
+use super::parcel;
+
+/// Steps in a row after which a program that nobody used is given up.
+const UNUSED: u32 = 8;
+
+/// The parcels that follow the steps, and which of them has answered what.
+#[derive(Default)]
+pub(super) struct Program {
+    bytes: Vec<u8>,
+    reads: Vec<Reading>,
+    /// What came of them after the last steps.
+    answers: Vec<u8>,
+    /// Where the last parcel begins that was carried out, or begun.
+    last: usize,
+    /// The guest was lost there.
+    lost: Option<Lost>,
+    is_used: bool,
+    unused: u32,
+}
+
+/// A call that reads, with what is set right before it.
+struct Reading {
+    instance: u32,
+    /// Where the parcel that sets begins, if there is one.
+    set: Option<usize>,
+    get: usize,
+    end: usize,
+    /// Where the values that are read begin.
+    values: usize,
+    /// It can still answer.
+    is_open: bool,
+}
+
+/// What the program knows of a call.
+pub(super) enum Answered {
+    /// Nothing.
+    No,
+    /// The status, with the values in the call.
+    Yes(i32),
+    /// The guest was lost in it.
+    Lost(Lost),
+}
+
+impl Program {
+    /// Adds a reading; gives its number, to which those that come later may refer.
+    pub(super) fn add(&mut self, instance: u32, foreseen: &Foreseen) -> usize {
+        let begin = self.bytes.len();
+        let mut values = vec![0.0; foreseen.count];
+        let mut get = Call::plain(Function::Get(Scalar::Float64));
+        get.references = foreseen.read;
+        get.count = foreseen.count;
+        get.values = Values::Out(cast_slice_mut(&mut values));
+        get.flags[AHEAD] = true;
+        let set = (!foreseen.set.is_empty()).then(|| {
+            // Pairs of places, from the beginning of their own parcel.
+            let mut moves = vec![0_i64; 2 * foreseen.wires.len()];
+            let mut wire = Call::plain(Function::Copy);
+            wire.values = Values::In(cast_slice(&moves));
+            let at = begin + parcel::size(&wire);
+            let mut call = Call::plain(Function::Set(Scalar::Float64));
+            call.references = foreseen.set;
+            call.count = foreseen.values.len();
+            call.values = Values::In(cast_slice(foreseen.values));
+            let into = at + parcel::values_at(&call);
+            for (pair, wire) in moves.chunks_exact_mut(2).zip(foreseen.wires) {
+                let from = self.reads.get(wire.reading).map_or(into, |it| it.values);
+                let place = |at: usize, element: usize| (at + 8 * element) as i64 - begin as i64;
+                pair[0] = place(from, wire.element);
+                pair[1] = place(into, wire.place);
+            }
+            let mut wire = Call::plain(Function::Copy);
+            wire.values = Values::In(cast_slice(&moves));
+            parcel::append(&mut self.bytes, instance, &wire);
+            parcel::append(&mut self.bytes, instance, &call);
+            at
+        });
+        let at = self.bytes.len();
+        let values = at + parcel::values_at(&get);
+        parcel::append(&mut self.bytes, instance, &get);
+        self.reads.push(Reading {
+            instance,
+            set,
+            get: at,
+            end: self.bytes.len(),
+            values,
+            is_open: false,
+        });
+        self.reads.len() - 1
+    }
+
+    /// What follows the steps.
+    pub(super) fn bytes(&mut self) -> &[u8] {
+        self.unused = if self.is_used { 0 } else { self.unused + 1 };
+        self.is_used = false;
+        if self.unused > UNUSED {
+            self.bytes.clear();
+            self.reads.clear();
+        }
+        &self.bytes
+    }
+
+    /// Whether it reads from an instance.
+    pub(super) fn has(&self, instance: u32) -> bool {
+        self.reads.iter().any(|read| read.instance == instance)
+    }
+
+    /// Takes what came of it: `last` is where the last parcel begins that was begun, none where it was not
+    /// reached.
+    pub(super) fn take(&mut self, answers: &[u8], last: Option<usize>, lost: Option<Lost>) {
+        self.answers.clear();
+        self.answers.extend_from_slice(answers);
+        self.last = last.unwrap_or(0);
+        self.lost = lost;
+        for read in &mut self.reads {
+            read.is_open = last.is_some_and(|last| read.get <= last);
+        }
+    }
+
+    /// The state of an instance is no longer what the program left, or soon will not be.
+    pub(super) fn forget(&mut self, instance: u32) {
+        for read in self.reads.iter_mut().filter(|it| it.instance == instance) {
+            read.is_open = false;
+        }
+    }
+
+    /// Answers a call that reads, after what was set in `kept`, where it did just that.
+    pub(super) fn answer(&mut self, instance: u32, kept: &[u8], call: &mut Call) -> Answered {
+        let mut reads = self.reads.iter_mut();
+        let Some(read) = reads.find(|it| it.is_open && it.instance == instance) else {
+            return Answered::No;
+        };
+        read.is_open = false;
+        let set = read.set.map_or(&[][..], |at| {
+            self.answers.get(at..read.get).unwrap_or_default()
+        });
+        let parcel = self.answers.get(read.get..read.end).unwrap_or_default();
+        let head = parcel::head(parcel);
+        let fits = head.is_some_and(|head| {
+            head.function == call.function.number()
+                && head.count == call.count as u64
+                && matches!(&call.values, Values::Out(values) if values.len() as u64 == head.length)
+                && parcel::references(parcel, &head) == call.references
+        });
+        let Some(head) = head.filter(|_| fits && set == kept) else {
+            self.forget(instance);
+            return Answered::No;
+        };
+        if let Some(lost) = self.lost.clone().filter(|_| read.get == self.last) {
+            return Answered::Lost(lost);
+        }
+        let outcome = parcel::outcome(parcel, &head);
+        let Ok(status @ (0 | 1)) = outcome else {
+            self.forget(instance);
+            return Answered::No;
+        };
+        self.is_used = true;
+        parcel::give_back(parcel, &head, call);
+        Answered::Yes(status)
+    }
+}
+
+/// In the guest: copies numbers among the parcels of `room`, as the one at `at` says; a place outside is
+/// passed over.
+pub(super) fn copy(room: &mut [u8], at: usize, head: &parcel::Head) {
+    let begin = at + parcel::values_of(head);
+    for pair in 0..head.length as usize / 16 {
+        let place = |which: usize| {
+            let said = begin + 16 * pair + 8 * which;
+            let by = i64::from_ne_bytes(room.get(said..said + 8)?.try_into().ok()?);
+            let first = usize::try_from((at as i64).checked_add(by)?).ok()?;
+            let end = first.checked_add(8)?;
+            (end <= room.len()).then_some(first..end)
+        };
+        if let (Some(from), Some(to)) = (place(0), place(1)) {
+            room.copy_within(from, to.start);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::call::Wire;
+    use super::*;
+
+    /// In place of a guest whose FMUs give twice their input: carries out what it is sent, and gives where
+    /// the last parcel begins. From the parcel at `until` on the FMUs refuse.
+    fn guest(room: &mut [u8], inputs: &mut [f64; 3], until: usize) -> usize {
+        let (mut at, mut last) = (0, 0);
+        while at < room.len() {
+            last = at;
+            let head = parcel::head(&room[at..]).unwrap();
+            let next = at + head.size as usize;
+            if head.function == Function::Copy.number() {
+                copy(room, at, &head);
+                at = next;
+                continue;
+            }
+            let input = &mut inputs[head.instance as usize];
+            let size = head.size as usize;
+            let went_well = parcel::carry_out(&mut room[at..], size, &head, |call| {
+                match &mut call.values {
+                    Values::In(bytes) => *input = cast_slice::<u8, f64>(bytes)[0],
+                    Values::Out(bytes) => cast_slice_mut::<u8, f64>(bytes)[0] = 2.0 * *input,
+                    _ => {}
+                }
+                Ok(if at >= until { 3 } else { 0 })
+            });
+            if !went_well {
+                break;
+            }
+            at = next;
+        }
+        last
+    }
+
+    fn chain() -> Program {
+        let mut program = Program::default();
+        let first = Foreseen {
+            set: &[],
+            values: &[],
+            wires: &[],
+            read: &[7],
+            count: 1,
+        };
+        let mut reading = program.add(0, &first);
+        for instance in 1..3 {
+            let wire = Wire {
+                reading,
+                element: 0,
+                place: 0,
+            };
+            let next = Foreseen {
+                set: &[4],
+                values: &[0.0],
+                wires: &[wire],
+                ..first
+            };
+            reading = program.add(instance, &next);
+        }
+        program
+    }
+
+    fn settings(instance: u32, value: f64) -> Vec<u8> {
+        let (mut kept, value) = (Vec::new(), [value]);
+        let mut set = Call::plain(Function::Set(Scalar::Float64));
+        (set.references, set.count) = (&[4], 1);
+        set.values = Values::In(cast_slice(&value));
+        parcel::append(&mut kept, instance, &set);
+        kept
+    }
+
+    /// What the program answers when `kept` was set before.
+    fn asked(program: &mut Program, instance: u32, kept: &[u8]) -> Option<f64> {
+        let mut value = [0.0];
+        let mut get = Call::plain(Function::Get(Scalar::Float64));
+        (get.references, get.count) = (&[7], 1);
+        get.values = Values::Out(cast_slice_mut(&mut value));
+        match program.answer(instance, kept, &mut get) {
+            Answered::Yes(0) => Some(value[0]),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn a_chain_is_read_behind_the_steps_and_answers_what_does_the_same() {
+        let mut program = chain();
+        let mut room = program.bytes().to_vec();
+        let last = guest(&mut room, &mut [1.5, 0.0, 0.0], usize::MAX);
+        program.take(&room, Some(last), None);
+        assert_eq!(asked(&mut program, 0, &[]), Some(3.0));
+        assert_eq!(asked(&mut program, 1, &settings(1, 3.0)), Some(6.0));
+        // Something else was set: the call has to be made, and so has each after it.
+        assert_eq!(asked(&mut program, 2, &settings(2, 6.5)), None);
+        assert_eq!(asked(&mut program, 2, &settings(2, 6.0)), None);
+        // Each answer is given once.
+        assert_eq!(asked(&mut program, 0, &[]), None);
+    }
+
+    #[test]
+    fn what_was_not_reached_or_refused_answers_nothing() {
+        let mut program = chain();
+        let mut room = program.bytes().to_vec();
+        let until = program.reads[1].get;
+        let last = guest(&mut room, &mut [1.5, 0.0, 0.0], until);
+        program.take(&room, Some(last), None);
+        assert_eq!(asked(&mut program, 0, &[]), Some(3.0));
+        assert_eq!(asked(&mut program, 1, &settings(1, 3.0)), None);
+        assert_eq!(asked(&mut program, 2, &settings(2, 6.0)), None);
+        // A guest that died in it: the loss is that of the reading in which it died.
+        let lost = Some(Lost("is gone".to_string()));
+        program.take(&room, Some(until), lost);
+        assert_eq!(asked(&mut program, 0, &[]), Some(3.0));
+        let mut get = Call::plain(Function::Get(Scalar::Float64));
+        let mut value = [0.0];
+        (get.references, get.count) = (&[7], 1);
+        get.values = Values::Out(cast_slice_mut(&mut value));
+        let kept = settings(1, 3.0);
+        assert!(matches!(
+            program.answer(1, &kept, &mut get),
+            Answered::Lost(_)
+        ));
+    }
+
+    #[test]
+    fn a_program_that_nobody_uses_is_given_up() {
+        let mut program = chain();
+        for _ in 0..UNUSED {
+            assert!(!program.bytes().is_empty());
+        }
+        assert!(program.bytes().is_empty() && !program.has(1));
+    }
+}
