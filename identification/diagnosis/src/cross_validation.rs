@@ -100,8 +100,12 @@ fn settle<M: SimulatedModel>(
     least_squares(model, start, record, &Free::All, steps).map(Simulated::from)
 }
 
-/// The model with the effects of `start`, fitted to `record` to the end, with the standard deviations
-/// of all coordinates.
+/// The model with the effects of `start`, fitted to `record` to the end.
+pub fn settled<M: SimulatedModel>(model: &M, start: &Point, record: usize) -> Option<Point> {
+    least_squares(model, start, record, &Free::All, TO_THE_END).map(|found| found.point)
+}
+
+/// As [`settled`], with the standard deviations of all coordinates.
 pub fn refit<M: SimulatedModel>(
     model: &M,
     start: &Point,
@@ -313,9 +317,8 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             })
             .collect();
         let in_base = |effect: usize| {
-            let alike = candidates[effect].look_alikes;
-            let held = |i: usize| i == effect || alike.contains(&candidates[i].effect);
-            base.point.effects.iter().any(|(i, _)| held(*i))
+            let mut effects = base.point.effects.iter();
+            effects.any(|(i, _)| model.excludes(*i, effect))
         };
         let suggested = model.starts(&base.point, screen);
         let begun = if base.point.effects.is_empty() {

@@ -5,13 +5,14 @@ use super::PartReport;
 use super::confirmed::unfit;
 use super::parts::{EVERYTHING, InParts};
 use super::readings::Crossed;
-use diagnosis::{Point, refit};
+use diagnosis::{Observer, Point, refit, settled};
 use rayon::prelude::*;
 
 /// Logarithm of how much less likely a model is that does nearly as well.
 const NEARLY: f64 = 2.0;
 
-/// What the two parts ask for, each alone and both together; of effects that cannot be told apart one.
+/// What the two parts ask for, each alone and both together, of effects that cannot be told apart one; each also
+/// from the stated values of what vanished in it.
 pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Vec<Point> {
     let mut all: Vec<Point> = parts.iter().map(|part| part.point.clone()).collect();
     for (one, other) in [(0, 1), (1, 0)] {
@@ -19,13 +20,15 @@ pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Ve
         let more = parts[other].point.effects.iter();
         let new = more.filter(|(i, _)| {
             let mut own = parts[one].point.effects.iter();
-            own.all(|(known, _)| !measured.are_alike(*i, *known))
+            own.all(|(known, _)| !measured.excludes(*known, *i))
         });
         both.effects.extend(new.cloned());
         if both.effects.len() > parts[one].point.effects.len() {
             all.push(both);
         }
     }
+    let restored: Vec<Point> = all.iter().map(|own| measured.restored(own)).collect();
+    all.extend(restored);
     all
 }
 
@@ -36,6 +39,7 @@ pub(super) fn of_its_class<M: InParts>(
     measured: &M,
     point: &Point,
     crossed: Crossed,
+    observer: Observer<'_>,
 ) -> Vec<(Point, Crossed)> {
     let mut all = vec![(point.clone(), crossed)];
     let mut best = 0;
@@ -44,6 +48,9 @@ pub(super) fn of_its_class<M: InParts>(
         let others =
             (0..measured.candidates().len()).filter(|&i| !known(i) && measured.are_alike(i, own));
         for other in others {
+            if observer.is_over() {
+                break;
+            }
             let (base, against) = &all[best];
             let taken = base.effects[place].0;
             let candidate = &measured.candidates()[other];
@@ -121,9 +128,8 @@ pub(super) fn least_needed<M: InParts>(
             let errors = Crossed::of(measured, &left)?;
             // Where a part does not tell a parameter that the rig has, it may predict worse with it.
             let fits = || {
-                refit(measured, &left, EVERYTHING).is_some_and(|(found, _)| {
-                    measured.normalised_error(&found.point, EVERYTHING) < most
-                })
+                settled(measured, &left, EVERYTHING)
+                    .is_some_and(|found| measured.normalised_error(&found, EVERYTHING) < most)
             };
             let is_idle = !crossed.needs(&errors) && (matches!(item, Item::Effect(_)) || fits());
             is_idle.then_some((item, left, errors))

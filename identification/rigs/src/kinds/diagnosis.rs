@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::alternatives::{Item, least_needed, of_its_class, proposals, replaced};
 use super::cause::{Cause, effect_in_words, in_own_words, joined, undetermined};
-use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
+use super::confirmed::{
+    Confirmed, Refused, confirm, effects as named_values, lengths, needed, unfit,
+};
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, LOST, Part};
@@ -16,7 +18,7 @@ use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::gain_interval;
 use diagnosis::{
     Observer, Point, Progress, Selected, Verdict, all_errors, completed, select, select_jointly,
-    squares,
+    settled, squares,
 };
 
 /// Errors on data that were not fitted that still agree with those on fitted ones: at most so many times
@@ -180,7 +182,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     };
     let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
     // Either part proposes; all data together decide by how either part predicts the other.
-    let mut start = select_jointly(
+    let start = select_jointly(
         measured,
         &proposals(measured, [&as_described, &swapped]),
         EVERYTHING,
@@ -210,21 +212,11 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             reason: reason.to_owned(),
         });
     }
-    // What either part gives a reason against is not named.
     let mut refused: Vec<Refused> = Vec::new();
-    for effect in as_described.effects.iter().chain(&swapped.effects) {
-        let index = measured.index(&effect.effect);
-        if let (Some(index), Some(reason)) = (index, &effect.objection) {
-            start.point.effects.retain(|(known, _)| *known != index);
-            if refused.iter().all(|(known, _)| *known != index) {
-                refused.push((index, reason.clone()));
-            }
-        }
-    }
     let mut findings = Vec::new();
     let mut confirmed = confirm(measured, &start.point, &mut refused, &mut findings)?;
     let crossed = Crossed::of(measured, &confirmed.point)?;
-    let mut of_its_class = of_its_class(measured, &confirmed.point, crossed).into_iter();
+    let mut of_its_class = of_its_class(measured, &confirmed.point, crossed, observer).into_iter();
     let (best, mut crossed) = of_its_class.next()?;
     if replaced(&confirmed.point, &best).is_some() {
         let mut new = refused.clone();
@@ -244,8 +236,9 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let mut asked: Option<Vec<Item>> = None;
     let fitted = |own: &Confirmed| measured.normalised_error(&own.point, EVERYTHING);
     let mut most = AS_WELL * fitted(&confirmed);
-    while let Some((left, without)) =
-        least_needed(measured, &confirmed.point, &crossed, most, &mut asked)
+    while !observer.is_over()
+        && let Some((left, without)) =
+            least_needed(measured, &confirmed.point, &crossed, most, &mut asked)
     {
         let gone = confirmed.point.effects.iter();
         let mut gone = gone.filter(|(i, _)| left.effects.iter().all(|(known, _)| known != i));
@@ -274,6 +267,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             if !as_described.rivals.contains(&pair) {
                 as_described.rivals.push(pair);
             }
+            confirmed.widen_by(&measured.parameters(&point, &[]));
             weighed.extend(Weighed::of(measured, &point, errors));
         }
     }
@@ -290,7 +284,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         .iter()
         .map(
             |(name, _)| match there.iter().find(|other| alike(name, other)) {
-                Some(other) if other != name => format!("{name} or {other}"),
+                Some(other) if !there.contains(name) => format!("{name} or {other}"),
                 _ => name.clone(),
             },
         )
@@ -331,13 +325,28 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         }
         let without = measured.without_cause(i);
         let without = without.and_then(|own| {
-            let errors = Crossed::of(&own, &confirmed.point)?;
-            Some((own, errors))
+            // Without it the fit may need what vanished beside it.
+            let error = |point: &Point| own.normalised_error(point, EVERYTHING);
+            let starts = [confirmed.point.clone(), own.restored(&confirmed.point)];
+            let fitted = starts
+                .into_iter()
+                .filter_map(|start| settled(&own, &start, EVERYTHING));
+            let best = fitted.min_by(|a, b| error(a).total_cmp(&error(b)))?;
+            let errors = Crossed::of(&own, &best)?;
+            // No part tells another one's zero.
+            let is_needed = if measured.is_of_first_file(i) {
+                let bare = all_errors(&own, &best, EVERYTHING);
+                let with = all_errors(measured, &confirmed.point, EVERYTHING);
+                needed(&bare, &with, &lengths(measured, EVERYTHING))
+            } else {
+                crossed.needs(&errors)
+            };
+            Some((own, best, errors, is_needed))
         });
         match without {
-            Some((own, errors)) if !crossed.needs(&errors) => {
+            Some((own, best, errors, false)) => {
                 doubted.push(cause);
-                weighed.extend(Weighed::of(&own, &confirmed.point, errors));
+                weighed.extend(Weighed::of(&own, &best, errors));
             }
             _ => causes.push(cause),
         }

@@ -11,6 +11,9 @@ const CHEAP: usize = 40_000;
 /// Logarithm, in deviations, of a nominal parameter that is none: nothing depends on it any more.
 const GONE: f64 = -40.0;
 
+/// Logarithm of the share of what was stated below which a nominal parameter tells a fit no more that it is there.
+const VANISHED: f64 = -5.0;
+
 /// Error over the output's deviation from which on fits begin from what is read off as well.
 const SHAKY: f64 = 0.2;
 
@@ -284,6 +287,15 @@ impl SimulatedModel for Measured<'_> {
         &self.candidates
     }
 
+    fn excludes(&self, other: usize, one: usize) -> bool {
+        let (own, new) = (&self.candidates[other], &self.candidates[one]);
+        let mut beside = self.rig.beside().iter();
+        let are_both = beside.any(|(a, b)| {
+            (own.effect == *a && new.effect == *b) || (own.effect == *b && new.effect == *a)
+        });
+        other == one || (new.look_alikes.contains(&own.effect) && !are_both)
+    }
+
     fn blocks(&self) -> usize {
         self.measurement.recordings.len()
     }
@@ -467,6 +479,13 @@ impl InParts for Measured<'_> {
         self.rig.causes().contains(&name)
     }
 
+    fn is_of_first_file(&self, i: usize) -> bool {
+        let (_, unit) = self.rig.parameters()[self.uncertain[i]];
+        let mut session = self.rig.session().iter();
+        self.is_cause(i)
+            && session.any(|own| own.role == SessionRole::AgainstFirst && own.unit == unit)
+    }
+
     fn without_cause(&self, i: usize) -> Option<Self> {
         let mut same = self.held();
         same.width = self.width;
@@ -480,6 +499,19 @@ impl InParts for Measured<'_> {
         let mut without = point.clone();
         without.nuisance[i] = GONE;
         (may_be_nothing && point.nuisance[i] > GONE).then_some(without)
+    }
+
+    fn restored(&self, point: &Point) -> Point {
+        let mut restored = point.clone();
+        for (place, &i) in self.uncertain.iter().enumerate() {
+            let (value, deviation) = self.nominal[i];
+            let is_logarithmic = value > 0.0 && deviation <= value;
+            let vanished = restored.nuisance[place] * deviation / value < VANISHED;
+            if is_logarithmic && vanished || !is_logarithmic && self.is_cause(place) {
+                restored.nuisance[place] = 0.0;
+            }
+        }
+        restored
     }
 
     fn contradictions(&self) -> Vec<Cause> {
