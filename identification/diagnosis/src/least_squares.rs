@@ -24,6 +24,8 @@ const STILL: f64 = 0.3;
 const LARGEST_TIME: f64 = 20.0;
 /// Share of the squared change of the errors up to which derivatives may miss it and are still learned from it.
 const MISSED: f64 = 0.25;
+/// Share of what the errors tell of a coordinate that keeps those that compensate each other wholly from rounding.
+const RIDGE: f64 = 1e-10;
 /// Runs of neighbouring samples whose scatter tells standard errors.
 const RUNS: usize = 24;
 
@@ -37,11 +39,9 @@ pub trait SimulatedModel: Sync {
     /// The catalogue.
     fn candidates(&self) -> &[Candidate];
 
-    /// Whether a model with the candidate `other` has no place for `one`, since records do not tell them apart.
-    fn excludes(&self, other: usize, one: usize) -> bool {
-        let candidates = self.candidates();
-        let alike = candidates[one].look_alikes;
-        other == one || alike.contains(&candidates[other].effect)
+    /// `point` with `step` added to its coordinates, kept in bounds.
+    fn moved(&self, point: &Point, step: &[f64]) -> Point {
+        point.moved(step, self.candidates())
     }
 
     /// Number of blocks.
@@ -205,7 +205,7 @@ fn column<M: SimulatedModel>(
     let moved = |size: f64| {
         let mut step = vec![0.0; coordinates(&at.point)];
         step[coordinate] = size;
-        let moved = at.point.moved(&step, model.candidates());
+        let moved = model.moved(&at.point, &step);
         (moved != at.point).then_some(moved)
     };
     let errors = |point: &Point| match only {
@@ -324,7 +324,7 @@ pub fn least_squares<M: SimulatedModel>(
                 continue;
             };
             let step = shortened(step, start.nuisance.len());
-            let moved = best.point.moved(&step, model.candidates());
+            let moved = model.moved(&best.point, &step);
             // What stands at a bound and wants beyond leaves the step.
             let stuck: Vec<usize> = stuck(&best.point, &moved, &step);
             if !stuck.is_empty() && stuck.iter().any(|&i| active[i]) {
@@ -466,7 +466,7 @@ fn shortened(mut step: Vec<f64>, nuisance: usize) -> Vec<f64> {
     step
 }
 
-/// Effect coordinates that a step would move and a bound keeps in place.
+/// Coordinates that a step would move and a bound keeps in place.
 fn stuck(before: &Point, after: &Point, step: &[f64]) -> Vec<usize> {
     let (before, after) = (flat(before), flat(after));
     (0..step.len())
@@ -486,8 +486,13 @@ pub fn deviations<M: SimulatedModel>(model: &M, at: &Solution, record: usize) ->
     let (hessian, _) = normal(model, &at.point, &all, &at.errors, variance);
     let places: Vec<usize> = (0..all.len()).filter(|&i| hessian[(i, i)] > 0.0).collect();
     let count = places.len();
-    let reduced = DMatrix::from_fn(count, count, |i, j| hessian[(places[i], places[j])]);
+    // Coordinates that the errors hardly see stand beside others.
+    let size = |i: usize| hessian[(places[i], places[i])].sqrt();
+    let reduced = DMatrix::from_fn(count, count, |i, j| {
+        hessian[(places[i], places[j])] / (size(i) * size(j)) + if i == j { RIDGE } else { 0.0 }
+    });
     let inverse = reduced.try_inverse()?;
+    let inverse = DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] / (size(i) * size(j)));
     let mut scatter = DMatrix::zeros(count, count);
     for run in 0..RUNS {
         let (from, to) = (run * n / RUNS, (run + 1) * n / RUNS);

@@ -3,9 +3,10 @@
 
 use super::PartReport;
 use super::confirmed::unfit;
+use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts};
-use super::readings::Crossed;
-use diagnosis::{Observer, Point, refit, settled};
+use super::readings::{Crossed, NEEDED};
+use diagnosis::{Observer, Point, looked, refit, settled};
 use rayon::prelude::*;
 
 /// Logarithm of how much less likely a model is that does nearly as well.
@@ -20,7 +21,7 @@ pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Ve
         let more = parts[other].point.effects.iter();
         let new = more.filter(|(i, _)| {
             let mut own = parts[one].point.effects.iter();
-            own.all(|(known, _)| !measured.excludes(*known, *i))
+            own.all(|(known, _)| !measured.are_alike(*i, *known))
         });
         both.effects.extend(new.cloned());
         if both.effects.len() > parts[one].point.effects.len() {
@@ -96,6 +97,19 @@ pub(super) fn replaced(model: &Point, other: &Point) -> Option<(usize, usize)> {
     Some((own.0, new.0))
 }
 
+/// Nominal parameters, on all data, of models without one of those at `point` that fit nearly as well: what they
+/// differ by is not known.
+pub(super) fn nearly_without<M: InParts>(measured: &M, point: &Point) -> Vec<Vec<NamedValue>> {
+    let error = |point: &Point| measured.normalised_error(point, EVERYTHING).powi(2);
+    let most = NEEDED * error(point);
+    let all = (0..point.nuisance.len()).into_par_iter();
+    let near = all.filter_map(|i| {
+        let found = looked(measured, &measured.without(point, i)?, EVERYTHING)?;
+        (error(&found) < most).then(|| measured.parameters(&found, &[]))
+    });
+    near.collect()
+}
+
 /// What a model may go without.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Item {
@@ -125,7 +139,11 @@ pub(super) fn least_needed<M: InParts>(
     let idle: Vec<(Item, Point, Crossed)> = items
         .into_par_iter()
         .filter_map(|(item, left)| {
-            let errors = Crossed::of(measured, &left)?;
+            let errors = Crossed::looked(measured, &left)?;
+            if crossed.is_far_from(&errors) {
+                return None;
+            }
+            let errors = errors.settled(measured)?;
             // Where a part does not tell a parameter that the rig has, it may predict worse with it.
             let fits = || {
                 settled(measured, &left, EVERYTHING)

@@ -5,7 +5,8 @@
 //! valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
 //! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. Two lags in a row
 //! are nearer to a spool, and to a coil before a mass, than one and a delay. The command runs
-//! evenly from sample to sample; the linear equations are solved exactly, and what is not linear by steps.
+//! evenly from sample to sample, a delayed one by cubics through its samples; the linear equations are solved
+//! exactly, and what is not linear by steps.
 //!
 //! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
 
@@ -126,8 +127,6 @@ impl Equations for ClosedLoopActuator {
     const PLACES: &'static [&'static str] = &["valve"];
     const SAID_BY: &'static [(&'static str, &'static str)] =
         &[("delay", "command_delay"), ("valve_lag", "loop_lag")];
-    // A valve's lands overlap, and the table rubs.
-    const BESIDE: &'static [(&'static str, &'static str)] = &[(vocabulary::DEAD_BAND, "friction")];
     const CAUSES: &'static [&'static str] = &["command_delay", "scale", "offset"];
     // Beyond, with any loop gain, it makes up for a delay.
     const LIMITS: &'static [(&'static str, f64)] = &[("feedforward", 1.2)];
@@ -137,6 +136,22 @@ impl Equations for ClosedLoopActuator {
             time: 1.0 / nominal.loop_gain,
             ..channels
         }
+    }
+
+    fn starts(
+        &self,
+        recording: &RigRecording,
+        _nominal: &Nominal,
+        errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)> {
+        // A rail is hardly above the fastest motion that it lets through.
+        let places: Vec<usize> = (0..errors.len())
+            .filter(|k| errors[*k].is_finite())
+            .collect();
+        let speeds = speeds(recording.output(), &places);
+        let fastest = speeds.map(|(_, most)| most).filter(|most| *most > 0.0);
+        let start = fastest.map(|most| ("speed_limit", vec![recording.period() / most]));
+        start.into_iter().collect()
     }
 
     fn read_off(
@@ -334,20 +349,22 @@ fn rail(command: &[f64], displacement: &[f64], places: &[usize]) -> Option<f64> 
     // Of a motion that nothing holds back, few samples are nearly as fast as the fastest.
     const KEPT: f64 = 1.35;
     const FASTER: f64 = 1.3;
-    // Samples on either side over which speeds are told.
-    const APART: usize = 2;
-    let quantiles = |values: &[f64]| {
-        let speed = |&k: &usize| {
-            let apart = values.get(k + APART)? - values.get(k.checked_sub(APART)?)?;
-            Some(apart.abs() / (2 * APART) as f64).filter(|own| own.is_finite())
-        };
-        let mut speeds: Vec<f64> = places.iter().filter_map(speed).collect();
-        speeds.sort_by(f64::total_cmp);
-        let at = |share: f64| speeds.get((share * speeds.len() as f64) as usize).copied();
-        Some((at(0.95)?, at(0.998)?))
-    };
-    let ((often, most), (_, asked)) = (quantiles(displacement)?, quantiles(command)?);
+    let ((often, most), (_, asked)) = (speeds(displacement, places)?, speeds(command, places)?);
     (most > 0.0 && most < KEPT * often && asked > FASTER * most).then(|| 1.0 / most)
+}
+
+/// Speeds per sample that `values` pass seldom (one in twenty) and hardly ever (two in a thousand).
+fn speeds(values: &[f64], places: &[usize]) -> Option<(f64, f64)> {
+    // Samples on either side.
+    const APART: usize = 2;
+    let speed = |&k: &usize| {
+        let apart = values.get(k + APART)? - values.get(k.checked_sub(APART)?)?;
+        Some(apart.abs() / (2 * APART) as f64).filter(|own| own.is_finite())
+    };
+    let mut speeds: Vec<f64> = places.iter().filter_map(speed).collect();
+    speeds.sort_by(f64::total_cmp);
+    let at = |share: f64| speeds.get((share * speeds.len() as f64) as usize).copied();
+    Some((at(0.95)?, at(0.998)?))
 }
 
 /// The linear loop.

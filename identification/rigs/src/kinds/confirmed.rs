@@ -45,6 +45,9 @@ pub struct Confirmed {
     pub parameters: Vec<NamedValue>,
     /// Parameters of its effects.
     pub effects: Vec<(String, Vec<NamedValue>)>,
+    /// Whether the effects gain on either part, from a fit to the other.
+    #[serde(skip)]
+    pub(super) pays: bool,
     /// Where it is.
     #[serde(skip)]
     pub(super) point: Point,
@@ -226,6 +229,29 @@ fn listed<M: InParts>(measured: &M, point: &Point, deviations: &[f64]) -> Vec<Na
     all
 }
 
+/// The nominal model, fitted to all data, with standard deviations, and to either part.
+pub(super) struct NominalFits {
+    everything: (Point, Vec<f64>),
+    parts: [Point; 2],
+}
+
+impl NominalFits {
+    /// Of the data of `measured`; what cannot be fitted stays as described.
+    pub(super) fn of<M: InParts>(measured: &M) -> Self {
+        let origin = measured.origin();
+        let part = |part: Part| {
+            settled(measured, &origin, part as usize).unwrap_or_else(|| origin.clone())
+        };
+        Self {
+            everything: refit(measured, &origin, EVERYTHING).map_or_else(
+                || (origin.clone(), Vec::new()),
+                |(found, deviations)| (found.point, deviations),
+            ),
+            parts: [part(Part::Fitted), part(Part::LeftOut)],
+        }
+    }
+}
+
 /// One model, fitted to parts and to files.
 struct Fits {
     everything: (Point, Vec<f64>),
@@ -261,6 +287,7 @@ fn fits<M: InParts>(measured: &M, start: &Point) -> Option<Fits> {
 /// `start` that turn out to be unfit leave it, each with its reason.
 pub(super) fn confirm<M: InParts>(
     measured: &M,
+    nominal: &NominalFits,
     start: &Point,
     refused: &mut Vec<Refused>,
     findings: &mut Vec<String>,
@@ -290,11 +317,7 @@ pub(super) fn confirm<M: InParts>(
         }
     };
     let (point, deviations) = &fits.everything;
-    let origin = measured.origin();
-    let (refitted, refitted_deviations) = refit(measured, &origin, EVERYTHING).map_or_else(
-        || (origin.clone(), Vec::new()),
-        |(found, deviations)| (found.point, deviations),
-    );
+    let (refitted, refitted_deviations) = &nominal.everything;
     let own = measured.parameters(point, deviations);
     let count = own.len();
     let mut all = listed(measured, point, deviations);
@@ -325,23 +348,25 @@ pub(super) fn confirm<M: InParts>(
     };
     let (here, there) = (on(Part::Fitted), on(Part::LeftOut));
     let (tested, swapped) = (Part::LeftOut as usize, Part::Fitted as usize);
-    let nominal =
-        settled(measured, &origin, Part::Fitted as usize).unwrap_or_else(|| origin.clone());
-    let nominal = completed(measured, &nominal, Some(swapped), tested);
+    let gain = |part: Part, own: &Point| {
+        let (fitted, tested) = (part as usize, part.other() as usize);
+        let nominal = completed(measured, &nominal.parts[fitted], Some(fitted), tested);
+        let errors = |point: &Point| all_errors(measured, point, tested);
+        gain_interval(&errors(&nominal), &errors(own))
+    };
+    let gains = [gain(Part::Fitted, &here), gain(Part::LeftOut, &there)];
     Some(Confirmed {
         error: measured.normalised_error(&here, tested),
         swapped_error: measured.normalised_error(&there, swapped),
-        gain_interval: gain_interval(
-            &all_errors(measured, &nominal, tested),
-            &all_errors(measured, &here, tested),
-        ),
-        refitted_error: measured.normalised_error(&refitted, EVERYTHING),
+        gain_interval: gains[0],
+        pays: gains.iter().all(|own| own.0 > 0.0),
+        refitted_error: measured.normalised_error(refitted, EVERYTHING),
         fitted_error: measured.normalised_error(point, EVERYTHING),
-        refitted: measured.parameters(&refitted, &refitted_deviations),
+        refitted: measured.parameters(refitted, refitted_deviations),
         parameters: with_errors(own, 0),
         effects,
         point: point.clone(),
-        refitted_point: refitted,
+        refitted_point: refitted.clone(),
     })
 }
 

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::alternatives::{Item, least_needed, of_its_class, proposals, replaced};
+use super::alternatives::{Item, least_needed, nearly_without, of_its_class, proposals, replaced};
 use super::cause::{Cause, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
-    Confirmed, Refused, confirm, effects as named_values, lengths, needed, unfit,
+    Confirmed, NominalFits, Refused, confirm, effects as named_values, lengths, needed, unfit,
 };
 use super::measured::Measured;
 use super::named_value::NamedValue;
@@ -214,13 +214,20 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     let mut refused: Vec<Refused> = Vec::new();
     let mut findings = Vec::new();
-    let mut confirmed = confirm(measured, &start.point, &mut refused, &mut findings)?;
+    let nominal = NominalFits::of(measured);
+    let mut confirmed = confirm(
+        measured,
+        &nominal,
+        &start.point,
+        &mut refused,
+        &mut findings,
+    )?;
     let crossed = Crossed::of(measured, &confirmed.point)?;
     let mut of_its_class = of_its_class(measured, &confirmed.point, crossed, observer).into_iter();
     let (best, mut crossed) = of_its_class.next()?;
     if replaced(&confirmed.point, &best).is_some() {
         let mut new = refused.clone();
-        let again = confirm(measured, &best, &mut new, &mut Vec::new());
+        let again = confirm(measured, &nominal, &best, &mut new, &mut Vec::new());
         let as_many = |again: &Confirmed| again.effects.len() == confirmed.effects.len();
         if let Some(again) = again.filter(as_many) {
             crossed = Crossed::of(measured, &again.point)?;
@@ -248,7 +255,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         }
         findings.clear();
         let had = confirmed.point.effects.len();
-        confirmed = confirm(measured, &left, &mut refused, &mut findings)?;
+        confirmed = confirm(measured, &nominal, &left, &mut refused, &mut findings)?;
         crossed = without;
         if confirmed.point.effects.len() < had {
             most = most.max(AS_WELL * fitted(&confirmed));
@@ -271,6 +278,15 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             weighed.extend(Weighed::of(measured, &point, errors));
         }
     }
+    let is_told = |(i, value): (usize, &NamedValue)| {
+        let is_cause = measured.is_cause(i) && !measured.is_of_first_file(i);
+        is_cause && Cause::of(value.clone(), measured.stated(i)).is_some()
+    };
+    if !observer.is_over() && confirmed.parameters.iter().enumerate().any(is_told) {
+        for near in nearly_without(measured, &confirmed.point) {
+            confirmed.widen_by(&near);
+        }
+    }
     // What the model may lack or not changes the others by as much as is not known.
     confirmed.widen_to(&with_all);
     for (i, reason) in refused {
@@ -279,17 +295,22 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             set_aside.push(SetAside { effect, reason });
         }
     }
+    let or_its_like = |name: &String| {
+        let rivals = as_described.rivals.iter();
+        let own = rivals.filter(|(rival, against)| against == name && alike(against, rival));
+        let mut all: Vec<&str> = own.map(|(rival, _)| rival.as_str()).collect();
+        if all.is_empty() && !there.contains(name) {
+            let other = there.iter().find(|other| alike(name, other));
+            all.extend(other.map(String::as_str));
+        }
+        all.insert(0, name);
+        all.join(" or ")
+    };
     let named: Vec<String> = confirmed
         .effects
         .iter()
-        .map(
-            |(name, _)| match there.iter().find(|other| alike(name, other)) {
-                Some(other) if !there.contains(name) => format!("{name} or {other}"),
-                _ => name.clone(),
-            },
-        )
+        .map(|(name, _)| or_its_like(name))
         .collect();
-    let pays = confirmed.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
     let is_named = |effect: &str| confirmed.effects.iter().any(|(name, _)| name == effect);
     let rivalled = as_described
         .rivals
@@ -356,7 +377,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         holds || cause.deviations() > FAR
     }));
     let readings = readings(measured, weighed, &causes, &doubted, (&confirmed, crossed));
-    let verdict = match (named.is_empty() || !pays, rivalled) {
+    let verdict = match (named.is_empty() || !confirmed.pays, rivalled) {
         (true, _) if !causes.is_empty() => Verdict::Named,
         (true, _) if here.is_empty() && there.is_empty() && holds => Verdict::Adequate,
         (true, _) => Verdict::Unexplained,

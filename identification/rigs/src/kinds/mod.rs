@@ -93,8 +93,6 @@ pub trait Equations: Sync {
     const SCREENED: usize = usize::MAX;
     /// Effects that an uncertain nominal parameter says as well.
     const SAID_BY: &'static [(&'static str, &'static str)] = &[];
-    /// Effects that records hardly tell apart although a rig may have both.
-    const BESIDE: &'static [(&'static str, &'static str)] = &[];
     /// Nominal parameters whose deviation from what was stated is a cause, such as a scale.
     const CAUSES: &'static [&'static str] = &[];
     /// Nominal parameters that are this at most, SI, whatever the data say.
@@ -210,9 +208,6 @@ pub trait Rig: Sync {
 
     /// Effects that an uncertain nominal parameter says as well, with its name.
     fn said_by(&self) -> &'static [(&'static str, &'static str)];
-
-    /// Effects that records hardly tell apart although a rig may have both.
-    fn beside(&self) -> &'static [(&'static str, &'static str)];
 
     /// Nominal parameters whose deviation from what was stated is a cause.
     fn causes(&self) -> &'static [&'static str];
@@ -337,10 +332,6 @@ impl<E: Equations> Rig for E {
 
     fn said_by(&self) -> &'static [(&'static str, &'static str)] {
         E::SAID_BY
-    }
-
-    fn beside(&self) -> &'static [(&'static str, &'static str)] {
-        E::BESIDE
     }
 
     fn causes(&self) -> &'static [&'static str] {

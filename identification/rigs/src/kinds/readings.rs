@@ -8,7 +8,7 @@ use super::confirmed::{clearly_better, effects, lengths};
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part};
 use diagnosis::resampling::correlation_time;
-use diagnosis::{Point, all_errors, completed, refit, settled, squares};
+use diagnosis::{Point, all_errors, completed, looked, refit, settled, squares};
 
 /// The squared error grows by this factor at least without what the data need.
 pub(super) const NEEDED: f64 = 1.1;
@@ -19,6 +19,9 @@ const BETTER: f64 = 0.95;
 /// Most independent samples that a part counts for, halved. No model is exact: a tenth more squared error in
 /// both parts makes a reading less likely by a factor of e, however many samples show it.
 const MOST: f64 = 5.0;
+
+/// Growth of the squared error in either part after a few steps of a fit beyond which more of them change nothing.
+const FAR: f64 = 3.0;
 
 /// Least weight that is told in the sentence.
 const TOLD: f64 = 0.05;
@@ -41,20 +44,48 @@ pub(super) struct Crossed {
     errors: [Vec<f64>; 2],
     /// Samples of each file in either part.
     lengths: [Vec<usize>; 2],
+    /// Where the model is, fitted to the part that is not predicted.
+    points: [Point; 2],
 }
 
 impl Crossed {
     /// Of the model at `point`, fitted to either part; none where it cannot be.
     pub(super) fn of<M: InParts>(model: &M, point: &Point) -> Option<Self> {
-        let predicted = |part: Part| -> Option<Vec<f64>> {
-            let (own, other) = (part as usize, part.other() as usize);
-            let found = settled(model, point, own)?;
-            let there = completed(model, &found, Some(own), other);
-            Some(all_errors(model, &there, other))
+        Self::from(model, [point, point], settled)
+    }
+
+    /// As [`Self::of`], of fits in a few steps.
+    pub(super) fn looked<M: InParts>(model: &M, point: &Point) -> Option<Self> {
+        Self::from(model, [point, point], looked)
+    }
+
+    /// The same with its fits ended.
+    pub(super) fn settled<M: InParts>(&self, model: &M) -> Option<Self> {
+        Self::from(model, [&self.points[0], &self.points[1]], settled)
+    }
+
+    fn from<M: InParts>(
+        model: &M,
+        starts: [&Point; 2],
+        fit: impl Fn(&M, &Point, usize) -> Option<Point>,
+    ) -> Option<Self> {
+        let tested = [Part::Fitted, Part::LeftOut];
+        let points = [
+            fit(model, starts[0], tested[1] as usize)?,
+            fit(model, starts[1], tested[0] as usize)?,
+        ];
+        let errors = |i: usize| {
+            let (own, other) = (tested[1 - i] as usize, tested[i] as usize);
+            all_errors(
+                model,
+                &completed(model, &points[i], Some(own), other),
+                other,
+            )
         };
         Some(Self {
-            errors: [predicted(Part::LeftOut)?, predicted(Part::Fitted)?],
-            lengths: [Part::Fitted, Part::LeftOut].map(|part| lengths(model, part as usize)),
+            errors: [errors(0), errors(1)],
+            lengths: tested.map(|part| lengths(model, part as usize)),
+            points,
         })
     }
 
@@ -73,6 +104,11 @@ impl Crossed {
         let spoils =
             |i: usize| growths[i] < BETTER && clearly_better(own(i), bare(i), &self.lengths[i]);
         !(0..2).any(spoils) && (0..2).any(|i| growths[i] > NEEDED && clear(i))
+    }
+
+    /// Whether `without`, of which the fits have not ended, will not come near this model.
+    pub(super) fn is_far_from(&self, without: &Self) -> bool {
+        self.growths(without).into_iter().all(|own| own > FAR) && self.needs(without)
     }
 
     /// Logarithm of the likelihood beyond that of `other`, correlated samples counted once.
@@ -190,6 +226,10 @@ mod tests {
         Crossed {
             errors,
             lengths: [vec![2000], vec![2000]],
+            points: [(); 2].map(|()| Point {
+                nuisance: Vec::new(),
+                effects: Vec::new(),
+            }),
         }
     }
 

@@ -160,10 +160,6 @@ impl Rig for ExtendedKind {
         self.base.screened()
     }
 
-    fn beside(&self) -> &'static [(&'static str, &'static str)] {
-        self.base.beside()
-    }
-
     fn said_by(&self) -> &'static [(&'static str, &'static str)] {
         self.base.said_by()
     }
