@@ -20,7 +20,7 @@ use self::harmonics::{HarmonicControl, HarmonicMemory};
 use self::lag::Lag;
 use self::rig::KnownRig;
 use self::specimen_force::SpecimenForceCompensation;
-use self::valve::ValveCompensation;
+use self::valve::{Spools, ValveCompensation};
 use crate::pid::VALVE_LIMIT;
 use crate::{Controller, ModelError, Motion};
 use units::{Parameters, vocabulary};
@@ -141,7 +141,8 @@ impl Controller for OperatorAids {
             command += self.pressure.step(input.force, period);
         }
         if on.valve {
-            command = self.valve.command(command);
+            let hydraulics = &self.rig.hydraulics;
+            command = self.valve.step(command, hydraulics, self.limit, period);
         }
         let sent = command.clamp(-self.limit, self.limit);
         self.saturated = sent != command;
@@ -153,6 +154,7 @@ impl Controller for OperatorAids {
         self.specimen.memory = Lag::default();
         self.pressure.slow = 0.0;
         self.harmonics.memory = HarmonicMemory::default();
+        self.valve.memory = Spools::default();
         self.saturated = false;
     }
 }

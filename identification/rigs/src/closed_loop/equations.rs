@@ -13,6 +13,8 @@
 //! Each is linear in the channels, so each holds between the projections on the reference too, and
 //! for the stochastic distortions that friction and a yielding specimen cause.
 
+use std::sync::Arc;
+
 use nalgebra::{Complex, DMatrix};
 
 use super::bands::{Band, Bands};
@@ -237,9 +239,9 @@ fn coefficients(
 pub struct Equations {
     /// Their bands.
     pub experiments: Vec<Bands>,
-    /// Coordinates at which the residuals' covariance is held; by default it goes with the rig, as
+    /// The residuals' covariance, band by band, where it is held; by default it goes with the rig, as
     /// maximum likelihood with errors in all channels has it.
-    pub held: Option<Vec<f64>>,
+    held: Option<Arc<[Whitener]>>,
     /// The friction's shape from which changes are counted, where there is friction.
     pub shape: Option<SealShape>,
 }
@@ -253,25 +255,58 @@ impl Equations {
         if !rig.is_sound() {
             return None;
         }
-        let held = self.held.as_deref().unwrap_or(values);
-        let weigher = HydraulicRig::at(held)?;
+        let own;
+        let mut whiteners = match &self.held {
+            Some(held) => held.iter(),
+            None => {
+                own = self.whiteners(values)?;
+                own.iter()
+            }
+        };
         let shape = values.get(PARAMETERS..PARAMETERS + SHAPE)?;
-        let held = held.get(PARAMETERS..PARAMETERS + SHAPE)?;
         let mut all = Vec::new();
         for (index, experiment) in self.experiments.iter().enumerate() {
-            let payload = match index {
-                0 => 0.0,
-                _ => *values.get(PARAMETERS + SHAPE + index - 1)?,
-            };
+            let payload = payload(values, index)?;
             for band in &experiment.bands {
-                let rows = rows(&weigher, held, payload, experiment, band);
-                let whitener = Whitener::new(&rows, &band.noise)?;
+                let whitener = whiteners.next()?;
                 for sums in sums(&rig, shape, payload, experiment, band) {
                     all.push(whitener.apply(sums)?);
                 }
             }
         }
         Some(all)
+    }
+
+    /// What whitens the residuals of each band of a rig.
+    fn whiteners(&self, values: &[f64]) -> Option<Vec<Whitener>> {
+        let rig = HydraulicRig::at(values)?;
+        let shape = values.get(PARAMETERS..PARAMETERS + SHAPE)?;
+        let mut all = Vec::new();
+        for (index, experiment) in self.experiments.iter().enumerate() {
+            let payload = payload(values, index)?;
+            for band in &experiment.bands {
+                let rows = rows(&rig, shape, payload, experiment, band);
+                all.push(Whitener::new(&rows, &band.noise)?);
+            }
+        }
+        Some(all)
+    }
+
+    /// Equations of `experiments` about a friction's `shape`.
+    pub fn new(experiments: Vec<Bands>, shape: Option<SealShape>) -> Self {
+        Self {
+            experiments,
+            held: None,
+            shape,
+        }
+    }
+
+    /// The same with the covariance of the residuals held where it is at `values`.
+    pub fn holding(&self, values: &[f64]) -> Option<Self> {
+        Some(Self {
+            held: Some(self.whiteners(values)?.into()),
+            ..self.clone()
+        })
     }
 
     /// What is left of each equation over its largest term, root mean squares over the bands'
@@ -282,10 +317,7 @@ impl Equations {
         let shape = values.get(PARAMETERS..PARAMETERS + SHAPE)?;
         let (mut left, mut size) = ([0.0; EQUATIONS], [0.0; EQUATIONS]);
         for (index, experiment) in self.experiments.iter().enumerate() {
-            let payload = match index {
-                0 => 0.0,
-                _ => *values.get(PARAMETERS + SHAPE + index - 1)?,
-            };
+            let payload = payload(values, index)?;
             for band in &experiment.bands {
                 let rows = rows(&rig, shape, payload, experiment, band);
                 let sums = sums(&rig, shape, payload, experiment, band);
@@ -314,6 +346,14 @@ impl Equations {
     }
 }
 
+/// The payload of an experiment over the first's, kg.
+fn payload(values: &[f64], index: usize) -> Option<f64> {
+    match index {
+        0 => Some(0.0),
+        _ => values.get(PARAMETERS + SHAPE + index - 1).copied(),
+    }
+}
+
 /// The equations of a band, projected on each of its instruments.
 fn sums(
     rig: &HydraulicRig,
@@ -327,8 +367,12 @@ fn sums(
         let s = Complex::new(0.0, omega);
         let rows = coefficients(rig, shape, payload, s, experiment.period);
         for (equation, row) in rows.iter().enumerate() {
+            // Most of the channels are not in an equation.
             let channels = band.spectra.iter().zip(row).zip(&experiment.scale);
-            let value: Complex<f64> = channels.map(|((z, c), scale)| c * z[line] * *scale).sum();
+            let value: Complex<f64> = channels
+                .filter(|((_, c), _)| **c != Complex::ZERO)
+                .map(|((z, c), scale)| c * *scale * z[line])
+                .sum();
             for (sum, instrument) in sums.iter_mut().zip(&band.instruments) {
                 sum[equation] += instrument[line].conj() * value;
             }
@@ -353,6 +397,7 @@ fn rows(
 }
 
 /// Whitens complex residuals to unit variance of each real part.
+#[derive(Debug)]
 struct Whitener {
     size: [f64; EQUATIONS],
     factor: nalgebra::Cholesky<Complex<f64>, nalgebra::Const<EQUATIONS>>,
@@ -361,11 +406,16 @@ struct Whitener {
 impl Whitener {
     /// For residuals `rows` of channels with a covariance of `noise`.
     fn new(rows: &DMatrix<Complex<f64>>, noise: &DMatrix<Complex<f64>>) -> Option<Self> {
-        let product = rows * noise * rows.adjoint();
-        let mut covariance =
-            nalgebra::SMatrix::<Complex<f64>, EQUATIONS, EQUATIONS>::from_fn(|i, j| {
-                product[(i, j)]
-            });
+        let part = |i: usize, j: usize| -> Complex<f64> {
+            let present =
+                |i: usize| (0..rows.ncols()).filter(move |k| rows[(i, *k)] != Complex::ZERO);
+            let along = |a: usize| {
+                let over = present(j).map(|b| noise[(a, b)] * rows[(j, b)].conj());
+                rows[(i, a)] * over.sum::<Complex<f64>>()
+            };
+            present(i).map(along).sum()
+        };
+        let mut covariance = nalgebra::SMatrix::<Complex<f64>, EQUATIONS, EQUATIONS>::from_fn(part);
         // Equations are of different units: scale before factoring.
         let size: [f64; EQUATIONS] = std::array::from_fn(|i| covariance[(i, i)].re.sqrt());
         if size.iter().any(|own| own.is_nan() || *own <= 0.0) {

@@ -8,7 +8,7 @@ use recordings::{Channel, IdentificationError, Recording, mean_and_deviation};
 
 use super::equations::{EQUATIONS, Equations, HydraulicRig, PARAMETERS};
 use super::friction::{SHAPE, SealShape, Searched};
-use super::least_squares::{Coordinate, Optimum, minimise};
+use super::least_squares::{Coordinate, Derivatives, Effort, Optimum, WHOLE, minimise_with};
 use super::specimen::{self, SpecimenFit};
 use super::{
     Channels, Found, Histories, LEAST_INERTIA, Settings, lateness, start, valve, velocity,
@@ -19,6 +19,16 @@ const OVERLAPS: [f64; 4] = [0.2, 0.4, 0.6, 0.9];
 /// Least Coulomb force over the actuator's (rms), and least damping over that of the critical oil column, from which
 /// the seals' start.
 const SEALS: f64 = 0.05;
+/// How a fit with a held covariance, and the one after it, is sought.
+const APPROACHED: Effort = Effort {
+    part: 1e-4,
+    derivatives: Derivatives::Trusted,
+    ..WHOLE
+};
+const FITTED: Effort = Effort {
+    derivatives: Derivatives::Carried,
+    ..WHOLE
+};
 
 /// A fit of the equations.
 #[derive(Clone)]
@@ -87,11 +97,7 @@ impl<'a> Fitting<'a> {
             .iter()
             .map(|own| own.bands(histories, &self.settings, self.specimen))
             .collect::<Result<_, _>>()?;
-        Ok(Equations {
-            experiments,
-            held: None,
-            shape: histories.shape,
-        })
+        Ok(Equations::new(experiments, histories.shape))
     }
 
     /// The shape from which the search of the friction's begins.
@@ -150,8 +156,14 @@ impl<'a> Fitting<'a> {
         for coordinate in &mut own[PARAMETERS..PARAMETERS + SHAPE] {
             coordinate.free = free;
         }
+        // What began near its end needs no approach.
+        let optimum = if free {
+            minimise_with(&equations, &own, FITTED)
+        } else {
+            approach(&equations, &own)
+        };
         Some(Fit {
-            optimum: approach(&equations, &own)?,
+            optimum: optimum?,
             equations,
             histories,
         })
@@ -319,15 +331,15 @@ impl<'a> Fitting<'a> {
 /// the rig: from far away the latter may fit noise to the signal.
 fn approach(equations: &Equations, coordinates: &[Coordinate]) -> Option<Optimum> {
     let mut own = coordinates.to_vec();
-    let mut held = equations.clone();
     for _ in 0..2 {
-        held.held = Some(own.iter().map(|c| c.start).collect());
-        let found = minimise(&held, &own)?;
+        let start: Vec<f64> = own.iter().map(|c| c.start).collect();
+        let held = equations.holding(&start)?;
+        let found = minimise_with(&held, &own, APPROACHED)?;
         for (coordinate, value) in own.iter_mut().zip(found.values) {
             coordinate.start = value;
         }
     }
-    minimise(equations, &own)
+    minimise_with(equations, &own, FITTED)
 }
 
 /// The fit's coordinates from `rig`; forces are of the size of `force` (N).

@@ -2,6 +2,8 @@
 
 pub use plant::identified::seal_shape::SealShape;
 
+use super::seals::Seals;
+
 /// Number of [`SealShape`]'s parameters.
 pub const SHAPE: usize = 5;
 
@@ -43,16 +45,16 @@ impl Searched for SealShape {
 
     fn histories(&self, velocity: &[f64], period: f64) -> Vec<Vec<f64>> {
         const CHANGE: f64 = 0.05;
-        let mut all = vec![self.history(velocity, period)];
+        let history = |shape: &Self| Seals::new(*shape).history(velocity, period);
+        let mut all = vec![history(self)];
         for i in 0..SHAPE {
             let beside = |sign: f64| {
                 let mut changes = [0.0; SHAPE];
                 changes[i] = sign * CHANGE;
-                let shape = self.changed(&changes);
-                (shape, shape.history(velocity, period))
+                history(&self.changed(&changes))
             };
             // Upwards only: what may not be negative may be zero.
-            let (_, up) = beside(1.0);
+            let up = beside(1.0);
             let slope = up.iter().zip(&all[0]).map(|(a, b)| (a - b) / CHANGE);
             let slope = slope.collect();
             all.push(slope);

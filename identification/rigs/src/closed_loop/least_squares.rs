@@ -44,18 +44,89 @@ fn cost(residuals: &[f64]) -> f64 {
     0.5 * residuals.iter().map(|r| r * r).sum::<f64>()
 }
 
+/// How much work a fit takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Most iterations.
+    pub iterations: usize,
+    /// It ends with an iteration that lowers the cost by less than this part of it.
+    pub part: f64,
+    /// Where its derivatives come from.
+    pub derivatives: Derivatives,
+}
+
+/// Where the derivatives of an iteration come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Derivatives {
+    /// They are taken in each.
+    Taken,
+    /// They are carried from the one before by what the residuals did (Broyden, Mathematics of Computation 19,
+    /// 1965), as long as steps keep most of their promises. A fit does not end with carried ones.
+    Carried,
+    /// The same, and it may end with them.
+    Trusted,
+}
+
+/// The best there is.
+pub const WHOLE: Effort = Effort {
+    iterations: ITERATIONS,
+    part: 0.0,
+    derivatives: Derivatives::Taken,
+};
+
+/// Share of the promised gain below which a step says that derivatives are too old.
+const KEPT: f64 = 0.5;
+
+/// Derivatives of the residuals in units of the coordinates' scales, and what follows from them.
+struct Slopes {
+    jacobian: DMatrix<f64>,
+    information: DMatrix<f64>,
+    /// Whether they are those of the place, not carried there.
+    fresh: bool,
+}
+
+impl Slopes {
+    fn at(
+        model: &impl Residuals,
+        coordinates: &[Coordinate],
+        free: &[usize],
+        values: &[f64],
+        here: &[f64],
+    ) -> Option<Self> {
+        let jacobian = jacobian(model, coordinates, free, values, here)?;
+        Some(Self {
+            information: jacobian.tr_mul(&jacobian),
+            jacobian,
+            fresh: true,
+        })
+    }
+
+    /// Carries them over `step`, along which the residuals changed by `change`.
+    fn carry(&mut self, step: &DVector<f64>, mut change: DVector<f64>) {
+        let square = step.norm_squared();
+        if square > 0.0 {
+            change.gemv(-1.0, &self.jacobian, step, 1.0);
+            change /= square;
+            let along = self.jacobian.tr_mul(&change);
+            self.information += &along * step.transpose() + step * along.transpose();
+            self.information += step * step.transpose() * change.norm_squared();
+            self.jacobian.ger(1.0, &change, step, 1.0);
+        }
+        self.fresh = false;
+    }
+}
+
 /// Minimises half the sum of squares over the free coordinates; `None` where the start value gives
 /// no model.
 pub fn minimise(model: &impl Residuals, coordinates: &[Coordinate]) -> Option<Optimum> {
-    minimise_within(model, coordinates, ITERATIONS, 0.0)
+    minimise_with(model, coordinates, WHOLE)
 }
 
-/// As [`minimise`], in at most so many iterations, and until one lowers the cost by less than a part of it.
-pub fn minimise_within(
+/// As [`minimise`], with no more than an effort.
+pub fn minimise_with(
     model: &impl Residuals,
     coordinates: &[Coordinate],
-    iterations: usize,
-    part: f64,
+    effort: Effort,
 ) -> Option<Optimum> {
     let mut values: Vec<f64> = coordinates.iter().map(|c| c.start).collect();
     let free: Vec<usize> = (0..values.len()).filter(|&i| coordinates[i].free).collect();
@@ -64,11 +135,16 @@ pub fn minimise_within(
     let mut damping = 1e-3;
     let mut converged = false;
     let mut information = DMatrix::zeros(free.len(), free.len());
-    for _ in 0..iterations {
-        let jacobian = jacobian(model, coordinates, &free, &values, &here)?;
-        information = jacobian.transpose() * &jacobian;
-        let gradient = jacobian.transpose() * DVector::from_column_slice(&here);
-        let mut accepted = false;
+    let mut carried: Option<Slopes> = None;
+    for _ in 0..effort.iterations {
+        let mut slopes = match carried.take() {
+            Some(own) => own,
+            None => Slopes::at(model, coordinates, &free, &values, &here)?,
+        };
+        information.copy_from(&slopes.information);
+        let before = DVector::from_column_slice(&here);
+        let gradient = slopes.jacobian.tr_mul(&before);
+        let mut accepted = None;
         for _ in 0..10 {
             let mut damped = information.clone();
             for i in 0..free.len() {
@@ -84,28 +160,43 @@ pub fn minimise_within(
                 let (low, high) = coordinates[i].bounds;
                 trial[i] = (values[i] - step[row] * coordinates[i].scale).clamp(low, high);
             }
-            let gain = match model.residuals(&trial) {
-                Some(there) if cost(&there) <= least => {
-                    let gain = least - cost(&there);
-                    least -= gain;
-                    here = there;
-                    values = trial;
-                    Some(gain)
-                }
-                _ => None,
-            };
-            if let Some(gain) = gain {
-                accepted = true;
-                damping = (0.2 * damping).max(1e-9);
-                converged = gain < (part * least).max(0.005);
+            let there = model.residuals(&trial);
+            if let Some(there) = there.filter(|there| cost(there) <= least) {
+                accepted = Some((trial, there));
+                break;
+            }
+            // Carried derivatives are taken again before a step is shortened.
+            if !slopes.fresh {
                 break;
             }
             damping = (damping * 5.0).max(1e-6);
         }
-        if !accepted {
-            // No step lowers the cost: an optimum to rounding.
-            converged = true;
+        let Some((trial, there)) = accepted else {
+            if slopes.fresh {
+                // No step lowers the cost: an optimum to rounding.
+                converged = true;
+                break;
+            }
+            continue;
+        };
+        damping = (0.2 * damping).max(1e-9);
+        let gain = least - cost(&there);
+        least -= gain;
+        let is_little = gain < (effort.part * least).max(0.005);
+        let is_sure = slopes.fresh || effort.derivatives == Derivatives::Trusted;
+        converged = is_little && is_sure;
+        if effort.derivatives != Derivatives::Taken && !is_little {
+            let moved = free
+                .iter()
+                .map(|&i| (trial[i] - values[i]) / coordinates[i].scale);
+            let moved = DVector::from_iterator(free.len(), moved);
+            let promised = -gradient.dot(&moved) - 0.5 * (&information * &moved).dot(&moved);
+            if gain > KEPT * promised {
+                slopes.carry(&moved, DVector::from_column_slice(&there) - before);
+                carried = Some(slopes);
+            }
         }
+        (here, values) = (there, trial);
         if converged {
             break;
         }

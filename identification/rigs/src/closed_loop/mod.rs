@@ -15,6 +15,7 @@ mod lateness;
 pub mod least_squares;
 mod model_section;
 pub mod replay;
+mod seals;
 pub mod simulation;
 pub mod specimen;
 pub mod start;
@@ -217,11 +218,7 @@ pub fn check(
         let channels = Channels::new(recording)?;
         experiments.push(channels.bands(found.histories(), &settings, specimen)?);
     }
-    let equations = Equations {
-        experiments,
-        held: None,
-        shape: None,
-    };
+    let equations = Equations::new(experiments, None);
     let mut values = found.rig.coordinates().to_vec();
     values.extend([0.0; SHAPE]);
     values.extend(&found.payloads);

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::{EQUATIONS, HydraulicRig, PARAMETERS};
 use super::fitting::Fitting;
 use super::friction::{SHAPE, SealShape, Searched};
-use super::least_squares::{Coordinate, Residuals, minimise};
+use super::least_squares::{Coordinate, Derivatives, Effort, Residuals, minimise_with};
 use super::simulation::Simulation;
 use super::specimen::SpecimenOverMass;
 use super::velocity::velocity;
@@ -25,8 +25,9 @@ use recordings::{Channel, Recording};
 pub(super) const CORRECTION: f64 = 1.0;
 /// Time in which what went before a record has died away, s.
 const SETTLING: f64 = 3.0;
-/// Longest inner step, s.
+/// Longest inner step, s, and that of fits.
 const STEP: f64 = 5e-4;
+const FITTED_STEP: f64 = 1e-3;
 /// Samples that are replayed of all recordings together, at most.
 const MOST: usize = 60_000;
 /// Length of the blocks whose scatter gives the standard errors, s, and how many there are of them at least to a
@@ -380,12 +381,17 @@ fn friction(records: &[Replayed<'_>], start: Actuator, known: f64) -> Option<Fri
         weights: [1.0; 2],
         known,
         part: (0.0, PART),
-        step: STEP,
+        step: FITTED_STEP,
     };
     let start = [0.0; FITTED];
     let fitted = own.weighed(&start)?;
     let coordinates = coordinates(&start, |i| i < SEALS && (i != 1 || rig.seal_damping > 0.0));
-    let found = minimise(&fitted, &coordinates)?;
+    let effort = Effort {
+        iterations: 30,
+        part: 1e-3,
+        derivatives: Derivatives::Trusted,
+    };
+    let found = minimise_with(&fitted, &coordinates, effort)?;
     let rest = fitted.rest();
     let size = |values: &[f64]| -> Option<f64> {
         let sizes = rest.sizes(values)?;

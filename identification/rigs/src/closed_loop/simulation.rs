@@ -6,6 +6,7 @@ use plant::integration::inner_steps;
 
 use super::equations::HydraulicRig;
 use super::friction::SealShape;
+use super::seals::Seals;
 use super::specimen::SpecimenOverMass;
 
 /// Longest inner step, s.
@@ -14,8 +15,6 @@ const LONGEST_STEP: f64 = 1e-4;
 /// and hysteretic deformation.
 const BARE: usize = 3;
 const STATES: usize = 6;
-/// Stribeck velocities from which on a seal that slides has its Coulomb force, to rounding.
-const FAST: f64 = 6.0;
 
 /// What a spool that follows a constant command is away from it, and its rate, after `time` (s) over those before.
 pub(super) fn spool_transition(rig: &HydraulicRig, time: f64) -> Matrix2<f64> {
@@ -45,7 +44,7 @@ struct Piece {
 pub struct Simulation {
     rig: HydraulicRig,
     mass: f64,
-    shape: SealShape,
+    seals: Seals,
     curve: ValveCurve,
     specimen: Option<SpecimenOverMass>,
     period: f64,
@@ -84,7 +83,7 @@ impl Simulation {
         Self {
             rig,
             mass: rig.mass + payload,
-            shape,
+            seals: Seals::new(shape),
             curve: ValveCurve::default(),
             seal: 0.0,
             specimen,
@@ -121,28 +120,14 @@ impl Simulation {
     }
 
     #[inline]
-    fn is_fast(&self, v: f64) -> bool {
-        v.abs() > FAST * self.shape.stribeck_velocity
-    }
-
-    #[inline]
     fn seal_force(&self, v: f64) -> f64 {
-        let share = match self.is_fast(v) {
-            true => self.seal,
-            false => self.shape.force(self.seal, v),
-        };
-        self.rig.seal_damping * v + self.rig.seal_friction * share
+        self.rig.seal_damping * v + self.rig.seal_friction * self.seals.force(self.seal, v)
     }
 
     /// Moves the seals on.
     #[inline]
     fn advance_seal(&mut self, step: f64) {
-        const ROUNDING: f64 = 1e-12;
-        let v = self.state[2];
-        let slides = (self.seal * v.signum() - 1.0).abs() < ROUNDING;
-        if !(slides && self.is_fast(v)) {
-            self.seal = self.shape.advance(self.seal, v, step);
-        }
+        self.seal = self.seals.advance(self.seal, self.state[2], step);
     }
 
     #[inline]
@@ -229,6 +214,7 @@ impl Simulation {
         self.commands.push(command);
         let pieces = self.pieces.unwrap_or_else(|| self.pieces());
         self.pieces = Some(pieces);
+        let mut owed = 0.0;
         for piece in pieces {
             let latest = self.commands.len() - 1;
             let command = latest
@@ -241,9 +227,10 @@ impl Simulation {
                 let openings = [self.spool, middle, end].map(|at| self.curve.opening(at.x));
                 self.spool = end;
                 // The seals are stiff: they move on by themselves, half a step to either
-                // side (Strang).
+                // side (Strang), in one go from one step to the next.
                 let half = 0.5 * piece.inner;
-                self.advance_seal(half);
+                self.advance_seal(owed + half);
+                owed = half;
                 if self.specimen.is_some() {
                     self.state = self.moved(&self.state, piece.inner, &openings);
                 } else {
@@ -252,8 +239,8 @@ impl Simulation {
                     let bare: [f64; BARE] = self.moved(&bare, piece.inner, &openings);
                     self.state[..BARE].copy_from_slice(&bare);
                 }
-                self.advance_seal(half);
             }
         }
+        self.advance_seal(owed);
     }
 }

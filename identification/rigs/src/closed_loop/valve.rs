@@ -1,13 +1,13 @@
 //! What a valve lacks to an ideal one: overlap or underlap, gain lost around null, asymmetry.
 //!
 //! The rig is replayed under its recorded command ([`super::replay`]), and valve, oil and seals are fitted
-//! together. The search begins with an ideal valve, and once more with the best of several overlaps: a fit without one
-//! takes lost flow for soft oil and friction, from where no overlap is found. In each round every member that is not in
-//! the curve yet is tried, and the one stays whose refit gains most on the part of the records that was not fitted; it
-//! ends when none gains more than chance and `LEAST`. What the null leaves uncertain is the scatter between blocks of
-//! the records, widened by how much more is left where nothing was fitted.
-
-use std::cmp::Ordering;
+//! together. The search begins with an ideal valve. In each round every member that is not in the curve yet is tried on
+//! a part of the records, and the best is fitted to more; it stays if it gains on the part that was not fitted, and the
+//! search ends when none gains more than chance and `LEAST`. The first round also tries actuators that were found
+//! behind several overlaps: a fit without one takes lost flow for soft oil and friction, from where none is found.
+//! Then the table is found again behind the valve, and the search goes on once more.
+//! What the null leaves uncertain is the scatter between blocks of the records, widened by how much more is left where
+//! nothing was fitted.
 
 use nalgebra::{DMatrix, Vector2};
 use plant::identified::valve_curve::ValveCurve;
@@ -17,7 +17,7 @@ use recordings::{Recording, mean_and_deviation};
 use super::equations::{HydraulicRig, PARAMETERS};
 use super::fitting::Fitting;
 use super::friction::SealShape;
-use super::least_squares::{Coordinate, Optimum, minimise_within};
+use super::least_squares::{Coordinate, Derivatives, Effort, Optimum, minimise_with};
 use super::replay::{
     Actuator, CORRECTION, Errors, FITTED, MISTAKEN, OF_CURVE, PART, Replay, coordinates, speed,
 };
@@ -45,11 +45,27 @@ const SURE: f64 = 2.5;
 /// Length of such a block, s.
 const BLOCK: f64 = 0.5;
 /// Longest inner step of the search, s.
-const STEP: f64 = 1e-3;
-/// Iterations in which a member shows what it is worth, and in which the one that is taken is fitted; and the part of
-/// the cost that an iteration has to take away.
-const TRIED: (usize, f64) = (6, 1e-2);
-const FITTED_WITHIN: (usize, f64) = (20, 1e-3);
+const STEP: f64 = 2e-3;
+/// Part of the records on which a member is tried.
+const TRIED_ON: f64 = 0.4;
+/// How a member shows what it is worth, how the one that is taken is fitted, and how all of them are at the end.
+const TRIED: Effort = Effort {
+    iterations: 10,
+    part: 1e-2,
+    derivatives: Derivatives::Trusted,
+};
+const TAKEN: Effort = Effort {
+    iterations: 30,
+    part: 3e-3,
+    derivatives: Derivatives::Carried,
+};
+const SETTLED: Effort = Effort {
+    iterations: 30,
+    part: 1e-4,
+    derivatives: Derivatives::Carried,
+};
+/// Squared error over that of the fit before from which a trial is not followed.
+const HOPELESS: f64 = 1.1;
 
 /// What a valve's curve may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -175,15 +191,6 @@ impl Trial {
         self.blocks.iter().sum::<f64>() / self.blocks.len().max(1) as f64
     }
 
-    /// Whether it is taken before `other`: what has fewer members is, unless it leaves more by more than chance.
-    fn goes_before(&self, other: &Self) -> bool {
-        match self.members.len().cmp(&other.members.len()) {
-            Ordering::Less => !other.is_better_than(self),
-            Ordering::Equal => self.left() < other.left(),
-            Ordering::Greater => self.is_better_than(other),
-        }
-    }
-
     /// Whether it leaves less than `other` by more than chance.
     fn is_better_than(&self, other: &Self) -> bool {
         let gains: Vec<f64> = other
@@ -214,6 +221,7 @@ fn blocks(errors: &Errors, replay: &Replay) -> Vec<f64> {
 }
 
 /// The search on recordings.
+#[derive(Clone, Copy)]
 struct Search<'a> {
     replay: Replay<'a>,
     command: f64,
@@ -230,10 +238,10 @@ impl Search<'_> {
         }
     }
 
-    fn fit(&self, members: &[Member], start: &[f64], within: (usize, f64)) -> Option<Trial> {
+    fn fit(&self, members: &[Member], start: &[f64], within: Effort) -> Option<Trial> {
         let start: [f64; FITTED] = start.try_into().ok()?;
         let own: Vec<Coordinate> = coordinates(&start, |i| self.is_free(members, i));
-        let fit = minimise_within(&self.replay, &own, within.0, within.1)?;
+        let fit = minimise_with(&self.replay, &own, within)?;
         let rest = self.replay.rest();
         let blocks = blocks(&rest.errors(&fit.values)?, &rest);
         Some(Trial {
@@ -241,6 +249,18 @@ impl Search<'_> {
             fit,
             blocks,
         })
+    }
+
+    /// A fit that costs little and shows what it is worth.
+    fn attempt(&self, members: &[Member], start: &[f64]) -> Option<Trial> {
+        let own = Self {
+            replay: Replay {
+                part: (0.0, TRIED_ON),
+                ..self.replay
+            },
+            ..*self
+        };
+        own.fit(members, start, TRIED)
     }
 
     /// Whether what a member adds to the curve is more than a trifle.
@@ -282,12 +302,12 @@ impl Search<'_> {
         own
     }
 
-    /// The same search from the best of `lapped`, and what it finds.
+    /// Fits behind overlaps that are not small, each with the search that begins there.
     fn behind(
         &self,
         lapped: &[(HydraulicRig, ValveCurve)],
         shape: SealShape,
-    ) -> Option<(Self, Trial)> {
+    ) -> Vec<(Self, Trial)> {
         let trials = lapped.par_iter().filter_map(|(rig, curve)| {
             let own = Self {
                 replay: Replay {
@@ -300,28 +320,33 @@ impl Search<'_> {
                 },
                 ..*self
             };
-            let trial = own.fit(&[Member::Lap], &[0.0; FITTED], TRIED)?;
-            Some((own, trial))
+            let trial = own.attempt(&[Member::Lap], &[0.0; FITTED])?;
+            own.is_there(&trial, Member::Lap).then_some((own, trial))
         });
-        let (own, best) = trials.min_by(|a, b| a.1.left().total_cmp(&b.1.left()))?;
-        let best = own.fit(&best.members, &best.fit.values, FITTED_WITHIN)?;
-        let best = own.further(best);
-        Some((own, best))
+        trials.collect()
     }
 
-    /// `best` with what gains most, as long as something does.
-    fn further(&self, mut best: Trial) -> Trial {
-        while let Some(next) = self.extended(&best) {
+    /// `best` with what gains most, as long as something does, and the actuator with what gains too little to be sure
+    /// of. The first member may be one of `rivals`.
+    fn further(
+        self,
+        mut best: Trial,
+        mut rivals: Vec<(Self, Trial)>,
+    ) -> (Self, Trial, Option<Actuator>) {
+        let mut own = self;
+        while let Some((search, next)) = own.extended(&best, std::mem::take(&mut rivals)) {
             if !next.is_better_than(&best) {
-                break;
+                let doubted = search.replay.start.at(&next.fit.values);
+                let doubted = (next.left() < best.left()).then_some(doubted);
+                return (own, best, doubted);
             }
-            best = next;
+            (own, best) = (search, next);
         }
-        best
+        (own, best, None)
     }
 
-    /// The best fit with one member more.
-    fn extended(&self, from: &Trial) -> Option<Trial> {
+    /// The best fit with one member more, or of `rivals`.
+    fn extended(&self, from: &Trial, rivals: Vec<(Self, Trial)>) -> Option<(Self, Trial)> {
         let wanting = Member::ALL
             .into_iter()
             .filter(|member| !from.members.contains(member));
@@ -338,14 +363,17 @@ impl Search<'_> {
             for (place, value) in member.places().iter().zip(own) {
                 start[*place] = *value;
             }
-            let trial = self.fit(&members, &start, TRIED)?;
-            self.is_there(&trial, *member).then_some((*member, trial))
+            let trial = self.attempt(&members, &start)?;
+            self.is_there(&trial, *member).then_some((*self, trial))
         });
         let mut trials: Vec<_> = trials.collect();
+        trials.extend(rivals);
+        trials.retain(|(_, trial)| trial.left() < HOPELESS * from.left());
         trials.sort_by(|a, b| a.1.left().total_cmp(&b.1.left()));
-        trials.into_iter().find_map(|(member, trial)| {
-            let found = self.fit(&trial.members, &trial.fit.values, FITTED_WITHIN)?;
-            self.is_there(&found, member).then_some(found)
+        trials.into_iter().find_map(|(search, trial)| {
+            let found = search.fit(&trial.members, &trial.fit.values, TAKEN)?;
+            let member = *found.members.last()?;
+            search.is_there(&found, member).then_some((search, found))
         })
     }
 }
@@ -373,15 +401,12 @@ impl Found {
             part: (0.0, PART),
             step: STEP,
         };
-        let Some((mut search, plain, mut best)) = search(replay, fitting.command) else {
+        let Some((search, plain)) = search(replay, fitting.command) else {
             return;
         };
+        let rivals = search.behind(lapped, fitting.usual_shape());
+        let (mut search, mut best, mut doubted) = search.further(plain.clone(), rivals);
         let mut own = self.clone();
-        if let Some((rival, found)) = search.behind(lapped, fitting.usual_shape())
-            && found.goes_before(&best)
-        {
-            (search, best) = (rival, found);
-        }
         if best.members.is_empty() {
             return;
         }
@@ -402,18 +427,28 @@ impl Found {
             let mut moved = fit.values.clone();
             moved[..PARAMETERS].copy_from_slice(&own.rig.coordinates());
             own.mean_squares = equations.mean_squares(&moved).unwrap_or(own.mean_squares);
-            let start = search.with_usual_seals(&[0.0; FITTED]);
-            let Some(next) = search.fit(&members, &start, FITTED_WITHIN) else {
+            let (start, effort) = match rounds {
+                0 => ([0.0; FITTED].to_vec(), SETTLED),
+                _ => (search.with_usual_seals(&[0.0; FITTED]), TAKEN),
+            };
+            let Some(next) = search.fit(&members, &start, effort) else {
                 break;
             };
             best = next;
+            if rounds > 0 {
+                // With a table that is right, what is left may be of the valve.
+                (search, best, doubted) = search.further(best, Vec::new());
+            }
             if search.settled(&best).1 != best.members {
                 rounds = 1;
             }
         }
         let moved = search.replay.start.at(&best.fit.values);
         own.take(&moved, &best.members);
-        if own.take_errors(&search, &best, &plain).is_some() {
+        if own
+            .take_errors(&search, &best, &plain, doubted.as_ref())
+            .is_some()
+        {
             *self = own;
         }
     }
@@ -449,7 +484,14 @@ impl Found {
     }
 
     /// Errors of what was replayed, and the position of the null.
-    fn take_errors(&mut self, search: &Search, best: &Trial, plain: &Trial) -> Option<()> {
+    /// What a member that is not taken would change is as uncertain by half.
+    fn take_errors(
+        &mut self,
+        search: &Search,
+        best: &Trial,
+        plain: &Trial,
+        doubted: Option<&Actuator>,
+    ) -> Option<()> {
         let replay = &search.replay;
         let free: Vec<usize> = (0..FITTED)
             .filter(|i| search.is_free(&best.members, *i))
@@ -489,13 +531,21 @@ impl Found {
             0.0
         };
         self.covariance[(delay, delay)] += DELAY_MISTAKEN.powi(2) + exchanged.powi(2);
+        let mut edge = EDGE_MISTAKEN * moved.curve.overlap;
+        if let Some(other) = doubted {
+            edge = edge.hypot(0.5 * (other.curve.overlap - moved.curve.overlap));
+            let [own, other]: [[f64; PARAMETERS]; 2] = [moved.rig.into(), other.rig.into()];
+            for (_, i, _) in slopes {
+                self.covariance[(i, i)] += (0.5 * (other[i] - own[i])).powi(2);
+            }
+        }
         self.standard_error = std::array::from_fn(|i| self.covariance[(i, i)].max(0.0).sqrt());
         let error = |i: usize| place(i).map_or(0.0, |i| covariance[(i, i)].max(0.0).sqrt());
         let (bias, bias_error) = null(replay, &moved)?;
         let valve = self.valve.as_mut()?;
         valve.curve.null_bias += bias;
         valve.standard_error = ValveCurve {
-            overlap: error(OF_CURVE).hypot(EDGE_MISTAKEN * moved.curve.overlap),
+            overlap: error(OF_CURVE).hypot(edge),
             null_loss: error(OF_CURVE + 1),
             null_width: moved.curve.null_width * error(OF_CURVE + 2),
             asymmetry: error(OF_CURVE + 3),
@@ -506,16 +556,14 @@ impl Found {
     }
 }
 
-/// Fits the rig with an ideal valve, and then with what gains most, as long as something does. None where the rig
-/// cannot be replayed.
-fn search(replay: Replay<'_>, command: f64) -> Option<(Search<'_>, Trial, Trial)> {
+/// Fits the rig with an ideal valve. None where it cannot be replayed.
+fn search(replay: Replay<'_>, command: f64) -> Option<(Search<'_>, Trial)> {
     let replay = replay.weighed(&[0.0; FITTED])?;
     let mut search = Search { replay, command };
-    let first = search.fit(&[], &[0.0; FITTED], FITTED_WITHIN)?;
+    let first = search.fit(&[], &[0.0; FITTED], TRIED)?;
     search.replay = search.replay.weighed(&first.fit.values)?;
-    let plain = search.fit(&[], &first.fit.values, FITTED_WITHIN)?;
-    let best = search.further(plain.clone());
-    Some((search, plain, best))
+    let plain = search.fit(&[], &first.fit.values, TAKEN)?;
+    Some((search, plain))
 }
 
 /// Position of the spool at zero command beyond that of the curve (V) and its standard error: what has to be added

@@ -91,6 +91,7 @@ impl Rules {
     ) -> Result<(), String> {
         if let Some(curve) = self.model.curve {
             set(component, &curve.named());
+            set(component, &self.known_rig()?.hydraulics.named());
         }
         let on = |switch: &str| component.parameters.get(switch) == Some(&Setting::Boolean(true));
         let known = [
