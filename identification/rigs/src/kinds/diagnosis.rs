@@ -333,7 +333,10 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let explains = explains
         .into_iter()
         .all(|(error, nominal)| error < LOST && error < MOST * nominal);
-    let believed = |cause: &Cause| holds || (explains && cause.deviations() > FAR);
+    // A zero shows in a file by itself, whatever a part tells of another.
+    let believed = |i: usize, cause: &Cause| {
+        holds || ((explains || measured.is_of_first_file(i)) && cause.deviations() > FAR)
+    };
     let values = confirmed.parameters.iter().enumerate();
     let mut causes: Vec<Cause> = Vec::new();
     let mut doubted: Vec<Cause> = Vec::new();
@@ -341,7 +344,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         let Some(cause) = Cause::of(value.clone(), measured.stated(i)) else {
             continue;
         };
-        if !believed(&cause) {
+        if !believed(i, &cause) {
             continue;
         }
         let without = measured.without_cause(i);
