@@ -543,8 +543,8 @@ impl Loop {
 }
 
 impl Step {
-    /// The state after the step; the command at its begin and its slope, the flow beyond the linear one for what
-    /// the controller sends, where there is one, and what friction takes of a speed over a step.
+    /// The state after the step for the command at its begin and its slope. `beyond` is the flow beyond the linear
+    /// one for what the controller sends; `rub` is what friction takes of a speed over a step.
     #[inline]
     fn advance(
         &self,

@@ -170,7 +170,7 @@ pub(super) fn lengths<M: InParts>(measured: &M, record: usize) -> Vec<usize> {
 /// samples counted once: by the ratio of the likelihoods, or, where slow drift in both hides that, by the
 /// differences (Vuong, Econometrica 57, 1989; for nested models half the root of the ratio's chi-square
 /// at most). `lengths` are those of the files that follow one another: what differs from file to file, such as
-/// a zero of the first alone, is no drift.
+/// a zero of the first alone, does not count as drift.
 pub(super) fn clearly_better(before: &[f64], after: &[f64], lengths: &[usize]) -> bool {
     let (mut independent, mut gain, mut variance) = (0.0, 0.0, 0.0);
     let mut from = 0;

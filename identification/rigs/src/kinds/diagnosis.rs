@@ -182,7 +182,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     };
     let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
     // Either part proposes; all data together decide by how either part predicts the other.
-    let start = select_jointly(
+    let mut start = select_jointly(
         measured,
         &proposals(measured, [&as_described, &swapped]),
         EVERYTHING,
@@ -212,7 +212,22 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             reason: reason.to_owned(),
         });
     }
+    // What a part gives a reason against is not named, unless the other part names it without one.
     let mut refused: Vec<Refused> = Vec::new();
+    let both = || as_described.effects.iter().chain(&swapped.effects);
+    for effect in both() {
+        let (Some(index), Some(reason)) = (measured.index(&effect.effect), &effect.objection)
+        else {
+            continue;
+        };
+        if both().any(|own| own.effect == effect.effect && own.objection.is_none()) {
+            continue;
+        }
+        start.point.effects.retain(|(known, _)| *known != index);
+        if refused.iter().all(|(known, _)| *known != index) {
+            refused.push((index, reason.clone()));
+        }
+    }
     let mut findings = Vec::new();
     let nominal = NominalFits::of(measured);
     let mut confirmed = confirm(
@@ -333,7 +348,10 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let explains = explains
         .into_iter()
         .all(|(error, nominal)| error < LOST && error < MOST * nominal);
-    let believed = |cause: &Cause| holds || (explains && cause.deviations() > FAR);
+    // A zero shows in a file by itself, whatever a part tells of another.
+    let believed = |i: usize, cause: &Cause| {
+        holds || ((explains || measured.is_of_first_file(i)) && cause.deviations() > FAR)
+    };
     let values = confirmed.parameters.iter().enumerate();
     let mut causes: Vec<Cause> = Vec::new();
     let mut doubted: Vec<Cause> = Vec::new();
@@ -341,7 +359,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         let Some(cause) = Cause::of(value.clone(), measured.stated(i)) else {
             continue;
         };
-        if !believed(&cause) {
+        if !believed(i, &cause) {
             continue;
         }
         let without = measured.without_cause(i);

@@ -11,9 +11,9 @@ const CHEAP: usize = 40_000;
 /// Logarithm, in deviations, of a nominal parameter that is none: nothing depends on it any more.
 const GONE: f64 = -40.0;
 
-/// Logarithm of the share of what was stated below which a nominal parameter has vanished, and of the least share of
-/// one that may be nothing: less would tell a fit no more that it is there.
+/// Logarithm of the share of what was stated below which a nominal parameter has vanished.
 const VANISHED: f64 = -5.0;
+/// The least of it for a parameter that may be nothing: with less a fit does not find it again.
 const LEAST: f64 = -7.0;
 
 /// Error over the output's deviation from which on fits begin from what is read off as well.
