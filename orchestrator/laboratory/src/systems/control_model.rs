@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use controllers::preview::model::Hydraulics;
 use controllers::tuning::suite::{Measurements, Suite};
 use identification::closed_loop::equations::{HydraulicRig, PARAMETERS};
 use identification::closed_loop::friction::SealShape;
@@ -11,6 +12,8 @@ use plant::identified::shake_table::ShakeTable;
 use plant::identified::valve_curve::ValveCurve;
 use plant::sensors::channel;
 use units::constants::{G, INCH, SAMPLING_PERIOD};
+
+use super::tuning::hydraulics;
 
 /// The model of the physical rig that comes with the program, as its commissioning found it.
 const COMMISSIONED: &str = include_str!("../../systems/plant/servohydraulic-model.toml");
@@ -45,6 +48,8 @@ pub struct ControlModel {
     pub curve: Option<ValveCurve>,
     /// Samples by which the valve acts late: of `delay`, those that are not the sensors'.
     pub command_delay: usize,
+    /// By how much it acts later than that, s; negative for earlier.
+    pub fraction: f64,
     uncertainty: Uncertainty,
 }
 
@@ -122,6 +127,7 @@ impl ControlModel {
         };
         let late = file.command_delay.unwrap_or(0.0);
         let command = (late - file.sensor_delay.unwrap_or(late)).max(0.0);
+        let samples = (command / SAMPLING_PERIOD).round();
         Ok(Self {
             rig,
             late: late.max(0.0),
@@ -130,7 +136,8 @@ impl ControlModel {
             specimen_mass: file.specimen(name).map_err(said)?.map(|own| own.mass),
             hydraulics: file.hydraulic_rig(name).map_err(said)?,
             curve: file.valve_curve(),
-            command_delay: (command / SAMPLING_PERIOD).round() as usize,
+            command_delay: samples as usize,
+            fraction: command - samples * SAMPLING_PERIOD,
             uncertainty: Uncertainty::of(file, units),
         })
     }
@@ -147,8 +154,29 @@ impl ControlModel {
             hydraulics: None,
             curve: None,
             command_delay: 0,
+            fraction: 0.0,
             uncertainty: Uncertainty::Unknown,
         }
+    }
+
+    /// Valve and oil for controllers that count whole samples of delay, where the model has them: what is more or less
+    /// than those is in the spool, `(1 + l s + j s²) exp(τ s)` to the second order.
+    pub fn whole_samples(&self) -> Option<Hydraulics> {
+        /// Least lag and damping ratio of a spool that acts earlier.
+        const LEAST: f64 = 5e-4;
+        const LEAST_DAMPING: f64 = 0.3;
+        let (own, _) = self.hydraulics.as_ref()?;
+        let late = self.fraction.max(LEAST - own.spool_lag);
+        let lag = own.spool_lag + late;
+        let inertia = own.spool_inertia + own.spool_lag * late + 0.5 * late * late;
+        // A spool that acts earlier may have no inertia left, one that acts later too little damping.
+        let least = (0.05 * lag * lag).min(own.spool_inertia);
+        let most = (0.5 * lag / LEAST_DAMPING).powi(2).max(own.spool_inertia);
+        Some(Hydraulics {
+            spool_lag: lag,
+            spool_inertia: inertia.clamp(least, most),
+            ..hydraulics(own)
+        })
     }
 
     /// Delay and noise for the rules of the controllers.
@@ -257,5 +285,33 @@ impl Uncertainty {
         own.table.damping = errors.table.damping * per_length;
         own.table.stiffness = errors.table.stiffness * per_length;
         Self::Coefficients(Box::new(own))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use nalgebra::Complex;
+
+    use super::*;
+
+    /// Parts of a sample either way are in the spool: both act alike where motions are.
+    #[test]
+    fn a_spool_takes_what_samples_leave_of_a_delay() {
+        let mut model = ControlModel::commissioned().unwrap();
+        let (own, _) = model.hydraulics.unwrap();
+        assert_eq!(model.whole_samples(), Some(hydraulics(&own)));
+        for late in [-9e-4, -4e-4, 3e-4, 9e-4] {
+            model.fraction = late;
+            let spool = model.whole_samples().unwrap();
+            for hertz in [0.5, 2.0, 5.0, 10.0] {
+                let s = Complex::new(0.0, TAU * hertz);
+                let of = |lag: f64, inertia: f64| 1.0 / ((s * inertia + lag) * s + 1.0);
+                let wanted = of(own.spool_lag, own.spool_inertia) * (-s * late).exp();
+                let got = of(spool.spool_lag, spool.spool_inertia);
+                assert!((got / wanted - 1.0).norm() < 3e-3, "{late} s, {hertz} Hz");
+            }
+        }
     }
 }

@@ -452,9 +452,9 @@ impl Rules {
         let tuned = own.tuned().map_err(|error| error.to_string())?;
         let noise = &self.model.noise;
         self.model(component);
-        if let Some((own, _)) = &self.model.hydraulics {
+        if let Some(own) = self.model.whole_samples() {
             component.set("hydraulics_known", true);
-            set(component, &hydraulics(own).named());
+            set(component, &own.named());
         }
         set(
             component,
@@ -494,7 +494,7 @@ fn preview_control(model: &ControlModel) -> preview::Parameters {
     preview::Parameters {
         rig: RigModel {
             shake_table: model.rig,
-            hydraulics: model.hydraulics.map(|(own, _)| hydraulics(&own)),
+            hydraulics: model.whole_samples(),
         },
         delay: model.delay,
         uncertainty: Uncertainty {
