@@ -535,8 +535,12 @@ impl Found {
         if let Some(other) = doubted {
             edge = edge.hypot(0.5 * (other.curve.overlap - moved.curve.overlap));
             let [own, other]: [[f64; PARAMETERS]; 2] = [moved.rig.into(), other.rig.into()];
+            let half = |i: usize| 0.5 * (other[i] - own[i]);
+            // They change together.
             for (_, i, _) in slopes {
-                self.covariance[(i, i)] += (0.5 * (other[i] - own[i])).powi(2);
+                for (_, j, _) in slopes {
+                    self.covariance[(i, j)] += half(i) * half(j);
+                }
             }
         }
         self.standard_error = std::array::from_fn(|i| self.covariance[(i, i)].max(0.0).sqrt());
