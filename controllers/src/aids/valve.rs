@@ -13,7 +13,7 @@ use crate::preview::model::Hydraulics;
 ///
 /// The curve is behind the spool, which takes some milliseconds through the overlap. A controller counts on the opening
 /// `o` of an ideal valve behind the same spool. So to `h⁻¹` of its command is added what brings the real spool nearest
-/// to `h⁻¹(o)`, by least squares over the [`AHEAD`] samples to come, all under the present commands. Where the curve is
+/// to `h⁻¹(o)`, by least squares over the two samples to come, all under the present commands. Where the curve is
 /// straight nothing is added. Both spools are models: nothing is fed back.
 ///
 /// Within the overlap the exact inverse jumps. A jump that the valve does not need is a relay in the loop, which

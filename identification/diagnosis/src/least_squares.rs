@@ -289,7 +289,6 @@ pub fn least_squares<M: SimulatedModel>(
         Free::Frozen(columns) => columns.columns.as_slice(),
         _ => &[],
     };
-    let still = STILL * correlation_time(&best.errors).clamp(1.0, LARGEST_TIME);
     let mut damping = 1e-4;
     let mut learned: Option<Vec<Vec<f64>>> = None;
     // In halves of a step.
@@ -343,6 +342,10 @@ pub fn least_squares<M: SimulatedModel>(
             damping = (damping * 10.0).max(1e-6);
         }
         let gained = before - best.cost;
+        let still = match gained < STILL * LARGEST_TIME {
+            true => STILL * correlation_time(&best.errors).clamp(1.0, LARGEST_TIME),
+            false => STILL,
+        };
         if gained < still && is_fresh {
             break;
         }

@@ -364,22 +364,18 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         }
         let without = measured.without_cause(i);
         let without = without.and_then(|own| {
-            // Without it the fit may need what vanished beside it.
-            let error = |point: &Point| own.normalised_error(point, EVERYTHING);
-            let starts = [confirmed.point.clone(), own.restored(&confirmed.point)];
-            let fitted = starts
-                .into_iter()
-                .filter_map(|start| settled(&own, &start, EVERYTHING));
-            let best = fitted.min_by(|a, b| error(a).total_cmp(&error(b)))?;
-            let errors = Crossed::of(&own, &best)?;
             // No part tells another one's zero.
-            let is_needed = if measured.is_of_first_file(i) {
+            if measured.is_of_first_file(i) {
+                let best = settled(&own, &confirmed.point, EVERYTHING)?;
+                let errors = Crossed::of(&own, &best)?;
                 let bare = all_errors(&own, &best, EVERYTHING);
                 let with = all_errors(measured, &confirmed.point, EVERYTHING);
-                needed(&bare, &with, &lengths(measured, EVERYTHING))
-            } else {
-                crossed.needs(&errors)
-            };
+                let is_needed = needed(&bare, &with, &lengths(measured, EVERYTHING));
+                return Some((own, best, errors, is_needed));
+            }
+            let best = confirmed.point.clone();
+            let errors = Crossed::of(&own, &best)?;
+            let is_needed = crossed.needs(&errors);
             Some((own, best, errors, is_needed))
         });
         match without {
