@@ -2,7 +2,7 @@
 //! spool there in time.
 
 use nalgebra::{Matrix2, Vector2};
-use plant::identified::valve_curve::ValveCurve;
+use plant::identified::valve_curve::{ValveCurve, spool_transition};
 use units::Parameters;
 
 use crate::ModelError;
@@ -48,8 +48,7 @@ struct Spool(Matrix2<f64>);
 impl Spool {
     fn new(hydraulics: &Hydraulics, period: f64) -> Self {
         let (lag, inertia) = (hydraulics.spool_lag, hydraulics.spool_inertia);
-        let rates = Matrix2::new(0.0, 1.0, -1.0 / inertia, -lag / inertia);
-        Self((rates * period).exp())
+        Self(spool_transition(lag, inertia, period))
     }
 
     fn moved(&self, at: Vector2<f64>, command: f64) -> Vector2<f64> {

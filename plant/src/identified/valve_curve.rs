@@ -110,6 +110,14 @@ impl ValveCurve {
     }
 }
 
+/// What a spool of `lag` (s) and `inertia` (s²), `y + l dy/dt + j d²y/dt² = u`, that follows a constant command is away
+/// from it, and its rate, after `time` (s) over those before.
+#[must_use]
+pub fn spool_transition(lag: f64, inertia: f64, time: f64) -> nalgebra::Matrix2<f64> {
+    let rates = nalgebra::Matrix2::new(0.0, 1.0, -1.0 / inertia, -lag / inertia);
+    (rates * time).exp()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -16,15 +16,9 @@ const LONGEST_STEP: f64 = 1e-4;
 const BARE: usize = 3;
 const STATES: usize = 6;
 
-/// What a spool that follows a constant command is away from it, and its rate, after `time` (s) over those before.
+/// [`valve_curve::spool_transition`](plant::identified::valve_curve::spool_transition) of a rig.
 pub(super) fn spool_transition(rig: &HydraulicRig, time: f64) -> Matrix2<f64> {
-    let rates = Matrix2::new(
-        0.0,
-        1.0,
-        -1.0 / rig.spool_inertia,
-        -rig.spool_lag / rig.spool_inertia,
-    );
-    (rates * time).exp()
+    plant::identified::valve_curve::spool_transition(rig.spool_lag, rig.spool_inertia, time)
 }
 
 /// A part of the sampling period under one command.
