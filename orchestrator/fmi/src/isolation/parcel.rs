@@ -179,8 +179,8 @@ pub(super) fn references(bytes: &[u8], head: &Head) -> Vec<u32> {
 }
 
 /// In the guest: carries out the parcel at the beginning of `bytes` by `endpoint` and writes what
-/// came of it in the first `end` bytes; gives whether it went well. The reason why there is no status may
-/// take more of `bytes`, for what follows is not carried out then.
+/// came of it in the first `end` bytes; gives whether it went well. Without a status, the reason may take more of
+/// `bytes`, because nothing that follows is carried out.
 pub(super) fn carry_out(
     bytes: &mut [u8],
     end: usize,

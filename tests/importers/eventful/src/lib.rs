@@ -1,6 +1,6 @@
 #![allow(non_snake_case, reason = "an FMU is named in camel case")]
 //! A component that uses what FMI 3.0 offers beyond scalars and steps, and refuses an importer that gets it
-//! wrong. It is no product and is not packed among them.
+//! wrong. It exists for the tests and is not packed.
 //!
 //! `level` rises at `rate` and falls by 1 where it reaches 1: an event within a step, at which the output
 //! clock `wrapped` ticks and the step returns early. The event takes two passes: the first counts in
