@@ -209,27 +209,60 @@ pub(super) const AHEAD: usize = 3;
 /// Texts and binaries, which have lengths of their own.
 pub(super) type Texts = Vec<Vec<u8>>;
 
-/// What will be set and read after each step of an instance, all of it Float64.
+/// What will be set and read after each step of an instance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Foreseen<'a> {
-    /// What is set, and to what where no wire leads there.
+    /// What is set, all of it Float64, and to what where no wire leads there.
     pub set: &'a [u32],
     pub values: &'a [f64],
     pub wires: &'a [Wire],
-    /// What is read, and how many values that are.
+    /// What is read, of which type, and how many values that are, of 8 bytes each.
     pub read: &'a [u32],
+    pub scalar: Scalar,
     pub count: usize,
 }
 
-/// A number that was read before, and where it is set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A Float64 that was read before, and where it is set.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wire {
     /// The reading, as it was numbered.
     pub reading: usize,
     /// Which of its values.
     pub element: usize,
-    /// Where it goes among those that are set.
+    /// Where it goes among the Float64 that are set.
     pub place: usize,
+    /// What is done to it on its way.
+    pub change: Linear,
+}
+
+/// `factor * value + offset`: what is done to a value on its way along a connection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linear {
+    /// The factor.
+    pub factor: f64,
+    /// Added after the factor.
+    pub offset: f64,
+}
+
+impl Linear {
+    /// Leaves values as they are.
+    pub const NOTHING: Self = Self {
+        factor: 1.0,
+        offset: 0.0,
+    };
+
+    /// What comes of a value.
+    #[must_use]
+    #[inline]
+    pub fn of(self, value: f64) -> f64 {
+        let value = self.factor * value;
+        // A sum with nothing would turn -0 into 0.
+        if self.offset == 0.0 {
+            value
+        } else {
+            value + self.offset
+        }
+    }
 }
 
 /// What goes into a call and what comes out of it; [`Function`] says which fields it uses.
@@ -334,6 +367,28 @@ pub(super) trait Endpoint: Send {
     /// [`Endpoint::answer`] asks for its outcome; false where [`Endpoint::call`] has to step.
     fn request(&mut self, _call: &Call) -> bool {
         false
+    }
+
+    /// Takes a step that travels with those of other instances, as [`Endpoint::request`], where `wires` lead
+    /// to what is set right before it from what is read right after earlier ones. Gives the number of what
+    /// is read after this one, which is none where that is not known to be `read`.
+    fn request_wired(
+        &mut self,
+        _call: &Call,
+        _wires: &[Wire],
+        _read: (&[u32], usize),
+    ) -> Option<Option<usize>> {
+        None
+    }
+
+    /// How often calls have travelled to the other process that carries them out.
+    fn exchanges(&self) -> u64 {
+        0
+    }
+
+    /// Whether nothing has been set that has not reached the FMU, and no step been requested.
+    fn is_settled(&self) -> bool {
+        true
     }
 
     /// Notes what will be set and read after each step, so that it can be done together with those of

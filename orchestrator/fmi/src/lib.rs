@@ -23,7 +23,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use sha2::{Digest, Sha256};
 
-pub use call::Wire;
+pub use call::{Linear, Wire};
 pub use datum::Datum;
 pub use description::{
     BaseUnit, Causality, Description, Flow, FmiVersion, InputClock, Interface, Item, Kind,

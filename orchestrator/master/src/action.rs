@@ -68,7 +68,10 @@ impl Action {
                 if !at.calls {
                     return Ok(part.outputs.read(signals, &mut part.instance)?);
                 }
-                part.step(at.time, every as f64 * at.step)?;
+                match part.is_requested {
+                    true => part.finish_step()?,
+                    false => part.step(at.time, every as f64 * at.step)?,
+                }
                 if part.failure.is_none() {
                     part.read(signals)?;
                 }

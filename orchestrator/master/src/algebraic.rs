@@ -21,6 +21,18 @@ pub(super) struct AlgebraicLoop {
 }
 
 impl AlgebraicLoop {
+    /// The numbers that it gives.
+    pub(super) fn signals(&self, parts: &[Part]) -> Vec<usize> {
+        let given = |action: &Action| -> Vec<usize> {
+            match action {
+                Action::Read { outputs, .. } => outputs.signals().collect(),
+                Action::Call { part } => parts[*part].outputs.signals().collect(),
+                Action::Solve(inner) => inner.signals(parts),
+            }
+        };
+        self.actions.iter().flat_map(given).collect()
+    }
+
     /// Of the actions of a pass.
     pub(super) fn new(actions: Vec<Action>, parts: &[Part], round: Vec<String>) -> Self {
         let reads = |action: &Action| -> Vec<usize> {

@@ -13,7 +13,7 @@ use super::samples::Samples;
 use super::signals::{Place, Signals};
 use super::transfer::{Drive, Inputs, Outputs};
 use super::variable::{self, StepControl, VariableStep};
-use super::{Algorithm, EndSignals, MasterError, Part, Simulation, order, start};
+use super::{Algorithm, EndSignals, MasterError, Part, Simulation, order, start, together};
 use fmi_import::{Causality, Datum, Instance, Kind, Options, Processes, State, Variability};
 use fmi_system::{Between, Connection, Operation, Quantity, Source, System};
 
@@ -179,8 +179,12 @@ impl Simulation {
         }
         let actions = schedule.operations.iter();
         let actions = actions.map(|operation| plan.action(&mut reference, operation, &parts));
-        let actions: Vec<Action> = actions.collect();
+        let mut actions: Vec<Action> = actions.collect();
+        let mut together = Vec::new();
         if algorithm == Algorithm::GaussSeidel {
+            if variable.is_none() {
+                together = together::plan(&mut actions, &parts);
+            }
             foresee(&mut parts, &actions);
         }
         // What ends a run is Boolean, and its cause an enumeration: both are numbers.
@@ -271,6 +275,7 @@ impl Simulation {
             parts,
             diverted: processes.diverted(),
             actions,
+            together,
             notes,
             interrupt: None,
             keep_every: 1,

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use super::Part;
 use super::action::Action;
+use super::transfer::Driven;
 use fmi_import::{Kind, Wire};
 
 /// A number that is read, by the process and the signal: which reading, and which of its values.
@@ -15,8 +16,8 @@ struct Planned<'a> {
     part: usize,
     set: &'a [u32],
     values: &'a [f64],
-    /// Where each driven value is set and which signal drives it.
-    driven: Vec<(usize, usize)>,
+    driven: Vec<Driven>,
+    kind: &'a Kind,
     read: &'a [u32],
     first: usize,
     count: usize,
@@ -44,7 +45,7 @@ pub(super) fn foresee(parts: &mut [Part], actions: &[Action]) {
         };
         let driven = inputs.foreseen().filter(|_| !done[*part]);
         let driven = driven.filter(|(.., driven)| {
-            let mut signals = driven.iter().map(|(_, signal)| (process, *signal));
+            let mut signals = driven.iter().map(|it| (process, it.signal));
             signals.all(|signal| known.contains_key(&signal))
         });
         let Some((set, values, driven)) = driven else {
@@ -56,12 +57,13 @@ pub(super) fn foresee(parts: &mut [Part], actions: &[Action]) {
         }
         let mut before = Some((set, values, driven));
         for (kind, read, first, count) in outputs.readings() {
-            if *kind != Kind::Float64 {
+            if *kind == Kind::Clock {
                 done[*part] = true;
                 break;
             }
             let (set, values, driven) = before.take().unwrap_or_default();
-            for element in 0..count {
+            let wired = if *kind == Kind::Float64 { count } else { 0 };
+            for element in 0..wired {
                 known.insert((process, first + element), (usize::MAX, 0));
             }
             planned.push(Planned {
@@ -69,6 +71,7 @@ pub(super) fn foresee(parts: &mut [Part], actions: &[Action]) {
                 set,
                 values,
                 driven,
+                kind,
                 read,
                 first,
                 count,
@@ -81,19 +84,23 @@ pub(super) fn foresee(parts: &mut [Part], actions: &[Action]) {
         let Some(process) = instance.process().filter(|own| gains.contains(own)) else {
             continue;
         };
-        let wires = it.driven.iter().filter_map(|&(place, signal)| {
-            let (reading, element) = *known.get(&(process, signal))?;
+        let wires = it.driven.iter().filter_map(|driven| {
+            let (reading, element) = *known.get(&(process, driven.signal))?;
             Some(Wire {
                 reading,
                 element,
-                place,
+                place: driven.place,
+                change: driven.change,
             })
         });
         let wires: Vec<Wire> = wires.collect();
-        let Some(reading) = instance.foresee((it.set, it.values, &wires), (it.read, it.count))
-        else {
+        let read = (it.kind, it.read, it.count);
+        let Some(reading) = instance.foresee((it.set, it.values, &wires), read) else {
             continue;
         };
+        if *it.kind != Kind::Float64 {
+            continue;
+        }
         for element in 0..it.count {
             known.insert((process, it.first + element), (reading, element));
         }

@@ -26,10 +26,12 @@ mod samples;
 mod signals;
 mod start;
 mod stepwise;
+mod together;
 mod transfer;
 mod tuning;
 mod variable;
 
+use std::collections::HashMap;
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
@@ -53,6 +55,7 @@ use action::{Action, Moment};
 use fmi_import::{CallError, Diverted, Instance, Item, Progress, State};
 use reference::Reference;
 use signals::Signals;
+use together::Together;
 use transfer::{Inputs, Outputs};
 
 /// The order in which components are called and values are exchanged.
@@ -105,6 +108,8 @@ pub struct Simulation {
     /// While foreign FMUs live in this process, what they print does not go among the results.
     diverted: Option<Diverted>,
     actions: Vec<Action>,
+    /// Calls whose steps travel to another process together.
+    together: Vec<Together>,
     /// What the user should know of the order of calls.
     notes: Vec<String>,
     /// Ends the run when it becomes true.
@@ -198,7 +203,7 @@ impl Part {
         if self.failure.is_some() || self.ended.is_some() {
             return Ok(());
         }
-        let begun = self.steps.is_multiple_of(TIMED).then(Instant::now);
+        let begun = self.is_timed().then(Instant::now);
         let stepped = self.instance.do_step(time, length);
         if let Some(begun) = begun {
             self.spent += begun.elapsed();
@@ -227,8 +232,7 @@ impl Part {
         if !self.is_apart || self.failure.is_some() || self.ended.is_some() {
             return self.step(time, length);
         }
-        let is_timed = self.steps.is_multiple_of(TIMED);
-        if !self.instance.request_step(time, length, is_timed) {
+        if !self.instance.request_step(time, length, self.is_timed()) {
             return self.step(time, length);
         }
         self.is_requested = true;
@@ -246,7 +250,7 @@ impl Part {
 
     #[inline(never)]
     fn take_answer(&mut self) -> Result<(), MasterError> {
-        let is_timed = self.steps.is_multiple_of(TIMED);
+        let is_timed = self.is_timed();
         let stepped = self.instance.finish_step().map(|(progress, taken)| {
             if is_timed {
                 self.spent += Duration::try_from_secs_f64(taken).unwrap_or_default();
@@ -281,6 +285,11 @@ impl Part {
     fn wall(&self) -> f64 {
         let timed = self.steps.div_ceil(TIMED).max(1);
         self.spent.as_secs_f64() * f64::from(self.steps) / f64::from(timed)
+    }
+
+    /// Whether its next step is timed.
+    fn is_timed(&self) -> bool {
+        self.steps.is_multiple_of(TIMED)
     }
 
     fn is_due(&self, tick: usize) -> bool {
@@ -324,6 +333,14 @@ impl Simulation {
         &self.signals.numbers
     }
 
+    /// How often calls have travelled to other processes and back so far.
+    pub fn exchanges(&self) -> u64 {
+        let apart = self.parts.iter();
+        let of =
+            apart.filter_map(|part| Some((part.instance.process()?, part.instance.exchanges())));
+        of.collect::<HashMap<_, _>>().values().sum()
+    }
+
     /// Makes the outputs at the present tick known; due sampled components are called.
     ///
     /// # Errors
@@ -340,7 +357,11 @@ impl Simulation {
 
     /// Carries out all actions.
     fn perform(&mut self, at: Moment) -> Result<(), MasterError> {
-        for action in &mut self.actions {
+        let mut together = self.together.iter().filter(|_| at.calls).peekable();
+        for (index, action) in self.actions.iter_mut().enumerate() {
+            if let Some(steps) = together.next_if(|it| it.at == index) {
+                steps.request(at, &mut self.parts, &self.signals);
+            }
             action.perform(at, &mut self.parts, &mut self.signals, &self.names)?;
         }
         Ok(())

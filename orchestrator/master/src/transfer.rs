@@ -2,7 +2,7 @@
 //! afterwards.
 
 use super::signals::{Place, Signals};
-use fmi_import::{CallError, Datum, Instance, Kind, Variability, Variable};
+use fmi_import::{CallError, Datum, Instance, Kind, Linear, Variability, Variable};
 use fmi_system::Passage;
 
 type Outcome = Result<(), Box<CallError>>;
@@ -18,7 +18,18 @@ pub(super) struct Inputs {
 }
 
 /// References, values, and where which signal goes among them.
-type ForeseenInputs<'a> = (&'a [u32], &'a [f64], Vec<(usize, usize)>);
+type ForeseenInputs<'a> = (&'a [u32], &'a [f64], Vec<Driven>);
+
+/// A Float64 among the values that are set, and the number that drives it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Driven {
+    /// Its place among the values.
+    pub place: usize,
+    /// The number.
+    pub signal: usize,
+    /// What is done to it on its way.
+    pub change: Linear,
+}
 
 struct InputGroup {
     kind: Kind,
@@ -224,8 +235,8 @@ impl Inputs {
         Ok(())
     }
 
-    /// What is set where all of it is Float64 and taken as it is: the references, the values, and for each
-    /// driven value its place and signal; none otherwise.
+    /// What is set where all of it is Float64 and driven by numbers that are converted linearly; none
+    /// otherwise.
     pub(super) fn foreseen(&self) -> Option<ForeseenInputs<'_>> {
         let plain = !self.is_discrete && self.exact.is_empty() && self.groups.len() <= 1;
         if !plain {
@@ -234,17 +245,35 @@ impl Inputs {
         let Some(group) = self.groups.first() else {
             return Some((&[], &[], Vec::new()));
         };
-        if group.kind != Kind::Float64 || !group.sources.is_empty() {
+        if group.kind != Kind::Float64 || !group.sources.iter().all(InputSource::is_linear) {
             return None;
         }
-        let copies = group.copies.iter();
-        let copied = copies.flat_map(|it| (0..it.count).map(|at| (it.place + at, it.signal + at)));
-        let smooth = group.smooth.iter().map(|it| (it.place, it.signal));
-        Some((
-            &group.references,
-            &group.values,
-            copied.chain(smooth).collect(),
-        ))
+        Some((&group.references, &group.values, group.driven().collect()))
+    }
+
+    /// The Float64 that are driven by numbers which are converted linearly.
+    pub(super) fn driven(&self) -> impl Iterator<Item = Driven> + '_ {
+        let mut groups = self.groups.iter();
+        let real = groups.find(|group| group.kind == Kind::Float64);
+        real.into_iter().flat_map(InputGroup::driven)
+    }
+
+    /// The numbers that drive it otherwise.
+    pub(super) fn others(&self) -> impl Iterator<Item = usize> + '_ {
+        self.groups.iter().flat_map(|group| {
+            let is_real = group.kind == Kind::Float64;
+            let plain = group.driven().filter(move |_| !is_real);
+            let sources = group.sources.iter();
+            let mapped = sources.filter(|it| it.passage.linear().is_none());
+            let plain = plain.map(|driven| driven.signal);
+            plain.chain(mapped.filter_map(InputSource::number))
+        })
+    }
+
+    /// Whether all is set without an event, and none of it is of a type that a number does not hold.
+    pub(super) fn is_plain(&self, instance: &Instance) -> bool {
+        let waits = self.is_discrete && instance.has_events();
+        self.exact.is_empty() && !waits
     }
 
     /// The numbers that drive it.
@@ -321,6 +350,26 @@ impl Inputs {
 }
 
 impl InputGroup {
+    /// What is driven by a number that is converted linearly.
+    fn driven(&self) -> impl Iterator<Item = Driven> + '_ {
+        let plain = |(place, signal)| Driven {
+            place,
+            signal,
+            change: Linear::NOTHING,
+        };
+        let copies = self.copies.iter();
+        let copied = copies.flat_map(|it| (0..it.count).map(|at| (it.place + at, it.signal + at)));
+        let smooth = self.smooth.iter().map(|it| (it.place, it.signal));
+        let others = self.sources.iter().filter_map(|it| {
+            Some(Driven {
+                place: it.place,
+                signal: it.number()?,
+                change: it.passage.linear()?,
+            })
+        });
+        copied.chain(smooth).map(plain).chain(others)
+    }
+
     /// Lets a signal drive the value that is added next.
     fn drive(&mut self, drive: &Drive) {
         let place = self.values.len();
@@ -368,6 +417,10 @@ impl InputGroup {
 }
 
 impl InputSource {
+    fn is_linear(&self) -> bool {
+        self.number().is_some() && self.passage.linear().is_some()
+    }
+
     #[inline]
     fn number(&self) -> Option<usize> {
         match self.signal {
@@ -420,6 +473,13 @@ impl Outputs {
     /// Whether it gives values that numbers do not hold.
     pub(super) fn has_exact(&self) -> bool {
         !self.exact.is_empty()
+    }
+
+    /// The Float64 that it gives: references, first signal and how many values there are.
+    pub(super) fn reals(&self) -> Option<(&[u32], usize, usize)> {
+        let mut all = self.readings();
+        let real = all.find(|(kind, ..)| **kind == Kind::Float64);
+        real.map(|(_, references, first, count)| (references, first, count))
     }
 
     /// The numbers that it gives.

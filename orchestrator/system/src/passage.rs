@@ -1,7 +1,7 @@
 //! What is done to a value on its way along a connection: conversions between units, and the
 //! transformations that a file gives.
 
-use fmi_import::{BaseUnit, Kind};
+use fmi_import::{BaseUnit, Kind, Linear};
 use units::Unit;
 
 /// A unit that a file names, and what it is in SI where the file says so.
@@ -71,12 +71,19 @@ impl Passage {
             let found = self.map.iter().find(|(from, _)| *from == value);
             return found.map_or(value, |(_, to)| *to);
         }
-        let value = self.factor * value;
-        // A sum with nothing would turn -0 into 0.
-        if self.offset == 0.0 {
-            value
-        } else {
-            value + self.offset
+        self.linear_part().of(value)
+    }
+
+    /// Factor and offset alone; none where values are mapped.
+    #[must_use]
+    pub fn linear(&self) -> Option<Linear> {
+        self.map.is_empty().then(|| self.linear_part())
+    }
+
+    fn linear_part(&self) -> Linear {
+        Linear {
+            factor: self.factor,
+            offset: self.offset,
         }
     }
 }

@@ -16,6 +16,7 @@ mod events;
 mod failures;
 mod fault_table;
 mod figures;
+mod group;
 mod hostile;
 mod installation;
 mod iteration;

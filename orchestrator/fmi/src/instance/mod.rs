@@ -271,6 +271,11 @@ impl Instance {
         self.process
     }
 
+    /// How often calls have travelled to that process and back, those of its other FMUs among them.
+    pub fn exchanges(&self) -> u64 {
+        self.endpoint.exchanges()
+    }
+
     /// What the FMU logged since this was last asked.
     pub fn take_messages(&self) -> Vec<Message> {
         self.messages.take()

@@ -1,7 +1,7 @@
 //! Steps, and events at communication points.
 
-use super::super::FmiVersion;
 use super::super::call::{Call, Foreseen, Function, Lost, MEASURED, Stepped, Wire};
+use super::super::{FmiVersion, Kind};
 use super::{Instance, Outcome, Phase};
 
 /// How a step ended.
@@ -41,19 +41,46 @@ impl Instance {
         self.endpoint.request(&call)
     }
 
+    /// As [`Instance::request_step`], of a step before which inputs have just been set that are not all known
+    /// yet. `wires` lead to the Float64 among them from what is read right after earlier steps that travel
+    /// along. The inputs are set again before [`Instance::finish_step`], when they are known. `read`: the Float64
+    /// variables that are read after the step, and how many values they have. Gives the number of that
+    /// reading, itself none where it does not travel along; none where [`Instance::do_step`] has to be
+    /// called.
+    pub fn request_wired_step(
+        &mut self,
+        (time, step, measured): (f64, f64, bool),
+        wires: &[Wire],
+        read: (&[u32], usize),
+    ) -> Option<Option<usize>> {
+        self.time = time;
+        let mut call = Call::plain(Function::DoStep);
+        call.numbers = [time, step, 0.0];
+        call.flags[MEASURED] = measured;
+        self.endpoint.request_wired(&call, wires, read)
+    }
+
+    /// Whether all that was set has reached the FMU, and no step been requested whose outcome is not known.
+    pub fn is_settled(&self) -> bool {
+        self.endpoint.is_settled()
+    }
+
     /// Notes that after each step the Float64 variables `set` will be set, to `values` or along `wires` from
-    /// readings noted before in the same process, and `count` values of `read` be read. Gives the number
-    /// of the reading; none where the instance is not in another process, or nothing is gained.
+    /// readings noted before in the same process. Then `count` values of `read` will be read, which are of type
+    /// `kind`. Gives the number of the reading; none where the instance is not in another process, or nothing
+    /// is gained.
     pub fn foresee(
         &mut self,
         (set, values, wires): (&[u32], &[f64], &[Wire]),
-        (read, count): (&[u32], usize),
+        (kind, read, count): (&Kind, &[u32], usize),
     ) -> Option<usize> {
+        let scalar = self.scalar(kind);
         self.endpoint.foresee(&Foreseen {
             set,
             values,
             wires,
             read,
+            scalar,
             count,
         })
     }

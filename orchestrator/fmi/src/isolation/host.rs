@@ -12,7 +12,8 @@ use super::super::native::Sink;
 use super::frame::Frame;
 use super::leftovers::{self, Mark};
 use super::listen::{Sinks, listen};
-use super::program::{Answered, Program};
+use super::program::Program;
+use super::requests::Requests;
 use super::turn::{GUEST, HOST, Patience, take_short_turns};
 use super::{COMMAND, parcel};
 
@@ -24,50 +25,25 @@ const FAREWELL: Duration = Duration::from_millis(500);
 const LAST_WORDS: Duration = Duration::from_millis(500);
 /// Messages that are passed on after a call; an FMU may log faster than anybody can read.
 const MESSAGES: usize = 10_000;
-/// Bytes of steps that travel together.
-const MOST_REQUESTS: usize = 512 << 10;
 
 /// A guest process with FMUs in it.
 pub(in super::super) struct Host {
     child: Child,
     /// The guest ends when it closes.
     stdin: Option<ChildStdin>,
-    frame: Frame,
+    pub(super) frame: Frame,
     patience: Patience,
     /// What the processes that FMUs start inherit.
     mark: Mark,
     limit: Duration,
-    sinks: Sinks,
+    pub(super) sinks: Sinks,
     readers: Vec<JoinHandle<()>>,
     /// What became of the guest, once it is gone.
-    gone: Option<String>,
-    requests: Requests,
+    pub(super) gone: Option<String>,
+    pub(super) requests: Requests,
+    /// How often the guest had its turn.
+    pub(super) exchanges: u64,
     pub(super) program: Program,
-}
-
-/// Steps of several instances that travel together.
-#[derive(Default)]
-struct Requests {
-    /// Their parcels, as they are sent and as they came back.
-    sent: Vec<u8>,
-    answers: Vec<u8>,
-    are_sent: bool,
-    /// Those whose outcome nobody has fetched.
-    open: usize,
-    /// Where the last parcel begins that was carried out, or begun.
-    last: usize,
-    /// The loss after which there are no more answers.
-    lost: Option<Lost>,
-}
-
-/// A step among those that travel together: its parcels, first what is set before it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Request {
-    begin: usize,
-    /// The step itself, among the parcels.
-    step: usize,
-    end: usize,
-    instance: u32,
 }
 
 /// What came of several calls that travelled together.
@@ -135,6 +111,7 @@ impl Host {
             readers: readers.into_iter().flatten().collect(),
             gone: None,
             requests: Requests::default(),
+            exchanges: 0,
             program: Program::default(),
         };
         take_short_turns();
@@ -204,146 +181,8 @@ impl Host {
         read(self.frame.room(), before.len(), call, after)
     }
 
-    /// Takes a step that shall travel with others: what is set before, the step, what is read after it.
-    /// None where it has to be called. Where FMUs print each is called by itself, so that their lines
-    /// bear their names.
-    pub(super) fn request(
-        &mut self,
-        instance: u32,
-        before: &[u8],
-        call: &Call,
-        after: &[u8],
-    ) -> Option<Request> {
-        self.program.forget(instance);
-        let requests = &mut self.requests;
-        if requests.are_sent && requests.open == 0 {
-            requests.sent.clear();
-            requests.are_sent = false;
-        }
-        let begin = requests.sent.len();
-        let is_full = begin + before.len() + parcel::size(call) + after.len() > MOST_REQUESTS;
-        if requests.are_sent
-            || is_full
-            || self.gone.is_some()
-            || self.sinks.heard.load(Ordering::Relaxed)
-        {
-            return None;
-        }
-        requests.sent.extend_from_slice(before);
-        parcel::append(&mut requests.sent, instance, call);
-        requests.sent.extend_from_slice(after);
-        requests.open += 1;
-        Some(Request {
-            begin,
-            step: begin + before.len(),
-            end: requests.sent.len(),
-            instance,
-        })
-    }
-
-    /// The outcome of a step that was requested; `after` is replaced by what was read after it, or emptied.
-    pub(super) fn answer(
-        &mut self,
-        request: Request,
-        call: &mut Call,
-        after: &mut Vec<u8>,
-    ) -> Answer {
-        self.send_requests();
-        self.requests.open = self.requests.open.saturating_sub(1);
-        let Request {
-            begin,
-            step,
-            end,
-            instance,
-        } = request;
-        let requests = &mut self.requests;
-        let (last, sent) = (requests.last, begin..end);
-        if last < begin {
-            // One before did not go well.
-            if let Some(lost) = &requests.lost {
-                return Answer::Called(Err(lost.clone()));
-            }
-            let sent = requests.sent[sent].to_vec();
-            self.requests.lost = self.exchange(instance, &sent).err();
-            self.keep_answers(begin, sent.len());
-        }
-        let requests = &self.requests;
-        if let Some(lost) = requests.lost.clone().filter(|_| requests.last < end) {
-            let parcel = requests.answers.get(requests.last..end);
-            return match parcel
-                .filter(|_| requests.last != step)
-                .and_then(parcel::head)
-            {
-                Some(head) => {
-                    let size = head.size as usize;
-                    Answer::Other(
-                        requests.answers[requests.last..][..size].to_vec(),
-                        Err(lost),
-                    )
-                }
-                None => Answer::Called(Err(lost)),
-            };
-        }
-        read(&requests.answers[begin..], step - begin, call, after)
-    }
-
-    /// Keeps what came of the first `length` bytes that were sent, those of the requests from `begin` on.
-    fn keep_answers(&mut self, begin: usize, length: usize) {
-        let last = self.frame.began_at().min(length);
-        let room = self.frame.room();
-        // What did not go well may have taken more room to say why.
-        let end = length.max(last + parcel::answered(&room[last..]));
-        let answers = &mut self.requests.answers;
-        answers.resize(begin, 0);
-        answers.extend_from_slice(&room[..end.min(room.len())]);
-        self.requests.last = begin + last;
-    }
-
-    /// Answers a call from what was read after the steps, where it was.
-    pub(super) fn foreseen(
-        &mut self,
-        instance: u32,
-        kept: &[u8],
-        call: &mut Call,
-    ) -> Option<Result<i32, Lost>> {
-        if !self.requests.are_sent {
-            return None;
-        }
-        match self.program.answer(instance, kept, call) {
-            Answered::No => None,
-            Answered::Yes(status) => Some(Ok(status)),
-            Answered::Lost(lost) => Some(Err(lost)),
-        }
-    }
-
-    /// A step that was requested will not be fetched.
-    pub(super) fn forget_request(&mut self) {
-        self.requests.open = self.requests.open.saturating_sub(1);
-    }
-
-    /// Sends the steps that wait.
-    fn send_requests(&mut self) {
-        if self.requests.are_sent || self.requests.sent.is_empty() {
-            return;
-        }
-        let mut requests = std::mem::take(&mut self.requests);
-        let first = parcel::head(&requests.sent).map_or(0, |head| head.instance);
-        let length = requests.sent.len();
-        // What is read after the steps goes with them, and is no request.
-        requests.sent.extend_from_slice(self.program.bytes());
-        requests.lost = self.exchange(first, &requests.sent).err();
-        requests.are_sent = true;
-        let (whole, lost) = (requests.sent.len(), requests.lost.clone());
-        requests.sent.truncate(length);
-        self.requests = requests;
-        self.keep_answers(0, length);
-        let last = self.frame.began_at().checked_sub(length);
-        let answers = &self.frame.room()[length..whole];
-        self.program.take(answers, last, lost);
-    }
-
     /// Lets the guest carry out calls, and waits for it.
-    fn exchange(&mut self, instance: u32, parcels: &[u8]) -> Result<(), Lost> {
+    pub(super) fn exchange(&mut self, instance: u32, parcels: &[u8]) -> Result<(), Lost> {
         if let Some(gone) = &self.gone {
             return Err(is_gone(gone));
         }
@@ -357,6 +196,7 @@ impl Host {
         self.sinks
             .current
             .store(instance as usize, Ordering::Relaxed);
+        self.exchanges += 1;
         self.frame.turn().give(GUEST);
         let done = self.wait(self.limit);
         self.hear();
@@ -473,7 +313,7 @@ impl Drop for Host {
 }
 
 /// What came of the calls in `room`, of which the one that was asked for begins at `place`.
-fn read(room: &[u8], place: usize, call: &mut Call, after: &mut Vec<u8>) -> Answer {
+pub(super) fn read(room: &[u8], place: usize, call: &mut Call, after: &mut Vec<u8>) -> Answer {
     let strange = || Answer::Called(Err(Lost("received an answer out of order".to_string())));
     let mut at = 0;
     while at < place {
@@ -499,10 +339,12 @@ fn read(room: &[u8], place: usize, call: &mut Call, after: &mut Vec<u8>) -> Answ
     }
     let next = place + head.size as usize;
     let answer = &room[next..(next + after.len()).min(room.len())];
+    let went_well = |(at, head): (usize, parcel::Head)| {
+        matches!(parcel::outcome(&answer[at..], &head), Ok(0 | 1))
+    };
     let is_sound = matches!(outcome, Ok(0 | 1))
         && answer.len() == after.len()
-        && parcel::head(answer)
-            .is_some_and(|head| matches!(parcel::outcome(answer, &head), Ok(0 | 1)));
+        && parcel::all(answer).all(went_well);
     match is_sound {
         true => after.copy_from_slice(answer),
         false => after.clear(),

@@ -14,6 +14,7 @@ mod listen;
 mod parcel;
 mod program;
 mod remote;
+mod requests;
 mod ring;
 mod turn;
 

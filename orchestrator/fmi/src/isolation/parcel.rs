@@ -108,6 +108,16 @@ pub(super) fn values_of(head: &Head) -> usize {
     head.values_at()
 }
 
+/// Whether the calls in `bytes` are those in `other`, whatever came of them.
+pub(super) fn are_alike(bytes: &[u8], other: &[u8]) -> bool {
+    let said = |head: &Head| (head.size, head.function, head.instance, head.references);
+    bytes.len() == other.len()
+        && all(bytes).zip(all(other)).all(|((at, one), (_, two))| {
+            let content = at + HEAD..at + one.size as usize;
+            said(&one) == said(&two) && bytes[content.clone()] == other[content]
+        })
+}
+
 /// How many bytes a call takes.
 pub(super) fn size(call: &Call) -> usize {
     Head::new(0, call).size as usize
@@ -176,6 +186,23 @@ pub(super) fn references(bytes: &[u8], head: &Head) -> Vec<u32> {
         .chunks_exact(4)
         .map(|four| u32::from_ne_bytes([four[0], four[1], four[2], four[3]]))
         .collect()
+}
+
+/// Whether the references of a parcel are those.
+pub(super) fn are_references(bytes: &[u8], head: &Head, references: &[u32]) -> bool {
+    let own = bytes.get(HEAD..HEAD + 4 * head.references as usize);
+    own == Some(bytemuck::cast_slice(references))
+}
+
+/// Each parcel in `bytes`: where it begins, and its head.
+pub(super) fn all(bytes: &[u8]) -> impl Iterator<Item = (usize, Head)> {
+    let mut next = 0;
+    std::iter::from_fn(move || {
+        let at = next;
+        let head = head(bytes.get(at..)?)?;
+        next += head.size as usize;
+        Some((at, head))
+    })
 }
 
 /// In the guest: carries out the parcel at the beginning of `bytes` by `endpoint` and writes what
@@ -316,7 +343,10 @@ pub(super) fn give_back(bytes: &[u8], head: &Head, call: &mut Call) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Call, Function, HEAD, Lost, Values, answered, append, carry_out, head, outcome};
+    use super::super::super::call::Scalar;
+    use super::{
+        Call, Function, HEAD, Lost, Values, answered, append, are_alike, carry_out, head, outcome,
+    };
 
     #[test]
     fn a_reason_longer_than_its_parcel_comes_back_whole() {
@@ -333,6 +363,27 @@ mod tests {
         assert_eq!(length, end + 600);
         let first = head(&bytes[..length]).unwrap();
         assert_eq!(outcome(&bytes[..length], &first), Err(reason));
+    }
+
+    #[test]
+    fn calls_are_alike_whatever_came_of_them() {
+        let set = |value: f64| {
+            let (mut bytes, value) = (Vec::new(), [value]);
+            let mut call = Call::plain(Function::Set(Scalar::Float64));
+            call.references = &[4];
+            call.values = Values::In(bytemuck::cast_slice(&value));
+            append(&mut bytes, 1, &call);
+            append(&mut bytes, 1, &Call::plain(Function::EnterStepMode));
+            bytes
+        };
+        let mut warned = set(2.5);
+        let first = head(&warned).unwrap();
+        let end = first.size as usize;
+        assert!(carry_out(&mut warned, end, &first, |_| Ok(1)));
+        assert!(warned != set(2.5) && are_alike(&warned, &set(2.5)));
+        assert!(!are_alike(&warned, &set(2.25)));
+        assert!(!are_alike(&warned, &set(2.5)[..end]));
+        assert!(!are_alike(&[], &set(2.5)));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 
 use bytemuck::{cast_slice, cast_slice_mut};
 
-use super::super::call::{AHEAD, Call, Foreseen, Function, Lost, Scalar, Values};
+use super::super::call::{AHEAD, Call, Foreseen, Function, Linear, Lost, Scalar, Values, Wire};
 use super::parcel;
 
 /// Steps in a row after which a program that nobody used is given up.
@@ -53,33 +53,22 @@ pub(super) enum Answered {
 impl Program {
     /// Adds a reading; gives its number, to which those that come later may refer.
     pub(super) fn add(&mut self, instance: u32, foreseen: &Foreseen) -> usize {
-        let begin = self.bytes.len();
         let mut values = vec![0.0; foreseen.count];
-        let mut get = Call::plain(Function::Get(Scalar::Float64));
+        let mut get = Call::plain(Function::Get(foreseen.scalar));
         get.references = foreseen.read;
         get.count = foreseen.count;
         get.values = Values::Out(cast_slice_mut(&mut values));
         get.flags[AHEAD] = true;
         let set = (!foreseen.set.is_empty()).then(|| {
-            // Pairs of places, from the beginning of their own parcel.
-            let mut moves = vec![0_i64; 2 * foreseen.wires.len()];
-            let mut wire = Call::plain(Function::Copy);
-            wire.values = Values::In(cast_slice(&moves));
-            let at = begin + parcel::size(&wire);
             let mut call = Call::plain(Function::Set(Scalar::Float64));
             call.references = foreseen.set;
             call.count = foreseen.values.len();
             call.values = Values::In(cast_slice(foreseen.values));
-            let into = at + parcel::values_at(&call);
-            for (pair, wire) in moves.chunks_exact_mut(2).zip(foreseen.wires) {
-                let from = self.reads.get(wire.reading).map_or(into, |it| it.values);
-                let place = |at: usize, element: usize| (at + 8 * element) as i64 - begin as i64;
-                pair[0] = place(from, wire.element);
-                pair[1] = place(into, wire.place);
-            }
-            let mut wire = Call::plain(Function::Copy);
-            wire.values = Values::In(cast_slice(&moves));
-            parcel::append(&mut self.bytes, instance, &wire);
+            let reads = &self.reads;
+            let from = |reading: usize| reads.get(reading).map(|it| it.values);
+            let into = parcel::values_at(&call);
+            lay(&mut self.bytes, instance, foreseen.wires, from, into);
+            let at = self.bytes.len();
             parcel::append(&mut self.bytes, instance, &call);
             at
         });
@@ -148,7 +137,7 @@ impl Program {
             head.function == call.function.number()
                 && head.count == call.count as u64
                 && matches!(&call.values, Values::Out(values) if values.len() as u64 == head.length)
-                && parcel::references(parcel, &head) == call.references
+                && parcel::are_references(parcel, &head, call.references)
         });
         let Some(head) = head.filter(|_| fits && set == kept) else {
             self.forget(instance);
@@ -168,27 +157,78 @@ impl Program {
     }
 }
 
-/// In the guest: copies numbers among the parcels of `room`, as the one at `at` says; a place outside is
+/// Bytes that describe a wire on its way to the guest: two places from the beginning of their parcel, factor
+/// and offset.
+const WIRE: usize = 32;
+
+/// Appends a parcel that lets values flow along wires: from the values of readings, which begin at
+/// `from(reading)` among `bytes`, to those of a call, which begin `into` bytes behind it.
+pub(super) fn lay(
+    bytes: &mut Vec<u8>,
+    instance: u32,
+    wires: &[Wire],
+    from: impl Fn(usize) -> Option<usize>,
+    into: usize,
+) {
+    let ends = wires.iter();
+    let ends = ends.filter_map(|wire| Some((from(wire.reading)? + 8 * wire.element, wire)));
+    let ends: Vec<(usize, &Wire)> = ends.collect();
+    if ends.is_empty() {
+        return;
+    }
+    let begin = bytes.len();
+    let mut call = Call::plain(Function::Copy);
+    let mut said = vec![[0_u64; WIRE / 8]; ends.len()];
+    call.values = Values::In(cast_slice(&said));
+    let into = begin + parcel::size(&call) + into;
+    for (said, (from, wire)) in said.iter_mut().zip(ends) {
+        let place = |at: usize| (at as u64).wrapping_sub(begin as u64);
+        let Linear { factor, offset } = wire.change;
+        *said = [
+            place(from),
+            place(into + 8 * wire.place),
+            factor.to_bits(),
+            offset.to_bits(),
+        ];
+    }
+    let mut call = Call::plain(Function::Copy);
+    call.values = Values::In(cast_slice(&said));
+    parcel::append(bytes, instance, &call);
+}
+
+/// In the guest: lets numbers flow among the parcels of `room`, as the one at `at` says; a place outside is
 /// passed over.
 pub(super) fn copy(room: &mut [u8], at: usize, head: &parcel::Head) {
     let begin = at + parcel::values_of(head);
-    for pair in 0..head.length as usize / 16 {
+    for wire in 0..head.length as usize / WIRE {
+        let said = |which: usize| {
+            let said = begin + WIRE * wire + 8 * which;
+            Some(u64::from_ne_bytes(
+                room.get(said..said + 8)?.try_into().ok()?,
+            ))
+        };
         let place = |which: usize| {
-            let said = begin + 16 * pair + 8 * which;
-            let by = i64::from_ne_bytes(room.get(said..said + 8)?.try_into().ok()?);
+            let by = said(which)?.cast_signed();
             let first = usize::try_from((at as i64).checked_add(by)?).ok()?;
             let end = first.checked_add(8)?;
             (end <= room.len()).then_some(first..end)
         };
-        if let (Some(from), Some(to)) = (place(0), place(1)) {
-            room.copy_within(from, to.start);
+        let flow = || {
+            let value = f64::from_ne_bytes(room[place(0)?].try_into().ok()?);
+            let change = Linear {
+                factor: f64::from_bits(said(2)?),
+                offset: f64::from_bits(said(3)?),
+            };
+            Some((place(1)?, change.of(value)))
+        };
+        if let Some((to, value)) = flow() {
+            room[to].copy_from_slice(&value.to_ne_bytes());
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::call::Wire;
     use super::*;
 
     /// In place of a guest whose FMUs give twice their input: carries out what it is sent, and gives where
@@ -222,13 +262,14 @@ mod tests {
         last
     }
 
-    fn chain() -> Program {
+    fn chain(change: Linear) -> Program {
         let mut program = Program::default();
         let first = Foreseen {
             set: &[],
             values: &[],
             wires: &[],
             read: &[7],
+            scalar: Scalar::Float64,
             count: 1,
         };
         let mut reading = program.add(0, &first);
@@ -237,6 +278,7 @@ mod tests {
                 reading,
                 element: 0,
                 place: 0,
+                change,
             };
             let next = Foreseen {
                 set: &[4],
@@ -272,7 +314,7 @@ mod tests {
 
     #[test]
     fn a_chain_is_read_behind_the_steps_and_answers_what_does_the_same() {
-        let mut program = chain();
+        let mut program = chain(Linear::NOTHING);
         let mut room = program.bytes().to_vec();
         let last = guest(&mut room, &mut [1.5, 0.0, 0.0], usize::MAX);
         program.take(&room, Some(last), None);
@@ -286,8 +328,36 @@ mod tests {
     }
 
     #[test]
+    fn values_are_converted_on_their_way_as_the_host_converts_them() {
+        let change = Linear {
+            factor: 1.0 / 0.0254,
+            offset: -0.1,
+        };
+        let mut program = chain(change);
+        let mut room = program.bytes().to_vec();
+        let last = guest(&mut room, &mut [1.5, 0.0, 0.0], usize::MAX);
+        program.take(&room, Some(last), None);
+        assert_eq!(asked(&mut program, 0, &[]), Some(3.0));
+        // By hand, each operation rounded.
+        let first = 3.0 * (1.0 / 0.0254) + -0.1;
+        let second = 2.0 * first * (1.0 / 0.0254) + -0.1;
+        let kept = settings(1, first);
+        assert_eq!(asked(&mut program, 1, &kept), Some(2.0 * first));
+        assert_eq!(
+            asked(&mut program, 2, &settings(2, second)),
+            Some(2.0 * second)
+        );
+        // Without an offset the sign of zero is kept.
+        let negative = Linear {
+            factor: 2.0,
+            offset: 0.0,
+        };
+        assert_eq!(negative.of(-0.0).to_bits(), (-0.0_f64).to_bits());
+    }
+
+    #[test]
     fn what_was_not_reached_or_refused_answers_nothing() {
-        let mut program = chain();
+        let mut program = chain(Linear::NOTHING);
         let mut room = program.bytes().to_vec();
         let until = program.reads[1].get;
         let last = guest(&mut room, &mut [1.5, 0.0, 0.0], until);
@@ -312,7 +382,7 @@ mod tests {
 
     #[test]
     fn a_program_that_nobody_uses_is_given_up() {
-        let mut program = chain();
+        let mut program = chain(Linear::NOTHING);
         for _ in 0..UNUSED {
             assert!(!program.bytes().is_empty());
         }

@@ -2,10 +2,13 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::super::call::{AHEAD, Call, Culprit, Endpoint, Foreseen, Function, Lost, Values};
+use super::super::call::{
+    AHEAD, Call, Culprit, Endpoint, Foreseen, Function, Lost, Scalar, Values, Wire,
+};
 use super::super::native::{Setup, Sink};
-use super::host::{Answer, Host, Request};
+use super::host::{Answer, Host};
 use super::parcel;
+use super::requests::Request;
 
 /// Bytes of settings that are kept until the next call that gives something.
 const KEPT: usize = 64 << 10;
@@ -25,50 +28,61 @@ pub(in super::super) struct Remote {
     request: Option<Request>,
 }
 
-/// What is read right after each step travels with the step: one way to the guest instead of two.
+/// What is read right after each step travels with the step: one way to the guest instead of several.
 #[derive(Default)]
 struct Ahead {
-    /// What was read right after the last step.
-    references: Vec<u32>,
-    /// That call as a parcel; empty where there was none.
+    /// The readings right after the last step, as parcels.
     habit: Vec<u8>,
-    /// The same with its answer after a step; empty where anything has been called since.
-    answer: Vec<u8>,
-    /// Nothing has been called since the last step.
+    /// The same with their answers; empty where anything else has been called since.
+    answers: Vec<u8>,
+    /// How many bytes of the habit have been asked for again since the last step.
+    asked: usize,
+    /// Nothing but these has been called since the last step.
     is_after_step: bool,
 }
 
 impl Ahead {
     /// Answers a call from what came with the step, where it did.
     fn answer(&mut self, call: &mut Call) -> Option<i32> {
-        let head = parcel::head(&self.answer)?;
+        let answer = self.answers.get(self.asked..)?;
+        let head = parcel::head(answer)?;
         let fits = head.function == call.function.number()
             && head.count == call.count as u64
-            && self.references == call.references
-            && matches!(&call.values, Values::Out(values) if values.len() as u64 == head.length);
+            && matches!(&call.values, Values::Out(values) if values.len() as u64 == head.length)
+            && parcel::are_references(answer, &head, call.references);
         if !fits {
             return None;
         }
-        parcel::give_back(&self.answer, &head, call);
+        parcel::give_back(answer, &head, call);
+        self.asked += head.size as usize;
         Some(head.status)
     }
 
-    /// Notes what is called after a step.
+    /// Notes what is called after a step, and what is no longer called.
     fn learn(&mut self, instance: u32, call: &Call) {
-        self.answer.clear();
-        let is_first = std::mem::take(&mut self.is_after_step);
-        if call.function == Function::DoStep || !is_first {
+        self.answers.clear();
+        if !self.is_after_step {
             return;
         }
-        self.habit.clear();
-        self.references.clear();
-        if matches!(call.function, Function::Get(_))
-            && matches!(&call.values, Values::Out(values) if values.len() < KEPT)
-        {
-            self.references.extend(call.references);
+        self.habit.truncate(self.asked);
+        self.is_after_step = matches!(call.function, Function::Get(_))
+            && matches!(&call.values, Values::Out(values) if values.len() + self.asked < KEPT);
+        if self.is_after_step {
             parcel::append(&mut self.habit, instance, call);
-            parcel::mark(&mut self.habit, AHEAD);
+            parcel::mark(&mut self.habit[self.asked..], AHEAD);
+            self.asked = self.habit.len();
         }
+    }
+
+    /// Where the values of a reading of Float64 begin among the parcels of the habit.
+    fn place_of(&self, references: &[u32], count: usize) -> Option<usize> {
+        let number = Function::Get(Scalar::Float64).number();
+        parcel::all(&self.habit).find_map(|(at, head)| {
+            let is_it = head.function == number
+                && head.count == count as u64
+                && parcel::are_references(&self.habit[at..], &head, references);
+            is_it.then(|| at + parcel::values_of(&head))
+        })
     }
 }
 
@@ -132,13 +146,11 @@ impl Endpoint for Remote {
             if self.kept.is_empty()
                 && let Some(status) = self.ahead.answer(call)
             {
-                self.ahead.answer.clear();
-                self.ahead.is_after_step = false;
                 return Ok(status);
             }
             self.ahead.learn(self.instance, call);
             if call.function == Function::DoStep {
-                after = std::mem::take(&mut self.ahead.answer);
+                after = std::mem::take(&mut self.ahead.answers);
                 after.extend_from_slice(&self.ahead.habit);
             }
         }
@@ -161,14 +173,45 @@ impl Endpoint for Remote {
         if self.is_foreseen {
             self.ahead.habit.clear();
         }
-        self.request = host.request(self.instance, &self.kept, call, &self.ahead.habit);
-        drop(host);
-        if self.request.is_none() {
-            return false;
-        }
         self.ahead.learn(self.instance, call);
-        self.kept.clear();
-        true
+        self.request = host.request(self.instance, &self.kept, call, &self.ahead.habit);
+        if self.request.is_some() {
+            self.kept.clear();
+        }
+        self.request.is_some()
+    }
+
+    fn request_wired(
+        &mut self,
+        call: &Call,
+        wires: &[Wire],
+        (references, count): (&[u32], usize),
+    ) -> Option<Option<usize>> {
+        if self.keeps {
+            self.ahead.learn(self.instance, call);
+            let set = Function::Set(Scalar::Float64).number();
+            let into = parcel::all(&self.kept).find(|(_, head)| head.function == set);
+            let into = into.map(|(at, head)| at + parcel::values_of(&head));
+            let habit = &self.ahead.habit;
+            let read = self.ahead.place_of(references, count);
+            let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+            let before = (&self.kept[..], into);
+            let requested = host.request_wired(self.instance, before, wires, call, (habit, read));
+            self.request = requested.map(|(request, _)| request);
+            // They are set again when all of them are known.
+            self.kept.clear();
+            return requested.map(|(_, reading)| reading);
+        }
+        None
+    }
+
+    fn exchanges(&self) -> u64 {
+        let host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
+        host.exchanges
+    }
+
+    fn is_settled(&self) -> bool {
+        self.keeps && self.kept.is_empty() && self.request.is_none()
     }
 
     fn foresee(&mut self, foreseen: &Foreseen) -> Option<usize> {
@@ -184,12 +227,18 @@ impl Endpoint for Remote {
         let Some(request) = self.request.take() else {
             return Err(Lost("was not requested".to_string()));
         };
-        let mut after = std::mem::take(&mut self.ahead.answer);
+        let mut after = std::mem::take(&mut self.ahead.answers);
         after.clear();
         after.extend_from_slice(&self.ahead.habit);
         let mut host = self.host.lock().unwrap_or_else(PoisonError::into_inner);
-        let answer = host.answer(request, call, &mut after);
+        let answer = match request.is_wired() {
+            true => host.answer_wired(request, &self.kept, call, &mut after),
+            false => host.answer(request, call, &mut after),
+        };
         drop(host);
+        if request.is_wired() {
+            self.kept.clear();
+        }
         self.came(answer, call, after)
     }
 }
@@ -197,7 +246,8 @@ impl Endpoint for Remote {
 impl Remote {
     /// The outcome of a call, with what was read after it.
     fn came(&mut self, answer: Answer, call: &mut Call, after: Vec<u8>) -> Result<i32, Lost> {
-        self.ahead.answer = after;
+        self.ahead.answers = after;
+        self.ahead.asked = 0;
         self.ahead.is_after_step = call.function == Function::DoStep;
         match answer {
             Answer::Called(outcome) => outcome,
