@@ -25,6 +25,17 @@ impl Variable<'_> {
     pub(super) fn reference(&self) -> Option<u64> {
         self.node.attribute("valueReference")?.trim().parse().ok()
     }
+
+    /// Whether its initial value is computed, by what it says or by the standards' defaults.
+    pub(super) fn is_computed_initially(&self) -> bool {
+        match self.initial {
+            Some(initial) => initial != "exact",
+            None => {
+                let may_be = ["output", "local", "calculatedParameter"].contains(&self.causality);
+                may_be && self.variability != "constant"
+            }
+        }
+    }
 }
 
 /// Checks the description's rules.

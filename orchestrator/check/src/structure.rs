@@ -55,6 +55,7 @@ pub(super) fn check(findings: &mut Findings, root: Node, all: &[Variable], is_se
             lists
         }
     };
+    initial_unknowns(findings, &lists, (all, &by_number), is_second);
     let mut listed: HashSet<u64> = HashSet::new();
     for (name, unknowns) in &lists {
         let mut seen: HashSet<u64> = HashSet::new();
@@ -102,6 +103,66 @@ pub(super) fn check(findings: &mut Findings, root: Node, all: &[Variable], is_se
             let place = findings.place(variable.node);
             let message = format!("the output `{}` is not in <ModelStructure>", variable.name);
             findings.error(&place, message);
+        }
+    }
+}
+
+/// The initial unknowns are those that the standards name (FMI 2.0, section 2.2.8; FMI 3.0, section 2.4.8):
+/// outputs, continuous states and their derivatives with initial approx or calculated, and calculated
+/// parameters. What clocks govern is none. Whether a clock itself is one is left open.
+fn initial_unknowns(
+    findings: &mut Findings,
+    lists: &[(&str, Vec<Node>)],
+    (all, by_number): (&[Variable], &HashMap<u64, &Variable>),
+    is_second: bool,
+) {
+    let (attribute, name, derivatives) = match is_second {
+        true => ("index", "InitialUnknowns", "Derivatives"),
+        false => (
+            "valueReference",
+            "InitialUnknown",
+            "ContinuousStateDerivative",
+        ),
+    };
+    let number = |node: &Node| node.attribute(attribute)?.trim().parse::<u64>().ok();
+    let unknowns = |name: &'static str| {
+        let named = lists.iter().filter(move |(list, _)| *list == name);
+        named.flat_map(move |(_, unknowns)| unknowns.iter().copied())
+    };
+    let mut states: HashSet<u64> = HashSet::new();
+    for number in unknowns(derivatives).filter_map(|node| number(&node)) {
+        states.insert(number);
+        let typed = by_number.get(&number).map(|derivative| derivative.typed);
+        let state = typed.and_then(|typed| typed.attribute("derivative"));
+        states.extend(state.and_then(|text| text.trim().parse::<u64>().ok()));
+    }
+    let listed: HashSet<u64> = unknowns(name).filter_map(|node| number(&node)).collect();
+    for (at, variable) in all.iter().enumerate() {
+        let own = match is_second {
+            true => Some(at as u64 + 1),
+            false => variable.reference(),
+        };
+        let Some(own) = own.filter(|_| variable.kind != "Clock") else {
+            continue;
+        };
+        let is_unknown = variable.causality == "calculatedParameter"
+            || variable.is_computed_initially()
+                && (states.contains(&own)
+                    || variable.causality == "output" && !variable.node.has_attribute("clocks"));
+        let (place, variable) = (findings.place(variable.node), variable.name);
+        match (is_unknown, listed.contains(&own)) {
+            (true, false) => {
+                let message = format!("`{variable}` is computed initially, but is not in <{name}>");
+                findings.error(&place, message);
+            }
+            (false, true) => {
+                let message = format!(
+                    "`{variable}` is in <{name}>; expected an output, state or derivative with initial approx or \
+                     calculated, or a calculated parameter"
+                );
+                findings.error(&place, message);
+            }
+            _ => {}
         }
     }
 }

@@ -19,7 +19,8 @@ const SECOND: &str = r#"<?xml version="1.0"?>
     <ScalarVariable name="y" valueReference="2" causality="output" initial="calculated"><Real unit="mm"/></ScalarVariable>
     <ScalarVariable name="k" valueReference="3" causality="output" variability="discrete"><Integer/></ScalarVariable>
   </ModelVariables>
-  <ModelStructure><Outputs><Unknown index="3"/><Unknown index="4"/></Outputs></ModelStructure>
+  <ModelStructure><Outputs><Unknown index="3"/><Unknown index="4"/></Outputs>
+    <InitialUnknowns><Unknown index="3" dependencies="1"/><Unknown index="4" dependencies=""/></InitialUnknowns></ModelStructure>
 </fmiModelDescription>
 "#;
 
@@ -34,7 +35,7 @@ const THIRD: &str = r#"<?xml version="1.0"?>
     <String name="s" valueReference="3" causality="parameter"><Start value="x"/></String>
     <Float64 name="y" valueReference="4" causality="output"/>
   </ModelVariables>
-  <ModelStructure><Output valueReference="4"/></ModelStructure>
+  <ModelStructure><Output valueReference="4"/><InitialUnknown valueReference="4" dependencies="1"/></ModelStructure>
 </fmiModelDescription>
 "#;
 
@@ -127,10 +128,12 @@ fn the_shape_of_fmi_2_is_checked() {
 
 #[test]
 fn what_must_be_held_is_missed() {
-    let bare = SECOND.replace(
-        "<ModelStructure><Outputs><Unknown index=\"3\"/><Unknown index=\"4\"/></Outputs></ModelStructure>",
-        "",
-    );
+    let bare = SECOND
+        .split("  <ModelStructure>")
+        .next()
+        .unwrap()
+        .to_string();
+    let bare = bare + "</fmiModelDescription>";
     let said = found(&bare);
     assert!(
         said.iter().any(|line| line.contains("ModelStructure")),
@@ -396,6 +399,73 @@ fn references_and_numbers_of_fmi_3_are_checked() {
             ),
         ],
     );
+}
+
+/// The lists are those that fmpy's `_validate_model_structure` accepts and refuses.
+#[test]
+fn initial_unknowns_are_those_that_the_standards_name() {
+    let one = |text: &str, expected: &[&str]| {
+        let said = found(text);
+        let is_meant = said.len() == 1 && expected.iter().all(|part| said[0].contains(part));
+        assert!(is_meant, "{said:#?} is not one of {expected:?}");
+    };
+    let missing = "is computed initially, but is not in <InitialUnknown";
+    one(
+        &SECOND.replace("<Unknown index=\"3\" dependencies=\"1\"/>", ""),
+        &["error", ":15: ", "`y`", missing],
+    );
+    one(
+        &THIRD.replace(
+            "<InitialUnknown valueReference=\"4\" dependencies=\"1\"/>",
+            "",
+        ),
+        &["error", ":10: ", "`y`", missing],
+    );
+    // An exact output, a parameter and what a clock governs are none.
+    let exact = SECOND.replace(
+        "initial=\"calculated\"><Real unit=\"mm\"/>",
+        "initial=\"exact\"><Real unit=\"mm\" start=\"0\"/>",
+    );
+    one(
+        &exact,
+        &["error", "`y` is in <InitialUnknowns>", "expected"],
+    );
+    let parameter = THIRD.replace(
+        "</ModelStructure>",
+        "<InitialUnknown valueReference=\"2\"/></ModelStructure>",
+    );
+    one(&parameter, &["error", "`n` is in <InitialUnknown>"]);
+    let clock = "<Clock name=\"c\" valueReference=\"5\" causality=\"input\" intervalVariability=\"triggered\"/>";
+    let clocked = THIRD
+        .replace(
+            "causality=\"output\"/>",
+            "causality=\"output\" variability=\"discrete\" clocks=\"5\"/>",
+        )
+        .replace(
+            "  </ModelVariables>",
+            &format!("  {clock}\n  </ModelVariables>"),
+        );
+    one(&clocked, &["error", "`y` is in <InitialUnknown>"]);
+    // States and derivatives where they are computed, and calculated parameters.
+    let state = "<Float64 name=\"x\" valueReference=\"5\" initial=\"exact\" start=\"1\"/>
+    <Float64 name=\"der\" valueReference=\"6\" derivative=\"5\"/>
+    <Float64 name=\"q\" valueReference=\"7\" causality=\"calculatedParameter\"/>
+  </ModelVariables>";
+    let moving = THIRD.replace("</ModelVariables>", state).replace(
+        "<InitialUnknown",
+        "<ContinuousStateDerivative valueReference=\"6\"/><InitialUnknown",
+    );
+    let said = found(&moving);
+    assert!(said.len() == 2, "{said:?}");
+    assert!(
+        said[0].contains("`der`") && said[1].contains("`q`"),
+        "{said:?}"
+    );
+    let known = moving.replace(
+        "</ModelStructure>",
+        "<InitialUnknown valueReference=\"6\"/><InitialUnknown valueReference=\"7\"/></ModelStructure>",
+    );
+    assert_eq!(found(&known), [""; 0]);
 }
 
 #[test]

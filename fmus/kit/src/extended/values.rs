@@ -131,160 +131,81 @@ pub unsafe fn set_float64<C: Extended>(
     }
 }
 
-pub unsafe fn get_uint64<C: Extended>(
-    handle: Handle,
-    references: *const ValueReference,
-    count: usize,
-    values: *mut u64,
-) -> Status {
-    unsafe {
-        entry::<C>(handle, "fmi3GetUInt64", |instance| {
-            let references = slice(references, count, "valueReferences")?;
-            let values = slice_mut(values, count, "values")?;
-            for (&reference, value) in references.iter().zip(values) {
-                match instance.now.component.place(reference) {
-                    Some((Place::Size(own), ..)) => *value = *own,
-                    _ => return Err(unknown::<C>(reference, "UInt64")),
-                }
+/// Functions that go through their references one by one: the name in the standard, the arrays with as many
+/// values, and what is done at each place.
+macro_rules! one_by_one {
+    ($(fn $name:ident($function:literal, $($array:ident: $pointer:ty = $open:ident $label:literal),+)
+       |$instance:ident, $reference:ident, $at:ident| $one:block)+) => {$(
+        pub unsafe fn $name<C: Extended>(
+            handle: Handle,
+            references: *const ValueReference,
+            count: usize,
+            $($array: $pointer),+
+        ) -> Status {
+            unsafe {
+                entry::<C>(handle, $function, |$instance| {
+                    let references = slice(references, count, "valueReferences")?;
+                    $(let $array = $open($array, count, $label)?;)+
+                    for ($at, &$reference) in references.iter().enumerate() $one
+                    Ok(())
+                })
             }
-            Ok(())
-        })
-    }
+        }
+    )+};
 }
 
-pub unsafe fn set_uint64<C: Extended>(
-    handle: Handle,
-    references: *const ValueReference,
-    count: usize,
-    values: *const u64,
-) -> Status {
-    unsafe {
-        entry::<C>(handle, "fmi3SetUInt64", |instance| {
-            let references = slice(references, count, "valueReferences")?;
-            let values = slice(values, count, "values")?;
-            for (&reference, value) in references.iter().zip(values) {
-                check(instance, reference)?;
-                match instance.now.component.place(reference) {
-                    Some((Place::Size(own), ..)) => *own = *value,
-                    _ => return Err(unknown::<C>(reference, "UInt64")),
-                }
-            }
-            Ok(())
-        })
+one_by_one! {
+    fn get_uint64("fmi3GetUInt64", values: *mut u64 = slice_mut "values") |instance, reference, at| {
+        match instance.now.component.place(reference) {
+            Some((Place::Size(own), ..)) => values[at] = *own,
+            _ => return Err(unknown::<C>(reference, "UInt64")),
+        }
     }
-}
 
-pub unsafe fn get_binary<C: Extended>(
-    handle: Handle,
-    references: *const ValueReference,
-    count: usize,
-    sizes: *mut usize,
-    values: *mut *const u8,
-) -> Status {
-    unsafe {
-        entry::<C>(handle, "fmi3GetBinary", |instance| {
-            let references = slice(references, count, "valueReferences")?;
-            let sizes = slice_mut(sizes, count, "valueSizes")?;
-            let values = slice_mut(values, count, "values")?;
-            for (at, &reference) in references.iter().enumerate() {
-                match fresh(instance, reference)? {
-                    Place::Binary(own) => (sizes[at], values[at]) = (own.len(), own.as_ptr()),
-                    _ => return Err(unknown::<C>(reference, "Binary")),
-                }
-            }
-            Ok(())
-        })
+    fn set_uint64("fmi3SetUInt64", values: *const u64 = slice "values") |instance, reference, at| {
+        check(instance, reference)?;
+        match instance.now.component.place(reference) {
+            Some((Place::Size(own), ..)) => *own = values[at],
+            _ => return Err(unknown::<C>(reference, "UInt64")),
+        }
     }
-}
 
-pub unsafe fn set_binary<C: Extended>(
-    handle: Handle,
-    references: *const ValueReference,
-    count: usize,
-    sizes: *const usize,
-    values: *const *const u8,
-) -> Status {
-    unsafe {
-        entry::<C>(handle, "fmi3SetBinary", |instance| {
-            let references = slice(references, count, "valueReferences")?;
-            let sizes = slice(sizes, count, "valueSizes")?;
-            let values = slice(values, count, "values")?;
-            for (at, &reference) in references.iter().enumerate() {
-                check(instance, reference)?;
-                let given = slice(values[at], sizes[at], "value")?;
-                match instance.now.component.place(reference) {
-                    Some((Place::Binary(own), ..)) => *own = given.to_vec(),
-                    _ => return Err(unknown::<C>(reference, "Binary")),
-                }
-                instance.now.stale = true;
-            }
-            Ok(())
-        })
+    fn get_binary("fmi3GetBinary", sizes: *mut usize = slice_mut "valueSizes", values: *mut *const u8 = slice_mut "values") |instance, reference, at| {
+        match fresh(instance, reference)? {
+            Place::Binary(own) => (sizes[at], values[at]) = (own.len(), own.as_ptr()),
+            _ => return Err(unknown::<C>(reference, "Binary")),
+        }
     }
-}
 
-pub unsafe fn get_clock<C: Extended>(
-    handle: Handle,
-    references: *const ValueReference,
-    count: usize,
-    values: *mut bool,
-) -> Status {
-    unsafe {
-        entry::<C>(handle, "fmi3GetClock", |instance| {
-            instance.require(&[Phase::Event])?;
-            let references = slice(references, count, "valueReferences")?;
-            let values = slice_mut(values, count, "values")?;
-            for (&reference, value) in references.iter().zip(values) {
-                match instance.now.component.place(reference) {
-                    Some((Place::Clock(own), Causality::Output, _)) => *value = *own,
-                    _ => return Err(unknown::<C>(reference, "output clock")),
-                }
-            }
-            Ok(())
-        })
+    fn set_binary("fmi3SetBinary", sizes: *const usize = slice "valueSizes", values: *const *const u8 = slice "values") |instance, reference, at| {
+        check(instance, reference)?;
+        let given = slice(values[at], sizes[at], "value")?;
+        match instance.now.component.place(reference) {
+            Some((Place::Binary(own), ..)) => *own = given.to_vec(),
+            _ => return Err(unknown::<C>(reference, "Binary")),
+        }
+        instance.now.stale = true;
     }
-}
 
-pub unsafe fn set_clock<C: Extended>(
-    handle: Handle,
-    references: *const ValueReference,
-    count: usize,
-    values: *const bool,
-) -> Status {
-    unsafe {
-        entry::<C>(handle, "fmi3SetClock", |instance| {
-            let references = slice(references, count, "valueReferences")?;
-            let values = slice(values, count, "values")?;
-            for (&reference, value) in references.iter().zip(values) {
-                check(instance, reference)?;
-                match instance.now.component.place(reference) {
-                    Some((Place::Clock(own), ..)) => *own = *value,
-                    _ => return Err(unknown::<C>(reference, "input clock")),
-                }
-            }
-            Ok(())
-        })
+    fn get_clock("fmi3GetClock", values: *mut bool = slice_mut "values") |instance, reference, at| {
+        instance.require(&[Phase::Event])?;
+        match instance.now.component.place(reference) {
+            Some((Place::Clock(own), Causality::Output, _)) => values[at] = *own,
+            _ => return Err(unknown::<C>(reference, "output clock")),
+        }
     }
-}
 
-pub unsafe fn get_interval<C: Extended>(
-    handle: Handle,
-    references: *const ValueReference,
-    count: usize,
-    intervals: *mut f64,
-    qualifiers: *mut i32,
-) -> Status {
-    unsafe {
-        entry::<C>(handle, "fmi3GetIntervalDecimal", |instance| {
-            let references = slice(references, count, "valueReferences")?;
-            let intervals = slice_mut(intervals, count, "intervals")?;
-            let qualifiers = slice_mut(qualifiers, count, "qualifiers")?;
-            for (at, &reference) in references.iter().enumerate() {
-                let interval = instance.now.component.interval(reference);
-                (intervals[at], qualifiers[at]) =
-                    interval.ok_or_else(|| unknown::<C>(reference, "clock with an interval"))?;
-            }
-            Ok(())
-        })
+    fn set_clock("fmi3SetClock", values: *const bool = slice "values") |instance, reference, at| {
+        check(instance, reference)?;
+        match instance.now.component.place(reference) {
+            Some((Place::Clock(own), ..)) => *own = values[at],
+            _ => return Err(unknown::<C>(reference, "input clock")),
+        }
+    }
+
+    fn get_interval("fmi3GetIntervalDecimal", intervals: *mut f64 = slice_mut "intervals", qualifiers: *mut i32 = slice_mut "qualifiers") |instance, reference, at| {
+        let interval = instance.now.component.interval(reference);
+        (intervals[at], qualifiers[at]) =
+            interval.ok_or_else(|| unknown::<C>(reference, "clock with an interval"))?;
     }
 }

@@ -88,20 +88,24 @@ impl Instance {
         alone: bool,
     ) -> Result<Self, FmuError> {
         let description = &fmu.description;
-        if description.interface == Interface::ScheduledExecution {
-            let reason = "it supports only scheduled execution: a real-time scheduler must call its \
-                parts, which a co-simulation cannot do";
-            return Err(refused(fmu, name, reason.to_string()));
-        }
+        let is_exchange = match description.interface {
+            Interface::CoSimulation => false,
+            Interface::ModelExchange => true,
+            Interface::ScheduledExecution => {
+                let reason = "it supports only scheduled execution: a real-time scheduler must call its \
+                    parts, which a co-simulation cannot do";
+                return Err(refused(fmu, name, reason.to_string()));
+            }
+        };
         let events = events::of(description);
         let mut events = events.map_err(|reason| refused(fmu, name, reason))?;
         let is_traced = processes.options().trace.is_some();
-        let mode = match description.interface {
-            Interface::CoSimulation | Interface::ScheduledExecution => Mode::CoSimulation {
+        let mode = match is_exchange {
+            false => Mode::CoSimulation {
                 events: events.clone(),
                 elsewhere: is_traced,
             },
-            Interface::ModelExchange => Mode::ModelExchange {
+            true => Mode::ModelExchange {
                 states: description.states,
                 indicators: description.event_indicators,
                 pairs: match description.directional_derivatives {
