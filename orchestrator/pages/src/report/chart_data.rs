@@ -115,29 +115,33 @@ pub(super) fn envelope(series: &Series, buckets: usize) -> Series {
 
 /// Little-endian 32-bit floats in base 64 (RFC 4648).
 fn base64_of_floats(values: impl Iterator<Item = f64>) -> String {
-    let bytes: Vec<u8> = values
-        .flat_map(|value| (value as f32).to_le_bytes())
-        .collect();
+    let mut bytes = Vec::with_capacity(4 * values.size_hint().0);
+    for value in values {
+        bytes.extend_from_slice(&(value as f32).to_le_bytes());
+    }
     base64(&bytes)
 }
 
 fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let bits = three
-            .iter()
-            .fold(0_u32, |bits, &byte| bits << 8 | u32::from(byte))
-            << (8 * (3 - three.len()));
-        for letter in 0..4 {
-            text.push(if letter <= three.len() {
-                char::from(LETTERS[(bits >> (18 - 6 * letter)) as usize & 63])
-            } else {
-                '='
-            });
-        }
+    let four = |[first, second, third]: [u8; 3]| {
+        let bits = u32::from_be_bytes([0, first, second, third]);
+        let letter = |shift: u32| LETTERS[(bits >> shift) as usize & 63];
+        [letter(18), letter(12), letter(6), letter(0)]
+    };
+    let mut text = Vec::with_capacity(bytes.len().div_ceil(3) * 4);
+    let threes = bytes.chunks_exact(3);
+    let rest = threes.remainder();
+    for three in threes {
+        text.extend_from_slice(&four([three[0], three[1], three[2]]));
     }
-    text
+    if let Some(&first) = rest.first() {
+        let mut last = four([first, rest.get(1).copied().unwrap_or(0), 0]);
+        last[rest.len() + 1..].fill(b'=');
+        text.extend_from_slice(&last);
+    }
+    // Letters of ASCII only.
+    String::from_utf8(text).unwrap_or_default()
 }
 
 #[cfg(test)]
