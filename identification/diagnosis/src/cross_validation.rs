@@ -37,6 +37,8 @@ const FINALISTS: usize = 6;
 /// standard deviations.
 const OTHER_STARTS: usize = 6;
 const APART: f64 = 2.0;
+/// Of them, those that are fitted to the end.
+const ENDED: usize = 3;
 /// Seed of those starts.
 pub const STARTS_SEED: u64 = 15;
 /// Steps of a first look, of a fit to the end, and of one that begins near its end.
@@ -100,8 +102,17 @@ fn settle<M: SimulatedModel>(
     least_squares(model, start, record, &Free::All, steps).map(Simulated::from)
 }
 
-/// The model with the effects of `start`, fitted to `record` to the end, with the standard deviations
-/// of all coordinates.
+/// The model with the effects of `start`, fitted to `record` to the end.
+pub fn settled<M: SimulatedModel>(model: &M, start: &Point, record: usize) -> Option<Point> {
+    least_squares(model, start, record, &Free::All, TO_THE_END).map(|found| found.point)
+}
+
+/// As [`settled`], in a few steps: what is far from the end then is of no use.
+pub fn looked<M: SimulatedModel>(model: &M, start: &Point, record: usize) -> Option<Point> {
+    least_squares(model, start, record, &Free::All, AGAIN).map(|found| found.point)
+}
+
+/// As [`settled`], with the standard deviations of all coordinates.
 pub fn refit<M: SimulatedModel>(
     model: &M,
     start: &Point,
@@ -150,9 +161,11 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         .filter(|point| point.effects.is_empty())
         .collect();
     looked.extend(opened(model, &begun, screen, LOOK));
-    let best = best_of(&looked)?;
-    // The look may have been at a part of the record only.
-    let ends: Vec<Simulated> = [first, best]
+    // The look may have been at a part of the record only, and how near it came tells little of where a fit ends.
+    looked.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    looked.truncate(ENDED);
+    looked.push(first);
+    let ends: Vec<Simulated> = looked
         .par_iter()
         .filter_map(|one| settle(model, &one.point, record, TO_THE_END))
         .collect();

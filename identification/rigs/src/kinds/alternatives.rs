@@ -3,15 +3,17 @@
 
 use super::PartReport;
 use super::confirmed::unfit;
+use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts};
-use super::readings::Crossed;
-use diagnosis::{Point, refit};
+use super::readings::{Crossed, NEEDED};
+use diagnosis::{Observer, Point, looked, refit, settled};
 use rayon::prelude::*;
 
 /// Logarithm of how much less likely a model is that does nearly as well.
 const NEARLY: f64 = 2.0;
 
-/// What the two parts ask for, each alone and both together; of effects that cannot be told apart one.
+/// What the two parts ask for, each alone and both together, of effects that cannot be told apart one; each also
+/// from the stated values of what vanished in it.
 pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Vec<Point> {
     let mut all: Vec<Point> = parts.iter().map(|part| part.point.clone()).collect();
     for (one, other) in [(0, 1), (1, 0)] {
@@ -26,6 +28,8 @@ pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Ve
             all.push(both);
         }
     }
+    let restored: Vec<Point> = all.iter().map(|own| measured.restored(own)).collect();
+    all.extend(restored);
     all
 }
 
@@ -36,6 +40,7 @@ pub(super) fn of_its_class<M: InParts>(
     measured: &M,
     point: &Point,
     crossed: Crossed,
+    observer: Observer<'_>,
 ) -> Vec<(Point, Crossed)> {
     let mut all = vec![(point.clone(), crossed)];
     let mut best = 0;
@@ -44,6 +49,9 @@ pub(super) fn of_its_class<M: InParts>(
         let others =
             (0..measured.candidates().len()).filter(|&i| !known(i) && measured.are_alike(i, own));
         for other in others {
+            if observer.is_over() {
+                break;
+            }
             let (base, against) = &all[best];
             let taken = base.effects[place].0;
             let candidate = &measured.candidates()[other];
@@ -89,6 +97,19 @@ pub(super) fn replaced(model: &Point, other: &Point) -> Option<(usize, usize)> {
     Some((own.0, new.0))
 }
 
+/// Nominal parameters, on all data, of models without one of those at `point` that fit nearly as well: what they
+/// differ by is not known.
+pub(super) fn nearly_without<M: InParts>(measured: &M, point: &Point) -> Vec<Vec<NamedValue>> {
+    let error = |point: &Point| measured.normalised_error(point, EVERYTHING).powi(2);
+    let most = NEEDED * error(point);
+    let all = (0..point.nuisance.len()).into_par_iter();
+    let near = all.filter_map(|i| {
+        let found = looked(measured, &measured.without(point, i)?, EVERYTHING)?;
+        (error(&found) < most).then(|| measured.parameters(&found, &[]))
+    });
+    near.collect()
+}
+
 /// What a model may go without.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Item {
@@ -118,12 +139,15 @@ pub(super) fn least_needed<M: InParts>(
     let idle: Vec<(Item, Point, Crossed)> = items
         .into_par_iter()
         .filter_map(|(item, left)| {
-            let errors = Crossed::of(measured, &left)?;
+            let errors = Crossed::looked(measured, &left)?;
+            if crossed.is_far_from(&errors) {
+                return None;
+            }
+            let errors = errors.settled(measured)?;
             // Where a part does not tell a parameter that the rig has, it may predict worse with it.
             let fits = || {
-                refit(measured, &left, EVERYTHING).is_some_and(|(found, _)| {
-                    measured.normalised_error(&found.point, EVERYTHING) < most
-                })
+                settled(measured, &left, EVERYTHING)
+                    .is_some_and(|found| measured.normalised_error(&found, EVERYTHING) < most)
             };
             let is_idle = !crossed.needs(&errors) && (matches!(item, Item::Effect(_)) || fits());
             is_idle.then_some((item, left, errors))
