@@ -110,6 +110,38 @@ pub(super) fn nearly_without<M: InParts>(measured: &M, point: &Point) -> Vec<Vec
     near.collect()
 }
 
+/// The model without any of the nominal parameters that a rig may lack, if none of them is needed: one after the
+/// other may not be missed where the rest has settled to make up for it.
+pub(super) fn simplest<M: InParts>(
+    measured: &M,
+    point: &Point,
+    crossed: &Crossed,
+    most: f64,
+) -> Option<(Point, Crossed)> {
+    let mut gone = 0;
+    let mut bare = point.clone();
+    for i in 0..point.nuisance.len() {
+        if let Some(without) = measured.without(&bare, i) {
+            (bare, gone) = (without, gone + 1);
+        }
+    }
+    if gone < 2 {
+        return None;
+    }
+    let mut stated = bare.clone();
+    for i in 0..stated.nuisance.len() {
+        let is_there = measured.block_of(i).is_none() && stated.nuisance[i] == point.nuisance[i];
+        stated.nuisance[i] = if is_there { 0.0 } else { stated.nuisance[i] };
+    }
+    let fits = [bare, stated].into_par_iter().filter_map(|start| {
+        let found = settled(measured, &start, EVERYTHING)?;
+        Some((measured.normalised_error(&found, EVERYTHING), found))
+    });
+    let (error, best) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let errors = Crossed::of(measured, &best)?;
+    (error < most && !crossed.needs(&errors)).then_some((best, errors))
+}
+
 /// What a model may go without.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Item {

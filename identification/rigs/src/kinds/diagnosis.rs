@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::alternatives::{Item, least_needed, nearly_without, of_its_class, proposals, replaced};
+use super::alternatives::{
+    Item, least_needed, nearly_without, of_its_class, proposals, replaced, simplest,
+};
 use super::cause::{Cause, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
     Confirmed, NominalFits, Refused, confirm, effects as named_values, lengths, needed, unfit,
@@ -258,6 +260,13 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let mut asked: Option<Vec<Item>> = None;
     let fitted = |own: &Confirmed| measured.normalised_error(&own.point, EVERYTHING);
     let mut most = AS_WELL * fitted(&confirmed);
+    if !observer.is_over()
+        && let Some((left, without)) = simplest(measured, &confirmed.point, &crossed, most)
+    {
+        findings.clear();
+        confirmed = confirm(measured, &nominal, &left, &mut refused, &mut findings)?;
+        crossed = without;
+    }
     while !observer.is_over()
         && let Some((left, without)) =
             least_needed(measured, &confirmed.point, &crossed, most, &mut asked)
