@@ -5,8 +5,7 @@
 //! valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
 //! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. Two lags in a row
 //! are nearer to a spool, and to a coil before a mass, than one and a delay. The command runs
-//! evenly from sample to sample, a delayed one by cubics through its samples; the linear equations are solved
-//! exactly, and what is not linear by steps.
+//! evenly from sample to sample; the linear equations are solved exactly, and what is not linear by steps.
 //!
 //! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
 
@@ -71,7 +70,8 @@ effects! {
         half_width: size("m", 3e-3, (0.0, 3.0)),
     } from [[0.02], [0.15]], like ["reduced_null_gain", "friction"];
     /// Friction of the table: beside the flow, `v + K b tanh(v / s)` (Armstrong-Hélouvry and others,
-    /// Automatica 30, 1994): with `s` at zero it moves beyond a position error of `b`.
+    /// Automatica 30, 1994): with `s` at zero it moves beyond a position error of `b`. With a resonance it
+    /// acts on the mass: `P v' = q - K b tanh(v / s) / 2d` for `P q' = w - v - 2d q`.
     friction: Friction {
         breakaway_error: size("m", 3e-3, (0.0, 3.0)),
         sliding_speed: shape("m/s", 0.02, 1.0),
@@ -280,15 +280,30 @@ impl Equations for ClosedLoopActuator {
             dead_band != 0.0 || null.reduction != 0.0 || asymmetry != 0.0 || compression != 0.0;
         let has_effect = has_effect || !inside.valves.is_empty();
         let is_linear = !has_effect && fastest == f64::INFINITY && !form.rubs;
-        let steps = if is_linear {
-            1.0
-        } else {
-            let most = gain * (1.0 + asymmetry.abs());
-            (sample * most / FINE).ceil().clamp(1.0, MOST_STEPS)
+        // A step ends where the delayed command bends.
+        let bend = delay - delay.floor();
+        let parts = [(0.0, bend), (bend, 1.0)].into_iter();
+        let parts: Vec<(f64, Step, usize)> = parts
+            .filter(|(from, to)| to - from > 1e-3)
+            .map(|(from, to)| {
+                let length = (to - from) * sample;
+                let steps = if is_linear {
+                    1.0
+                } else {
+                    let most = gain * (1.0 + asymmetry.abs());
+                    (length * most / FINE).ceil().clamp(1.0, MOST_STEPS)
+                };
+                (from, form.step(length / steps, sample), steps as usize)
+            })
+            .collect();
+        let last = loop_input.len() - 1;
+        let at = |place: f64| {
+            let place = (place - delay).max(0.0);
+            let before = (place as usize).min(last);
+            let share = (place - before as f64).min(1.0);
+            let after = (before + 1).min(last);
+            scale * (loop_input[before] * (1.0 - share) + loop_input[after] * share) + offset
         };
-        let step = form.step(sample / steps, sample);
-        let steps = steps as usize;
-        let arrived = |k: usize| scale * later(loop_input, k as f64 - delay) + offset;
         let now = Cell::new(0.0);
         // What the flow is beyond that of the linear loop.
         let beyond = |sent: f64| {
@@ -309,7 +324,7 @@ impl Equations for ClosedLoopActuator {
         let start = scale * first + offset;
         let mut state: State = [start, start, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         let mut shown = state[1];
-        let mut begin = arrived(0);
+        let mut begin = at(0.0);
         for (k, y) in out.iter_mut().enumerate() {
             let x = state[1];
             // Not `clamp`, which panics where a model has left the finite.
@@ -318,30 +333,19 @@ impl Equations for ClosedLoopActuator {
             if coupling != 0.0 {
                 *y += coupling * (command[k] - clean[k]);
             }
-            let end = arrived(k + 1);
-            let slope = (end - begin) / sample;
-            for part in 0..steps {
-                let passed = part as f64 * step.length;
-                now.set(k as f64 * sample + passed);
-                state = step.advance(state, begin + passed * slope, slope, beyond, &rub);
+            for (from, step, steps) in &parts {
+                let share = step.length / sample;
+                let end = at(k as f64 + from + *steps as f64 * share);
+                let slope = (end - begin) / (*steps as f64 * step.length);
+                for part in 0..*steps {
+                    let passed = part as f64 * step.length;
+                    now.set((k as f64 + from) * sample + passed);
+                    state = step.advance(state, begin + passed * slope, slope, beyond, &rub);
+                }
+                begin = end;
             }
-            begin = end;
         }
     }
-}
-
-/// `values` at a `place` between samples by the cubic through the nearest four; the first and the last ones go on.
-fn later(values: &[f64], place: f64) -> f64 {
-    let before = place.floor();
-    let f = place - before;
-    let at = |apart: f64| values[(before + apart).clamp(0.0, (values.len() - 1) as f64) as usize];
-    if f == 0.0 {
-        return at(0.0);
-    }
-    let ends = f * (f - 1.0) / 6.0;
-    let middle = (f + 1.0) * (f - 2.0) / 2.0;
-    at(0.0) * middle * (f - 1.0) - at(1.0) * middle * f
-        + ends * (at(2.0) * (f + 1.0) - at(-1.0) * (f - 2.0))
 }
 
 /// Samples per metre at the speed that the table keeps to where the command is faster; none without one.
@@ -441,9 +445,12 @@ struct Step {
     /// What it sends after the step of a flow beyond the linear one and of what friction takes.
     sent_of_beyond: f64,
     sent_of_rubbed: f64,
-    /// Whether there is friction, on the speed that the flow gives.
-    rubs: bool,
+    /// The state that is the speed on which friction acts, if there is friction.
+    rubbed_at: Option<usize>,
 }
+
+/// Damping of the resonance below which friction takes no more speed.
+const LEAST_DAMPING: f64 = 0.02;
 
 impl Loop {
     fn step(&self, length: f64, sample: f64) -> Step {
@@ -461,8 +468,13 @@ impl Loop {
                 0.0
             }
         };
+        let has_resonance = self.resonance > 1e-3 * sample;
         // Friction needs a speed to act on.
-        let least = if self.rubs { 0.1 * sample } else { 0.0 };
+        let least = if self.rubs && !has_resonance {
+            0.1 * sample
+        } else {
+            0.0
+        };
         let lag = 0.5 * self.loop_lag.max(least);
         let (command_pole, pole) = (pole(self.command_lag), pole(lag));
         let ahead = feedforward / gain;
@@ -484,7 +496,6 @@ impl Loop {
         let column = |i: usize| [0, 1, 2, 3, command, slope, beyond][i];
         let mut a = SMatrix::<f64, ALL, ALL>::zeros();
         let flow: [f64; 7] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| gain * s));
-        let has_resonance = self.resonance > 1e-3 * sample;
         // What the flow moves: the table itself, or the mass on the oil.
         let moved = if has_resonance { 5 } else { 1 };
         let share = if has_resonance {
@@ -511,10 +522,14 @@ impl Loop {
             a[(6, 6)] -= pole;
             a[(2, 6)] = pole;
             a[(2, 2)] = -pole;
-            a[(2, friction)] = pole;
+            if !has_resonance {
+                a[(2, friction)] = pole;
+            }
             a[(moved, 2)] += share;
         }
         if has_resonance {
+            // On the mass: what it takes of a steady speed is lost in the damping (a leak, a coil's resistance).
+            a[(4, friction)] = 0.5 * share / self.resonance_damping.max(LEAST_DAMPING);
             a[(1, 4)] = 1.0;
             a[(4, 5)] = share;
             a[(5, 4)] -= share;
@@ -537,7 +552,7 @@ impl Loop {
             sent,
             sent_of_beyond: sent_of(beyond),
             sent_of_rubbed: sent_of(friction),
-            rubs: self.rubs,
+            rubbed_at: self.rubs.then_some(if has_resonance { 4 } else { 2 }),
         }
     }
 }
@@ -571,16 +586,16 @@ impl Step {
         if let Some(beyond) = beyond {
             let now = beyond(sent(&state, command));
             let mut sends = sent(&after, command + self.length * slope) + now * self.sent_of_beyond;
-            if self.rubs {
-                let free = after[2] + now * beyond_column[2];
-                sends += self.sent_of_rubbed * rub(free, rubbed[2]);
+            if let Some(at) = self.rubbed_at {
+                let free = after[at] + now * beyond_column[at];
+                sends += self.sent_of_rubbed * rub(free, rubbed[at]);
             }
             let its_slope = (beyond(sends) - now) / self.length;
             add(&mut after, beyond_column, now);
             add(&mut after, slope_column, its_slope);
         }
-        if self.rubs {
-            let taken = rub(after[2], rubbed[2]);
+        if let Some(at) = self.rubbed_at {
+            let taken = rub(after[at], rubbed[at]);
             add(&mut after, rubbed, taken);
         }
         after
@@ -687,22 +702,6 @@ mod tests {
     }
 
     #[test]
-    fn a_delayed_command_is_the_smooth_one_between_samples() {
-        // At a sixteenth of the sampling rate; a straight line between samples is off by 1.9 %.
-        let wave = |place: f64| (std::f64::consts::TAU * place / 16.0).sin();
-        let samples: Vec<f64> = (0..64).map(|k| wave(f64::from(k))).collect();
-        for k in 2..1000 {
-            let place = 2.0 + 0.0573 * f64::from(k);
-            assert!(
-                (later(&samples, place) - wave(place)).abs() < 1.5e-3,
-                "{place}"
-            );
-        }
-        assert!((later(&samples, -3.5) - samples[0]).abs() < 1e-12);
-        assert!((later(&samples, 99.2) - samples[63]).abs() < 1e-12);
-    }
-
-    #[test]
     fn the_quick_tanh_is_the_library_s() {
         for k in -4000..4000 {
             let x = 0.01 * f64::from(k);
@@ -726,6 +725,68 @@ mod tests {
         let held: Vec<f64> = held.collect();
         let found = rail(&command, &held, &places).unwrap();
         assert!((found * most - 1.0).abs() < 1e-3, "{found}");
+    }
+
+    #[test]
+    fn friction_on_the_mass_of_a_motor_is_that_of_its_own_equations() {
+        // L i' = k (r - x) - R i - b v, m v' = b i - F tanh(v / s), by small steps of its own.
+        let (mass, resistance, inductance, constant) = (20.0, 1.0, 2e-3, 80.0);
+        let (gain, b, sliding_speed) = (30.0, 2e-4, 2e-3);
+        let force = b * gain * constant * constant / resistance;
+        let (rate, n, steps) = (200.0, 2000, 400);
+        let wave = |t: f64| 4e-3 * (4.0 * t).sin() + 2e-3 * (13.0 * t).sin();
+        let command: Vec<f64> = (0..n).map(|k| wave(k as f64 / rate)).collect();
+        let (mut current, mut x, mut v) = (0.0f64, 0.0f64, 0.0f64);
+        let h = 1.0 / rate / f64::from(steps);
+        let mut measured = Vec::new();
+        for k in 0..n {
+            measured.push(x);
+            let next = command[(k + 1).min(n - 1)];
+            for part in 0..steps {
+                let r = command[k] + (next - command[k]) * f64::from(part) / f64::from(steps);
+                let voltage = gain * constant * (r - x);
+                current += h * (voltage - resistance * current - constant * v) / inductance;
+                v += h * (constant * current - force * (v / sliding_speed).tanh()) / mass;
+                x += h * v;
+            }
+        }
+        let channels = vec![
+            (COMMAND, command.clone()),
+            (Channel::Displacement, vec![0.0; n]),
+        ];
+        let recording = Recording::new("motor", 1.0 / rate, channels).unwrap();
+        let recording =
+            RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
+        let resonance = (mass * inductance).sqrt() / constant;
+        let nominal = Nominal {
+            loop_gain: gain,
+            command_lag: 0.0,
+            scale: 1.0,
+            offset: 0.0,
+            command_delay: 0.0,
+            loop_lag: 0.0,
+            feedforward: 0.0,
+            integral: 0.0,
+            resonance,
+            resonance_damping: 0.5 * resonance * resistance / inductance,
+        };
+        let off = |breakaway_error: f64| {
+            let effects = Effects {
+                friction: Friction {
+                    breakaway_error,
+                    sliding_speed,
+                },
+                ..Effects::off().unwrap()
+            };
+            let mut out = vec![0.0; n];
+            let session = Session::default();
+            ClosedLoopActuator.simulate(&recording, &nominal, &effects, &session, &mut out);
+            let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
+            let size: f64 = measured.iter().map(|x| x * x).sum();
+            (errors.sum::<f64>() / size).sqrt()
+        };
+        assert!(off(b) < 3e-3, "{}", off(b));
+        assert!(off(0.0) > 0.03, "{}", off(0.0));
     }
 
     #[test]
