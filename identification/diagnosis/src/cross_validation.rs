@@ -37,6 +37,8 @@ const FINALISTS: usize = 6;
 /// standard deviations.
 const OTHER_STARTS: usize = 6;
 const APART: f64 = 2.0;
+/// How many of them beside one that an equation gives.
+const BESIDE: usize = 2;
 /// Of them, those that are fitted to the end.
 const ENDED: usize = 3;
 /// Seed of those starts.
@@ -130,8 +132,16 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         effects: Vec::new(),
     };
     let mut random = ChaCha8Rng::seed_from_u64(STARTS_SEED);
+    let screen = model.screen(record);
     let mut starts = vec![stated.clone()];
-    for _ in 0..OTHER_STARTS {
+    let estimated = model.estimated(screen);
+    let others = if estimated.is_some() {
+        BESIDE
+    } else {
+        OTHER_STARTS
+    };
+    starts.extend(estimated);
+    for _ in 0..others {
         let mut start = stated.clone();
         for (i, p) in start.nuisance.iter_mut().enumerate() {
             let off = random.random_range(-APART..APART);
@@ -144,7 +154,6 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         }
         starts.push(start);
     }
-    let screen = model.screen(record);
     let mut looked: Vec<Solution> = starts
         .par_iter()
         .filter_map(|start| least_squares(model, start, screen, &Free::All, LOOK))

@@ -106,6 +106,12 @@ pub trait SimulatedModel: Sync {
         Vec::new()
     }
 
+    /// The nominal model by an equation that is solved without a simulation, from which fits to `record` begin as
+    /// well.
+    fn estimated(&self, _record: usize) -> Option<Point> {
+        None
+    }
+
     /// Whole models with one effect at most from which fits to `record` begin as well, where `base` loses the
     /// motion.
     fn begun(&self, _base: &Point, _record: usize) -> Vec<Point> {

@@ -15,6 +15,7 @@ use nalgebra::SMatrix;
 use units::vocabulary;
 
 use super::hypotheses::Inside;
+use super::linear_loop::LinearLoop;
 use super::sensors::accelerometer_scale;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Begun, Cause, Equations, Natural, RigRecording};
@@ -178,6 +179,36 @@ impl Equations for ClosedLoopActuator {
             effect: Some(("speed_limit", vec![samples * recording.period()])),
         });
         begun.into_iter().collect()
+    }
+
+    fn estimated(
+        &self,
+        recording: &RigRecording,
+        places: &[usize],
+        nominal: &Nominal,
+    ) -> Option<Vec<f64>> {
+        // What an equation gives no sign of is small: no fit comes back from nothing.
+        const SMALL: f64 = 0.05;
+        let own = LinearLoop::of(recording, COMMAND, places)?;
+        let or_small = |value: f64, stated: f64| value.max(SMALL * stated);
+        let has_second = own.lag > 0.0 && own.second_lag > 0.0;
+        let resonance = own.second_lag.max(0.0).sqrt();
+        Some(vec![
+            own.gain,
+            nominal.command_lag,
+            own.scale,
+            nominal.offset,
+            own.delay,
+            or_small(if has_second { 0.0 } else { own.lag }, nominal.loop_lag),
+            or_small(own.feedforward, nominal.feedforward),
+            or_small(own.integral, nominal.integral),
+            or_small(resonance, nominal.resonance),
+            if has_second {
+                (0.5 * own.lag / resonance).clamp(0.05, 3.0)
+            } else {
+                nominal.resonance_damping
+            },
+        ])
     }
 
     fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause> {

@@ -434,6 +434,23 @@ impl SimulatedModel for Measured<'_> {
             .collect()
     }
 
+    fn estimated(&self, record: usize) -> Option<Point> {
+        let block = (0..self.blocks()).max_by_key(|&b| self.samples(record, b))?;
+        let recording = &self.measurement.recordings[block];
+        let stated: Vec<f64> = self.nominal.iter().map(|(value, _)| *value).collect();
+        let nominal = self
+            .rig
+            .estimated(recording, &self.places[record][block], &stated)?;
+        let own = Begun {
+            nominal,
+            session: vec![0.0; self.session.len()],
+            effect: None,
+        };
+        // From the stated point into bounds.
+        let there = self.point_of(&own, block)?;
+        Some(self.moved(&self.origin(), &there.nuisance))
+    }
+
     fn begun(&self, base: &Point, record: usize) -> Vec<Point> {
         if self.normalised_error(base, record) < SHAKY {
             return Vec::new();
