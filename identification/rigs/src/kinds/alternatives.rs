@@ -12,6 +12,9 @@ use rayon::prelude::*;
 /// Logarithm of how much less likely a model is that does nearly as well.
 const NEARLY: f64 = 2.0;
 
+/// Error after a few steps of a fit, over the most that it may be in the end, beyond which more of them change nothing.
+const ALMOST: f64 = 3.0;
+
 /// What the two parts ask for, each alone and both together, of effects that cannot be told apart one; each also
 /// from the stated values of what vanished in it.
 pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Vec<Point> {
@@ -133,11 +136,17 @@ pub(super) fn simplest<M: InParts>(
         let is_there = measured.block_of(i).is_none() && stated.nuisance[i] == point.nuisance[i];
         stated.nuisance[i] = if is_there { 0.0 } else { stated.nuisance[i] };
     }
-    let fits = [bare, stated].into_par_iter().filter_map(|start| {
-        let found = settled(measured, &start, EVERYTHING)?;
-        Some((measured.normalised_error(&found, EVERYTHING), found))
+    let error = |point: &Point| measured.normalised_error(point, EVERYTHING);
+    let near = [bare, stated].into_par_iter().filter_map(|start| {
+        let found = looked(measured, &start, EVERYTHING)?;
+        Some((error(&found), found))
     });
-    let (error, best) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (near, best) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    if near > ALMOST * most {
+        return None;
+    }
+    let best = settled(measured, &best, EVERYTHING)?;
+    let error = error(&best);
     let errors = Crossed::of(measured, &best)?;
     (error < most && !crossed.needs(&errors)).then_some((best, errors))
 }
