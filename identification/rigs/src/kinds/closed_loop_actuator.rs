@@ -311,22 +311,19 @@ impl Equations for ClosedLoopActuator {
             dead_band != 0.0 || null.reduction != 0.0 || asymmetry != 0.0 || compression != 0.0;
         let has_effect = has_effect || !inside.valves.is_empty();
         let is_linear = !has_effect && fastest == f64::INFINITY && !form.rubs;
-        // A step ends where the delayed command bends.
+        let steps = if is_linear {
+            1.0
+        } else {
+            let most = gain * (1.0 + asymmetry.abs());
+            (sample * most / FINE).ceil().clamp(1.0, MOST_STEPS)
+        };
+        let mut step = form.step(sample / steps, sample);
+        // A delayed command bends inside a step.
         let bend = delay - delay.floor();
-        let parts = [(0.0, bend), (bend, 1.0)].into_iter();
-        let parts: Vec<(f64, Step, usize)> = parts
-            .filter(|(from, to)| to - from > 1e-3)
-            .map(|(from, to)| {
-                let length = (to - from) * sample;
-                let steps = if is_linear {
-                    1.0
-                } else {
-                    let most = gain * (1.0 + asymmetry.abs());
-                    (length * most / FINE).ceil().clamp(1.0, MOST_STEPS)
-                };
-                (from, form.step(length / steps, sample), steps as usize)
-            })
-            .collect();
+        let (bent, before_bend) = ((bend * steps) as usize, (bend * steps).fract());
+        let rest = (1.0 - before_bend) * step.length;
+        step.bend = form.step(rest, sample).columns[SLOPE];
+        let steps = steps as usize;
         let last = loop_input.len() - 1;
         let at = |place: f64| {
             let place = (place - delay).max(0.0);
@@ -364,17 +361,31 @@ impl Equations for ClosedLoopActuator {
             if coupling != 0.0 {
                 *y += coupling * (command[k] - clean[k]);
             }
-            for (from, step, steps) in &parts {
-                let share = step.length / sample;
-                let end = at(k as f64 + from + *steps as f64 * share);
-                let slope = (end - begin) / (*steps as f64 * step.length);
-                for part in 0..*steps {
-                    let passed = part as f64 * step.length;
-                    now.set((k as f64 + from) * sample + passed);
-                    state = step.advance(state, begin + passed * slope, slope, beyond, &rub);
-                }
-                begin = end;
+            let k = k as f64;
+            let end = at(k + 1.0);
+            let middle = at(k + bend);
+            let slopes = [middle - begin, end - middle];
+            let later = slopes[1] / ((1.0 - bend) * sample);
+            let earlier = if bend > 0.0 {
+                slopes[0] / (bend * sample)
+            } else {
+                later
+            };
+            let mut command = begin;
+            for part in 0..steps {
+                now.set(k * sample + part as f64 * step.length);
+                let slope = if part <= bent { earlier } else { later };
+                let change = if part == bent { later - earlier } else { 0.0 };
+                let reached = command + step.length * slope + rest * change;
+                let course = Course {
+                    ends: [command, reached],
+                    slope,
+                    change,
+                };
+                state = step.advance(state, &course, beyond, &rub);
+                command = reached;
             }
+            begin = end;
         }
     }
 }
@@ -424,6 +435,7 @@ const WIDTH: usize = 8;
 /// The states, the command, its slope, the flow beyond the linear one, its slope and the speed that friction
 /// takes.
 const ALL: usize = STATES + 5;
+const SLOPE: usize = STATES + 1;
 
 /// The speed, times `share`, that friction takes over a step after which it would have been `free` without:
 /// implicit, so that it sticks with steps of any length.
@@ -478,6 +490,17 @@ struct Step {
     sent_of_rubbed: f64,
     /// The state that is the speed on which friction acts, if there is friction.
     rubbed_at: Option<usize>,
+    /// The state after the step for a command whose slope grows by one inside it.
+    bend: State,
+}
+
+/// The command over a step.
+struct Course {
+    ends: [f64; 2],
+    /// At the begin.
+    slope: f64,
+    /// What is added to the slope on the way.
+    change: f64,
 }
 
 /// Damping of the resonance below which friction takes no more speed.
@@ -584,19 +607,19 @@ impl Loop {
             sent_of_beyond: sent_of(beyond),
             sent_of_rubbed: sent_of(friction),
             rubbed_at: self.rubs.then_some(if has_resonance { 4 } else { 2 }),
+            bend: [0.0; WIDTH],
         }
     }
 }
 
 impl Step {
-    /// The state after the step for the command at its begin and its slope. `beyond` is the flow beyond the linear
-    /// one for what the controller sends; `rub` is what friction takes of a speed over a step.
+    /// The state after the step. `beyond` is the flow beyond the linear one for what the controller sends; `rub` is
+    /// what friction takes of a speed over a step.
     #[inline]
     fn advance(
         &self,
         state: State,
-        command: f64,
-        slope: f64,
+        course: &Course,
         beyond: Option<&impl Fn(f64) -> f64>,
         rub: &impl Fn(f64, f64) -> f64,
     ) -> State {
@@ -604,19 +627,24 @@ impl Step {
         let mut after: State = [0.0; WIDTH];
         for (j, column) in columns.iter().enumerate() {
             let value = match j {
-                STATES => command,
-                j if j > STATES => slope,
+                STATES => course.ends[0],
+                SLOPE => course.slope,
                 j => state[j],
             };
             add(&mut after, column, value);
         }
-        let sent = |state: &State, command: f64| -> f64 {
+        if course.change != 0.0 {
+            add(&mut after, &self.bend, course.change);
+        }
+        let sent = |state: &State, command: f64, slope: f64| -> f64 {
             let own: f64 = (0..4).map(|i| self.sent[i] * state[i]).sum();
             own + self.sent[4] * command + self.sent[5] * slope
         };
         if let Some(beyond) = beyond {
-            let now = beyond(sent(&state, command));
-            let mut sends = sent(&after, command + self.length * slope) + now * self.sent_of_beyond;
+            let [begin, end] = course.ends;
+            let now = beyond(sent(&state, begin, course.slope));
+            let mut sends =
+                sent(&after, end, course.slope + course.change) + now * self.sent_of_beyond;
             if let Some(at) = self.rubbed_at {
                 let free = after[at] + now * beyond_column[at];
                 sends += self.sent_of_rubbed * rub(free, rubbed[at]);
@@ -730,6 +758,51 @@ mod tests {
         assert!(last(0.0, 5.0, 0.0, 0.0).abs() < 1e-6);
         let slow = last(0.0, 0.0, 2.0, 0.0);
         assert!((slow - 0.5 * ramp[n - 1]).abs() < 0.01, "{slow}");
+    }
+
+    #[test]
+    fn a_command_that_bends_inside_a_step_is_followed_as_in_two_steps() {
+        let form = Loop {
+            gain: 30.0,
+            command_lag: 0.002,
+            loop_lag: 0.003,
+            feedforward: 0.4,
+            integral: 0.7,
+            resonance: 0.004,
+            resonance_damping: 0.3,
+            rubs: false,
+        };
+        let (length, share) = (0.01, 0.3);
+        let state: State = [1.0, -2.0, 0.5, 0.1, 3.0, -1.0, 2.0, 0.0];
+        let (slope, change) = (7.0, -11.0);
+        let bend = 1.0 + share * length * slope;
+        let end = bend + (1.0 - share) * length * (slope + change);
+        let straight = |ends: [f64; 2], slope: f64| Course {
+            ends,
+            slope,
+            change: 0.0,
+        };
+        let none = |_: f64, _: f64| 0.0;
+        let beyond: Option<&fn(f64) -> f64> = None;
+        let first = form.step(share * length, length);
+        let middle = first.advance(state, &straight([1.0, bend], slope), beyond, &none);
+        let second = form.step((1.0 - share) * length, length);
+        let course = straight([bend, end], slope + change);
+        let expected = second.advance(middle, &course, beyond, &none);
+        let mut whole = form.step(length, length);
+        whole.bend = second.columns[SLOPE];
+        let course = Course {
+            ends: [1.0, end],
+            slope,
+            change,
+        };
+        let found = whole.advance(state, &course, beyond, &none);
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!(
+                (found - expected).abs() < 1e-9 * expected.abs().max(1.0),
+                "{found} {expected}"
+            );
+        }
     }
 
     #[test]
