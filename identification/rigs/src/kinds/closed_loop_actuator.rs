@@ -32,6 +32,8 @@ const COMMAND: Channel = Channel::Other {
 /// The loop's gain times a step at most, where it is not linear, and the most steps of a sample.
 const FINE: f64 = 0.25;
 const MOST_STEPS: f64 = 64.0;
+/// The fewest where there is friction, which is even over a step.
+const RUBBED: f64 = 2.0;
 
 nominal_parameters! {
     /// K: speed over position error.
@@ -315,7 +317,8 @@ impl Equations for ClosedLoopActuator {
             1.0
         } else {
             let most = gain * (1.0 + asymmetry.abs());
-            (sample * most / FINE).ceil().clamp(1.0, MOST_STEPS)
+            let least = if form.rubs { RUBBED } else { 1.0 };
+            (sample * most / FINE).ceil().clamp(least, MOST_STEPS)
         };
         let mut step = form.step(sample / steps, sample);
         // A delayed command bends inside a step.
