@@ -14,6 +14,8 @@ const NEARLY: f64 = 2.0;
 
 /// Error after a few steps of a fit, over the most that it may be in the end, beyond which more of them change nothing.
 const ALMOST: f64 = 3.0;
+/// Error, over the output, that tells nothing of that: without noise a fit that is nearly there is far off.
+const LITTLE: f64 = 0.01;
 
 /// What the two parts ask for, each alone and both together, of effects that cannot be told apart one; each also
 /// from the stated values of what vanished in it.
@@ -142,7 +144,7 @@ pub(super) fn simplest<M: InParts>(
         Some((error(&found), found))
     });
     let (near, best) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    if near > ALMOST * most {
+    if near > (ALMOST * most).max(LITTLE) {
         return None;
     }
     let best = settled(measured, &best, EVERYTHING)?;

@@ -256,7 +256,6 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     // What else the data may mean: everything that is not needed for sure goes, the least needed first.
     let mut weighed: Vec<Weighed> = Vec::new();
-    let with_all = confirmed.clone();
     let mut asked: Option<Vec<Item>> = None;
     let fitted = |own: &Confirmed| measured.normalised_error(&own.point, EVERYTHING);
     let mut most = AS_WELL * fitted(&confirmed);
@@ -267,6 +266,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         confirmed = confirm(measured, &nominal, &left, &mut refused, &mut findings)?;
         crossed = without;
     }
+    let with_all = confirmed.clone();
     while !observer.is_over()
         && let Some((left, without)) =
             least_needed(measured, &confirmed.point, &crossed, most, &mut asked)
