@@ -37,6 +37,10 @@ const FINALISTS: usize = 6;
 /// standard deviations.
 const OTHER_STARTS: usize = 6;
 const APART: f64 = 2.0;
+/// How many of them beside one that an equation gives.
+const BESIDE: usize = 2;
+/// Of them, those that are fitted to the end.
+const ENDED: usize = 3;
 /// Seed of those starts.
 pub const STARTS_SEED: u64 = 15;
 /// Steps of a first look, of a fit to the end, and of one that begins near its end.
@@ -100,8 +104,17 @@ fn settle<M: SimulatedModel>(
     least_squares(model, start, record, &Free::All, steps).map(Simulated::from)
 }
 
-/// The model with the effects of `start`, fitted to `record` to the end, with the standard deviations
-/// of all coordinates.
+/// The model with the effects of `start`, fitted to `record` to the end.
+pub fn settled<M: SimulatedModel>(model: &M, start: &Point, record: usize) -> Option<Point> {
+    least_squares(model, start, record, &Free::All, TO_THE_END).map(|found| found.point)
+}
+
+/// As [`settled`], in a few steps: what is far from the end then is of no use.
+pub fn looked<M: SimulatedModel>(model: &M, start: &Point, record: usize) -> Option<Point> {
+    least_squares(model, start, record, &Free::All, AGAIN).map(|found| found.point)
+}
+
+/// As [`settled`], with the standard deviations of all coordinates.
 pub fn refit<M: SimulatedModel>(
     model: &M,
     start: &Point,
@@ -119,8 +132,16 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         effects: Vec::new(),
     };
     let mut random = ChaCha8Rng::seed_from_u64(STARTS_SEED);
+    let screen = model.screen(record);
     let mut starts = vec![stated.clone()];
-    for _ in 0..OTHER_STARTS {
+    let estimated = model.estimated(screen);
+    let others = if estimated.is_some() {
+        BESIDE
+    } else {
+        OTHER_STARTS
+    };
+    starts.extend(estimated);
+    for _ in 0..others {
         let mut start = stated.clone();
         for (i, p) in start.nuisance.iter_mut().enumerate() {
             let off = random.random_range(-APART..APART);
@@ -133,7 +154,6 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         }
         starts.push(start);
     }
-    let screen = model.screen(record);
     let mut looked: Vec<Solution> = starts
         .par_iter()
         .filter_map(|start| least_squares(model, start, screen, &Free::All, LOOK))
@@ -150,9 +170,11 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         .filter(|point| point.effects.is_empty())
         .collect();
     looked.extend(opened(model, &begun, screen, LOOK));
-    let best = best_of(&looked)?;
-    // The look may have been at a part of the record only.
-    let ends: Vec<Simulated> = [first, best]
+    // The look may have been at a part of the record only, and how near it came tells little of where a fit ends.
+    looked.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    looked.truncate(ENDED);
+    looked.push(first);
+    let ends: Vec<Simulated> = looked
         .par_iter()
         .filter_map(|one| settle(model, &one.point, record, TO_THE_END))
         .collect();
@@ -178,8 +200,16 @@ pub fn completed<M: SimulatedModel>(
     if !(0..model.nuisance()).any(open) {
         return point.clone();
     }
-    least_squares(model, point, tested, &Free::Chosen(&open), AGAIN)
-        .map_or_else(|| point.clone(), |found| found.point)
+    // Where a fit did not see how a file begins, it may have left it anywhere.
+    let mut stated = point.clone();
+    for (i, p) in stated.nuisance.iter_mut().enumerate() {
+        *p = if open(i) { 0.0 } else { *p };
+    }
+    let error = |start: &Point| squares(&all_errors(model, start, tested));
+    let is_lost = error(&stated) < error(point);
+    let start = if is_lost { &stated } else { point };
+    least_squares(model, start, tested, &Free::Chosen(&open), AGAIN)
+        .map_or_else(|| start.clone(), |found| found.point)
 }
 
 /// What a model fitted to one fold gains on the other, both ways.
@@ -557,4 +587,78 @@ pub fn select_jointly<M: SimulatedModel>(
         }
     }
     Some(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Candidate;
+
+    /// A swing whose frequency grows with its amplitude `p[0]`, by which a record begins; the later half of the
+    /// record is of a motion that has forgotten it.
+    struct Swing(Vec<f64>);
+
+    const SAMPLES: usize = 400;
+
+    fn swing(begin: f64, k: usize) -> f64 {
+        let t = k as f64 / 40.0;
+        begin * (-0.5 * t).exp() * ((6.0 + 3.0 * begin * begin) * t).cos()
+    }
+
+    impl SimulatedModel for Swing {
+        fn nuisance(&self) -> usize {
+            1
+        }
+        fn candidates(&self) -> &[Candidate] {
+            &[]
+        }
+        fn blocks(&self) -> usize {
+            1
+        }
+        fn block_of(&self, i: usize) -> Option<usize> {
+            Some(i)
+        }
+        fn tells(&self, fitted: usize, _: usize, tested: usize) -> bool {
+            fitted <= tested
+        }
+        fn samples(&self, _: usize, _: usize) -> usize {
+            SAMPLES / 2
+        }
+        fn errors(&self, point: &Point, record: usize, _: usize) -> Vec<f64> {
+            let from = record * SAMPLES / 2;
+            let own = from..from + SAMPLES / 2;
+            own.map(|k| self.0[k] - swing(point.nuisance[0], k))
+                .collect()
+        }
+        fn folds(&self, _: usize) -> [usize; 2] {
+            [0, 1]
+        }
+        fn screen(&self, record: usize) -> usize {
+            record
+        }
+        fn held(&self) -> Self {
+            Self(self.0.clone())
+        }
+        fn record_name(&self, _: usize) -> &str {
+            "swing"
+        }
+    }
+
+    #[test]
+    fn how_a_record_begins_is_found_where_a_fit_to_its_end_left_it_far_away() {
+        let model = Swing((0..SAMPLES).map(|k| swing(0.3, k)).collect());
+        let begun = |begin: f64| Point {
+            nuisance: vec![begin],
+            effects: Vec::new(),
+        };
+        let from_there = least_squares(&model, &begun(5.4), 0, &Free::All, AGAIN).unwrap();
+        assert!(
+            (from_there.point.nuisance[0].abs() - 0.3).abs() > 0.05,
+            "the start is no trap"
+        );
+        let found = completed(&model, &begun(5.4), Some(1), 0);
+        assert!((found.nuisance[0].abs() - 0.3).abs() < 1e-3, "{found:?}");
+        // What the fit did see stays.
+        assert_eq!(completed(&model, &begun(5.4), Some(0), 1), begun(5.4));
+    }
 }

@@ -20,6 +20,12 @@ const DIFFERENCE: (f64, f64, f64) = (4e-3, 1e-3, 1e-4);
 const LONGEST_STEP: f64 = 6.0;
 /// Gain in twice the logarithm of the likelihood below which a fit has settled.
 const STILL: f64 = 0.3;
+/// Correlated samples that count as one in it, at most.
+const LARGEST_TIME: f64 = 20.0;
+/// Share of the squared change of the errors up to which derivatives may miss it and are still learned from it.
+const MISSED: f64 = 0.25;
+/// Share of what the errors tell of a coordinate that keeps those that compensate each other wholly from rounding.
+const RIDGE: f64 = 1e-10;
 /// Runs of neighbouring samples whose scatter tells standard errors.
 const RUNS: usize = 24;
 
@@ -32,6 +38,11 @@ pub trait SimulatedModel: Sync {
 
     /// The catalogue.
     fn candidates(&self) -> &[Candidate];
+
+    /// `point` with `step` added to its coordinates, kept in bounds.
+    fn moved(&self, point: &Point, step: &[f64]) -> Point {
+        point.moved(step, self.candidates())
+    }
 
     /// Number of blocks.
     fn blocks(&self) -> usize;
@@ -93,6 +104,12 @@ pub trait SimulatedModel: Sync {
     /// on `record` suggest them.
     fn starts(&self, _base: &Point, _record: usize) -> Vec<(usize, Vec<f64>)> {
         Vec::new()
+    }
+
+    /// The nominal model by an equation that is solved without a simulation, from which fits to `record` begin as
+    /// well.
+    fn estimated(&self, _record: usize) -> Option<Point> {
+        None
     }
 
     /// Whole models with one effect at most from which fits to `record` begin as well, where `base` loses the
@@ -194,7 +211,7 @@ fn column<M: SimulatedModel>(
     let moved = |size: f64| {
         let mut step = vec![0.0; coordinates(&at.point)];
         step[coordinate] = size;
-        let moved = at.point.moved(&step, model.candidates());
+        let moved = model.moved(&at.point, &step);
         (moved != at.point).then_some(moved)
     };
     let errors = |point: &Point| match only {
@@ -279,55 +296,116 @@ pub fn least_squares<M: SimulatedModel>(
         _ => &[],
     };
     let mut damping = 1e-4;
-    for _ in 0..iterations {
+    let mut learned: Option<Vec<Vec<f64>>> = None;
+    // In halves of a step.
+    let mut left = 2 * iterations;
+    while left > 0 {
         let variance = squares(&best.errors) / n;
         if variance <= f64::MIN_POSITIVE {
             break;
         }
-        let fresh: Vec<Vec<f64>> = (held.len()..count)
-            .map(|i| {
-                if is_free(i) {
-                    column(model, &best, record, i, false)
-                } else {
-                    Some(vec![0.0; best.errors.len()])
-                }
-            })
-            .collect::<Option<_>>()?;
-        let columns: Vec<&Vec<f64>> = held.iter().chain(&fresh).collect();
-        let (hessian, gradient) = normal(model, &best.point, &columns, &best.errors, variance);
-        let gained = {
-            let mut gained = 0.0;
-            let mut active: Vec<bool> = (0..count).map(|i| hessian[(i, i)] > 0.0).collect();
-            for _ in 0..8 {
-                let Some(step) = step(&hessian, &gradient, &active, damping) else {
-                    damping = (damping * 10.0).max(1e-6);
-                    continue;
-                };
-                let step = shortened(step, start.nuisance.len());
-                let moved = best.point.moved(&step, model.candidates());
-                // What stands at a bound and wants beyond leaves the step.
-                let stuck: Vec<usize> = stuck(&best.point, &moved, &step);
-                if !stuck.is_empty() && stuck.iter().any(|&i| active[i]) {
-                    stuck.iter().for_each(|&i| active[i] = false);
-                    continue;
-                }
-                if let Some(next) = solution(model, &moved, record)
-                    && next.cost < best.cost
-                {
-                    gained = best.cost - next.cost;
-                    best = next;
-                    damping = (damping * 0.1).max(1e-9);
-                    break;
-                }
-                damping = (damping * 10.0).max(1e-6);
+        let (mut own, is_fresh) = match learned.take() {
+            Some(learned) => (learned, false),
+            None => {
+                let fresh = (held.len()..count).map(|i| {
+                    if is_free(i) {
+                        column(model, &best, record, i, false)
+                    } else {
+                        Some(vec![0.0; best.errors.len()])
+                    }
+                });
+                (fresh.collect::<Option<_>>()?, true)
             }
-            gained
         };
-        if gained < STILL {
+        left = left.saturating_sub(if is_fresh { 2 } else { 1 });
+        let columns: Vec<&Vec<f64>> = held.iter().chain(&own).collect();
+        let (hessian, gradient) = normal(model, &best.point, &columns, &best.errors, variance);
+        let before = best.cost;
+        let mut active: Vec<bool> = (0..count).map(|i| hessian[(i, i)] > 0.0).collect();
+        let (mut has_learned, damped) = (false, damping);
+        for _ in 0..if is_fresh { 8 } else { 2 } {
+            let Some(step) = step(&hessian, &gradient, &active, damping) else {
+                damping = (damping * 10.0).max(1e-6);
+                continue;
+            };
+            let step = shortened(step, start.nuisance.len());
+            let moved = model.moved(&best.point, &step);
+            // What stands at a bound and wants beyond leaves the step.
+            let stuck: Vec<usize> = stuck(&best.point, &moved, &step);
+            if !stuck.is_empty() && stuck.iter().any(|&i| active[i]) {
+                stuck.iter().for_each(|&i| active[i] = false);
+                continue;
+            }
+            if let Some(next) = solution(model, &moved, record)
+                && next.cost < best.cost
+            {
+                damping = (damping * 0.1).max(1e-9);
+                // Beside derivatives that are held, those that are not are few.
+                has_learned = held.is_empty() && learn(&mut own, &hessian, &best, &next);
+                best = next;
+                break;
+            }
+            damping = (damping * 10.0).max(1e-6);
+        }
+        let gained = before - best.cost;
+        let still = match gained < STILL * LARGEST_TIME {
+            true => STILL * correlation_time(&best.errors).clamp(1.0, LARGEST_TIME),
+            false => STILL,
+        };
+        if gained < still && is_fresh {
             break;
+        }
+        if gained <= 0.0 {
+            // Learned derivatives that lead nowhere say nothing of the damping.
+            damping = damped;
+        }
+        if has_learned && gained >= still {
+            learned = Some(own);
         }
     }
     Some(best)
+}
+
+/// Changes derivatives of the errors so that they give the change from `before` to `after`, along that step and not
+/// across it, each coordinate weighed by what the errors tell of it (Broyden, Mathematics of Computation 19, 1965).
+/// False where the errors changed so differently that the derivatives are better computed again.
+fn learn(
+    columns: &mut [Vec<f64>],
+    hessian: &DMatrix<f64>,
+    before: &Solution,
+    after: &Solution,
+) -> bool {
+    let ends = flat(&after.point).into_iter().zip(flat(&before.point));
+    let step: Vec<f64> = ends.map(|(after, before)| after - before).collect();
+    let weighed = step.iter().enumerate().map(|(i, s)| hessian[(i, i)] * s);
+    let weighed: Vec<f64> = weighed.collect();
+    let size = dot(&weighed, &step);
+    if size.is_nan() || size <= 0.0 {
+        return false;
+    }
+    let change = after.errors.iter().zip(&before.errors);
+    let mut missed: Vec<f64> = change.map(|(after, before)| after - before).collect();
+    let changed = squares(&missed);
+    for (column, s) in columns.iter().zip(&step).filter(|(_, s)| **s != 0.0) {
+        for (m, c) in missed.iter_mut().zip(column) {
+            *m -= s * c;
+        }
+    }
+    if squares(&missed) > MISSED * changed {
+        return false;
+    }
+    for (column, weight) in columns.iter_mut().zip(weighed).filter(|(_, w)| *w != 0.0) {
+        for (c, m) in column.iter_mut().zip(&missed) {
+            *c += weight / size * m;
+        }
+    }
+    true
+}
+
+/// All coordinates of a point.
+fn flat(point: &Point) -> Vec<f64> {
+    let effects = point.effects.iter().flat_map(|(_, q)| q.iter().copied());
+    point.nuisance.iter().copied().chain(effects).collect()
 }
 
 /// Normal equations; rows of coordinates that nothing depends on are zero.
@@ -397,12 +475,8 @@ fn shortened(mut step: Vec<f64>, nuisance: usize) -> Vec<f64> {
     step
 }
 
-/// Effect coordinates that a step would move and a bound keeps in place.
+/// Coordinates that a step would move and a bound keeps in place.
 fn stuck(before: &Point, after: &Point, step: &[f64]) -> Vec<usize> {
-    let flat = |point: &Point| -> Vec<f64> {
-        let effects = point.effects.iter().flat_map(|(_, q)| q.iter().copied());
-        point.nuisance.iter().copied().chain(effects).collect()
-    };
     let (before, after) = (flat(before), flat(after));
     (0..step.len())
         .filter(|&i| step[i] != 0.0 && before[i] == after[i])
@@ -421,8 +495,13 @@ pub fn deviations<M: SimulatedModel>(model: &M, at: &Solution, record: usize) ->
     let (hessian, _) = normal(model, &at.point, &all, &at.errors, variance);
     let places: Vec<usize> = (0..all.len()).filter(|&i| hessian[(i, i)] > 0.0).collect();
     let count = places.len();
-    let reduced = DMatrix::from_fn(count, count, |i, j| hessian[(places[i], places[j])]);
+    // Coordinates that the errors hardly see stand beside others.
+    let size = |i: usize| hessian[(places[i], places[i])].sqrt();
+    let reduced = DMatrix::from_fn(count, count, |i, j| {
+        hessian[(places[i], places[j])] / (size(i) * size(j)) + if i == j { RIDGE } else { 0.0 }
+    });
     let inverse = reduced.try_inverse()?;
+    let inverse = DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] / (size(i) * size(j)));
     let mut scatter = DMatrix::zeros(count, count);
     for run in 0..RUNS {
         let (from, to) = (run * n / RUNS, (run + 1) * n / RUNS);
@@ -555,6 +634,29 @@ mod tests {
         let errors = deviations(&model, &found, 0).unwrap();
         let off = (p[0] - 100.0) / errors[0];
         assert!(errors[0] < 0.5 && off.abs() < 3.5, "{off} {errors:?}");
+    }
+
+    #[test]
+    fn derivatives_are_learned_along_a_step_and_stay_across_it() {
+        let model = Decay::new([1.5, 1.2, 0.0, 0.0, 0.0], 0.01);
+        let before = solution(&model, &origin(), 0).unwrap();
+        let mut moved = origin();
+        (moved.nuisance[0], moved.nuisance[1]) = (20.0, 15.0);
+        let after = solution(&model, &moved, 0).unwrap();
+        let mut columns = Columns::at(&model, &before, 0).unwrap().columns;
+        let fresh = columns.clone();
+        let all: Vec<&Vec<f64>> = columns.iter().collect();
+        let (hessian, _) = normal(&model, &before.point, &all, &before.errors, 1.0);
+        assert!(learn(&mut columns, &hessian, &before, &after));
+        for (k, error) in after.errors.iter().enumerate() {
+            let change = 20.0 * columns[0][k] + 15.0 * columns[1][k];
+            assert!((change - (error - before.errors[k])).abs() < 1e-12);
+        }
+        assert_eq!(columns[2..], fresh[2..]);
+        // So far away that nothing of them is right.
+        moved.nuisance[1] = 1e4;
+        let after = solution(&model, &moved, 0).unwrap();
+        assert!(!learn(&mut columns, &hessian, &before, &after));
     }
 
     #[test]

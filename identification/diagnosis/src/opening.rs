@@ -19,6 +19,10 @@ impl<M: SimulatedModel> SimulatedModel for Opening<'_, M> {
         self.model.candidates()
     }
 
+    fn moved(&self, point: &Point, step: &[f64]) -> Point {
+        self.model.moved(point, step)
+    }
+
     fn blocks(&self) -> usize {
         self.model.blocks()
     }

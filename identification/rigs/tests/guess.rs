@@ -56,7 +56,7 @@ fn two_files_alone_are_answered_with_delay_and_scale_in_the_first_sentence() {
     assert!((value("scale") - 1.05).abs() < 1e-3, "{found:?}");
     assert_eq!(found.causes.len(), 2, "{found:?}");
     let sentence = found.sentence();
-    assert!(sentence.contains("the command arrives 12."), "{sentence}");
+    assert!(sentence.contains("the command arrives 12.0"), "{sentence}");
     assert!(sentence.contains("more than commanded"), "{sentence}");
     assert!(sentence.contains("all of the error"), "{sentence}");
     // The description is read as it stands, and predicts as a model does.

@@ -3,15 +3,22 @@
 
 use super::PartReport;
 use super::confirmed::unfit;
+use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts};
-use super::readings::Crossed;
-use diagnosis::{Point, refit};
+use super::readings::{Crossed, NEEDED};
+use diagnosis::{Observer, Point, looked, refit, settled};
 use rayon::prelude::*;
 
 /// Logarithm of how much less likely a model is that does nearly as well.
 const NEARLY: f64 = 2.0;
 
-/// What the two parts ask for, each alone and both together; of effects that cannot be told apart one.
+/// Error after a few steps of a fit, over the most that it may be in the end, beyond which more of them change nothing.
+const ALMOST: f64 = 3.0;
+/// Error, over the output, that tells nothing of that: without noise a fit that is nearly there is far off.
+const LITTLE: f64 = 0.01;
+
+/// What the two parts ask for, each alone and both together, of effects that cannot be told apart one; each also
+/// from the stated values of what vanished in it.
 pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Vec<Point> {
     let mut all: Vec<Point> = parts.iter().map(|part| part.point.clone()).collect();
     for (one, other) in [(0, 1), (1, 0)] {
@@ -26,6 +33,8 @@ pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Ve
             all.push(both);
         }
     }
+    let restored: Vec<Point> = all.iter().map(|own| measured.restored(own)).collect();
+    all.extend(restored);
     all
 }
 
@@ -36,6 +45,7 @@ pub(super) fn of_its_class<M: InParts>(
     measured: &M,
     point: &Point,
     crossed: Crossed,
+    observer: Observer<'_>,
 ) -> Vec<(Point, Crossed)> {
     let mut all = vec![(point.clone(), crossed)];
     let mut best = 0;
@@ -44,6 +54,9 @@ pub(super) fn of_its_class<M: InParts>(
         let others =
             (0..measured.candidates().len()).filter(|&i| !known(i) && measured.are_alike(i, own));
         for other in others {
+            if observer.is_over() {
+                break;
+            }
             let (base, against) = &all[best];
             let taken = base.effects[place].0;
             let candidate = &measured.candidates()[other];
@@ -89,6 +102,57 @@ pub(super) fn replaced(model: &Point, other: &Point) -> Option<(usize, usize)> {
     Some((own.0, new.0))
 }
 
+/// Nominal parameters, on all data, of models without one of those at `point` that fit nearly as well: what they
+/// differ by is not known.
+pub(super) fn nearly_without<M: InParts>(measured: &M, point: &Point) -> Vec<Vec<NamedValue>> {
+    let error = |point: &Point| measured.normalised_error(point, EVERYTHING).powi(2);
+    let most = NEEDED * error(point);
+    let all = (0..point.nuisance.len()).into_par_iter();
+    let near = all.filter_map(|i| {
+        let found = looked(measured, &measured.without(point, i)?, EVERYTHING)?;
+        (error(&found) < most).then(|| measured.parameters(&found, &[]))
+    });
+    near.collect()
+}
+
+/// The model without any of the nominal parameters that a rig may lack, if none of them is needed: one after the
+/// other may not be missed where the rest has settled to make up for it.
+pub(super) fn simplest<M: InParts>(
+    measured: &M,
+    point: &Point,
+    crossed: &Crossed,
+    most: f64,
+) -> Option<(Point, Crossed)> {
+    let mut gone = 0;
+    let mut bare = point.clone();
+    for i in 0..point.nuisance.len() {
+        if let Some(without) = measured.without(&bare, i) {
+            (bare, gone) = (without, gone + 1);
+        }
+    }
+    if gone < 2 {
+        return None;
+    }
+    let mut stated = bare.clone();
+    for i in 0..stated.nuisance.len() {
+        let is_there = measured.block_of(i).is_none() && stated.nuisance[i] == point.nuisance[i];
+        stated.nuisance[i] = if is_there { 0.0 } else { stated.nuisance[i] };
+    }
+    let error = |point: &Point| measured.normalised_error(point, EVERYTHING);
+    let near = [bare, stated].into_par_iter().filter_map(|start| {
+        let found = looked(measured, &start, EVERYTHING)?;
+        Some((error(&found), found))
+    });
+    let (near, best) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    if near > (ALMOST * most).max(LITTLE) {
+        return None;
+    }
+    let best = settled(measured, &best, EVERYTHING)?;
+    let error = error(&best);
+    let errors = Crossed::of(measured, &best)?;
+    (error < most && !crossed.needs(&errors)).then_some((best, errors))
+}
+
 /// What a model may go without.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Item {
@@ -118,12 +182,15 @@ pub(super) fn least_needed<M: InParts>(
     let idle: Vec<(Item, Point, Crossed)> = items
         .into_par_iter()
         .filter_map(|(item, left)| {
-            let errors = Crossed::of(measured, &left)?;
+            let errors = Crossed::looked(measured, &left)?;
+            if crossed.is_far_from(&errors) {
+                return None;
+            }
+            let errors = errors.settled(measured)?;
             // Where a part does not tell a parameter that the rig has, it may predict worse with it.
             let fits = || {
-                refit(measured, &left, EVERYTHING).is_some_and(|(found, _)| {
-                    measured.normalised_error(&found.point, EVERYTHING) < most
-                })
+                settled(measured, &left, EVERYTHING)
+                    .is_some_and(|found| measured.normalised_error(&found, EVERYTHING) < most)
             };
             let is_idle = !crossed.needs(&errors) && (matches!(item, Item::Effect(_)) || fits());
             is_idle.then_some((item, left, errors))

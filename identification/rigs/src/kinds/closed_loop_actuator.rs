@@ -15,6 +15,7 @@ use nalgebra::SMatrix;
 use units::vocabulary;
 
 use super::hypotheses::Inside;
+use super::linear_loop::LinearLoop;
 use super::sensors::accelerometer_scale;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Begun, Cause, Equations, Natural, RigRecording};
@@ -31,6 +32,8 @@ const COMMAND: Channel = Channel::Other {
 /// The loop's gain times a step at most, where it is not linear, and the most steps of a sample.
 const FINE: f64 = 0.25;
 const MOST_STEPS: f64 = 64.0;
+/// The fewest where there is friction, which is even over a step.
+const RUBBED: f64 = 2.0;
 
 nominal_parameters! {
     /// K: speed over position error.
@@ -70,7 +73,8 @@ effects! {
         half_width: size("m", 3e-3, (0.0, 3.0)),
     } from [[0.02], [0.15]], like ["reduced_null_gain", "friction"];
     /// Friction of the table: beside the flow, `v + K b tanh(v / s)` (Armstrong-Hélouvry and others,
-    /// Automatica 30, 1994): with `s` at zero it moves beyond a position error of `b`.
+    /// Automatica 30, 1994): with `s` at zero it moves beyond a position error of `b`. With a resonance it
+    /// acts on the mass: `P v' = q - K b tanh(v / s) / 2d` for `P q' = w - v - 2d q`.
     friction: Friction {
         breakaway_error: size("m", 3e-3, (0.0, 3.0)),
         sliding_speed: shape("m/s", 0.02, 1.0),
@@ -137,6 +141,22 @@ impl Equations for ClosedLoopActuator {
         }
     }
 
+    fn starts(
+        &self,
+        recording: &RigRecording,
+        _nominal: &Nominal,
+        errors: &[f64],
+    ) -> Vec<(&'static str, Vec<f64>)> {
+        // A rail is hardly above the fastest motion that it lets through.
+        let places: Vec<usize> = (0..errors.len())
+            .filter(|k| errors[*k].is_finite())
+            .collect();
+        let speeds = speeds(recording.output(), &places);
+        let fastest = speeds.map(|(_, most)| most).filter(|most| *most > 0.0);
+        let start = fastest.map(|most| ("speed_limit", vec![recording.period() / most]));
+        start.into_iter().collect()
+    }
+
     fn read_off(
         &self,
         recording: &RigRecording,
@@ -161,6 +181,36 @@ impl Equations for ClosedLoopActuator {
             effect: Some(("speed_limit", vec![samples * recording.period()])),
         });
         begun.into_iter().collect()
+    }
+
+    fn estimated(
+        &self,
+        recording: &RigRecording,
+        places: &[usize],
+        nominal: &Nominal,
+    ) -> Option<Vec<f64>> {
+        // What an equation gives no sign of is small: no fit comes back from nothing.
+        const SMALL: f64 = 0.05;
+        let own = LinearLoop::of(recording, COMMAND, places)?;
+        let or_small = |value: f64, stated: f64| value.max(SMALL * stated);
+        let has_second = own.lag > 0.0 && own.second_lag > 0.0;
+        let resonance = own.second_lag.max(0.0).sqrt();
+        Some(vec![
+            own.gain,
+            nominal.command_lag,
+            own.scale,
+            nominal.offset,
+            own.delay,
+            or_small(if has_second { 0.0 } else { own.lag }, nominal.loop_lag),
+            or_small(own.feedforward, nominal.feedforward),
+            or_small(own.integral, nominal.integral),
+            or_small(resonance, nominal.resonance),
+            if has_second {
+                (0.5 * own.lag / resonance).clamp(0.05, 3.0)
+            } else {
+                nominal.resonance_damping
+            },
+        ])
     }
 
     fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause> {
@@ -263,22 +313,20 @@ impl Equations for ClosedLoopActuator {
             dead_band != 0.0 || null.reduction != 0.0 || asymmetry != 0.0 || compression != 0.0;
         let has_effect = has_effect || !inside.valves.is_empty();
         let is_linear = !has_effect && fastest == f64::INFINITY && !form.rubs;
-        // A step ends where the delayed command bends.
+        let steps = if is_linear {
+            1.0
+        } else {
+            let most = gain * (1.0 + asymmetry.abs());
+            let least = if form.rubs { RUBBED } else { 1.0 };
+            (sample * most / FINE).ceil().clamp(least, MOST_STEPS)
+        };
+        let mut step = form.step(sample / steps, sample);
+        // A delayed command bends inside a step.
         let bend = delay - delay.floor();
-        let parts = [(0.0, bend), (bend, 1.0)].into_iter();
-        let parts: Vec<(f64, Step, usize)> = parts
-            .filter(|(from, to)| to - from > 1e-3)
-            .map(|(from, to)| {
-                let length = (to - from) * sample;
-                let steps = if is_linear {
-                    1.0
-                } else {
-                    let most = gain * (1.0 + asymmetry.abs());
-                    (length * most / FINE).ceil().clamp(1.0, MOST_STEPS)
-                };
-                (from, form.step(length / steps, sample), steps as usize)
-            })
-            .collect();
+        let (bent, before_bend) = ((bend * steps) as usize, (bend * steps).fract());
+        let rest = (1.0 - before_bend) * step.length;
+        step.bend = form.step(rest, sample).columns[SLOPE];
+        let steps = steps as usize;
         let last = loop_input.len() - 1;
         let at = |place: f64| {
             let place = (place - delay).max(0.0);
@@ -297,15 +345,17 @@ impl Equations for ClosedLoopActuator {
             let passed = inside.valve(now.get(), sent);
             let mut open = (passed.abs() - dead_band).max(0.0).copysign(passed);
             if null.reduction != 0.0 {
-                open -= null.reduction * null.width * (passed / null.width).tanh();
+                open -= null.reduction * null.width * tanh(passed / null.width);
             }
             let flow = gain * (open + asymmetry * open.abs());
             let flow = flow.min(fastest).max(-fastest);
             flow / (1.0 + compression * flow.abs()) - gain * sent
         };
+        let beyond = (has_effect || fastest < f64::INFINITY).then_some(&beyond);
         let start = scale * first + offset;
         let mut state: State = [start, start, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         let mut shown = state[1];
+        let mut begin = at(0.0);
         for (k, y) in out.iter_mut().enumerate() {
             let x = state[1];
             // Not `clamp`, which panics where a model has left the finite.
@@ -314,14 +364,31 @@ impl Equations for ClosedLoopActuator {
             if coupling != 0.0 {
                 *y += coupling * (command[k] - clean[k]);
             }
-            for (from, step, steps) in &parts {
-                for part in 0..*steps {
-                    let begin = k as f64 + from + part as f64 * step.length / sample;
-                    now.set(begin * sample);
-                    let ends = [at(begin), at(begin + step.length / sample)];
-                    state = step.advance(state, ends, (!is_linear).then_some(&beyond), &rub);
-                }
+            let k = k as f64;
+            let end = at(k + 1.0);
+            let middle = at(k + bend);
+            let slopes = [middle - begin, end - middle];
+            let later = slopes[1] / ((1.0 - bend) * sample);
+            let earlier = if bend > 0.0 {
+                slopes[0] / (bend * sample)
+            } else {
+                later
+            };
+            let mut command = begin;
+            for part in 0..steps {
+                now.set(k * sample + part as f64 * step.length);
+                let slope = if part <= bent { earlier } else { later };
+                let change = if part == bent { later - earlier } else { 0.0 };
+                let reached = command + step.length * slope + rest * change;
+                let course = Course {
+                    ends: [command, reached],
+                    slope,
+                    change,
+                };
+                state = step.advance(state, &course, beyond, &rub);
+                command = reached;
             }
+            begin = end;
         }
     }
 }
@@ -331,20 +398,22 @@ fn rail(command: &[f64], displacement: &[f64], places: &[usize]) -> Option<f64> 
     // Of a motion that nothing holds back, few samples are nearly as fast as the fastest.
     const KEPT: f64 = 1.35;
     const FASTER: f64 = 1.3;
-    // Samples on either side over which speeds are told.
-    const APART: usize = 2;
-    let quantiles = |values: &[f64]| {
-        let speed = |&k: &usize| {
-            let apart = values.get(k + APART)? - values.get(k.checked_sub(APART)?)?;
-            Some(apart.abs() / (2 * APART) as f64).filter(|own| own.is_finite())
-        };
-        let mut speeds: Vec<f64> = places.iter().filter_map(speed).collect();
-        speeds.sort_by(f64::total_cmp);
-        let at = |share: f64| speeds.get((share * speeds.len() as f64) as usize).copied();
-        Some((at(0.95)?, at(0.998)?))
-    };
-    let ((often, most), (_, asked)) = (quantiles(displacement)?, quantiles(command)?);
+    let ((often, most), (_, asked)) = (speeds(displacement, places)?, speeds(command, places)?);
     (most > 0.0 && most < KEPT * often && asked > FASTER * most).then(|| 1.0 / most)
+}
+
+/// Speeds per sample that `values` pass seldom (one in twenty) and hardly ever (two in a thousand).
+fn speeds(values: &[f64], places: &[usize]) -> Option<(f64, f64)> {
+    // Samples on either side.
+    const APART: usize = 2;
+    let speed = |&k: &usize| {
+        let apart = values.get(k + APART)? - values.get(k.checked_sub(APART)?)?;
+        Some(apart.abs() / (2 * APART) as f64).filter(|own| own.is_finite())
+    };
+    let mut speeds: Vec<f64> = places.iter().filter_map(speed).collect();
+    speeds.sort_by(f64::total_cmp);
+    let at = |share: f64| speeds.get((share * speeds.len() as f64) as usize).copied();
+    Some((at(0.95)?, at(0.998)?))
 }
 
 /// The linear loop.
@@ -369,15 +438,19 @@ const WIDTH: usize = 8;
 /// The states, the command, its slope, the flow beyond the linear one, its slope and the speed that friction
 /// takes.
 const ALL: usize = STATES + 5;
+const SLOPE: usize = STATES + 1;
 
 /// The speed, times `share`, that friction takes over a step after which it would have been `free` without:
 /// implicit, so that it sticks with steps of any length.
 fn rubbing(free: f64, most: f64, sliding_speed: f64) -> f64 {
     // v + most tanh(v / s) = free has one solution, which is between free less most and free.
     let (mut low, mut high) = ((free.abs() - most).max(0.0), free.abs());
+    if low > SATURATED * sliding_speed {
+        return most.copysign(-free);
+    }
     let mut v = low.max(high * sliding_speed / (sliding_speed + most));
     for _ in 0..20 {
-        let t = (v / sliding_speed).tanh();
+        let t = tanh(v / sliding_speed);
         let off = v + most * t - free.abs();
         if off > 0.0 {
             high = v;
@@ -398,6 +471,14 @@ fn rubbing(free: f64, most: f64, sliding_speed: f64) -> f64 {
     (v - free.abs()).copysign(-free)
 }
 
+/// `tanh` is one beyond it.
+const SATURATED: f64 = 20.0;
+
+/// To the last digits of one, by a single exponential.
+fn tanh(x: f64) -> f64 {
+    1.0 - 2.0 / (1.0 + (2.0 * x).exp())
+}
+
 /// The solution over a step for a command that runs straight and a flow beyond the linear one that does
 /// (exponential time differencing; Cox and Matthews, J. Comput. Phys. 176, 2002): exact for any lag.
 struct Step {
@@ -407,9 +488,26 @@ struct Step {
     columns: [State; ALL],
     /// What the controller sends, of the first four states, the command and its slope.
     sent: [f64; 6],
-    /// Whether there is friction, on the speed that the flow gives.
-    rubs: bool,
+    /// What it sends after the step of a flow beyond the linear one and of what friction takes.
+    sent_of_beyond: f64,
+    sent_of_rubbed: f64,
+    /// The state that is the speed on which friction acts, if there is friction.
+    rubbed_at: Option<usize>,
+    /// The state after the step for a command whose slope grows by one inside it.
+    bend: State,
 }
+
+/// The command over a step.
+struct Course {
+    ends: [f64; 2],
+    /// At the begin.
+    slope: f64,
+    /// What is added to the slope on the way.
+    change: f64,
+}
+
+/// Damping of the resonance below which friction takes no more speed.
+const LEAST_DAMPING: f64 = 0.02;
 
 impl Loop {
     fn step(&self, length: f64, sample: f64) -> Step {
@@ -427,8 +525,13 @@ impl Loop {
                 0.0
             }
         };
+        let has_resonance = self.resonance > 1e-3 * sample;
         // Friction needs a speed to act on.
-        let least = if self.rubs { 0.1 * sample } else { 0.0 };
+        let least = if self.rubs && !has_resonance {
+            0.1 * sample
+        } else {
+            0.0
+        };
         let lag = 0.5 * self.loop_lag.max(least);
         let (command_pole, pole) = (pole(self.command_lag), pole(lag));
         let ahead = feedforward / gain;
@@ -450,7 +553,6 @@ impl Loop {
         let column = |i: usize| [0, 1, 2, 3, command, slope, beyond][i];
         let mut a = SMatrix::<f64, ALL, ALL>::zeros();
         let flow: [f64; 7] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| gain * s));
-        let has_resonance = self.resonance > 1e-3 * sample;
         // What the flow moves: the table itself, or the mass on the oil.
         let moved = if has_resonance { 5 } else { 1 };
         let share = if has_resonance {
@@ -477,10 +579,14 @@ impl Loop {
             a[(6, 6)] -= pole;
             a[(2, 6)] = pole;
             a[(2, 2)] = -pole;
-            a[(2, friction)] = pole;
+            if !has_resonance {
+                a[(2, friction)] = pole;
+            }
             a[(moved, 2)] += share;
         }
         if has_resonance {
+            // On the mass: what it takes of a steady speed is lost in the damping (a leak, a coil's resistance).
+            a[(4, friction)] = 0.5 * share / self.resonance_damping.max(LEAST_DAMPING);
             a[(1, 4)] = 1.0;
             a[(4, 5)] = share;
             a[(5, 4)] -= share;
@@ -494,60 +600,74 @@ impl Loop {
         } else {
             a.map(|_| f64::NAN)
         };
+        let sent_of = |j: usize| -> f64 { (0..4).map(|i| sent[i] * solution[(i, j)]).sum() };
         Step {
             length,
             columns: std::array::from_fn(|j| {
                 std::array::from_fn(|i| if i < STATES { solution[(i, j)] } else { 0.0 })
             }),
             sent,
-            rubs: self.rubs,
+            sent_of_beyond: sent_of(beyond),
+            sent_of_rubbed: sent_of(friction),
+            rubbed_at: self.rubs.then_some(if has_resonance { 4 } else { 2 }),
+            bend: [0.0; WIDTH],
         }
     }
 }
 
 impl Step {
-    /// The state after the step; the command at its ends, the flow beyond the linear one for what the
-    /// controller sends, where there is one, and what friction takes of a speed over a step.
+    /// The state after the step. `beyond` is the flow beyond the linear one for what the controller sends; `rub` is
+    /// what friction takes of a speed over a step.
+    #[inline]
     fn advance(
         &self,
         state: State,
-        [begin, end]: [f64; 2],
+        course: &Course,
         beyond: Option<&impl Fn(f64) -> f64>,
         rub: &impl Fn(f64, f64) -> f64,
     ) -> State {
-        let slope = (end - begin) / self.length;
         let [columns @ .., beyond_column, slope_column, rubbed] = &self.columns;
-        let mut linear: State = [0.0; WIDTH];
-        let known = state[..STATES].iter().chain([&begin, &slope]);
-        for (column, value) in columns.iter().zip(known) {
-            add(&mut linear, column, *value);
+        let mut after: State = [0.0; WIDTH];
+        for (j, column) in columns.iter().enumerate() {
+            let value = match j {
+                STATES => course.ends[0],
+                SLOPE => course.slope,
+                j => state[j],
+            };
+            add(&mut after, column, value);
         }
-        let after = |more: f64, its_slope: f64| -> State {
-            let mut free = linear;
-            add(&mut free, beyond_column, more);
-            add(&mut free, slope_column, its_slope);
-            if self.rubs {
-                let taken = rub(free[2], rubbed[2]);
-                add(&mut free, rubbed, taken);
+        if course.change != 0.0 {
+            add(&mut after, &self.bend, course.change);
+        }
+        let sent = |state: &State, command: f64, slope: f64| -> f64 {
+            let own: f64 = (0..4).map(|i| self.sent[i] * state[i]).sum();
+            own + self.sent[4] * command + self.sent[5] * slope
+        };
+        if let Some(beyond) = beyond {
+            let [begin, end] = course.ends;
+            let now = beyond(sent(&state, begin, course.slope));
+            let mut sends =
+                sent(&after, end, course.slope + course.change) + now * self.sent_of_beyond;
+            if let Some(at) = self.rubbed_at {
+                let free = after[at] + now * beyond_column[at];
+                sends += self.sent_of_rubbed * rub(free, rubbed[at]);
             }
-            free
-        };
-        let Some(beyond) = beyond else {
-            return linear;
-        };
-        let sent = |[u, x, w, z, ..]: State, command: f64| -> f64 {
-            let all = [u, x, w, z, command, slope];
-            self.sent.iter().zip(all).map(|(a, b)| a * b).sum()
-        };
-        let now = beyond(sent(state, begin));
-        let then = beyond(sent(after(now, 0.0), end));
-        after(now, (then - now) / self.length)
+            let its_slope = (beyond(sends) - now) / self.length;
+            add(&mut after, beyond_column, now);
+            add(&mut after, slope_column, its_slope);
+        }
+        if let Some(at) = self.rubbed_at {
+            let taken = rub(after[at], rubbed[at]);
+            add(&mut after, rubbed, taken);
+        }
+        after
     }
 }
 
+#[inline]
 fn add(to: &mut State, column: &State, value: f64) {
-    for (own, one) in to.iter_mut().zip(column) {
-        *own += one * value;
+    for i in 0..WIDTH {
+        to[i] += column[i] * value;
     }
 }
 
@@ -644,6 +764,59 @@ mod tests {
     }
 
     #[test]
+    fn a_command_that_bends_inside_a_step_is_followed_as_in_two_steps() {
+        let form = Loop {
+            gain: 30.0,
+            command_lag: 0.002,
+            loop_lag: 0.003,
+            feedforward: 0.4,
+            integral: 0.7,
+            resonance: 0.004,
+            resonance_damping: 0.3,
+            rubs: false,
+        };
+        let (length, share) = (0.01, 0.3);
+        let state: State = [1.0, -2.0, 0.5, 0.1, 3.0, -1.0, 2.0, 0.0];
+        let (slope, change) = (7.0, -11.0);
+        let bend = 1.0 + share * length * slope;
+        let end = bend + (1.0 - share) * length * (slope + change);
+        let straight = |ends: [f64; 2], slope: f64| Course {
+            ends,
+            slope,
+            change: 0.0,
+        };
+        let none = |_: f64, _: f64| 0.0;
+        let beyond: Option<&fn(f64) -> f64> = None;
+        let first = form.step(share * length, length);
+        let middle = first.advance(state, &straight([1.0, bend], slope), beyond, &none);
+        let second = form.step((1.0 - share) * length, length);
+        let course = straight([bend, end], slope + change);
+        let expected = second.advance(middle, &course, beyond, &none);
+        let mut whole = form.step(length, length);
+        whole.bend = second.columns[SLOPE];
+        let course = Course {
+            ends: [1.0, end],
+            slope,
+            change,
+        };
+        let found = whole.advance(state, &course, beyond, &none);
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!(
+                (found - expected).abs() < 1e-9 * expected.abs().max(1.0),
+                "{found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_quick_tanh_is_the_library_s() {
+        for k in -4000..4000 {
+            let x = 0.01 * f64::from(k);
+            assert!((tanh(x) - x.tanh()).abs() < 1e-15, "{x}");
+        }
+    }
+
+    #[test]
     fn a_rail_is_told_from_a_motion_that_is_only_fast() {
         let n = 4000;
         let places: Vec<usize> = (0..n).collect();
@@ -659,6 +832,68 @@ mod tests {
         let held: Vec<f64> = held.collect();
         let found = rail(&command, &held, &places).unwrap();
         assert!((found * most - 1.0).abs() < 1e-3, "{found}");
+    }
+
+    #[test]
+    fn friction_on_the_mass_of_a_motor_is_that_of_its_own_equations() {
+        // L i' = k (r - x) - R i - b v, m v' = b i - F tanh(v / s), by small steps of its own.
+        let (mass, resistance, inductance, constant) = (20.0, 1.0, 2e-3, 80.0);
+        let (gain, b, sliding_speed) = (30.0, 2e-4, 2e-3);
+        let force = b * gain * constant * constant / resistance;
+        let (rate, n, steps) = (200.0, 2000, 400);
+        let wave = |t: f64| 4e-3 * (4.0 * t).sin() + 2e-3 * (13.0 * t).sin();
+        let command: Vec<f64> = (0..n).map(|k| wave(k as f64 / rate)).collect();
+        let (mut current, mut x, mut v) = (0.0f64, 0.0f64, 0.0f64);
+        let h = 1.0 / rate / f64::from(steps);
+        let mut measured = Vec::new();
+        for k in 0..n {
+            measured.push(x);
+            let next = command[(k + 1).min(n - 1)];
+            for part in 0..steps {
+                let r = command[k] + (next - command[k]) * f64::from(part) / f64::from(steps);
+                let voltage = gain * constant * (r - x);
+                current += h * (voltage - resistance * current - constant * v) / inductance;
+                v += h * (constant * current - force * (v / sliding_speed).tanh()) / mass;
+                x += h * v;
+            }
+        }
+        let channels = vec![
+            (COMMAND, command.clone()),
+            (Channel::Displacement, vec![0.0; n]),
+        ];
+        let recording = Recording::new("motor", 1.0 / rate, channels).unwrap();
+        let recording =
+            RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
+        let resonance = (mass * inductance).sqrt() / constant;
+        let nominal = Nominal {
+            loop_gain: gain,
+            command_lag: 0.0,
+            scale: 1.0,
+            offset: 0.0,
+            command_delay: 0.0,
+            loop_lag: 0.0,
+            feedforward: 0.0,
+            integral: 0.0,
+            resonance,
+            resonance_damping: 0.5 * resonance * resistance / inductance,
+        };
+        let off = |breakaway_error: f64| {
+            let effects = Effects {
+                friction: Friction {
+                    breakaway_error,
+                    sliding_speed,
+                },
+                ..Effects::off().unwrap()
+            };
+            let mut out = vec![0.0; n];
+            let session = Session::default();
+            ClosedLoopActuator.simulate(&recording, &nominal, &effects, &session, &mut out);
+            let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
+            let size: f64 = measured.iter().map(|x| x * x).sum();
+            (errors.sum::<f64>() / size).sqrt()
+        };
+        assert!(off(b) < 3e-3, "{}", off(b));
+        assert!(off(0.0) > 0.03, "{}", off(0.0));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::parts::{EVERYTHING, InParts, Part, file};
 use super::readings::NEEDED;
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
-use diagnosis::{Point, Role, all_errors, completed, estimates, refit, squares};
+use diagnosis::{Point, Role, all_errors, completed, estimates, refit, settled, squares};
 use recordings::mean_and_deviation;
 
 /// A parameter differs between parts where its estimates lie this many of their standard errors
@@ -45,6 +45,9 @@ pub struct Confirmed {
     pub parameters: Vec<NamedValue>,
     /// Parameters of its effects.
     pub effects: Vec<(String, Vec<NamedValue>)>,
+    /// Whether the effects gain on either part, from a fit to the other.
+    #[serde(skip)]
+    pub(super) pays: bool,
     /// Where it is.
     #[serde(skip)]
     pub(super) point: Point,
@@ -57,16 +60,25 @@ impl Confirmed {
     /// Widens standard errors to half of what an estimate differs by from that of `other`, another model of the
     /// same data.
     pub(super) fn widen_to(&mut self, other: &Self) {
-        let widen = |own: &mut [NamedValue], other: &[NamedValue]| {
-            for (own, other) in own.iter_mut().zip(other) {
-                let half = 0.5 * (own.value - other.value).abs();
-                own.standard_error = own.standard_error.max(half);
-            }
-        };
-        widen(&mut self.parameters, &other.parameters);
+        self.widen_by(&other.parameters);
         for (name, own) in &mut self.effects {
             let same = other.effects.iter().find(|(known, _)| known == name);
             widen(own, same.map_or(&[], |(_, values)| values));
+        }
+    }
+
+    /// As [`Self::widen_to`], the nominal parameters alone.
+    pub(super) fn widen_by(&mut self, others: &[NamedValue]) {
+        widen(&mut self.parameters, others);
+    }
+}
+
+fn widen(own: &mut [NamedValue], other: &[NamedValue]) {
+    for own in own {
+        let same = other.iter().find(|other| other.name == own.name);
+        if let Some(other) = same.filter(|other| other.value.is_finite()) {
+            let half = 0.5 * (own.value - other.value).abs();
+            own.standard_error = own.standard_error.max(half);
         }
     }
 }
@@ -132,14 +144,14 @@ fn without_and_with<M: InParts>(
 ) -> Option<[Vec<f64>; 2]> {
     let mut without = point.clone();
     without.effects.retain(|(index, _)| *index != effect);
-    let (without, _) = refit(measured, &without, record)?;
-    Some([&without.point, point].map(|point| all_errors(measured, point, record)))
+    let without = settled(measured, &without, record)?;
+    Some([&without, point].map(|point| all_errors(measured, point, record)))
 }
 
 /// Whether the fit to `record` without an effect is worse by more than chance.
 fn is_missed<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize) -> bool {
     without_and_with(measured, point, effect, record)
-        .is_some_and(|[before, after]| clearly_better(&before, &after))
+        .is_some_and(|[before, after]| clearly_better(&before, &after, &lengths(measured, record)))
 }
 
 /// Whether the squared error of the fit to `record` grows by more than a tenth without an effect.
@@ -148,17 +160,40 @@ fn is_felt<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize
         .is_some_and(|[before, after]| squares(&before) > NEEDED * squares(&after))
 }
 
+/// Samples of each file in `record`, of those that have some.
+pub(super) fn lengths<M: InParts>(measured: &M, record: usize) -> Vec<usize> {
+    let all = (0..measured.blocks()).map(|block| measured.samples(record, block));
+    all.filter(|count| *count > 0).collect()
+}
+
 /// Whether the squared errors `after` are smaller than those `before` by more than chance, correlated
 /// samples counted once: by the ratio of the likelihoods, or, where slow drift in both hides that, by the
 /// differences (Vuong, Econometrica 57, 1989; for nested models half the root of the ratio's chi-square
-/// at most).
-pub(super) fn clearly_better(before: &[f64], after: &[f64]) -> bool {
-    let independent = |values: &[f64]| values.len() as f64 / correlation_time(values);
-    let ratio = independent(after) * (squares(before) / squares(after)).ln();
-    let pairs = before.iter().zip(after);
-    let differences: Vec<f64> = pairs.map(|(b, a)| b * b - a * a).collect();
-    let (mean, deviation) = mean_and_deviation(&differences);
-    ratio > CLEAR * CLEAR || mean > CLEAR * deviation / independent(&differences).sqrt()
+/// at most). `lengths` are those of the files that follow one another: what differs from file to file, such as
+/// a zero of the first alone, does not count as drift.
+pub(super) fn clearly_better(before: &[f64], after: &[f64], lengths: &[usize]) -> bool {
+    let (mut independent, mut gain, mut variance) = (0.0, 0.0, 0.0);
+    let mut from = 0;
+    for length in lengths {
+        let place = from..(from + length).min(after.len()).min(before.len());
+        from += length;
+        let (before, after) = (&before[place.clone()], &after[place]);
+        independent += after.len() as f64 / correlation_time(after);
+        let pairs = before.iter().zip(after);
+        let differences: Vec<f64> = pairs.map(|(b, a)| b * b - a * a).collect();
+        let (mean, deviation) = mean_and_deviation(&differences);
+        gain += mean * differences.len() as f64;
+        variance +=
+            deviation * deviation * differences.len() as f64 * correlation_time(&differences);
+    }
+    let ratio = independent * (squares(before) / squares(after)).ln();
+    ratio > CLEAR * CLEAR || gain > CLEAR * variance.sqrt()
+}
+
+/// Whether the squared errors grow without something, from those `with` to the `bare` ones, by a tenth and by more
+/// than chance.
+pub(super) fn needed(bare: &[f64], with: &[f64], lengths: &[usize]) -> bool {
+    squares(bare) > NEEDED * squares(with) && clearly_better(bare, with, lengths)
 }
 
 /// Parameters of the effects at `point` with standard errors, under the model's names.
@@ -192,6 +227,29 @@ fn listed<M: InParts>(measured: &M, point: &Point, deviations: &[f64]) -> Vec<Na
         }));
     }
     all
+}
+
+/// The nominal model, fitted to all data, with standard deviations, and to either part.
+pub(super) struct NominalFits {
+    everything: (Point, Vec<f64>),
+    parts: [Point; 2],
+}
+
+impl NominalFits {
+    /// Of the data of `measured`; what cannot be fitted stays as described.
+    pub(super) fn of<M: InParts>(measured: &M) -> Self {
+        let origin = measured.origin();
+        let part = |part: Part| {
+            settled(measured, &origin, part as usize).unwrap_or_else(|| origin.clone())
+        };
+        Self {
+            everything: refit(measured, &origin, EVERYTHING).map_or_else(
+                || (origin.clone(), Vec::new()),
+                |(found, deviations)| (found.point, deviations),
+            ),
+            parts: [part(Part::Fitted), part(Part::LeftOut)],
+        }
+    }
 }
 
 /// One model, fitted to parts and to files.
@@ -229,6 +287,7 @@ fn fits<M: InParts>(measured: &M, start: &Point) -> Option<Fits> {
 /// `start` that turn out to be unfit leave it, each with its reason.
 pub(super) fn confirm<M: InParts>(
     measured: &M,
+    nominal: &NominalFits,
     start: &Point,
     refused: &mut Vec<Refused>,
     findings: &mut Vec<String>,
@@ -258,11 +317,7 @@ pub(super) fn confirm<M: InParts>(
         }
     };
     let (point, deviations) = &fits.everything;
-    let origin = measured.origin();
-    let (refitted, refitted_deviations) = refit(measured, &origin, EVERYTHING).map_or_else(
-        || (origin.clone(), Vec::new()),
-        |(found, deviations)| (found.point, deviations),
-    );
+    let (refitted, refitted_deviations) = &nominal.everything;
     let own = measured.parameters(point, deviations);
     let count = own.len();
     let mut all = listed(measured, point, deviations);
@@ -293,23 +348,25 @@ pub(super) fn confirm<M: InParts>(
     };
     let (here, there) = (on(Part::Fitted), on(Part::LeftOut));
     let (tested, swapped) = (Part::LeftOut as usize, Part::Fitted as usize);
-    let nominal = refit(measured, &origin, Part::Fitted as usize)
-        .map_or_else(|| origin.clone(), |(found, _)| found.point);
-    let nominal = completed(measured, &nominal, Some(swapped), tested);
+    let gain = |part: Part, own: &Point| {
+        let (fitted, tested) = (part as usize, part.other() as usize);
+        let nominal = completed(measured, &nominal.parts[fitted], Some(fitted), tested);
+        let errors = |point: &Point| all_errors(measured, point, tested);
+        gain_interval(&errors(&nominal), &errors(own))
+    };
+    let gains = [gain(Part::Fitted, &here), gain(Part::LeftOut, &there)];
     Some(Confirmed {
         error: measured.normalised_error(&here, tested),
         swapped_error: measured.normalised_error(&there, swapped),
-        gain_interval: gain_interval(
-            &all_errors(measured, &nominal, tested),
-            &all_errors(measured, &here, tested),
-        ),
-        refitted_error: measured.normalised_error(&refitted, EVERYTHING),
+        gain_interval: gains[0],
+        pays: gains.iter().all(|own| own.0 > 0.0),
+        refitted_error: measured.normalised_error(refitted, EVERYTHING),
         fitted_error: measured.normalised_error(point, EVERYTHING),
-        refitted: measured.parameters(&refitted, &refitted_deviations),
+        refitted: measured.parameters(refitted, refitted_deviations),
         parameters: with_errors(own, 0),
         effects,
         point: point.clone(),
-        refitted_point: refitted,
+        refitted_point: refitted.clone(),
     })
 }
 
@@ -418,6 +475,8 @@ mod tests {
             let all = noise.iter().enumerate();
             all.map(|(k, e)| e + more(k)).collect()
         };
+        let clearly_better =
+            |before: &[f64], after: &[f64]| clearly_better(before, after, &[before.len()]);
         assert!(clearly_better(&with(&wave), &noise));
         assert!(!clearly_better(&noise, &with(&wave)));
         let chance = |k: usize| 1e-3 * wave(k);
@@ -426,5 +485,16 @@ mod tests {
         let drift: Vec<f64> = (0..2000).map(|k| (2e-3 * f64::from(k)).sin()).collect();
         let shifted: Vec<f64> = drift.iter().map(|e| e + 0.05).collect();
         assert!(!clearly_better(&shifted, &drift));
+    }
+
+    #[test]
+    fn a_zero_of_the_first_of_two_files_is_clear() {
+        // Errors of slow waves; without the zero the first file has a constant besides.
+        let wave = |k: usize| 0.03 * (0.02 * k as f64).sin() + 0.02 * (0.37 * k as f64).cos();
+        let after: Vec<f64> = (0..8000).map(wave).collect();
+        let shifted = |(k, e): (usize, &f64)| e + if k < 4000 { 0.06 } else { 0.0 };
+        let before: Vec<f64> = after.iter().enumerate().map(shifted).collect();
+        assert!(clearly_better(&before, &after, &[4000, 4000]));
+        assert!(!clearly_better(&after, &before, &[4000, 4000]));
     }
 }

@@ -4,9 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::alternatives::{Item, least_needed, of_its_class, proposals, replaced};
+use super::alternatives::{
+    Item, least_needed, nearly_without, of_its_class, proposals, replaced, simplest,
+};
 use super::cause::{Cause, effect_in_words, in_own_words, joined, undetermined};
-use super::confirmed::{Confirmed, Refused, confirm, effects as named_values, unfit};
+use super::confirmed::{
+    Confirmed, NominalFits, Refused, confirm, effects as named_values, lengths, needed, unfit,
+};
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, LOST, Part};
@@ -16,7 +20,7 @@ use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::gain_interval;
 use diagnosis::{
     Observer, Point, Progress, Selected, Verdict, all_errors, completed, select, select_jointly,
-    squares,
+    settled, squares,
 };
 
 /// Errors on data that were not fitted that still agree with those on fitted ones: at most so many times
@@ -210,25 +214,37 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             reason: reason.to_owned(),
         });
     }
-    // What either part gives a reason against is not named.
+    // What a part gives a reason against is not named, unless the other part names it without one.
     let mut refused: Vec<Refused> = Vec::new();
-    for effect in as_described.effects.iter().chain(&swapped.effects) {
-        let index = measured.index(&effect.effect);
-        if let (Some(index), Some(reason)) = (index, &effect.objection) {
-            start.point.effects.retain(|(known, _)| *known != index);
-            if refused.iter().all(|(known, _)| *known != index) {
-                refused.push((index, reason.clone()));
-            }
+    let both = || as_described.effects.iter().chain(&swapped.effects);
+    for effect in both() {
+        let (Some(index), Some(reason)) = (measured.index(&effect.effect), &effect.objection)
+        else {
+            continue;
+        };
+        if both().any(|own| own.effect == effect.effect && own.objection.is_none()) {
+            continue;
+        }
+        start.point.effects.retain(|(known, _)| *known != index);
+        if refused.iter().all(|(known, _)| *known != index) {
+            refused.push((index, reason.clone()));
         }
     }
     let mut findings = Vec::new();
-    let mut confirmed = confirm(measured, &start.point, &mut refused, &mut findings)?;
+    let nominal = NominalFits::of(measured);
+    let mut confirmed = confirm(
+        measured,
+        &nominal,
+        &start.point,
+        &mut refused,
+        &mut findings,
+    )?;
     let crossed = Crossed::of(measured, &confirmed.point)?;
-    let mut of_its_class = of_its_class(measured, &confirmed.point, crossed).into_iter();
+    let mut of_its_class = of_its_class(measured, &confirmed.point, crossed, observer).into_iter();
     let (best, mut crossed) = of_its_class.next()?;
     if replaced(&confirmed.point, &best).is_some() {
         let mut new = refused.clone();
-        let again = confirm(measured, &best, &mut new, &mut Vec::new());
+        let again = confirm(measured, &nominal, &best, &mut new, &mut Vec::new());
         let as_many = |again: &Confirmed| again.effects.len() == confirmed.effects.len();
         if let Some(again) = again.filter(as_many) {
             crossed = Crossed::of(measured, &again.point)?;
@@ -240,12 +256,20 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     // What else the data may mean: everything that is not needed for sure goes, the least needed first.
     let mut weighed: Vec<Weighed> = Vec::new();
-    let with_all = confirmed.clone();
     let mut asked: Option<Vec<Item>> = None;
     let fitted = |own: &Confirmed| measured.normalised_error(&own.point, EVERYTHING);
     let mut most = AS_WELL * fitted(&confirmed);
-    while let Some((left, without)) =
-        least_needed(measured, &confirmed.point, &crossed, most, &mut asked)
+    if !observer.is_over()
+        && let Some((left, without)) = simplest(measured, &confirmed.point, &crossed, most)
+    {
+        findings.clear();
+        confirmed = confirm(measured, &nominal, &left, &mut refused, &mut findings)?;
+        crossed = without;
+    }
+    let with_all = confirmed.clone();
+    while !observer.is_over()
+        && let Some((left, without)) =
+            least_needed(measured, &confirmed.point, &crossed, most, &mut asked)
     {
         let gone = confirmed.point.effects.iter();
         let mut gone = gone.filter(|(i, _)| left.effects.iter().all(|(known, _)| known != i));
@@ -255,7 +279,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         }
         findings.clear();
         let had = confirmed.point.effects.len();
-        confirmed = confirm(measured, &left, &mut refused, &mut findings)?;
+        confirmed = confirm(measured, &nominal, &left, &mut refused, &mut findings)?;
         crossed = without;
         if confirmed.point.effects.len() < had {
             most = most.max(AS_WELL * fitted(&confirmed));
@@ -274,7 +298,17 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             if !as_described.rivals.contains(&pair) {
                 as_described.rivals.push(pair);
             }
+            confirmed.widen_by(&measured.parameters(&point, &[]));
             weighed.extend(Weighed::of(measured, &point, errors));
+        }
+    }
+    let is_told = |(i, value): (usize, &NamedValue)| {
+        let is_cause = measured.is_cause(i) && !measured.is_of_first_file(i);
+        is_cause && Cause::of(value.clone(), measured.stated(i)).is_some()
+    };
+    if !observer.is_over() && confirmed.parameters.iter().enumerate().any(is_told) {
+        for near in nearly_without(measured, &confirmed.point) {
+            confirmed.widen_by(&near);
         }
     }
     // What the model may lack or not changes the others by as much as is not known.
@@ -285,17 +319,22 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             set_aside.push(SetAside { effect, reason });
         }
     }
+    let or_its_like = |name: &String| {
+        let rivals = as_described.rivals.iter();
+        let own = rivals.filter(|(rival, against)| against == name && alike(against, rival));
+        let mut all: Vec<&str> = own.map(|(rival, _)| rival.as_str()).collect();
+        if all.is_empty() && !there.contains(name) {
+            let other = there.iter().find(|other| alike(name, other));
+            all.extend(other.map(String::as_str));
+        }
+        all.insert(0, name);
+        all.join(" or ")
+    };
     let named: Vec<String> = confirmed
         .effects
         .iter()
-        .map(
-            |(name, _)| match there.iter().find(|other| alike(name, other)) {
-                Some(other) if other != name => format!("{name} or {other}"),
-                _ => name.clone(),
-            },
-        )
+        .map(|(name, _)| or_its_like(name))
         .collect();
-    let pays = confirmed.gain_interval.0 > 0.0 && swapped.gain_interval.0 > 0.0;
     let is_named = |effect: &str| confirmed.effects.iter().any(|(name, _)| name == effect);
     let rivalled = as_described
         .rivals
@@ -318,7 +357,10 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let explains = explains
         .into_iter()
         .all(|(error, nominal)| error < LOST && error < MOST * nominal);
-    let believed = |cause: &Cause| holds || (explains && cause.deviations() > FAR);
+    // A zero shows in a file by itself, whatever a part tells of another.
+    let believed = |i: usize, cause: &Cause| {
+        holds || ((explains || measured.is_of_first_file(i)) && cause.deviations() > FAR)
+    };
     let values = confirmed.parameters.iter().enumerate();
     let mut causes: Vec<Cause> = Vec::new();
     let mut doubted: Vec<Cause> = Vec::new();
@@ -326,18 +368,29 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         let Some(cause) = Cause::of(value.clone(), measured.stated(i)) else {
             continue;
         };
-        if !believed(&cause) {
+        if !believed(i, &cause) {
             continue;
         }
         let without = measured.without_cause(i);
         let without = without.and_then(|own| {
-            let errors = Crossed::of(&own, &confirmed.point)?;
-            Some((own, errors))
+            // No part tells another one's zero.
+            if measured.is_of_first_file(i) {
+                let best = settled(&own, &confirmed.point, EVERYTHING)?;
+                let errors = Crossed::of(&own, &best)?;
+                let bare = all_errors(&own, &best, EVERYTHING);
+                let with = all_errors(measured, &confirmed.point, EVERYTHING);
+                let is_needed = needed(&bare, &with, &lengths(measured, EVERYTHING));
+                return Some((own, best, errors, is_needed));
+            }
+            let best = confirmed.point.clone();
+            let errors = Crossed::of(&own, &best)?;
+            let is_needed = crossed.needs(&errors);
+            Some((own, best, errors, is_needed))
         });
         match without {
-            Some((own, errors)) if !crossed.needs(&errors) => {
+            Some((own, best, errors, false)) => {
                 doubted.push(cause);
-                weighed.extend(Weighed::of(&own, &confirmed.point, errors));
+                weighed.extend(Weighed::of(&own, &best, errors));
             }
             _ => causes.push(cause),
         }
@@ -347,7 +400,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         holds || cause.deviations() > FAR
     }));
     let readings = readings(measured, weighed, &causes, &doubted, (&confirmed, crossed));
-    let verdict = match (named.is_empty() || !pays, rivalled) {
+    let verdict = match (named.is_empty() || !confirmed.pays, rivalled) {
         (true, _) if !causes.is_empty() => Verdict::Named,
         (true, _) if here.is_empty() && there.is_empty() && holds => Verdict::Adequate,
         (true, _) => Verdict::Unexplained,

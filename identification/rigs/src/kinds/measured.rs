@@ -11,6 +11,11 @@ const CHEAP: usize = 40_000;
 /// Logarithm, in deviations, of a nominal parameter that is none: nothing depends on it any more.
 const GONE: f64 = -40.0;
 
+/// Logarithm of the share of what was stated below which a nominal parameter has vanished.
+const VANISHED: f64 = -5.0;
+/// The least of it for a parameter that may be nothing: with less a fit does not find it again.
+const LEAST: f64 = -7.0;
+
 /// Error over the output's deviation from which on fits begin from what is read off as well.
 const SHAKY: f64 = 0.2;
 
@@ -134,7 +139,7 @@ impl<'a> Measured<'a> {
                 continue;
             }
             // Sizes stay positive: counted by their logarithm unless they may be zero.
-            values[i] = if value > 0.0 && deviation <= value {
+            values[i] = if self.is_logarithmic(i) {
                 value * (p * deviation / value).exp() * f64::from(*p > GONE)
             } else {
                 value + p * deviation
@@ -147,17 +152,39 @@ impl<'a> Measured<'a> {
         values
     }
 
+    /// Whether the nominal parameter `i` is counted by its logarithm.
+    fn is_logarithmic(&self, i: usize) -> bool {
+        let (value, deviation) = self.nominal[i];
+        value > 0.0 && deviation <= value
+    }
+
+    /// The coordinate of the nominal parameter `i`, as which it has `value`.
+    fn coordinate(&self, i: usize, value: f64) -> f64 {
+        let (stated, deviation) = self.nominal[i];
+        if self.is_logarithmic(i) {
+            (value / stated).ln() * stated / deviation
+        } else {
+            (value - stated) / deviation
+        }
+    }
+
+    /// Where the coordinate of the nominal parameter `i` ends: from where no fit comes back, and at the most.
+    fn bounds(&self, i: usize) -> (f64, f64) {
+        let (value, deviation) = self.nominal[i];
+        let may_be_nothing = value > 0.0 && deviation == value;
+        let least = if may_be_nothing {
+            LEAST
+        } else {
+            f64::NEG_INFINITY
+        };
+        (least, self.coordinate(i, self.most[i]))
+    }
+
     /// The point of a model that was read from recording `block`; none where it has an unknown effect.
     fn point_of(&self, own: &Begun, block: usize) -> Option<Point> {
         let mut nuisance = vec![0.0; self.nuisance()];
         for (p, &i) in nuisance.iter_mut().zip(&self.uncertain) {
-            let ((value, deviation), read) = (self.nominal[i], own.nominal[i]);
-            // The inverse of `nominal_values`.
-            *p = if value > 0.0 && deviation <= value {
-                (read / value).ln() * value / deviation
-            } else {
-                (read - value) / deviation
-            };
+            *p = self.coordinate(i, own.nominal[i]);
         }
         let first = self.uncertain.len() + block * self.session.len();
         let session = own.session.iter().zip(&self.session);
@@ -284,6 +311,21 @@ impl SimulatedModel for Measured<'_> {
         &self.candidates
     }
 
+    fn moved(&self, point: &Point, step: &[f64]) -> Point {
+        let mut moved = point.moved(step, &self.candidates);
+        for (place, &i) in self.uncertain.iter().enumerate() {
+            let (least, most) = self.bounds(i);
+            let p = &mut moved.nuisance[place];
+            // What is gone stays so.
+            *p = if point.nuisance[place] > GONE {
+                p.max(least).min(most)
+            } else {
+                GONE
+            };
+        }
+        moved
+    }
+
     fn blocks(&self) -> usize {
         self.measurement.recordings.len()
     }
@@ -392,6 +434,23 @@ impl SimulatedModel for Measured<'_> {
             .collect()
     }
 
+    fn estimated(&self, record: usize) -> Option<Point> {
+        let block = (0..self.blocks()).max_by_key(|&b| self.samples(record, b))?;
+        let recording = &self.measurement.recordings[block];
+        let stated: Vec<f64> = self.nominal.iter().map(|(value, _)| *value).collect();
+        let nominal = self
+            .rig
+            .estimated(recording, &self.places[record][block], &stated)?;
+        let own = Begun {
+            nominal,
+            session: vec![0.0; self.session.len()],
+            effect: None,
+        };
+        // From the stated point into bounds.
+        let there = self.point_of(&own, block)?;
+        Some(self.moved(&self.origin(), &there.nuisance))
+    }
+
     fn begun(&self, base: &Point, record: usize) -> Vec<Point> {
         if self.normalised_error(base, record) < SHAKY {
             return Vec::new();
@@ -467,6 +526,13 @@ impl InParts for Measured<'_> {
         self.rig.causes().contains(&name)
     }
 
+    fn is_of_first_file(&self, i: usize) -> bool {
+        let (_, unit) = self.rig.parameters()[self.uncertain[i]];
+        let mut session = self.rig.session().iter();
+        self.is_cause(i)
+            && session.any(|own| own.role == SessionRole::AgainstFirst && own.unit == unit)
+    }
+
     fn without_cause(&self, i: usize) -> Option<Self> {
         let mut same = self.held();
         same.width = self.width;
@@ -480,6 +546,20 @@ impl InParts for Measured<'_> {
         let mut without = point.clone();
         without.nuisance[i] = GONE;
         (may_be_nothing && point.nuisance[i] > GONE).then_some(without)
+    }
+
+    fn restored(&self, point: &Point) -> Point {
+        let mut restored = point.clone();
+        for (place, &i) in self.uncertain.iter().enumerate() {
+            let (value, deviation) = self.nominal[i];
+            let has_vanished = restored.nuisance[place] * deviation / value < VANISHED;
+            if self.is_logarithmic(i) && has_vanished
+                || !self.is_logarithmic(i) && self.is_cause(place)
+            {
+                restored.nuisance[place] = 0.0;
+            }
+        }
+        restored
     }
 
     fn contradictions(&self) -> Vec<Cause> {

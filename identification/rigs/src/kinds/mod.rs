@@ -22,6 +22,7 @@ pub mod guess;
 pub mod hypotheses;
 mod hysteretic_device;
 mod linear_axis;
+mod linear_loop;
 mod measured;
 mod named_value;
 mod natural;
@@ -151,6 +152,17 @@ pub trait Equations: Sync {
         Vec::new()
     }
 
+    /// Nominal values, near `nominal`, of an equation that is solved without a simulation, from which fits begin
+    /// as well.
+    fn estimated(
+        &self,
+        _recording: &RigRecording,
+        _places: &[usize],
+        _nominal: &Self::Nominal,
+    ) -> Option<Vec<f64>> {
+        None
+    }
+
     /// What the equations read out of a recording beside its inputs, a sentence each.
     fn notes(&self, _recording: &RigRecording, _nominal: &Self::Nominal) -> Vec<String> {
         Vec::new()
@@ -228,6 +240,14 @@ pub trait Rig: Sync {
 
     /// As [`Equations::read_off`].
     fn read_off(&self, recording: &RigRecording, places: &[usize], nominal: &[f64]) -> Vec<Begun>;
+
+    /// As [`Equations::estimated`].
+    fn estimated(
+        &self,
+        recording: &RigRecording,
+        places: &[usize],
+        nominal: &[f64],
+    ) -> Option<Vec<f64>>;
 
     /// As [`Equations::notes`].
     fn notes(&self, recording: &RigRecording, nominal: &[f64]) -> Vec<String>;
@@ -367,6 +387,16 @@ impl<E: Equations> Rig for E {
         E::Nominal::from_values(nominal).map_or_else(Vec::new, |nominal| {
             Equations::read_off(self, recording, places, &nominal)
         })
+    }
+
+    fn estimated(
+        &self,
+        recording: &RigRecording,
+        places: &[usize],
+        nominal: &[f64],
+    ) -> Option<Vec<f64>> {
+        let nominal = E::Nominal::from_values(nominal)?;
+        Equations::estimated(self, recording, places, &nominal)
     }
 
     fn notes(&self, recording: &RigRecording, nominal: &[f64]) -> Vec<String> {

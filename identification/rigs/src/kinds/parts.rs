@@ -138,6 +138,11 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
         false
     }
 
+    /// Whether that parameter is of the first file, and others have their own.
+    fn is_of_first_file(&self, _i: usize) -> bool {
+        false
+    }
+
     /// The same model with that parameter at its stated value; none where it has no cause.
     fn without_cause(&self, _i: usize) -> Option<Self>
     where
@@ -149,6 +154,12 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
     /// The model at `point` without the nominal parameter `i`; none where it cannot do without, or is.
     fn without(&self, _point: &Point, _i: usize) -> Option<Point> {
         None
+    }
+
+    /// `point` with the nominal parameters as stated that vanished, from where no fit comes back, and with those
+    /// that are causes of their own.
+    fn restored(&self, point: &Point) -> Point {
+        point.clone()
     }
 
     /// Sensors that contradict each other.

@@ -4,11 +4,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::cause::{Cause, effect_in_words, joined};
-use super::confirmed::{clearly_better, effects};
+use super::confirmed::{clearly_better, effects, lengths};
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part};
 use diagnosis::resampling::correlation_time;
-use diagnosis::{Point, all_errors, completed, refit, squares};
+use diagnosis::{Point, all_errors, completed, looked, refit, settled, squares};
 
 /// The squared error grows by this factor at least without what the data need.
 pub(super) const NEEDED: f64 = 1.1;
@@ -19,6 +19,9 @@ const BETTER: f64 = 0.95;
 /// Most independent samples that a part counts for, halved. No model is exact: a tenth more squared error in
 /// both parts makes a reading less likely by a factor of e, however many samples show it.
 const MOST: f64 = 5.0;
+
+/// Growth of the squared error in either part after a few steps of a fit beyond which more of them change nothing.
+const FAR: f64 = 3.0;
 
 /// Least weight that is told in the sentence.
 const TOLD: f64 = 0.05;
@@ -37,39 +40,82 @@ pub struct Reading {
 }
 
 /// Errors on either part of a model fitted to the other.
-pub(super) struct Crossed([Vec<f64>; 2]);
+pub(super) struct Crossed {
+    errors: [Vec<f64>; 2],
+    /// Samples of each file in either part.
+    lengths: [Vec<usize>; 2],
+    /// Where the model is, fitted to the part that is not predicted.
+    points: [Point; 2],
+}
 
 impl Crossed {
     /// Of the model at `point`, fitted to either part; none where it cannot be.
     pub(super) fn of<M: InParts>(model: &M, point: &Point) -> Option<Self> {
-        let predicted = |part: Part| -> Option<Vec<f64>> {
-            let (own, other) = (part as usize, part.other() as usize);
-            let (found, _) = refit(model, point, own)?;
-            let there = completed(model, &found.point, Some(own), other);
-            Some(all_errors(model, &there, other))
+        Self::from(model, [point, point], settled)
+    }
+
+    /// As [`Self::of`], of fits in a few steps.
+    pub(super) fn looked<M: InParts>(model: &M, point: &Point) -> Option<Self> {
+        Self::from(model, [point, point], looked)
+    }
+
+    /// The same with its fits ended.
+    pub(super) fn settled<M: InParts>(&self, model: &M) -> Option<Self> {
+        Self::from(model, [&self.points[0], &self.points[1]], settled)
+    }
+
+    fn from<M: InParts>(
+        model: &M,
+        starts: [&Point; 2],
+        fit: impl Fn(&M, &Point, usize) -> Option<Point>,
+    ) -> Option<Self> {
+        let tested = [Part::Fitted, Part::LeftOut];
+        let points = [
+            fit(model, starts[0], tested[1] as usize)?,
+            fit(model, starts[1], tested[0] as usize)?,
+        ];
+        let errors = |i: usize| {
+            let (own, other) = (tested[1 - i] as usize, tested[i] as usize);
+            all_errors(
+                model,
+                &completed(model, &points[i], Some(own), other),
+                other,
+            )
         };
-        Some(Self([predicted(Part::LeftOut)?, predicted(Part::Fitted)?]))
+        Some(Self {
+            errors: [errors(0), errors(1)],
+            lengths: tested.map(|part| lengths(model, part as usize)),
+            points,
+        })
     }
 
     /// Squared errors of `without` over those of this model, by part.
     fn growths(&self, without: &Self) -> [f64; 2] {
-        std::array::from_fn(|i| squares(&without.0[i]) / squares(&self.0[i]))
+        std::array::from_fn(|i| squares(&without.errors[i]) / squares(&self.errors[i]))
     }
 
     /// Whether what the model has and `without` lacks is needed: no part is clearly predicted better without
     /// it, and one clearly worse.
     pub(super) fn needs(&self, without: &Self) -> bool {
         let growths = self.growths(without);
-        let clear = |i: usize| clearly_better(&without.0[i], &self.0[i]);
-        let spoils = |i: usize| growths[i] < BETTER && clearly_better(&self.0[i], &without.0[i]);
+        let errors = [&self.errors, &without.errors];
+        let [own, bare] = errors.map(|both| move |i: usize| both[i].as_slice());
+        let clear = |i: usize| clearly_better(bare(i), own(i), &self.lengths[i]);
+        let spoils =
+            |i: usize| growths[i] < BETTER && clearly_better(own(i), bare(i), &self.lengths[i]);
         !(0..2).any(spoils) && (0..2).any(|i| growths[i] > NEEDED && clear(i))
+    }
+
+    /// Whether `without`, of which the fits have not ended, will not come near this model.
+    pub(super) fn is_far_from(&self, without: &Self) -> bool {
+        self.growths(without).into_iter().all(|own| own > FAR) && self.needs(without)
     }
 
     /// Logarithm of the likelihood beyond that of `other`, correlated samples counted once.
     pub(super) fn likelier_than(&self, other: &Self) -> f64 {
         let growths = self.growths(other);
         let of = |i: usize| {
-            let own = &self.0[i];
+            let own = &self.errors[i];
             let independent = 0.5 * own.len() as f64 / correlation_time(own);
             independent.min(MOST) * growths[i].ln()
         };
@@ -77,7 +123,7 @@ impl Crossed {
     }
 
     fn explains(&self, nominal: &[f64]) -> f64 {
-        1.0 - squares(&self.0[1]) / squares(nominal)
+        1.0 - squares(&self.errors[1]) / squares(nominal)
     }
 }
 
@@ -167,7 +213,7 @@ mod tests {
     use super::*;
 
     fn crossed(sizes: [f64; 2]) -> Crossed {
-        Crossed(sizes.map(|size| {
+        let errors = sizes.map(|size| {
             let sign = |k: usize| {
                 if (k * k * 7919 + k * 31) % 13 < 6 {
                     1.0
@@ -176,7 +222,15 @@ mod tests {
                 }
             };
             (0..2000).map(|k| size * sign(k)).collect()
-        }))
+        });
+        Crossed {
+            errors,
+            lengths: [vec![2000], vec![2000]],
+            points: [(); 2].map(|()| Point {
+                nuisance: Vec::new(),
+                effects: Vec::new(),
+            }),
+        }
     }
 
     #[test]

@@ -18,6 +18,8 @@ const FEWEST: usize = 6;
 /// Coherence with the command from which on a band counts, and bands that must count.
 const COHERENT: f64 = 0.5;
 const COUNTED: usize = 5;
+/// Share of the power beside the shared motion below which bands count alike.
+const EXACT: f64 = 1e-3;
 /// Least power of the commanded acceleration in a band over that in the strongest.
 const STIRRED: f64 = 1e-3;
 
@@ -37,27 +39,37 @@ pub(super) fn accelerometer_scale(
     }
     // Sensors and their filters differ in delay.
     let sum = |own: &dyn Fn(&Line) -> f64| lines.iter().map(own).sum::<f64>();
-    let delay = sum(&|(omega, g, w)| w * omega * g.arg()) / sum(&|(omega, _, w)| w * omega * omega);
-    let aligned = |omega: f64, g: Complex<f64>| (g * Complex::new(0.0, -omega * delay).exp()).re;
-    let weight = sum(&|(_, _, w)| *w);
-    let scale = sum(&|(omega, g, w)| w * aligned(*omega, *g)) / weight;
-    let variance = sum(&|(omega, g, w)| w * (aligned(*omega, *g) - scale).powi(2)) / weight;
-    let count = weight * weight / sum(&|(_, _, w)| w * w);
+    let delay = sum(&|l| l.weight * l.omega * l.ratio.arg()) / sum(&|l| l.weight * l.omega.powi(2));
+    let aligned = |l: &Line| (l.ratio * Complex::new(0.0, -l.omega * delay).exp()).re;
+    let weight = sum(&|l| l.weight);
+    let scale = sum(&|l| l.weight * aligned(l)) / weight;
+    let variance = sum(&|l| l.weight * (aligned(l) - scale).powi(2)) / weight;
+    let count = weight * weight / sum(&|l| l.weight.powi(2));
     // Where both sensors see one motion, what differs from band to band and from record to record is no noise
     // that more bands would lessen: without a filter before its converter an accelerometer shows what happens
-    // between samples as slow motion, late by a part of a sample.
-    let late = sum(&|(_, g, w)| w * g.im * g.im) / weight;
+    // between samples as slow motion, late by a part of a sample. What it shows beside the motion, such as the
+    // shocks of a loop that chatters, may be off as much in the part that follows the command.
+    let late = sum(&|l| l.weight * l.ratio.im.powi(2)) / weight;
+    let beside = sum(&|l| l.weight * l.beside) / weight;
     let noise = variance / (count - 1.0).max(1.0);
     Some(NamedValue {
         name: "accelerometer_scale".into(),
         value: scale,
         unit: "1".into(),
-        standard_error: (noise + variance + late).sqrt(),
+        standard_error: (noise + variance + late + beside).sqrt(),
     })
 }
 
-/// Angular frequency, rad/s; a ratio there; its weight.
-type Line = (f64, Complex<f64>, f64);
+/// What both sensors show in a band.
+struct Line {
+    /// Angular frequency, rad/s.
+    omega: f64,
+    /// Acceleration over the displacement's second derivative.
+    ratio: Complex<f64>,
+    weight: f64,
+    /// Share of the acceleration's power that does not belong to that derivative.
+    beside: f64,
+}
 
 /// Acceleration over the displacement's second derivative by angular frequency, with a weight. Every line of
 /// a band is differentiated at its own frequency, so that the response of the rig may turn inside it.
@@ -105,6 +117,7 @@ fn responses(one: &RigRecording, command: Channel) -> Option<Vec<Line>> {
         }
         let mut powers = [0.0; 3];
         let mut with_command = [Complex::new(0.0, 0.0); 2];
+        let mut with_each_other = Complex::new(0.0, 0.0);
         for k in lines {
             let omega = TAU * k as f64 * rate / length as f64;
             let both = [x[k] * -(omega * omega), a[k]];
@@ -113,6 +126,7 @@ fn responses(one: &RigRecording, command: Channel) -> Option<Vec<Line>> {
                 powers[i + 1] += own.norm_sqr();
                 with_command[i] += c[k].conj() * own;
             }
+            with_each_other += both[0].conj() * both[1];
         }
         let coherence = |i: usize| {
             with_command[i].norm_sqr() / (powers[0] * powers[i + 1]).max(f64::MIN_POSITIVE)
@@ -121,9 +135,14 @@ fn responses(one: &RigRecording, command: Channel) -> Option<Vec<Line>> {
         if !both.iter().all(|own| *own > COHERENT) {
             return None;
         }
-        let noise: f64 = both.iter().map(|own| (1.0 - own).max(1e-4) / own).sum();
-        let middle = TAU * (edge(band) * edge(band + 1)).sqrt();
-        Some((middle, with_command[1] / with_command[0], 1.0 / noise))
+        let shared = with_each_other.norm_sqr() / (powers[1] * powers[2]).max(f64::MIN_POSITIVE);
+        let beside = (1.0 - shared).max(0.0);
+        Some(Line {
+            omega: TAU * (edge(band) * edge(band + 1)).sqrt(),
+            ratio: with_command[1] / with_command[0],
+            weight: both[0].min(both[1]) / (beside + EXACT),
+            beside,
+        })
     });
     Some(bands.collect())
 }
@@ -174,6 +193,6 @@ mod tests {
         let recording = RigRecording::new(recording, &[command], Channel::Displacement);
         let found = accelerometer_scale(&[recording], command).unwrap();
         assert!((found.value - 1.08).abs() < 4e-3, "{found:?}");
-        assert!(found.standard_error < 4e-3, "{found:?}");
+        assert!(found.standard_error < 15e-3, "{found:?}");
     }
 }

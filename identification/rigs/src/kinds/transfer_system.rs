@@ -228,7 +228,8 @@ impl TransferSystemRig {
             })
             .collect();
         self.plant_of(&nominal, |effect, parameter| {
-            let is_named = found.named.iter().any(|name| name == effect);
+            let mut named = found.named.iter().flat_map(|name| name.split(" or "));
+            let is_named = named.any(|name| name == effect);
             let mut effects = part.effects.iter();
             let one = effects.find(|one| is_named && one.effect == effect)?;
             let mut parameters = one.parameters.iter();

@@ -189,6 +189,15 @@ impl Rig for ExtendedKind {
         self.base.read_off(recording, places, nominal)
     }
 
+    fn estimated(
+        &self,
+        recording: &RigRecording,
+        places: &[usize],
+        nominal: &[f64],
+    ) -> Option<Vec<f64>> {
+        self.base.estimated(recording, places, nominal)
+    }
+
     fn notes(&self, recording: &RigRecording, nominal: &[f64]) -> Vec<String> {
         self.base.notes(recording, nominal)
     }
