@@ -36,24 +36,34 @@ pub struct ValveCompensation {
 pub struct Spools {
     ideal: [f64; 2],
     real: [f64; 2],
+    /// How both move. It is computed again only if what it was computed from changes.
+    spool: Option<Spool>,
 }
 
 /// Samples over which the real spool is brought to where it should be: one alone would swing.
 const AHEAD: usize = 2;
 
 /// A spool under a command that is held for a sample.
-#[derive(Debug, Clone, Copy)]
-struct Spool(Matrix2<f64>);
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Spool {
+    /// Lag (s), inertia (s²) and the sample's duration (s).
+    of: [f64; 3],
+    /// Columns of the transition over the sample.
+    transition: [[f64; 2]; 2],
+}
 
 impl Spool {
-    fn new(hydraulics: &Hydraulics, period: f64) -> Self {
-        let (lag, inertia) = (hydraulics.spool_lag, hydraulics.spool_inertia);
-        Self(spool_transition(lag, inertia, period))
+    fn new(of: [f64; 3]) -> Self {
+        let [lag, inertia, period] = of;
+        Self {
+            of,
+            transition: spool_transition(lag, inertia, period).into(),
+        }
     }
 
     fn moved(&self, at: Vector2<f64>, command: f64) -> Vector2<f64> {
         let end = Vector2::new(command, 0.0);
-        end + self.0 * (at - end)
+        end + Matrix2::from(self.transition) * (at - end)
     }
 }
 
@@ -99,7 +109,9 @@ impl ValveCompensation {
     /// gets it within `limit` (V).
     #[must_use]
     pub fn step(&mut self, asked: f64, hydraulics: &Hydraulics, limit: f64, period: f64) -> f64 {
-        let spool = Spool::new(hydraulics, period);
+        let of = [hydraulics.spool_lag, hydraulics.spool_inertia, period];
+        let known = self.memory.spool.filter(|own| own.of == of);
+        let spool = known.unwrap_or_else(|| Spool::new(of));
         let still = self.command(asked);
         let [mut ideal, mut real] = [self.memory.ideal, self.memory.real].map(Vector2::from);
         let mut unit = Vector2::zeros();
@@ -116,7 +128,11 @@ impl ValveCompensation {
         let sent = command.clamp(-limit, limit);
         let [ideal, real] = [(self.memory.ideal, asked), (self.memory.real, sent)]
             .map(|(at, command)| spool.moved(at.into(), command).into());
-        self.memory = Spools { ideal, real };
+        self.memory = Spools {
+            ideal,
+            real,
+            spool: Some(spool),
+        };
         command
     }
 }
@@ -226,5 +242,30 @@ mod tests {
             let sent = own.step(asked, &hydraulics(), 10.0, PERIOD);
             assert!((sent - own.command(asked)).abs() < 1e-12, "{k}");
         }
+    }
+
+    /// A parameter that is tuned during a run acts from the next sample on.
+    #[test]
+    fn a_changed_spool_moves_as_its_new_parameters_have_it() {
+        let mut own = ValveCompensation::default();
+        own.curve.overlap = 0.1;
+        for _ in 0..5 {
+            let _ = own.step(0.3, &hydraulics(), 10.0, PERIOD);
+        }
+        let slower = Hydraulics {
+            spool_lag: 9e-3,
+            ..hydraulics()
+        };
+        let mut fresh = own;
+        fresh.memory.spool = None;
+        let mut stale = own;
+        assert_eq!(
+            own.step(-0.2, &slower, 10.0, PERIOD),
+            fresh.step(-0.2, &slower, 10.0, PERIOD)
+        );
+        assert_ne!(own.memory.real, {
+            let _ = stale.step(-0.2, &hydraulics(), 10.0, PERIOD);
+            stale.memory.real
+        });
     }
 }
