@@ -37,8 +37,9 @@ const FINALISTS: usize = 6;
 /// standard deviations.
 const OTHER_STARTS: usize = 6;
 const APART: f64 = 2.0;
-/// How many of them beside one that an equation gives.
-const BESIDE: usize = 2;
+/// Share of the squared error that a fit from an equation's answer must leave at most of what others leave: that
+/// answer bends towards what the equation lacks.
+const CLEARLY: f64 = 0.9;
 /// Of them, those that are fitted to the end.
 const ENDED: usize = 3;
 /// Seed of those starts.
@@ -134,14 +135,7 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
     let mut random = ChaCha8Rng::seed_from_u64(STARTS_SEED);
     let screen = model.screen(record);
     let mut starts = vec![stated.clone()];
-    let estimated = model.estimated(screen);
-    let others = if estimated.is_some() {
-        BESIDE
-    } else {
-        OTHER_STARTS
-    };
-    starts.extend(estimated);
-    for _ in 0..others {
+    for _ in 0..OTHER_STARTS {
         let mut start = stated.clone();
         for (i, p) in start.nuisance.iter_mut().enumerate() {
             let off = random.random_range(-APART..APART);
@@ -178,8 +172,14 @@ pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated>
         .par_iter()
         .filter_map(|one| settle(model, &one.point, record, TO_THE_END))
         .collect();
-    ends.into_iter()
-        .min_by(|a, b| a.squares.total_cmp(&b.squares))
+    let best = ends
+        .into_iter()
+        .min_by(|a, b| a.squares.total_cmp(&b.squares))?;
+    let estimated = model
+        .estimated(record)
+        .and_then(|start| settle(model, &start, record, TO_THE_END));
+    let is_better = |own: &Simulated| own.squares < CLEARLY * best.squares;
+    Some(estimated.filter(is_better).unwrap_or(best))
 }
 
 /// `point`, of which the nuisance of a block that `fitted` does not tell is fitted to `tested`: a
