@@ -1,7 +1,7 @@
 //! A closed loop's linear equation, fitted as it stands: where a simulation's fit may begin.
 //!
-//! `x' + T x'' + Q x''' = K (s r - x) + f s r' + i K ∫(s r - x) + c - F sgn x'` is linear in all but the delay of
-//! `r`. Every signal passes through the same lags, so that their derivatives are those lags' own (state-variable
+//! Apart from the delay of `r` this equation is linear:
+//! `x' + T x'' + Q x''' = K (s r - x) + f s r' + i K ∫(s r - x) + c - F sgn x'`. Every signal passes through the same lags, so that their derivatives are those lags' own (state-variable
 //! filters; Young and Jakeman, International Journal of Control 31, 1980), and one delay after the other is tried.
 
 use std::f64::consts::TAU;

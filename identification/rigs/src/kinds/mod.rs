@@ -23,6 +23,7 @@ pub mod hypotheses;
 mod hysteretic_device;
 mod linear_axis;
 mod linear_loop;
+mod loop_step;
 mod measured;
 mod named_value;
 mod natural;

@@ -1,0 +1,317 @@
+//! A step of a closed loop: the linear equations exactly, what is not linear straight over the step, and friction
+//! implicitly.
+
+use nalgebra::SMatrix;
+
+/// The linear loop.
+pub(super) struct Loop {
+    pub(super) gain: f64,
+    pub(super) command_lag: f64,
+    pub(super) loop_lag: f64,
+    pub(super) feedforward: f64,
+    pub(super) integral: f64,
+    pub(super) resonance: f64,
+    pub(super) resonance_damping: f64,
+    /// Whether there is friction.
+    pub(super) rubs: bool,
+}
+
+/// Lagging command, displacement, flow, integral of the error, velocity and its rate times `P`, flow behind
+/// half of its lag; nothing.
+pub(super) type State = [f64; WIDTH];
+const STATES: usize = 7;
+/// As processors take numbers.
+pub(super) const WIDTH: usize = 8;
+/// The states, the command, its slope, the flow beyond the linear one, its slope and the speed that friction
+/// takes.
+const ALL: usize = STATES + 5;
+pub(super) const SLOPE: usize = STATES + 1;
+
+/// The speed, times `share`, that friction takes over a step after which it would have been `free` without:
+/// implicit, so that it sticks with steps of any length.
+pub(super) fn rubbing(free: f64, most: f64, sliding_speed: f64) -> f64 {
+    // v + most tanh(v / s) = free has one solution, which is between free less most and free.
+    let (mut low, mut high) = ((free.abs() - most).max(0.0), free.abs());
+    if low > SATURATED * sliding_speed {
+        return most.copysign(-free);
+    }
+    let mut v = low.max(high * sliding_speed / (sliding_speed + most));
+    for _ in 0..20 {
+        let t = tanh(v / sliding_speed);
+        let off = v + most * t - free.abs();
+        if off > 0.0 {
+            high = v;
+        } else {
+            low = v;
+        }
+        let step = off / (1.0 + most / sliding_speed * (1.0 - t * t));
+        let next = v - step;
+        v = if (low..=high).contains(&next) {
+            next
+        } else {
+            0.5 * (low + high)
+        };
+        if step.abs() <= 1e-6 * sliding_speed {
+            break;
+        }
+    }
+    (v - free.abs()).copysign(-free)
+}
+
+/// `tanh` is one beyond it.
+const SATURATED: f64 = 20.0;
+
+/// To the last digits of one, by a single exponential.
+pub(super) fn tanh(x: f64) -> f64 {
+    1.0 - 2.0 / (1.0 + (2.0 * x).exp())
+}
+
+/// The solution over a step for a command that runs straight and a flow beyond the linear one that does
+/// (exponential time differencing; Cox and Matthews, J. Comput. Phys. 176, 2002): exact for any lag.
+pub(super) struct Step {
+    /// s.
+    pub(super) length: f64,
+    /// The state after the step for one of everything before.
+    pub(super) columns: [State; ALL],
+    /// What the controller sends, of the first four states, the command and its slope.
+    pub(super) sent: [f64; 6],
+    /// What it sends after the step of a flow beyond the linear one and of what friction takes.
+    pub(super) sent_of_beyond: f64,
+    pub(super) sent_of_rubbed: f64,
+    /// The state that is the speed on which friction acts, if there is friction.
+    pub(super) rubbed_at: Option<usize>,
+    /// The state after the step for a command whose slope grows by one inside it.
+    pub(super) bend: State,
+}
+
+/// The command over a step.
+pub(super) struct Course {
+    pub(super) ends: [f64; 2],
+    /// At the begin.
+    pub(super) slope: f64,
+    /// What is added to the slope on the way.
+    pub(super) change: f64,
+}
+
+/// Damping of the resonance below which friction takes no more speed.
+const LEAST_DAMPING: f64 = 0.02;
+
+impl Loop {
+    pub(super) fn step(&self, length: f64, sample: f64) -> Step {
+        let Self {
+            gain,
+            feedforward,
+            integral,
+            ..
+        } = *self;
+        // A lag that is nothing beside a sample is none.
+        let pole = |time: f64| {
+            if time > 1e-3 * sample {
+                1.0 / time
+            } else {
+                0.0
+            }
+        };
+        let has_resonance = self.resonance > 1e-3 * sample;
+        // Friction needs a speed to act on.
+        let least = if self.rubs && !has_resonance {
+            0.1 * sample
+        } else {
+            0.0
+        };
+        let lag = 0.5 * self.loop_lag.max(least);
+        let (command_pole, pole) = (pole(self.command_lag), pole(lag));
+        let ahead = feedforward / gain;
+        // Of the first four states, the command and its slope.
+        let error = if command_pole > 0.0 {
+            [1.0, -1.0, 0.0, 0.0, 0.0, 0.0]
+        } else {
+            [0.0, -1.0, 0.0, 0.0, 1.0, 0.0]
+        };
+        let speed = if command_pole > 0.0 {
+            [-command_pole, 0.0, 0.0, 0.0, command_pole, 0.0]
+        } else {
+            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+        };
+        let mut sent: [f64; 6] = std::array::from_fn(|i| error[i] + ahead * speed[i]);
+        sent[3] += 1.0;
+        // Places of the command, its slope, the flow beyond, its slope and friction behind the states.
+        let [command, slope, beyond, its_slope, friction] = std::array::from_fn(|i| STATES + i);
+        let column = |i: usize| [0, 1, 2, 3, command, slope, beyond][i];
+        let mut a = SMatrix::<f64, ALL, ALL>::zeros();
+        let flow: [f64; 7] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| gain * s));
+        // What the flow moves: the table itself, or the mass on the oil.
+        let moved = if has_resonance { 5 } else { 1 };
+        let share = if has_resonance {
+            1.0 / self.resonance
+        } else {
+            1.0
+        };
+        for i in 0..6 {
+            let place = column(i);
+            if command_pole > 0.0 {
+                a[(0, place)] = speed[i];
+            }
+            a[(3, place)] = integral * error[i];
+        }
+        for (i, value) in flow.into_iter().enumerate() {
+            let place = column(i);
+            if pole > 0.0 {
+                a[(6, place)] = pole * value;
+            } else {
+                a[(moved, place)] += share * value;
+            }
+        }
+        if pole > 0.0 {
+            a[(6, 6)] -= pole;
+            a[(2, 6)] = pole;
+            a[(2, 2)] = -pole;
+            if !has_resonance {
+                a[(2, friction)] = pole;
+            }
+            a[(moved, 2)] += share;
+        }
+        if has_resonance {
+            // On the mass: what it takes of a steady speed is lost in the damping (a leak, a coil's resistance).
+            a[(4, friction)] = 0.5 * share / self.resonance_damping.max(LEAST_DAMPING);
+            a[(1, 4)] = 1.0;
+            a[(4, 5)] = share;
+            a[(5, 4)] -= share;
+            a[(5, 5)] -= 2.0 * self.resonance_damping * share;
+        }
+        a[(command, slope)] = 1.0;
+        a[(beyond, its_slope)] = 1.0;
+        let a = a * length;
+        let solution = if a.iter().all(|value| value.is_finite()) {
+            a.exp()
+        } else {
+            a.map(|_| f64::NAN)
+        };
+        let sent_of = |j: usize| -> f64 { (0..4).map(|i| sent[i] * solution[(i, j)]).sum() };
+        Step {
+            length,
+            columns: std::array::from_fn(|j| {
+                std::array::from_fn(|i| if i < STATES { solution[(i, j)] } else { 0.0 })
+            }),
+            sent,
+            sent_of_beyond: sent_of(beyond),
+            sent_of_rubbed: sent_of(friction),
+            rubbed_at: self.rubs.then_some(if has_resonance { 4 } else { 2 }),
+            bend: [0.0; WIDTH],
+        }
+    }
+}
+
+impl Step {
+    /// The state after the step. `beyond` is the flow beyond the linear one for what the controller sends; `rub` is
+    /// what friction takes of a speed over a step.
+    #[inline]
+    pub(super) fn advance(
+        &self,
+        state: State,
+        course: &Course,
+        beyond: Option<&impl Fn(f64) -> f64>,
+        rub: &impl Fn(f64, f64) -> f64,
+    ) -> State {
+        let [columns @ .., beyond_column, slope_column, rubbed] = &self.columns;
+        let mut after: State = [0.0; WIDTH];
+        for (j, column) in columns.iter().enumerate() {
+            let value = match j {
+                STATES => course.ends[0],
+                SLOPE => course.slope,
+                j => state[j],
+            };
+            add(&mut after, column, value);
+        }
+        if course.change != 0.0 {
+            add(&mut after, &self.bend, course.change);
+        }
+        let sent = |state: &State, command: f64, slope: f64| -> f64 {
+            let own: f64 = (0..4).map(|i| self.sent[i] * state[i]).sum();
+            own + self.sent[4] * command + self.sent[5] * slope
+        };
+        if let Some(beyond) = beyond {
+            let [begin, end] = course.ends;
+            let now = beyond(sent(&state, begin, course.slope));
+            let mut sends =
+                sent(&after, end, course.slope + course.change) + now * self.sent_of_beyond;
+            if let Some(at) = self.rubbed_at {
+                let free = after[at] + now * beyond_column[at];
+                sends += self.sent_of_rubbed * rub(free, rubbed[at]);
+            }
+            let its_slope = (beyond(sends) - now) / self.length;
+            add(&mut after, beyond_column, now);
+            add(&mut after, slope_column, its_slope);
+        }
+        if let Some(at) = self.rubbed_at {
+            let taken = rub(after[at], rubbed[at]);
+            add(&mut after, rubbed, taken);
+        }
+        after
+    }
+}
+
+#[inline]
+fn add(to: &mut State, column: &State, value: f64) {
+    for i in 0..WIDTH {
+        to[i] += column[i] * value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_that_bends_inside_a_step_is_followed_as_in_two_steps() {
+        let form = Loop {
+            gain: 30.0,
+            command_lag: 0.002,
+            loop_lag: 0.003,
+            feedforward: 0.4,
+            integral: 0.7,
+            resonance: 0.004,
+            resonance_damping: 0.3,
+            rubs: false,
+        };
+        let (length, share) = (0.01, 0.3);
+        let state: State = [1.0, -2.0, 0.5, 0.1, 3.0, -1.0, 2.0, 0.0];
+        let (slope, change) = (7.0, -11.0);
+        let bend = 1.0 + share * length * slope;
+        let end = bend + (1.0 - share) * length * (slope + change);
+        let straight = |ends: [f64; 2], slope: f64| Course {
+            ends,
+            slope,
+            change: 0.0,
+        };
+        let none = |_: f64, _: f64| 0.0;
+        let beyond: Option<&fn(f64) -> f64> = None;
+        let first = form.step(share * length, length);
+        let middle = first.advance(state, &straight([1.0, bend], slope), beyond, &none);
+        let second = form.step((1.0 - share) * length, length);
+        let course = straight([bend, end], slope + change);
+        let expected = second.advance(middle, &course, beyond, &none);
+        let mut whole = form.step(length, length);
+        whole.bend = second.columns[SLOPE];
+        let course = Course {
+            ends: [1.0, end],
+            slope,
+            change,
+        };
+        let found = whole.advance(state, &course, beyond, &none);
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!(
+                (found - expected).abs() < 1e-9 * expected.abs().max(1.0),
+                "{found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_quick_tanh_is_the_library_s() {
+        for k in -4000..4000 {
+            let x = 0.01 * f64::from(k);
+            assert!((tanh(x) - x.tanh()).abs() < 1e-15, "{x}");
+        }
+    }
+}
