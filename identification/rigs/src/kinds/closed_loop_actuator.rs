@@ -422,6 +422,36 @@ mod tests {
     use super::*;
     use recordings::Recording;
 
+    /// A loop without lags.
+    fn proportional(loop_gain: f64) -> Nominal {
+        Nominal {
+            loop_gain,
+            command_lag: 0.0,
+            scale: 1.0,
+            offset: 0.0,
+            command_delay: 0.0,
+            loop_lag: 0.0,
+            feedforward: 0.0,
+            integral: 0.0,
+            resonance: 0.0,
+            resonance_damping: 0.5,
+        }
+    }
+
+    fn answer(rate: f64, command: &[f64], nominal: &Nominal, effects: &Effects) -> Vec<f64> {
+        let mut out = vec![0.0; command.len()];
+        let channels = vec![
+            (COMMAND, command.to_vec()),
+            (Channel::Displacement, out.clone()),
+        ];
+        let recording = Recording::new("command", 1.0 / rate, channels).unwrap();
+        let recording =
+            RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
+        let session = Session::default();
+        ClosedLoopActuator.simulate(&recording, nominal, effects, &session, &mut out);
+        out
+    }
+
     #[test]
     fn a_step_is_the_closed_form_at_any_rate() {
         // 1 / ((1 + τ s)(1 + s / K)) at 1 kHz and at 25 Hz, where K h = 2.
@@ -429,29 +459,12 @@ mod tests {
         for rate in [1000.0, 100.0, 25.0] {
             let n = 200;
             let ramp: Vec<f64> = (0..n).map(|k| f64::from(k) / rate).collect();
-            let channels = vec![
-                (COMMAND, ramp),
-                (Channel::Displacement, vec![0.0; n as usize]),
-            ];
-            let recording = Recording::new("ramp", 1.0 / rate, channels).unwrap();
-            let recording =
-                RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
             let nominal = Nominal {
-                loop_gain: gain,
                 command_lag: lag,
-                scale: 1.0,
-                offset: 0.0,
-                command_delay: 0.0,
-                loop_lag: 0.0,
-                feedforward: 0.0,
-                integral: 0.0,
-                resonance: 0.0,
-                resonance_damping: 0.5,
+                ..proportional(gain)
             };
-            let mut out = vec![0.0; n as usize];
             let off = Effects::off().unwrap();
-            let session = Session::default();
-            ClosedLoopActuator.simulate(&recording, &nominal, &off, &session, &mut out);
+            let out = answer(rate, &ramp, &nominal, &off);
             let slow = 1.0 / gain;
             for (k, y) in out.iter().enumerate() {
                 let t = k as f64 / rate;
@@ -471,33 +484,19 @@ mod tests {
         // the table follows at that speed.
         let (rate, n, gain) = (200.0, 800, 20.0);
         let ramp: Vec<f64> = (0..n).map(|k| k as f64 / rate).collect();
-        let channels = vec![
-            (COMMAND, ramp.clone()),
-            (Channel::Displacement, vec![0.0; n]),
-        ];
-        let recording = Recording::new("ramp", 1.0 / rate, channels).unwrap();
-        let recording =
-            RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
         let last = |feedforward: f64, integral: f64, rail: f64, delay: f64| {
             let nominal = Nominal {
-                loop_gain: gain,
-                command_lag: 0.0,
-                scale: 1.0,
-                offset: 0.0,
                 command_delay: delay,
                 loop_lag: 0.003,
                 feedforward,
                 integral,
-                resonance: 0.0,
-                resonance_damping: 0.5,
+                ..proportional(gain)
             };
             let off = Effects {
                 speed_limit: SpeedLimit { slowness: rail },
                 ..Effects::off().unwrap()
             };
-            let mut out = vec![0.0; n];
-            let session = Session::default();
-            ClosedLoopActuator.simulate(&recording, &nominal, &off, &session, &mut out);
+            let out = answer(rate, &ramp, &nominal, &off);
             ramp[n - 1] - out[n - 1]
         };
         assert!((last(0.0, 0.0, 0.0, 0.0) - 0.05).abs() < 1e-9);
@@ -549,25 +548,11 @@ mod tests {
                 x += h * v;
             }
         }
-        let channels = vec![
-            (COMMAND, command.clone()),
-            (Channel::Displacement, vec![0.0; n]),
-        ];
-        let recording = Recording::new("motor", 1.0 / rate, channels).unwrap();
-        let recording =
-            RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
         let resonance = (mass * inductance).sqrt() / constant;
         let nominal = Nominal {
-            loop_gain: gain,
-            command_lag: 0.0,
-            scale: 1.0,
-            offset: 0.0,
-            command_delay: 0.0,
-            loop_lag: 0.0,
-            feedforward: 0.0,
-            integral: 0.0,
             resonance,
             resonance_damping: 0.5 * resonance * resistance / inductance,
+            ..proportional(gain)
         };
         let off = |breakaway_error: f64| {
             let effects = Effects {
@@ -577,9 +562,7 @@ mod tests {
                 },
                 ..Effects::off().unwrap()
             };
-            let mut out = vec![0.0; n];
-            let session = Session::default();
-            ClosedLoopActuator.simulate(&recording, &nominal, &effects, &session, &mut out);
+            let out = answer(rate, &command, &nominal, &effects);
             let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
             let size: f64 = measured.iter().map(|x| x * x).sum();
             (errors.sum::<f64>() / size).sqrt()
@@ -600,24 +583,9 @@ mod tests {
                 speed * if t < 10.0 { t } else { 20.0 - t }
             })
             .collect();
-        let channels = vec![
-            (COMMAND, command.clone()),
-            (Channel::Displacement, vec![0.0; n]),
-        ];
-        let recording = Recording::new("triangle", 1.0 / rate, channels).unwrap();
-        let recording =
-            RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
         let nominal = Nominal {
-            loop_gain: gain,
-            command_lag: 0.0,
-            scale: 1.0,
-            offset: 0.0,
-            command_delay: 0.0,
             loop_lag: 0.004,
-            feedforward: 0.0,
-            integral: 0.0,
-            resonance: 0.0,
-            resonance_damping: 0.5,
+            ..proportional(gain)
         };
         let effects = Effects {
             friction: Friction {
@@ -626,9 +594,7 @@ mod tests {
             },
             ..Effects::off().unwrap()
         };
-        let mut out = vec![0.0; n];
-        let session = Session::default();
-        ClosedLoopActuator.simulate(&recording, &nominal, &effects, &session, &mut out);
+        let out = answer(rate, &command, &nominal, &effects);
         let behind = |t: f64| {
             let k = (t * rate) as usize;
             command[k] - out[k]
@@ -648,22 +614,7 @@ mod tests {
         let (gain, rate, n) = (40.0, 1000.0, 60);
         let moved = |step: f64, at: usize| {
             let command: Vec<f64> = (0..n).map(|k| if k > 0 { step } else { 0.0 }).collect();
-            let channels = vec![(COMMAND, command), (Channel::Displacement, vec![0.0; n])];
-            let recording = Recording::new("step", 1.0 / rate, channels).unwrap();
-            let recording =
-                RigRecording::new(recording, ClosedLoopActuator::INPUTS, Channel::Displacement);
-            let nominal = Nominal {
-                loop_gain: gain,
-                command_lag: 0.0,
-                scale: 1.0,
-                offset: 0.0,
-                command_delay: 0.0,
-                loop_lag: 0.0,
-                feedforward: 0.0,
-                integral: 0.0,
-                resonance: 0.0,
-                resonance_damping: 0.5,
-            };
+            let nominal = proportional(gain);
             let effects = Effects {
                 reduced_null_gain: ReducedNullGain {
                     reduction: 0.5,
@@ -671,9 +622,7 @@ mod tests {
                 },
                 ..Effects::off().unwrap()
             };
-            let mut out = vec![0.0; n];
-            let session = Session::default();
-            ClosedLoopActuator.simulate(&recording, &nominal, &effects, &session, &mut out);
+            let out = answer(rate, &command, &nominal, &effects);
             out[at] / step
         };
         // The command rises over the first sample.
