@@ -448,7 +448,7 @@ impl From<&RigDiagnosis> for DiagnosisReport {
                 parameters: parameters.collect(),
                 confidence: own.map_or(f64::NAN, |one| one.confidence),
                 share_explained: own.map(|one| one.share),
-                on_every_part: Some(true),
+                on_every_part: Some(!confirmed.on_one_part.contains(name)),
                 gain: None,
             }
         };
