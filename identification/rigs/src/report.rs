@@ -462,7 +462,14 @@ impl From<&RigDiagnosis> for DiagnosisReport {
                 .map(EffectReport::from)
                 .chain(confirmed.effects.iter().map(effect))
                 .collect(),
-            alternatives: rivals.map(|(rival, _)| vec![rival.clone()]).collect(),
+            alternatives: rivals
+                .map(|(rival, _)| rival.as_str())
+                .chain(
+                    (found.causes.iter())
+                        .filter_map(|own| own.or(&confirmed.parameters).map(|(name, _)| name)),
+                )
+                .map(|name| vec![name.to_owned()])
+                .collect(),
             separating_experiment: None,
             separating_motion: None,
             gain: GainReport {

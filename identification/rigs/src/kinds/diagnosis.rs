@@ -556,6 +556,15 @@ impl RigDiagnosis {
             })
     }
 
+    fn causes_in_words(&self) -> Vec<String> {
+        let causes = self.causes.iter();
+        let words = causes.map(|own| match own.or(&self.confirmed.parameters) {
+            Some((_, other)) => format!("{} or {other}", own.words()),
+            None => own.words(),
+        });
+        words.collect()
+    }
+
     /// The named effects, each `with_values`, after what shows them.
     fn shown_in_words(&self, with_values: Vec<String>) -> Vec<String> {
         let names = self.confirmed.effects.iter().map(|(name, _)| name);
@@ -611,7 +620,7 @@ impl RigDiagnosis {
                 100.0 * part.refitted_error
             ),
             Verdict::Named => {
-                let mut all: Vec<String> = self.causes.iter().map(Cause::words).collect();
+                let mut all = self.causes_in_words();
                 all.extend(shown);
                 let left = 1.0 - self.unexplained;
                 let share = match (all.len(), left > ALL) {
@@ -631,7 +640,7 @@ impl RigDiagnosis {
                 format!("{name}: {}; {share}; {falls}.", joined(&all))
             }
             Verdict::Ambiguous => {
-                let causes: Vec<String> = self.causes.iter().map(Cause::words).collect();
+                let causes = self.causes_in_words();
                 let causes = match causes.as_slice() {
                     [] => String::new(),
                     some => format!("{}; ", joined(some)),
