@@ -30,7 +30,7 @@ const RIVAL: f64 = 0.9;
 /// A candidate whose fit gains less than this share of the best one's is not tested on unseen data.
 const WORTH_TESTING: f64 = 0.7;
 /// One that gains less than this share of it after a few steps is not fitted to the end.
-const WORTH_ENDING: f64 = 0.2;
+const WORTH_ENDING: f64 = 0.35;
 /// Squared error of a proposal after a few steps over that of the best one, beyond which more of them change nothing.
 const FAR: f64 = 9.0;
 /// Effects in one model.

@@ -223,7 +223,7 @@ impl Equations for ClosedLoopActuator {
             .iter()
             .map(RigRecording::period)
             .fold(0.0, f64::max);
-        let within = CALIBRATED * (slowest * ENOUGH).max(1.0);
+        let within = CALIBRATED * (slowest * ENOUGH).max(1.0).powi(3);
         let scale = accelerometer_scale(recordings, COMMAND);
         let cause = scale.and_then(|scale| Cause::of(scale, (1.0, within)));
         cause.into_iter().collect()

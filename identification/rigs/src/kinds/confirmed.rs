@@ -10,7 +10,8 @@ use super::readings::NEEDED;
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
 use diagnosis::{
-    Free, Point, Role, all_errors, completed, estimates, least_squares, refit, settled, squares,
+    Free, Point, Role, all_errors, completed, estimates, least_squares, looked, refit, settled,
+    squares,
 };
 use recordings::mean_and_deviation;
 
@@ -74,6 +75,20 @@ impl Confirmed {
             let same = other.effects.iter().find(|(known, _)| known == name);
             widen(own, same.map_or(&[], |(_, values)| values));
         }
+    }
+
+    /// As [`Self::widen_to`], by nominal parameters of a part's own model that its standard errors do not bring near
+    /// these: where a part asks for something else, the law is not quite that of the rig.
+    pub(super) fn widen_apart(&mut self, part: &[NamedValue]) {
+        let is_apart = |other: &&NamedValue| {
+            let own = self.parameters.iter().find(|own| own.name == other.name);
+            own.is_some_and(|own| {
+                let both = own.standard_error.hypot(other.standard_error);
+                (own.value - other.value).abs() > DIFFERS * both
+            })
+        };
+        let apart: Vec<NamedValue> = part.iter().filter(is_apart).cloned().collect();
+        self.widen_by(&apart);
     }
 
     /// As [`Self::widen_to`], the nominal parameters alone.
@@ -174,8 +189,12 @@ fn is_felt<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize
 fn is_silent<M: InParts>(measured: &M, fits: &Fits, effect: usize, part: Part) -> bool {
     let all = &fits.everything.0;
     let is_vital = || {
-        without_and_with(measured, all, effect, EVERYTHING)
-            .is_some_and(|[bare, with]| squares(&bare) > VITAL * squares(&with))
+        let mut without = all.clone();
+        without.effects.retain(|(index, _)| *index != effect);
+        let without = looked(measured, &without, EVERYTHING)?;
+        let [bare, with] =
+            [&without, all].map(|point| squares(&all_errors(measured, point, EVERYTHING)));
+        Some(bare > VITAL * with)
     };
     let held = || {
         let (own, record) = (&fits.parts[part as usize].0, part as usize);
@@ -199,7 +218,7 @@ fn is_silent<M: InParts>(measured: &M, fits: &Fits, effect: usize, part: Part) -
             &lengths(measured, record),
         ))
     };
-    is_vital() && held() == Some(true)
+    is_vital() == Some(true) && held() == Some(true)
 }
 
 /// Samples of each file in `record`, of those that have some.

@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn a_noisy_record_hides_nothing_that_a_clean_one_tells() {
-        let both = [recording(|_| 1.08, 0.01), recording(|_| 1.08, 0.8)];
+        let both = [recording(|_| 1.08, 0.01), recording(|_| 1.08, 3.0)];
         let found = accelerometer_scale(&both, COMMAND).unwrap();
         assert!((found.value - 1.08).abs() < 4e-3, "{found:?}");
         assert!(found.standard_error < 15e-3, "{found:?}");
