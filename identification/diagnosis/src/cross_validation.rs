@@ -29,10 +29,6 @@ const LEAST_GAIN: f64 = 0.05;
 const RIVAL: f64 = 0.9;
 /// A candidate whose fit gains less than this share of the best one's is not tested on unseen data.
 const WORTH_TESTING: f64 = 0.7;
-/// One that gains less than this share of it after a few steps is not fitted to the end.
-const WORTH_ENDING: f64 = 0.35;
-/// Squared error of a proposal after a few steps over that of the best one, beyond which more of them change nothing.
-const FAR: f64 = 9.0;
 /// Effects in one model.
 const MOST_EFFECTS: usize = 8;
 /// Candidates that are fitted to the end in a round.
@@ -381,17 +377,8 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             .collect();
         quick.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
         quick.truncate(FINALISTS);
-        let near = quick.par_iter().filter_map(|(effect, quick)| {
-            let near = settle(model, &quick.point, record, AGAIN)?;
-            Some((*effect, near))
-        });
-        let mut near: Vec<(usize, Simulated)> = near.collect();
-        let gained = |one: &Simulated| base.squares - one.squares;
-        let most = near.iter().map(|(_, one)| gained(one));
-        let most = most.fold(0.0, f64::max);
-        near.retain(|(_, one)| gained(one) >= WORTH_ENDING * most);
-        let settled = near.par_iter().filter_map(|(effect, near)| {
-            let settled = settle(model, &near.point, record, TO_THE_END)?;
+        let settled = quick.par_iter().filter_map(|(effect, quick)| {
+            let settled = settle(model, &quick.point, record, TO_THE_END)?;
             Some((*effect, settled))
         });
         Some(settled.collect())
@@ -582,17 +569,9 @@ pub fn select_jointly<M: SimulatedModel>(
     observer: Observer<'_>,
 ) -> Option<Simulated> {
     let mut selection = CrossValidation::new(model, record, observer);
-    observer.tell(|| Progress::Fitting(model.record_name(record).to_owned()));
-    let near = proposals.par_iter();
-    let near = near.filter_map(|start| settle(model, start, record, AGAIN));
-    let mut near: Vec<Simulated> = near.collect();
-    let least = near
-        .iter()
-        .map(|one| one.squares)
-        .fold(f64::INFINITY, f64::min);
-    near.retain(|one| one.squares <= FAR * least);
-    let fitted = near.iter().filter_map(|near| {
-        let fitted = settle(model, &near.point, record, TO_THE_END)?;
+    let fitted = proposals.iter().filter_map(|start| {
+        observer.tell(|| Progress::Fitting(model.record_name(record).to_owned()));
+        let fitted = settle(model, start, record, TO_THE_END)?;
         let crossed = selection.crossed(&fitted)?;
         // Either half counts alike, whatever its size; a model of data without noise may leave nothing.
         let left: f64 = crossed.iter().map(|half| squares(half).ln()).sum();
