@@ -77,20 +77,6 @@ impl Confirmed {
         }
     }
 
-    /// As [`Self::widen_to`], by nominal parameters of a part's own model that its standard errors do not bring near
-    /// these: where a part asks for something else, the law is not quite that of the rig.
-    pub(super) fn widen_apart(&mut self, part: &[NamedValue]) {
-        let is_apart = |other: &&NamedValue| {
-            let own = self.parameters.iter().find(|own| own.name == other.name);
-            own.is_some_and(|own| {
-                let both = own.standard_error.hypot(other.standard_error);
-                (own.value - other.value).abs() > DIFFERS * both
-            })
-        };
-        let apart: Vec<NamedValue> = part.iter().filter(is_apart).cloned().collect();
-        self.widen_by(&apart);
-    }
-
     /// As [`Self::widen_to`], the nominal parameters alone.
     pub(super) fn widen_by(&mut self, others: &[NamedValue]) {
         widen(&mut self.parameters, others);

@@ -313,11 +313,6 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     // What the model may lack or not changes the others by as much as is not known.
     confirmed.widen_to(&with_all);
-    for part in [&as_described, &swapped] {
-        if part.fitted_error < AGREE * confirmed.fitted_error {
-            confirmed.widen_apart(&part.parameters);
-        }
-    }
     for (i, reason) in refused {
         let effect = measured.name(i);
         if set_aside.iter().all(|known| known.effect != effect) {
