@@ -448,7 +448,7 @@ impl From<&RigDiagnosis> for DiagnosisReport {
                 parameters: parameters.collect(),
                 confidence: own.map_or(f64::NAN, |one| one.confidence),
                 share_explained: own.map(|one| one.share),
-                on_every_part: Some(true),
+                on_every_part: Some(!confirmed.on_one_part.contains(name)),
                 gain: None,
             }
         };
@@ -462,7 +462,14 @@ impl From<&RigDiagnosis> for DiagnosisReport {
                 .map(EffectReport::from)
                 .chain(confirmed.effects.iter().map(effect))
                 .collect(),
-            alternatives: rivals.map(|(rival, _)| vec![rival.clone()]).collect(),
+            alternatives: rivals
+                .map(|(rival, _)| rival.as_str())
+                .chain(
+                    (found.causes.iter())
+                        .filter_map(|own| own.or(&confirmed.parameters).map(|(name, _)| name)),
+                )
+                .map(|name| vec![name.to_owned()])
+                .collect(),
             separating_experiment: None,
             separating_motion: None,
             gain: GainReport {

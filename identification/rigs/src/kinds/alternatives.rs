@@ -14,6 +14,8 @@ const NEARLY: f64 = 2.0;
 
 /// Error after a few steps of a fit, over the most that it may be in the end, beyond which more of them change nothing.
 const ALMOST: f64 = 3.0;
+/// The same of an effect in the place of another one, over the error with that.
+const BEHIND: f64 = 2.0;
 /// Error, over the output, that tells nothing of that: without noise a fit that is nearly there is far off.
 const LITTLE: f64 = 0.01;
 
@@ -68,8 +70,10 @@ pub(super) fn of_its_class<M: InParts>(
             let error = |point: &Point| measured.normalised_error(point, EVERYTHING);
             let trials = candidate.starts.iter().map(from);
             let nearest = trials.min_by(|a, b| error(a).total_cmp(&error(b)));
+            let near = nearest.and_then(|trial| looked(measured, &trial, EVERYTHING));
+            let near = near.filter(|near| error(near) < BEHIND * error(base));
             let Some((found, deviations)) =
-                nearest.and_then(|trial| refit(measured, &trial, EVERYTHING))
+                near.and_then(|near| refit(measured, &near, EVERYTHING))
             else {
                 continue;
             };

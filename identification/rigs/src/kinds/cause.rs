@@ -34,6 +34,15 @@ impl Cause {
         (self.found.value - self.stated).abs() / self.found.standard_error
     }
 
+    /// What explains it as well in a model of these `parameters`, as an effect and in words: without an integral that
+    /// makes up for it, a table on a spring moves less than commanded.
+    pub fn or(&self, parameters: &[NamedValue]) -> Option<(&'static str, &'static str)> {
+        let is_short = self.found.name == "scale" && self.found.value < self.stated;
+        let gives_way = |p: &NamedValue| p.name == "integral" && p.value == 0.0;
+        let spring = ("table_spring", "a spring under it holds it back");
+        (is_short && parameters.iter().any(gives_way)).then_some(spring)
+    }
+
     /// The cause in words, with value, unit and 95 % interval.
     pub fn words(&self) -> String {
         let NamedValue {

@@ -223,7 +223,7 @@ impl Equations for ClosedLoopActuator {
             .iter()
             .map(RigRecording::period)
             .fold(0.0, f64::max);
-        let within = CALIBRATED * (slowest * ENOUGH).max(1.0);
+        let within = CALIBRATED * (slowest * ENOUGH).max(1.0).powi(3);
         let scale = accelerometer_scale(recordings, COMMAND);
         let cause = scale.and_then(|scale| Cause::of(scale, (1.0, within)));
         cause.into_iter().collect()
@@ -301,8 +301,8 @@ impl Equations for ClosedLoopActuator {
             resonance_damping,
             rubs: breakaway_error > 0.0,
         };
-        let rub = |free: f64, share: f64| {
-            rubbing(free, share * gain * breakaway_error, sliding_speed) / share
+        let rub = |speeds: [f64; 2], share: f64| {
+            rubbing(speeds, share * gain * breakaway_error, sliding_speed) / share
         };
         let fastest = if slowness > 0.0 {
             1.0 / slowness
@@ -567,7 +567,8 @@ mod tests {
             let size: f64 = measured.iter().map(|x| x * x).sum();
             (errors.sum::<f64>() / size).sqrt()
         };
-        assert!(off(b) < 3e-3, "{}", off(b));
+
+        assert!(off(b) < 1e-3, "{}", off(b));
         assert!(off(0.0) > 0.03, "{}", off(0.0));
     }
 

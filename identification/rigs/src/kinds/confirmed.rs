@@ -9,7 +9,10 @@ use super::parts::{EVERYTHING, InParts, Part, file};
 use super::readings::NEEDED;
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
-use diagnosis::{Point, Role, all_errors, completed, estimates, refit, settled, squares};
+use diagnosis::{
+    Free, Point, Role, all_errors, completed, estimates, least_squares, looked, refit, settled,
+    squares,
+};
 use recordings::mean_and_deviation;
 
 /// A parameter differs between parts where its estimates lie this many of their standard errors
@@ -21,6 +24,10 @@ const SURPRISING: f64 = 3.0;
 const CLEAR: f64 = 1.96;
 /// Share of the least size worth a name below which an effect has none.
 const LEAST: f64 = 0.5;
+/// Factor by which the squared error on all data grows without an effect that one part of them need not show.
+const VITAL: f64 = 4.0;
+/// Steps of a fit that begins near its end.
+const AGAIN: usize = 12;
 /// Samples that a file must bring to be fitted by itself.
 const FEWEST: usize = 500;
 
@@ -45,6 +52,9 @@ pub struct Confirmed {
     pub parameters: Vec<NamedValue>,
     /// Parameters of its effects.
     pub effects: Vec<(String, Vec<NamedValue>)>,
+    /// Those of which one part of the data tells nothing, such as a rail that its motion does not reach.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub on_one_part: Vec<String>,
     /// Whether the effects gain on either part, from a fit to the other.
     #[serde(skip)]
     pub(super) pays: bool,
@@ -158,6 +168,43 @@ fn is_missed<M: InParts>(measured: &M, point: &Point, effect: usize, record: usi
 fn is_felt<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize) -> bool {
     without_and_with(measured, point, effect, record)
         .is_some_and(|[before, after]| squares(&before) > NEEDED * squares(&after))
+}
+
+/// Whether the data of `part` tell nothing of an effect that all data cannot do without: as it is in all of them, it
+/// makes nothing worse there. A rail is silent where no motion reaches it.
+fn is_silent<M: InParts>(measured: &M, fits: &Fits, effect: usize, part: Part) -> bool {
+    let all = &fits.everything.0;
+    let is_vital = || {
+        let mut without = all.clone();
+        without.effects.retain(|(index, _)| *index != effect);
+        let without = looked(measured, &without, EVERYTHING)?;
+        let [bare, with] =
+            [&without, all].map(|point| squares(&all_errors(measured, point, EVERYTHING)));
+        Some(bare > VITAL * with)
+    };
+    let held = || {
+        let (own, record) = (&fits.parts[part as usize].0, part as usize);
+        let mut held = own.clone();
+        let mut from = own.nuisance.len();
+        let mut place = 0..0;
+        for (i, values) in &mut held.effects {
+            if *i == effect {
+                let known = all.effects.iter().find(|(known, _)| known == i)?;
+                values.clone_from(&known.1);
+                place = from..from + values.len();
+            }
+            from += values.len();
+        }
+        let is_free = |i: usize| !place.contains(&i);
+        let held = least_squares(measured, &held, record, &Free::Chosen(&is_free), AGAIN)?;
+        let [bare, _] = without_and_with(measured, own, effect, record)?;
+        Some(!clearly_better(
+            &held.errors,
+            &bare,
+            &lengths(measured, record),
+        ))
+    };
+    is_vital() == Some(true) && held() == Some(true)
 }
 
 /// Samples of each file in `record`, of those that have some.
@@ -293,19 +340,28 @@ pub(super) fn confirm<M: InParts>(
     findings: &mut Vec<String>,
 ) -> Option<Confirmed> {
     let mut start = start.clone();
-    let fits = loop {
+    let (fits, on_one_part) = loop {
         let fits = fits(measured, &start)?;
-        let all = [
-            (&fits.everything, EVERYTHING),
-            (&fits.parts[0], Part::Fitted as usize),
-            (&fits.parts[1], Part::LeftOut as usize),
-        ];
-        let out: Vec<Refused> = all
-            .into_iter()
-            .flat_map(|((point, deviations), record)| unfit(measured, point, deviations, record))
-            .collect();
+        let on = |(point, deviations): &(Point, Vec<f64>), record: usize| {
+            unfit(measured, point, deviations, record)
+        };
+        let mut out = on(&fits.everything, EVERYTHING);
+        let parts = [Part::Fitted, Part::LeftOut];
+        let own = parts.map(|part| on(&fits.parts[part as usize], part as usize));
+        let has = |list: &[Refused], i: usize| list.iter().any(|(known, _)| *known == i);
+        let mut silent = Vec::new();
+        for part in parts {
+            for (i, reason) in &own[part as usize] {
+                let is_shown = !has(&out, *i) && !has(&own[part.other() as usize], *i);
+                if is_shown && is_silent(measured, &fits, *i, part) {
+                    silent.push(measured.name(*i));
+                } else if !has(&out, *i) {
+                    out.push((*i, reason.clone()));
+                }
+            }
+        }
         if out.is_empty() {
-            break fits;
+            break (fits, silent);
         }
         start
             .effects
@@ -365,6 +421,7 @@ pub(super) fn confirm<M: InParts>(
         refitted: measured.parameters(refitted, refitted_deviations),
         parameters: with_errors(own, 0),
         effects,
+        on_one_part,
         point: point.clone(),
         refitted_point: refitted.clone(),
     })

@@ -556,6 +556,33 @@ impl RigDiagnosis {
             })
     }
 
+    fn causes_in_words(&self) -> Vec<String> {
+        let causes = self.causes.iter();
+        let words = causes.map(|own| match own.or(&self.confirmed.parameters) {
+            Some((_, other)) => format!("{} or {other}", own.words()),
+            None => own.words(),
+        });
+        words.collect()
+    }
+
+    /// The named effects, each `with_values`, after what shows them.
+    fn shown_in_words(&self, with_values: Vec<String>) -> Vec<String> {
+        let names = self.confirmed.effects.iter().map(|(name, _)| name);
+        let (one, every): (Vec<_>, Vec<_>) = names
+            .zip(with_values)
+            .partition(|(name, _)| self.confirmed.on_one_part.contains(name));
+        let said = |begin: &str, all: Vec<(&String, String)>| {
+            let all: Vec<String> = all.into_iter().map(|(_, words)| words).collect();
+            (!all.is_empty()).then(|| format!("{begin} {}", joined(&all)))
+        };
+        let every = said("every part of the data shows", every);
+        let one = said(
+            "one part of the data, the other not reaching it, shows",
+            one,
+        );
+        every.into_iter().chain(one).collect()
+    }
+
     fn named_in_words(&self) -> String {
         let listed = |names: &[String]| names.join(", ").replace('_', " ");
         let effects = self.confirmed.effects.iter();
@@ -571,7 +598,7 @@ impl RigDiagnosis {
                 })
             })
             .collect();
-        let shown = joined(&with_values);
+        let shown = self.shown_in_words(with_values);
         let part = &self.as_described;
         let falls = format!(
             "the error of {} on the held-out data falls from {:.1} to {:.1} %",
@@ -593,10 +620,8 @@ impl RigDiagnosis {
                 100.0 * part.refitted_error
             ),
             Verdict::Named => {
-                let mut all: Vec<String> = self.causes.iter().map(Cause::words).collect();
-                if !with_values.is_empty() {
-                    all.push(format!("every part of the data shows {shown}"));
-                }
+                let mut all = self.causes_in_words();
+                all.extend(shown);
                 let left = 1.0 - self.unexplained;
                 let share = match (all.len(), left > ALL) {
                     _ if left <= 0.0 => {
@@ -615,7 +640,7 @@ impl RigDiagnosis {
                 format!("{name}: {}; {share}; {falls}.", joined(&all))
             }
             Verdict::Ambiguous => {
-                let causes: Vec<String> = self.causes.iter().map(Cause::words).collect();
+                let causes = self.causes_in_words();
                 let causes = match causes.as_slice() {
                     [] => String::new(),
                     some => format!("{}; ", joined(some)),
@@ -625,8 +650,8 @@ impl RigDiagnosis {
                     .map(|(rival, against)| format!("{rival} instead of {against}"))
                     .collect();
                 format!(
-                    "{name}: {causes}every part of the data shows {shown}, and {} explains it \
-                     nearly as well; {falls}.",
+                    "{name}: {causes}{}, and {} explains it nearly as well; {falls}.",
+                    shown.join(" and "),
                     listed(&rivals)
                 )
             }
@@ -639,10 +664,25 @@ impl RigDiagnosis {
                     100.0 * part.refitted_error
                 )
             }
-            Verdict::TooSmall | Verdict::Unexplained => format!(
-                "{name}: no effect is shown by every part of the data and improves the model on \
-                 all of them; with the effects of one part, {falls}."
-            ),
+            Verdict::TooSmall | Verdict::Unexplained => {
+                let one = if part.effects.is_empty() {
+                    &self.swapped
+                } else {
+                    part
+                };
+                let own = one.effects.iter();
+                let own: Vec<String> = own
+                    .map(|own| effect_in_words(&own.effect, &own.parameters))
+                    .collect();
+                format!(
+                    "{name}: no effect is shown by every part of the data and improves the model on \
+                     all of them; with {} of one part, the error of {} on the other falls from {:.1} to {:.1} %.",
+                    joined(&own),
+                    self.output,
+                    100.0 * one.nominal_error,
+                    100.0 * one.extended_error
+                )
+            }
         }
     }
 }

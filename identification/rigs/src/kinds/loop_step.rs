@@ -27,13 +27,26 @@ pub(super) const WIDTH: usize = 8;
 const ALL: usize = STATES + 5;
 pub(super) const SLOPE: usize = STATES + 1;
 
-/// The speed, times `share`, that friction takes over a step after which it would have been `free` without:
-/// implicit, so that it sticks with steps of any length.
-pub(super) fn rubbing(free: f64, most: f64, sliding_speed: f64) -> f64 {
+/// What friction takes, at `most`, of a speed that is `now` and would be `free` after a step without it: implicit, so
+/// that it sticks with steps of any length. Where the speed turns, friction does inside the step.
+pub(super) fn rubbing([now, free]: [f64; 2], most: f64, sliding_speed: f64) -> f64 {
+    if now * (free - most.copysign(now)) < 0.0 {
+        let end = free - most * tanh(now / sliding_speed);
+        if now * end < 0.0 {
+            // From rest in what is left of the step.
+            let left = end / (end - now);
+            return slowed(left * (free - now), left * most, sliding_speed) - free;
+        }
+    }
+    slowed(free, most, sliding_speed) - free
+}
+
+/// The speed after a step of friction `most` that would be `free` without.
+fn slowed(free: f64, most: f64, sliding_speed: f64) -> f64 {
     // v + most tanh(v / s) = free has one solution, which is between free less most and free.
     let (mut low, mut high) = ((free.abs() - most).max(0.0), free.abs());
     if low > SATURATED * sliding_speed {
-        return most.copysign(-free);
+        return low.copysign(free);
     }
     let mut v = low.max(high * sliding_speed / (sliding_speed + most));
     for _ in 0..20 {
@@ -55,7 +68,7 @@ pub(super) fn rubbing(free: f64, most: f64, sliding_speed: f64) -> f64 {
             break;
         }
     }
-    (v - free.abs()).copysign(-free)
+    v.copysign(free)
 }
 
 /// `tanh` is one beyond it.
@@ -211,7 +224,7 @@ impl Step {
         state: State,
         course: &Course,
         beyond: Option<&impl Fn(f64) -> f64>,
-        rub: &impl Fn(f64, f64) -> f64,
+        rub: &impl Fn([f64; 2], f64) -> f64,
     ) -> State {
         let [columns @ .., beyond_column, slope_column, rubbed] = &self.columns;
         let mut after: State = [0.0; WIDTH];
@@ -237,14 +250,14 @@ impl Step {
                 sent(&after, end, course.slope + course.change) + now * self.sent_of_beyond;
             if let Some(at) = self.rubbed_at {
                 let free = after[at] + now * beyond_column[at];
-                sends += self.sent_of_rubbed * rub(free, rubbed[at]);
+                sends += self.sent_of_rubbed * rub([state[at], free], rubbed[at]);
             }
             let its_slope = (beyond(sends) - now) / self.length;
             add(&mut after, beyond_column, now);
             add(&mut after, slope_column, its_slope);
         }
         if let Some(at) = self.rubbed_at {
-            let taken = rub(after[at], rubbed[at]);
+            let taken = rub([state[at], after[at]], rubbed[at]);
             add(&mut after, rubbed, taken);
         }
         after
@@ -284,7 +297,7 @@ mod tests {
             slope,
             change: 0.0,
         };
-        let none = |_: f64, _: f64| 0.0;
+        let none = |_: [f64; 2], _: f64| 0.0;
         let beyond: Option<&fn(f64) -> f64> = None;
         let first = form.step(share * length, length);
         let middle = first.advance(state, &straight([1.0, bend], slope), beyond, &none);

@@ -20,12 +20,15 @@ const COHERENT: f64 = 0.5;
 const COUNTED: usize = 5;
 /// Share of the power beside the shared motion below which bands count alike.
 const EXACT: f64 = 1e-3;
+/// Share by which the sensors' ratio turns, or differs from band to band, beyond which they see more than one motion.
+const ONE: f64 = 0.02;
 /// Least power of the commanded acceleration in a band over that in the strongest.
 const STIRRED: f64 = 1e-3;
 
 /// The accelerometer's scale from the response of both sensors to the command, which has none of their
 /// noise (an instrument; Söderström and Stoica, System Identification, 1989, chapter 8); the weighted mean
-/// over frequencies with its standard error. None where a recording lacks it or is too short.
+/// over frequencies with its standard error. None where a recording lacks it or is too short, and where the sensors
+/// see more than one motion.
 pub(super) fn accelerometer_scale(
     recordings: &[RigRecording],
     command: Channel,
@@ -40,7 +43,8 @@ pub(super) fn accelerometer_scale(
     // Sensors and their filters differ in delay.
     let sum = |own: &dyn Fn(&Line) -> f64| lines.iter().map(own).sum::<f64>();
     let delay = sum(&|l| l.weight * l.omega * l.ratio.arg()) / sum(&|l| l.weight * l.omega.powi(2));
-    let aligned = |l: &Line| (l.ratio * Complex::new(0.0, -l.omega * delay).exp()).re;
+    let turned = |l: &Line| l.ratio * Complex::new(0.0, -l.omega * delay).exp();
+    let aligned = |l: &Line| turned(l).re;
     let weight = sum(&|l| l.weight);
     let scale = sum(&|l| l.weight * aligned(l)) / weight;
     let variance = sum(&|l| l.weight * (aligned(l) - scale).powi(2)) / weight;
@@ -49,14 +53,17 @@ pub(super) fn accelerometer_scale(
     // that more bands would lessen: without a filter before its converter an accelerometer shows what happens
     // between samples as slow motion, late by a part of a sample. What it shows beside the motion, such as the
     // shocks of a loop that chatters, may be off as much in the part that follows the command.
-    let late = sum(&|l| l.weight * l.ratio.im.powi(2)) / weight;
-    let beside = sum(&|l| l.weight * l.beside) / weight;
+    let late = sum(&|l| l.weight * turned(l).im.powi(2)) / weight;
+    if variance.max(late).sqrt() > ONE * scale.abs() {
+        return None;
+    }
+    let beside = sum(&|l| l.weight * l.beside.sqrt()) / weight;
     let noise = variance / (count - 1.0).max(1.0);
     Some(NamedValue {
         name: "accelerometer_scale".into(),
         value: scale,
         unit: "1".into(),
-        standard_error: (noise + variance + late + beside).sqrt(),
+        standard_error: (noise + variance + late + beside * beside).sqrt(),
     })
 }
 
@@ -140,7 +147,7 @@ fn responses(one: &RigRecording, command: Channel) -> Option<Vec<Line>> {
         Some(Line {
             omega: TAU * (edge(band) * edge(band + 1)).sqrt(),
             ratio: with_command[1] / with_command[0],
-            weight: both[0].min(both[1]) / (beside + EXACT),
+            weight: both[0].min(both[1]) / (beside + EXACT).powi(2),
             beside,
         })
     });
@@ -152,47 +159,60 @@ mod tests {
     use super::*;
     use recordings::Recording;
 
-    #[test]
-    fn an_accelerometer_that_reads_too_much_is_told_from_its_displacement() {
-        // A sum of sines, known in closed form, with noise on both sensors.
+    const COMMAND: Channel = Channel::Other {
+        name: "command",
+        unit: "m",
+    };
+
+    /// A sum of sines, known in closed form, with noise on both sensors; the accelerometer shows `scale` by frequency.
+    fn recording(scale: impl Fn(f64) -> f64, noisy: f64) -> RigRecording {
         let (rate, n) = (200.0, 12_000);
-        let tone = |i: usize| (0.4 + 0.13 * i as f64, 1.7 * i as f64);
-        let sum = |order: i32, k: usize| -> f64 {
+        let sum = |k: usize, factor: &dyn Fn(f64) -> f64| -> f64 {
             (0..60)
                 .map(|i| {
-                    let (frequency, phase) = tone(i);
-                    let (omega, t) = (TAU * frequency, k as f64 / rate);
+                    let (frequency, phase) = (0.4 + 0.13 * f64::from(i), 1.7 * f64::from(i));
+                    let omega = TAU * frequency;
                     let size = 1e-3 / (1.0 + frequency);
-                    if order == 0 {
-                        size * (omega * t + phase).sin()
-                    } else {
-                        -size * omega * omega * (omega * t + phase).sin()
-                    }
+                    size * factor(frequency) * (omega * k as f64 / rate + phase).sin()
                 })
                 .sum()
         };
         let noise = |k: usize, seed: f64| (k as f64 * seed).sin() * (k as f64 * 0.37 * seed).cos();
-        let command = Channel::Other {
-            name: "command",
-            unit: "m",
-        };
+        let all = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..n).map(value).collect() };
+        let second = |frequency: f64| -(TAU * frequency).powi(2) * scale(frequency);
         let channels = vec![
-            (command, (0..n).map(|k| sum(0, k)).collect::<Vec<f64>>()),
+            (COMMAND, all(&|k| sum(k, &|_| 1.0))),
             (
                 Channel::Displacement,
-                (0..n).map(|k| sum(0, k) + 2e-6 * noise(k, 91.7)).collect(),
+                all(&|k| sum(k, &|_| 1.0) + 2e-6 * noise(k, 91.7)),
             ),
             (
                 Channel::Acceleration,
-                (0..n)
-                    .map(|k| 1.08 * sum(2, k) + 0.01 * noise(k, 57.3))
-                    .collect(),
+                all(&|k| sum(k, &second) + noisy * noise(k, 57.3)),
             ),
         ];
         let recording = Recording::new("two", 1.0 / rate, channels).unwrap();
-        let recording = RigRecording::new(recording, &[command], Channel::Displacement);
-        let found = accelerometer_scale(&[recording], command).unwrap();
+        RigRecording::new(recording, &[COMMAND], Channel::Displacement)
+    }
+
+    #[test]
+    fn an_accelerometer_that_reads_too_much_is_told_from_its_displacement() {
+        let found = accelerometer_scale(&[recording(|_| 1.08, 0.01)], COMMAND).unwrap();
         assert!((found.value - 1.08).abs() < 4e-3, "{found:?}");
         assert!(found.standard_error < 15e-3, "{found:?}");
+    }
+
+    #[test]
+    fn a_noisy_record_hides_nothing_that_a_clean_one_tells() {
+        let both = [recording(|_| 1.08, 0.01), recording(|_| 1.08, 3.0)];
+        let found = accelerometer_scale(&both, COMMAND).unwrap();
+        assert!((found.value - 1.08).abs() < 4e-3, "{found:?}");
+        assert!(found.standard_error < 15e-3, "{found:?}");
+    }
+
+    #[test]
+    fn of_an_accelerometer_that_shows_another_motion_besides_nothing_is_said() {
+        let other = |frequency: f64| 0.9 + 0.02 * (frequency - 4.0);
+        assert!(accelerometer_scale(&[recording(other, 0.01)], COMMAND).is_none());
     }
 }

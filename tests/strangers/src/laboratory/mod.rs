@@ -16,6 +16,9 @@ use crate::noise::{Channel, Shape, Spectrum};
 use dialect::Dialect;
 use table::{Drive, Loop, Table};
 
+/// Share of the time at a rail from which on a recording shows it.
+const SEEN: f64 = 1e-3;
+
 /// A fault that a laboratory does not know of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
@@ -52,6 +55,10 @@ pub struct Truth {
     pub drive: String,
     /// What is wrong.
     pub faults: Vec<Fault>,
+    /// Whether a motion takes the drive to its rail.
+    pub is_railed: bool,
+    /// Whether a spring holds the table, and no integral makes up for that.
+    pub gives_way: bool,
 }
 
 /// A laboratory's folder.
@@ -189,6 +196,7 @@ impl Laboratory {
         let dialect = Dialect::draw(dice);
         let rate = dice.pick(&[100.0, 200.0, 250.0, 500.0]);
         let names = dialect.files();
+        let mut is_railed = false;
         let recordings = (0..dice.pick(&[2, 2, 3])).map(|number| {
             let seconds = dice.even(30.0, 60.0).round();
             let n = (seconds * rate) as usize;
@@ -202,7 +210,8 @@ impl Laboratory {
             } else {
                 broadband(n, rate, size * reach, dice)
             };
-            let rows = record(&table, &faults, &motion, rate, width, dice);
+            let (rows, railed) = record(&table, &faults, &motion, rate, width, dice);
+            is_railed |= railed > SEEN;
             (
                 names[number].into(),
                 dialect.write(&rows, rate, width, number),
@@ -215,6 +224,8 @@ impl Laboratory {
                 laboratory: format!("laboratory-{seed}"),
                 drive: format!("{drive:?} under {:?}", table.control.kind),
                 faults: faults.said,
+                is_railed,
+                gives_way: table.gives_way(),
             },
             recordings,
         }
@@ -273,7 +284,7 @@ fn record(
     rate: f64,
     width: usize,
     dice: &mut Dice,
-) -> Vec<Vec<f64>> {
+) -> (Vec<Vec<f64>>, f64) {
     let n = motion.len();
     let reach = motion.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     let flicker = |share: f64| {
@@ -289,7 +300,7 @@ fn record(
         bits: dice.pick(&[12, 14, 16]),
         ..Channel::plain(rms)
     };
-    let readings = table.play(motion, rate, faults.delay, faults.scale);
+    let (readings, railed) = table.play(motion, rate, faults.delay, faults.scale);
     let largest = |i: usize| readings.iter().fold(0.0f64, |m, r| m.max(r[i].abs()));
     let channels = [
         channel(2e-4 * reach, 3.0 * reach, dice),
@@ -300,7 +311,7 @@ fn record(
         .clone()
         .map(|channel| channel.noise(n, rate, 50.0, dice));
     let mut linkage = 0.0f64;
-    (0..n)
+    let rows = (0..n)
         .map(|k| {
             let [x, a, f] = readings[k];
             linkage = linkage.clamp(x - faults.play, x + faults.play);
@@ -309,7 +320,8 @@ fn record(
             let all = [k as f64 / rate, motion[k]].into_iter().chain(shown);
             all.take(width + 1).collect()
         })
-        .collect()
+        .collect();
+    (rows, railed)
 }
 
 fn notes(table: &Table, reach: f64, rate: f64) -> String {

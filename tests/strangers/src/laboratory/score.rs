@@ -54,13 +54,17 @@ pub fn worth(truth: &Truth, answer: &Answer) -> Worth {
         .faults
         .iter()
         .all(|fault| named.iter().any(|effect| says(effect, fault)));
-    // Every table has some friction; what records cannot tell from it is said with it.
+    // Every table has some friction, and may be at its rail or on a spring; what records cannot tell from these is
+    // said with them.
     let alternatives = json["alternatives"].to_string();
     let is_foreign = |effect: &Value| {
         let name = effect["effect"].as_str().unwrap_or_default();
-        let is_hedged = name == "reduced_null_gain" && alternatives.contains("friction");
+        let is_hedged = name == "reduced_null_gain" && alternatives.contains("friction")
+            || name == "scale" && truth.gives_way && alternatives.contains("spring");
+        let is_rail = name == "speed_limit" && truth.is_railed;
         name != "friction"
             && !is_hedged
+            && !is_rail
             && !truth
                 .faults
                 .iter()

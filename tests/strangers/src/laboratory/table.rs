@@ -5,6 +5,9 @@ use std::f64::consts::TAU;
 use crate::dice::Dice;
 use crate::hydraulic::{Bristles, Rig, State};
 
+/// Of the voltage, V.
+const RAIL: f64 = 10.0;
+
 /// What moves a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Drive {
@@ -211,9 +214,21 @@ impl Table {
         }
     }
 
+    /// Whether a spring holds it, and no integral makes up for that.
+    pub fn gives_way(&self) -> bool {
+        let is_sprung = matches!(&self.body, Body::Electric(electric) if electric.stiffness > 0.0);
+        is_sprung && self.control.integral == 0.0
+    }
+
     /// Displacement, acceleration and force at every sample of a reference that reaches the loop late and by
-    /// another scale.
-    pub fn play(&self, reference: &[f64], rate: f64, delay: f64, scale: f64) -> Vec<[f64; 3]> {
+    /// another scale, and the share of the time at the voltage's rail.
+    pub fn play(
+        &self,
+        reference: &[f64],
+        rate: f64,
+        delay: f64,
+        scale: f64,
+    ) -> (Vec<[f64; 3]>, f64) {
         let control = &self.control;
         let ticks = (control.rate / rate).round().max(1.0) as usize;
         let period = 1.0 / (rate * ticks as f64);
@@ -232,6 +247,7 @@ impl Table {
         };
         let (mut sum, mut before, mut command) = (0.0, 0.0, 0.0);
         let mut readings = Vec::with_capacity(reference.len());
+        let mut railed = 0.0;
         for k in 0..reference.len() * ticks {
             let t = k as f64 * period;
             let [x, a, f] = self.reading(&state, command);
@@ -247,7 +263,10 @@ impl Table {
                 + control.derivative * (error - before) / period
                 + control.feedforward * rate_of(t)
                 - control.acceleration * a;
-            command = command.clamp(-10.0, 10.0);
+            if command.abs() > RAIL {
+                railed += 1.0 / (reference.len() * ticks) as f64;
+            }
+            command = command.clamp(-RAIL, RAIL);
             before = error;
             match (&self.body, &mut state) {
                 (Body::Hydraulic(rig), Moving::Hydraulic(state)) => {
@@ -259,7 +278,7 @@ impl Table {
                 _ => unreachable!("a body has its own state"),
             }
         }
-        readings
+        (readings, railed)
     }
 
     fn reading(&self, state: &Moving, command: f64) -> [f64; 3] {
@@ -323,7 +342,7 @@ mod tests {
             let motion: Vec<f64> = (0..2000)
                 .map(|k| 0.02 * (TAU * 0.3 * f64::from(k) / 200.0).sin())
                 .collect();
-            let readings = table.play(&motion, 200.0, 0.0, 0.0);
+            let (readings, _) = table.play(&motion, 200.0, 0.0, 0.0);
             let off = (500..2000)
                 .map(|k| (readings[k][0] - motion[k]).abs())
                 .fold(0.0, f64::max);
