@@ -12,8 +12,10 @@ use crate::preview::model::SampledRig;
 
 /// Weights of the command that are tried, 1/V: lighter, the feedback follows the sensors' noise.
 const COMMAND_WEIGHTS: [f64; 5] = [6.0, 12.0, 24.0, 48.0, 96.0];
-/// Largest step of the unknown force a sample that is tried, N.
+/// Largest step of the unknown force a sample that is tried, N, and over the Coulomb force where that is more: what is
+/// not known of friction grows with it.
 const FORCE_STEP: f64 = 0.1 * LBF;
+const FRICTION_SHARE: f64 = 1.0 / 30.0;
 /// How often it may be halved.
 const HALVINGS: usize = 8;
 
@@ -44,7 +46,7 @@ impl Parameters {
 
     /// The same with a feedback that keeps a gain margin of 6 dB either way and bears measurements one
     /// sample later than the model has it, bare and under the specimen that is known, its stiffness a fifth
-    /// off either way: of the steps of the unknown force, halved from 0.1 lbf on, the
+    /// off either way: of the steps of the unknown force, halved from 0.1 lbf or a thirtieth of the Coulomb force on, the
     /// largest with which some weight of the command from 6 to 96 1/V does, and of those the lightest.
     ///
     /// # Errors
@@ -69,7 +71,7 @@ impl Parameters {
         let plants = self.plants(&rig);
         let weights = self.feedback_weights.into();
         let mut tried = self;
-        tried.uncertainty.force_step = FORCE_STEP;
+        tried.uncertainty.force_step = FORCE_STEP.max(FRICTION_SHARE * self.load.friction);
         for _ in 0..=HALVINGS {
             for weight in COMMAND_WEIGHTS {
                 tried.command_weight = weight;
@@ -223,6 +225,18 @@ mod tests {
         let mut b = DMatrix::zeros(7, 1);
         b[(1, 0)] = 1.0 / oil.spool_inertia;
         (DMatrix::from_fn(7, 7, |i, j| rows[i][j]), b)
+    }
+
+    #[test]
+    fn a_thirtieth_of_much_friction_is_the_step_of_the_unknown_force() {
+        let step = |friction: f64| {
+            let mut own = Parameters::default();
+            own.load.friction = friction;
+            own.rig.hydraulics = Some(Hydraulics::default());
+            own.tuned().unwrap().uncertainty.force_step
+        };
+        assert_eq!(step(13.0), FORCE_STEP);
+        assert!((step(40.0) - 40.0 / 30.0).abs() < 1e-12);
     }
 
     #[test]

@@ -507,7 +507,12 @@ pub(super) fn hydraulics(own: &HydraulicRig) -> Hydraulics {
 fn preview_control(model: &ControlModel) -> preview::Parameters {
     let usual = preview::Parameters::default();
     let noise = &model.noise;
+    let mut load = usual.load;
+    if let Some((own, shape)) = &model.hydraulics {
+        (load.friction, load.shape) = (own.seal_friction, *shape);
+    }
     preview::Parameters {
+        load,
         rig: RigModel {
             shake_table: model.rig,
             hydraulics: model.whole_samples(),
