@@ -18,8 +18,6 @@ pub const ALL: usize = STATES + DISTURBANCES;
 /// Part of the unknown force that is left after a sample: what lasts for seconds is the valve's, from
 /// which a constant force cannot be told.
 const FORCE_LEFT: f64 = 0.999;
-/// Largest command of the valve where margins are found, as a factor: a gain margin of 6 dB.
-const MARGIN: f64 = 2.0;
 
 /// What the noise of a sensor is.
 const NOISE: &str = "Standard deviation of the sensor";
@@ -284,11 +282,11 @@ impl Feedback {
         poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max)
     }
 
-    /// Whether `plant` keeps a gain margin of 6 dB up and down under this feedback, and bears
+    /// Whether `plant` keeps a gain margin (a factor) up and down under this feedback, and bears
     /// measurements that are one sample later than it knows.
-    pub fn is_robust(&self, rig: &SampledRig, plant: &DiscreteStateSpace) -> bool {
+    pub fn is_robust(&self, rig: &SampledRig, plant: &DiscreteStateSpace, margin: f64) -> bool {
         let holds = |gain, late| self.slowest_pole(rig, plant, gain, late) < 1.0;
-        [1.0 / MARGIN, 1.0, MARGIN]
+        [1.0 / margin, 1.0, margin]
             .iter()
             .all(|gain| holds(*gain, self.delay))
             && holds(1.0, self.delay + 1)

@@ -12,10 +12,16 @@ use crate::preview::model::SampledRig;
 
 /// Weights of the command that are tried, 1/V: lighter, the feedback follows the sensors' noise.
 const COMMAND_WEIGHTS: [f64; 5] = [6.0, 12.0, 24.0, 48.0, 96.0];
-/// Largest step of the unknown force a sample that is tried, N.
+/// Largest step of the unknown force a sample that is tried, N, and over the Coulomb force where that is more: what is
+/// not known of friction grows with it.
 const FORCE_STEP: f64 = 0.1 * LBF;
+const FRICTION_SHARE: f64 = 1.0 / 30.0;
 /// How often it may be halved.
 const HALVINGS: usize = 8;
+
+/// Gain margin that is kept, and the least one under an identified specimen.
+const MARGIN: f64 = 2.0;
+const LEAST_MARGIN: f64 = 1.41;
 
 /// Stiffness that a specimen may have, over that which is known: a fifth either way.
 const STIFFNESSES: [f64; 3] = [0.8, 1.0, 1.25];
@@ -40,24 +46,41 @@ impl Parameters {
 
     /// The same with a feedback that keeps a gain margin of 6 dB either way and bears measurements one
     /// sample later than the model has it, bare and under the specimen that is known, its stiffness a fifth
-    /// off either way: of the steps of the unknown force, halved from 0.1 lbf on, the
+    /// off either way: of the steps of the unknown force, halved from 0.1 lbf or a thirtieth of the Coulomb force on, the
     /// largest with which some weight of the command from 6 to 96 1/V does, and of those the lightest.
     ///
     /// # Errors
     /// What [`Parameters::validate`] and [`Feedback::new`] refuse; a model that no such feedback holds.
     pub fn tuned(self) -> Result<Self, ModelError> {
+        self.holding(MARGIN)
+    }
+
+    /// As [`Self::tuned`] for a specimen that was identified together with the rig: where no feedback keeps 6 dB, one
+    /// that keeps 3 dB will do, as for the other controllers on an identified rig. The gain is known to some percent.
+    ///
+    /// # Errors
+    /// As [`Self::tuned`].
+    pub fn tuned_as_identified(self) -> Result<Self, ModelError> {
+        self.tuned().or_else(|_| self.holding(LEAST_MARGIN))
+    }
+
+    /// The same with a feedback that keeps a gain margin, as a factor.
+    fn holding(self, margin: f64) -> Result<Self, ModelError> {
         self.validate()?;
         let rig = self.rig.sample(self.period);
         let plants = self.plants(&rig);
         let weights = self.feedback_weights.into();
         let mut tried = self;
-        tried.uncertainty.force_step = FORCE_STEP;
+        tried.uncertainty.force_step = FORCE_STEP.max(FRICTION_SHARE * self.load.friction);
         for _ in 0..=HALVINGS {
             for weight in COMMAND_WEIGHTS {
                 tried.command_weight = weight;
                 let feedback =
                     Feedback::new(&rig, &weights, weight, &tried.uncertainty, tried.delay)?;
-                if plants.iter().all(|plant| feedback.is_robust(&rig, plant)) {
+                if plants
+                    .iter()
+                    .all(|plant| feedback.is_robust(&rig, plant, margin))
+                {
                     return Ok(tried);
                 }
             }
@@ -65,8 +88,10 @@ impl Parameters {
         }
         Err(ModelError::NoSolution {
             equation: "the rule for preview control's feedback",
-            reason: "no weight of its command keeps a margin of 6 dB, bare and with the specimen"
-                .into(),
+            reason: format!(
+                "no weight of its command keeps a margin of {:.0} dB, bare and with the specimen",
+                20.0 * margin.log10()
+            ),
         })
     }
 }
@@ -75,7 +100,10 @@ impl Parameters {
 mod tests {
     use super::*;
     use crate::preview::PreviewControl;
+    use crate::preview::model::Hydraulics;
+    use nalgebra::DMatrix;
     use plant::identified::coupled::Rig;
+    use plant::linear::StateSpace;
 
     /// A specimen that the feedback's own model lacks takes its estimate of the unknown force for its
     /// own: quick estimates are unstable then, and the rule has to find slower ones.
@@ -104,6 +132,111 @@ mod tests {
         };
         assert!(slowest(bare) > 1.0005, "{}", slowest(bare));
         assert!(slowest(loaded) < 1.0, "{}", slowest(loaded));
+    }
+
+    /// A heavy specimen of 5.8 Hz leaves no feedback 6 dB, but 3 dB; a heavier one leaves none.
+    #[test]
+    fn an_identified_specimen_is_held_with_three_decibels_where_none_has_six() {
+        let heavy = |mass: f64, hertz: f64| {
+            let omega = std::f64::consts::TAU * hertz;
+            LinearSpecimen {
+                mass,
+                damping: 0.06 * omega * mass,
+                stiffness: omega * omega * mass,
+            }
+        };
+        let mut known = Parameters {
+            delay: 3,
+            ..Parameters::default()
+        };
+        known.rig.hydraulics = Some(Hydraulics::default());
+        known.load.specimen = Some(heavy(21.0, 5.0).into());
+        assert!(known.tuned_as_identified().is_err());
+        let specimen = heavy(14.0, 5.8);
+        known.load.specimen = Some(specimen.into());
+        assert!(known.tuned().is_err());
+        let own = known.tuned_as_identified().unwrap();
+        // The monolithic equations of table, valve and specimen, not those of the rule.
+        let control = PreviewControl::new(own).unwrap();
+        let (a, b) = monolithic(&own, &specimen);
+        let outputs = DMatrix::from_fn(3, a.ncols(), |i, j| match i {
+            0 => f64::from(u8::from(j == 3)),
+            1 => f64::from(u8::from(j == 4)),
+            _ => a[(4, j)],
+        });
+        let d = DMatrix::zeros(3, 1);
+        let plant = StateSpace {
+            a,
+            b,
+            c: outputs,
+            d,
+        };
+        let plant = plant.sample(own.period);
+        let slowest = |gain, late| {
+            let feedback = control.feedback();
+            feedback.slowest_pole(control.rig(), &plant, gain, late)
+        };
+        for (gain, late) in [(0.71, 3), (1.0, 3), (1.41, 3), (1.0, 4)] {
+            let slowest = slowest(gain, late);
+            assert!(slowest < 1.0, "{gain} {late}: {slowest}");
+        }
+        assert!(slowest(4.0, 3) > 1.0);
+    }
+
+    /// Spool, its rate, force of the oil, displacement, velocity of the table, displacement and velocity of the
+    /// specimen, absolute.
+    fn monolithic(own: &Parameters, specimen: &LinearSpecimen) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (oil, table) = (own.rig.hydraulics.unwrap(), own.rig.shake_table.table);
+        let (k, c) = (specimen.stiffness, specimen.damping);
+        let (m, s) = (table.mass, specimen.mass);
+        let rows = [
+            [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [
+                -1.0 / oil.spool_inertia,
+                -oil.spool_lag / oil.spool_inertia,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            ],
+            [
+                oil.force_rate,
+                0.0,
+                -oil.leakage_rate,
+                0.0,
+                -oil.oil_stiffness,
+                0.0,
+                0.0,
+            ],
+            [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+            [
+                0.0,
+                0.0,
+                1.0 / m,
+                -(table.stiffness + k) / m,
+                -(table.damping + oil.seal_damping + c) / m,
+                k / m,
+                c / m,
+            ],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0, k / s, c / s, -k / s, -c / s],
+        ];
+        let mut b = DMatrix::zeros(7, 1);
+        b[(1, 0)] = 1.0 / oil.spool_inertia;
+        (DMatrix::from_fn(7, 7, |i, j| rows[i][j]), b)
+    }
+
+    #[test]
+    fn a_thirtieth_of_much_friction_is_the_step_of_the_unknown_force() {
+        let step = |friction: f64| {
+            let mut own = Parameters::default();
+            own.load.friction = friction;
+            own.rig.hydraulics = Some(Hydraulics::default());
+            own.tuned().unwrap().uncertainty.force_step
+        };
+        assert_eq!(step(13.0), FORCE_STEP);
+        assert!((step(40.0) - 40.0 / 30.0).abs() < 1e-12);
     }
 
     #[test]

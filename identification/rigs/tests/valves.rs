@@ -131,6 +131,35 @@ fn an_overlap_of_half_the_command_is_found() {
     });
 }
 
+/// Without what the model lacks, load on the orifices and the bristles of another law, nothing is exchanged between
+/// delay and spool. The sensors are one sample late.
+#[test]
+fn a_delay_and_a_spool_are_found_without_bias() {
+    let usual = Rig::default();
+    let rig = Rig {
+        supply: 1e4 * usual.supply,
+        flow_coefficient: 1e-2 * usual.flow_coefficient,
+        coulomb: 0.05 * usual.coulomb,
+        breakaway: 0.05 * usual.breakaway,
+        null_loss: 0.2,
+        delay: 2e-3,
+        ..usual
+    };
+    let (found, error) = found(&rig);
+    let omega = TAU * rig.valve_frequency;
+    let own = &found.rig;
+    assert!(
+        (own.command_delay - 4e-3).abs() < 2e-4,
+        "{}",
+        own.command_delay
+    );
+    let lag = 2.0 * rig.valve_damping / omega;
+    assert!((own.spool_lag - lag).abs() < 2e-4, "{}", own.spool_lag);
+    let late = own.command_delay + own.spool_lag - 4e-3 - lag;
+    assert!(late.abs() < 3e-5, "{late}");
+    assert!(error < 0.01, "{error}");
+}
+
 #[test]
 fn an_ideal_valve_stays_one() {
     let (found, error) = found(&Rig::default());

@@ -51,6 +51,8 @@ pub(super) const FITTED: usize = SEALS + ACTUATOR + CURVE;
 /// The first of the curve's.
 pub(super) const OF_CURVE: usize = SEALS + ACTUATOR;
 
+/// Largest share of the gain that may be lost at null.
+const MOST_LOST: f64 = 0.95;
 /// Part that is fitted before the rest says whether it is better.
 pub(super) const PART: f64 = 0.75;
 
@@ -113,7 +115,7 @@ impl Actuator {
             shape: self.shape.changed(&values[2..SEALS]),
             curve: ValveCurve {
                 overlap: self.curve.overlap + curve[0],
-                null_loss: (self.curve.null_loss + curve[1]).clamp(0.0, 0.95),
+                null_loss: (self.curve.null_loss + curve[1]).clamp(0.0, MOST_LOST),
                 null_width: self.curve.null_width * curve[2].exp(),
                 asymmetry: (self.curve.asymmetry + curve[3]).clamp(-0.9, 0.9),
                 ..self.curve
@@ -273,8 +275,13 @@ fn change(parameter: usize) -> f64 {
     }
 }
 
-/// Coordinates of the fit from `start` of the parameters that are `free`.
-pub(super) fn coordinates(start: &[f64; FITTED], free: impl Fn(usize) -> bool) -> Vec<Coordinate> {
+/// Coordinates of the fit from `start` of the parameters that are `free`, as changes of a rig whose valve has lost the
+/// share `null_loss` at null.
+pub(super) fn coordinates(
+    start: &[f64; FITTED],
+    null_loss: f64,
+    free: impl Fn(usize) -> bool,
+) -> Vec<Coordinate> {
     (0..FITTED)
         .map(|i| Coordinate {
             start: start[i],
@@ -287,7 +294,7 @@ pub(super) fn coordinates(start: &[f64; FITTED], free: impl Fn(usize) -> bool) -
                 own if own == SEALS + 3 || own == SEALS + 5 => (-20.0, 20.0),
                 own if own < OF_CURVE => (-2.0, 2.0),
                 own if own == OF_CURVE => (-2.0, 2.0),
-                own if own == OF_CURVE + 1 => (0.0, 0.95),
+                own if own == OF_CURVE + 1 => (-null_loss, MOST_LOST - null_loss),
                 own if own == OF_CURVE + 2 => (-2.0, 2.0),
                 _ => (-0.5, 0.5),
             },
@@ -385,7 +392,10 @@ fn friction(records: &[Replayed<'_>], start: Actuator, known: f64) -> Option<Fri
     };
     let start = [0.0; FITTED];
     let fitted = own.weighed(&start)?;
-    let coordinates = coordinates(&start, |i| i < SEALS && (i != 1 || rig.seal_damping > 0.0));
+    let null_loss = fitted.start.curve.null_loss;
+    let coordinates = coordinates(&start, null_loss, |i| {
+        i < SEALS && (i != 1 || rig.seal_damping > 0.0)
+    });
     let effort = Effort {
         iterations: 30,
         part: 1e-3,

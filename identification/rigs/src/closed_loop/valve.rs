@@ -240,7 +240,9 @@ impl Search<'_> {
 
     fn fit(&self, members: &[Member], start: &[f64], within: Effort) -> Option<Trial> {
         let start: [f64; FITTED] = start.try_into().ok()?;
-        let own: Vec<Coordinate> = coordinates(&start, |i| self.is_free(members, i));
+        let own: Vec<Coordinate> = coordinates(&start, self.replay.start.curve.null_loss, |i| {
+            self.is_free(members, i)
+        });
         let fit = minimise_with(&self.replay, &own, within)?;
         let rest = self.replay.rest();
         let blocks = blocks(&rest.errors(&fit.values)?, &rest);
@@ -599,4 +601,91 @@ fn null(replay: &Replay, moved: &Actuator) -> Option<(f64, f64)> {
     }
     let (_, deviation) = mean_and_deviation(&blocks);
     Some((mean, deviation / (blocks.len().max(1) as f64).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::simulation::Simulation;
+    use super::*;
+    use recordings::Channel;
+
+    /// A search that begins again where a fit ended may also lower the share that is lost at null.
+    #[test]
+    fn a_lost_gain_that_was_found_too_large_comes_down() {
+        const PERIOD: f64 = 2e-3;
+        let rig = HydraulicRig {
+            spool_lag: 4.8e-3,
+            spool_inertia: 7e-6,
+            force_rate: 1.9e4,
+            oil_stiffness: 1.9e5,
+            leakage_rate: 3.0,
+            seal_damping: 880.0,
+            seal_friction: 13.0,
+            mass: 21.0,
+            damping: 44.0,
+            stiffness: 4080.0,
+            command_delay: PERIOD,
+            ..super::super::start::empty()
+        };
+        let shape = SealShape {
+            presliding: 2e-5,
+            excess: 0.2,
+            stribeck_velocity: 4e-3,
+            sharpness: 3.0,
+            relaxation: 1e-3,
+        };
+        let lost = |null_loss: f64| ValveCurve {
+            null_loss,
+            ..ValveCurve::default()
+        };
+        let mut truth = Simulation::new(rig, shape, 0.0, None, PERIOD).through(lost(0.2));
+        let mut channels = [const { Vec::new() }; 3];
+        for k in 0..10_000 {
+            let t = PERIOD * f64::from(k);
+            let shown = truth.shown();
+            let command =
+                0.25 * (7.0 * t).sin() + 0.15 * (23.0 * t).cos() + 0.08 * (61.0 * t).sin();
+            for (channel, value) in
+                channels
+                    .iter_mut()
+                    .zip([command, shown.displacement, shown.acceleration])
+            {
+                channel.push(value);
+            }
+            truth.step(command);
+        }
+        let names = [
+            Channel::ValveCommand,
+            Channel::Displacement,
+            Channel::Acceleration,
+        ];
+        let channels = names.into_iter().zip(channels).collect();
+        let recording = Recording::new("lost", PERIOD, channels).unwrap();
+        let records = [super::super::replay::Replayed {
+            recording: &recording,
+            payload: 0.0,
+            specimen: None,
+        }];
+        let replay = Replay {
+            records: &records,
+            start: Actuator {
+                rig,
+                shape,
+                curve: lost(0.4),
+            },
+            weights: [1e-5, 1e-2],
+            known: f64::INFINITY,
+            part: (0.0, PART),
+            step: STEP,
+        };
+        let search = Search {
+            replay,
+            command: 0.2,
+        };
+        let trial = search
+            .fit(&[Member::NullLoss], &[0.0; FITTED], TAKEN)
+            .unwrap();
+        let found = replay.start.at(&trial.fit.values).curve.null_loss;
+        assert!((found - 0.2).abs() < 0.02, "{found}");
+    }
 }

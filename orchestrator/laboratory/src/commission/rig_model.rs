@@ -100,6 +100,7 @@ pub(super) fn predicted(
     let specimen = if is_inside { LINEAR } else { &request.specimen };
     let wanted = Wanted {
         rules: Some(rules),
+        inside: is_inside,
         ..Wanted::default()
     };
     let mut file = built_in::system(controller, &request.plant, specimen, wanted)?;

@@ -331,6 +331,7 @@ fn named(request: &Request, rules: Option<&Rules>) -> Result<SystemFile, Error> 
         tuning: request.tuning,
         model: request.control_model.as_deref(),
         rules,
+        inside: false,
     };
     Ok(built_in::system(
         name,

@@ -11,16 +11,15 @@ use units::vocabulary;
 use units::vocabulary::LOOP_DELAY_SAMPLES;
 
 use super::control_model::ControlModel;
-use super::tuning::{Rules, hydraulics, known, set};
+use super::tuning::{Rules, hydraulics, set};
 use fmi_system::{ComponentFile, Setting};
 
-/// A specimen as a controller knows it, before it yields.
+/// A specimen before it yields.
 pub(super) fn unyielding(specimen: &YieldingSpecimen) -> LinearSpecimen {
-    let own = known(specimen);
     LinearSpecimen {
-        mass: own.mass,
-        damping: own.damping,
-        stiffness: own.columns.stiffness(),
+        mass: specimen.mass,
+        damping: specimen.damping,
+        stiffness: specimen.columns.stiffness(),
     }
 }
 

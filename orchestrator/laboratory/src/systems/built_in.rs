@@ -12,8 +12,7 @@ use units::hint;
 
 use super::biaxial;
 use super::tuning::{self, Wanted};
-use fmi_system::SystemError;
-use fmi_system::SystemFile;
+use fmi_system::{Link, Origin, SystemError, SystemFile, VariableName};
 
 /// A part of a built-in system.
 struct Part {
@@ -89,6 +88,8 @@ const AIDS: [(&str, &str); 6] = [
 const VALVE: &str = "valve";
 /// A structure that OpenSees computes: `opensees:MODEL.py`.
 const OPENSEES: Part = part!("specimen/", "opensees");
+/// Component that stands on the table.
+const SPECIMEN: &str = "specimen";
 /// No specimen, no structure.
 pub const NONE: &str = "none";
 
@@ -305,8 +306,12 @@ pub fn system(
         )?;
         on_table = Some((part, found.and_then(|found| found.1())));
     }
-    if on_table.is_none() {
-        file.disconnect("specimen");
+    let wanted = Wanted {
+        inside: wanted.inside || on_table.is_none() && has_specimen_inside(&rig),
+        ..wanted
+    };
+    if on_table.is_none() && !wanted.inside {
+        file.disconnect(SPECIMEN);
     }
     let own = on_table.as_ref().and_then(|(_, own)| own.as_ref());
     tuning::apply(&mut file, &rig, own, wanted)
@@ -324,7 +329,7 @@ pub fn system(
         interlock.set(MOVING_MASS, mass);
     }
     match on_table {
-        None => file.disconnect("specimen"),
+        None => file.disconnect(SPECIMEN),
         Some((specimen, _)) => {
             file.adjust.extend(specimen.adjust.clone());
             file.extend(specimen);
@@ -332,6 +337,14 @@ pub fn system(
     }
     file.name = name.to_string();
     Ok(file)
+}
+
+/// Whether a plant measures a specimen's acceleration, but not of a component that others put on it.
+fn has_specimen_inside(plant: &SystemFile) -> bool {
+    let own = VariableName::new(SPECIMEN, "acceleration");
+    let is_outside =
+        |link: &Link| matches!(&link.from, Origin::Output(from) if from.component == SPECIMEN);
+    plant.instead.contains_key(&own) && !plant.connections.iter().any(is_outside)
 }
 
 fn read(
@@ -371,5 +384,63 @@ mod tests {
                 assert_eq!(again.components[name].inputs, component.inputs);
             }
         }
+    }
+
+    /// A plant that measures the acceleration of a specimen of its own, its model, and a controller on both.
+    fn with_a_specimen_inside(plant: &str, specimen: &str) -> SystemFile {
+        const OUTSIDE: &str = "specimen.acceleration  ->";
+        let folder = tempfile::tempdir().unwrap();
+        let text = PLANTS[1].text;
+        assert!(text.contains(OUTSIDE));
+        let inside = folder.path().join("inside.toml");
+        let own = text.replace(OUTSIDE, "table.specimen_acceleration ->");
+        std::fs::write(&inside, own).unwrap();
+        let model = folder.path().join("model.toml");
+        let carried = "[specimen]\nmass = 0.08\ndamping = 0.2\nstiffness = 100.0\n\n[hydraulics]\n";
+        let own = include_str!("../../systems/plant/servohydraulic-model.toml");
+        std::fs::write(&model, own.replacen("[hydraulics]\n", carried, 1)).unwrap();
+        let plant = match plant {
+            "inside" => inside.to_str().unwrap(),
+            other => other,
+        };
+        let wanted = Wanted {
+            model: Some(&model),
+            ..Wanted::default()
+        };
+        system("adaptive-preview", plant, specimen, wanted).unwrap()
+    }
+
+    #[test]
+    fn a_specimen_inside_of_a_plant_is_the_models() {
+        let pounds = |value: f64| value * 4.448_221_615_260_5 / 0.0254;
+        let number = |file: &SystemFile, name: &str| {
+            let own = &file.components["control"].parameters[name];
+            own.to_string().parse::<f64>().unwrap()
+        };
+        let stiffness = |file: &SystemFile| {
+            number(file, "specimen_yield_force") / number(file, "specimen_yield_displacement")
+        };
+        let measured = |file: &SystemFile| {
+            let mut links = file.connections.iter().map(ToString::to_string);
+            links.any(|link| {
+                link == "sensors.measured_specimen_acceleration -> control.specimen_acceleration"
+            })
+        };
+        let known = |file: &SystemFile| {
+            let own = &file.components["control"].parameters["specimen_known"];
+            own == &fmi_system::Setting::Boolean(true)
+        };
+        let inside = with_a_specimen_inside("inside", NONE);
+        assert!(known(&inside) && measured(&inside));
+        assert!((number(&inside, "specimen_mass") / pounds(0.08) - 1.0).abs() < 1e-9);
+        assert!((stiffness(&inside) / pounds(100.0) - 1.0).abs() < 1e-9);
+        // Nothing stands on a bare table, whatever stood there before.
+        let bare = with_a_specimen_inside("servohydraulic", NONE);
+        assert!(!known(&bare) && !measured(&bare));
+        // One that is named is known before the test within a fifth.
+        let named = with_a_specimen_inside("servohydraulic", "linear");
+        let own = LinearSpecimen::appendix_a();
+        assert!(known(&named) && measured(&named));
+        assert!((stiffness(&named) / own.stiffness - 0.8).abs() < 1e-9);
     }
 }

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use plant::identified::shake_table::ShakeTable;
 use plant::identified::valve_curve::ValveCurve;
 use plant::sensors::channel;
+use plant::specimens::linear::LinearSpecimen;
 use units::constants::{G, INCH, SAMPLING_PERIOD};
 
 use super::tuning::hydraulics;
@@ -40,8 +41,8 @@ pub struct ControlModel {
     pub late: f64,
     /// Noise of the measurements.
     pub noise: Noise,
-    /// Mass of the specimen in the recordings, kg.
-    pub specimen_mass: Option<f64>,
+    /// The specimen of the recordings.
+    pub specimen: Option<LinearSpecimen>,
     /// Valve, oil and seals beyond the form of Eq 2-4, where they were identified.
     pub hydraulics: Option<(HydraulicRig, SealShape)>,
     /// The valve's curve, where it is not an ideal one.
@@ -133,7 +134,7 @@ impl ControlModel {
             late: late.max(0.0),
             delay: (late / SAMPLING_PERIOD).round().max(0.0) as usize,
             noise: Noise::of(noise("displacement"), noise("acceleration")),
-            specimen_mass: file.specimen(name).map_err(said)?.map(|own| own.mass),
+            specimen: file.specimen(name).map_err(said)?,
             hydraulics: file.hydraulic_rig(name).map_err(said)?,
             curve: file.valve_curve(),
             command_delay: samples as usize,
@@ -150,7 +151,7 @@ impl ControlModel {
             delay: 0,
             late: 0.0,
             noise: Noise::of(0.0, 0.0),
-            specimen_mass: None,
+            specimen: None,
             hydraulics: None,
             curve: None,
             command_delay: 0,

@@ -73,6 +73,9 @@ pub struct Wanted<'a> {
     pub model: Option<&'a Path>,
     /// Rules on a model that has been read; they go before everything else.
     pub rules: Option<&'a Rules>,
+    /// Whether the specimen of the model's recordings stands on the table, not the one that is named. A plant that has
+    /// one inside sets it.
+    pub inside: bool,
 }
 
 impl Wanted<'_> {
@@ -102,7 +105,7 @@ pub(super) fn apply(
     wanted: Wanted<'_>,
 ) -> Result<(), String> {
     if let Some(rules) = wanted.rules {
-        return rules.apply(file, specimen);
+        return rules.apply(file, specimen, wanted.inside);
     }
     let own;
     let rules = match (wanted.tuning, wanted.model, plant.commissioned) {
@@ -125,7 +128,7 @@ pub(super) fn apply(
         }
         (_, Some(path), _) => {
             own = Rules::new(ControlModel::read(path)?);
-            let applied = own.apply(file, specimen);
+            let applied = own.apply(file, specimen, wanted.inside);
             return applied.map_err(|error| format!("{}: {error}", path.display()));
         }
         (_, None, true) => {
@@ -134,7 +137,7 @@ pub(super) fn apply(
             rules.as_ref().map_err(Clone::clone)?
         }
     };
-    rules.apply(file, specimen)
+    rules.apply(file, specimen, wanted.inside)
 }
 
 /// The rigid mass that moves on `plant` by the model that its controllers are tuned on, kg; none without a model of
@@ -189,8 +192,8 @@ const KNOWN_STIFFNESS: f64 = 0.8;
 /// As [`KNOWN_STIFFNESS`], for the yield force.
 const KNOWN_YIELD_FORCE: f64 = 1.2;
 
-/// A specimen as a controller knows it.
-pub(super) fn known(specimen: &YieldingSpecimen) -> YieldingSpecimen {
+/// A specimen that was not identified as a controller knows it.
+fn known(specimen: &YieldingSpecimen) -> YieldingSpecimen {
     let mut known = *specimen;
     known.columns.yield_force *= KNOWN_YIELD_FORCE;
     known.columns.yield_displacement *= KNOWN_YIELD_FORCE / KNOWN_STIFFNESS;
@@ -231,13 +234,20 @@ impl Rules {
         }
     }
 
-    /// Gives the controllers in `file` their parameters, under a specimen; its mass counts where the
-    /// model knows of none.
+    /// Gives the controllers in `file` their parameters, under a specimen: that of the model's recordings where it is
+    /// `inside` of the plant.
     fn apply(
         &self,
         file: &mut SystemFile,
         specimen: Option<&YieldingSpecimen>,
+        inside: bool,
     ) -> Result<(), String> {
+        let own = if inside {
+            self.model.specimen.map(Into::into)
+        } else {
+            specimen.map(known)
+        };
+        let specimen = own.as_ref();
         let mut is_stabilised = false;
         for component in file.components.values_mut() {
             let rule = component.tuning.as_deref().map(Rule::named).transpose()?;
@@ -266,8 +276,8 @@ impl Rules {
         file: &mut SystemFile,
         specimen: Option<&YieldingSpecimen>,
     ) -> Result<(), String> {
-        let mass = specimen.map(|specimen| specimen.mass);
-        let specimen_mass = self.model.specimen_mass.or(mass);
+        let identified = self.model.specimen.map(|own| own.mass);
+        let specimen_mass = identified.or(specimen.map(|own| own.mass));
         for (name, component) in &mut file.components {
             let Some(rule) = &component.tuning else {
                 continue;
@@ -422,7 +432,7 @@ impl Rules {
             );
         }
         component.set("specimen_known", specimen.is_some());
-        if let Some(known) = specimen.map(known) {
+        if let Some(known) = specimen {
             set(
                 component,
                 &[
@@ -448,8 +458,14 @@ impl Rules {
         specimen: Option<&YieldingSpecimen>,
     ) -> Result<(), String> {
         let mut own = preview_control(&self.model);
-        own.load.specimen = specimen.map(known);
-        let tuned = own.tuned().map_err(|error| error.to_string())?;
+        own.load.specimen = specimen.copied();
+        let identified = self.model.specimen.map(YieldingSpecimen::from);
+        let tuned = if specimen.is_some() && specimen == identified.as_ref() {
+            own.tuned_as_identified()
+        } else {
+            own.tuned()
+        };
+        let tuned = tuned.map_err(|error| error.to_string())?;
         let noise = &self.model.noise;
         self.model(component);
         if let Some(own) = self.model.whole_samples() {
@@ -491,7 +507,12 @@ pub(super) fn hydraulics(own: &HydraulicRig) -> Hydraulics {
 fn preview_control(model: &ControlModel) -> preview::Parameters {
     let usual = preview::Parameters::default();
     let noise = &model.noise;
+    let mut load = usual.load;
+    if let Some((own, shape)) = &model.hydraulics {
+        (load.friction, load.shape) = (own.seal_friction, *shape);
+    }
     preview::Parameters {
+        load,
         rig: RigModel {
             shake_table: model.rig,
             hydraulics: model.whole_samples(),

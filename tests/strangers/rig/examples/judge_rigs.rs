@@ -26,8 +26,9 @@ const PLANT: &str =
     include_str!("../../../../orchestrator/laboratory/systems/plant/servohydraulic.toml");
 const POUND: f64 = 4.448_221_615_260_5;
 const SNAIL: f64 = POUND / 0.0254;
-/// What the sensors are late, s; recordings do not tell it from the command's delay.
-const SAMPLE: f64 = 2e-3;
+/// What the displacement's sensor is late, s: a sample and a lag of 300 Hz. Recordings do not tell it from the command's
+/// delay.
+const SENSOR: f64 = 2e-3 + 1.0 / (std::f64::consts::TAU * 300.0);
 
 /// Packs the rig's library, which Cargo leaves beside the folder of this program, for FMI 3.0 on this platform.
 fn pack(folder: &Path) -> Result<PathBuf, String> {
@@ -174,7 +175,7 @@ fn intervals(model: &str, rig: &Rig) -> Vec<Value> {
     let speed = rig.flow_coefficient * (rig.supply / 2.0).sqrt() / rig.area;
     [
         ("table", "mass", (rig.table_mass + rig.payload) / SNAIL),
-        ("", "command_delay", rig.delay + SAMPLE),
+        ("", "command_delay", rig.delay + SENSOR),
         ("hydraulics", "seal_friction", rig.coulomb),
         ("hydraulics", "oil_stiffness", oil),
         ("hydraulics", "force_rate", oil * speed),
