@@ -1,6 +1,9 @@
 //! Is the residual noise? Every test gives a normal deviate; the largest one decides.
 
+use std::cell::OnceCell;
+
 use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
 
 use super::fit::Fit;
 use super::model::ExtensibleModel;
@@ -18,6 +21,8 @@ const KNOWN: f64 = 1.25;
 const KNOWN_WHOLE: f64 = 1.12;
 /// As [`KNOWN`], of a part of a record: slow noise wanders.
 const KNOWN_PART: f64 = 1.4;
+/// As [`KNOWN`], of the drift of a sensor's zero beside a straight line: one record's says little of another's.
+const KNOWN_DRIFT: f64 = 4.0;
 /// Deviations of the nominal parameters in those stated, up to which they say nothing of the model: a noise of
 /// another form than was learned bends them a little. Those farther off are findings of the report.
 const KNOWN_SPREAD: f64 = 1.6;
@@ -104,12 +109,14 @@ pub fn chi_square_deviate(sum: f64, count: f64) -> f64 {
 }
 
 /// Looks at whitened residuals, `channels` a sample, with the channels' names; `regressors` are
-/// functions of state and command that a wrong model leaves traces of.
+/// functions of state and command that a wrong model leaves traces of. Errors slower than `drift`, a share of
+/// the sampling rate, are the drift of a sensor's zero where they are loud, and told from the rest.
 pub fn tests(
     record: &str,
     residuals: &[f64],
     channels: &[&str],
     regressors: &[(String, Vec<f64>)],
+    drift: f64,
 ) -> Vec<Test> {
     let width = channels.len();
     let n = residuals.len() / width.max(1);
@@ -119,57 +126,83 @@ pub fn tests(
     }
     let samples = (n / PARTS).max(16);
     let motion = motion(regressors, samples, n);
-    let steady = without_bursts(residuals, width, samples, &motion);
-    let mut planner = RealFftPlanner::<f64>::new();
-    let transform = planner.plan_fft_forward(n);
+    let mut steady = without_bursts(residuals, width, samples, &motion);
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let spectrum_of = |series: &[f64]| {
+        let mut spectrum = transform.make_output_vec();
+        let done = transform.process(&mut series.to_vec(), &mut spectrum);
+        done.is_ok().then_some(spectrum)
+    };
+    let power = |lines: &[Complex<f64>]| lines.iter().map(|z| z.norm_sqr()).sum::<f64>();
+    let slow = FIRST_LINE..((drift * n as f64).ceil() as usize).clamp(FIRST_LINE, n / 2);
+    let share = |line: usize| line as f64 / n as f64;
+    let faster = OnceCell::new();
     for (c, channel) in channels.iter().enumerate() {
-        let series: Vec<f64> = steady.iter().skip(c).step_by(width).copied().collect();
-        let energy: f64 = series.iter().map(|r| r * r).sum();
-        if energy == 0.0 {
-            continue;
-        }
+        let mut series: Vec<f64> = steady.iter().skip(c).step_by(width).copied().collect();
         let live = series.iter().filter(|r| **r != 0.0).count() as f64;
+        let Some(mut spectrum) = spectrum_of(&series).filter(|_| live > 0.0) else {
+            continue;
+        };
+        // A mean is one more draw of what is slow: it is measured by the slowest lines where those are
+        // louder than white noise.
+        let mean = series.iter().sum::<f64>() / live;
+        let slowest = &spectrum[1..(1 + SLOWEST).min(spectrum.len())];
+        let level = (power(slowest) / (slowest.len().max(1) as f64 * live)).max(1.0);
+        tests.push(Test::of(
+            format!("{record}: {channel}, mean"),
+            mean.abs() * (live / level).sqrt(),
+        ));
+        let mut low = FIRST_LINE;
+        let mut known = regressors;
+        let count = slow.len() as f64;
+        if power(&spectrum[slow.clone()]) > KNOWN.powi(2) * count * live {
+            let mut rest = without_line(&series);
+            let drifted = spectrum_of(&rest).map_or(0.0, |own| power(&own[slow.clone()]));
+            let test = Test::of(
+                format!("{record}: {channel}, drift"),
+                chi_square_deviate(2.0 * drifted / (KNOWN_DRIFT.powi(2) * live), 2.0 * count),
+            );
+            let part = Part::Band(share(slow.start), share(slow.end));
+            tests.push(test.at(Some(channel), part, drifted / (count * live)));
+            rest = without_slow(&rest, slow.end);
+            if let Some(own) = spectrum_of(&rest) {
+                for (row, value) in steady.chunks_exact_mut(width).zip(&rest) {
+                    row[c] = *value;
+                }
+                (series, spectrum, low) = (rest, own, slow.end);
+                known = faster.get_or_init(|| {
+                    let all = regressors.iter();
+                    all.map(|(name, g)| (name.clone(), without_slow(g, slow.end)))
+                        .collect::<Vec<_>>()
+                });
+            }
+        }
+        let energy: f64 = series.iter().map(|r| r * r).sum();
         let mean_square = energy / live;
         let whole = Test::of(
             format!("{record}: {channel}, mean square {mean_square:.3}"),
             chi_square_deviate(energy / KNOWN_WHOLE.powi(2), live),
         );
         tests.push(whole.at(Some(channel), Part::Whole, mean_square));
-        let mean = series.iter().sum::<f64>() / live;
-        let mut time = series.clone();
-        let mut spectrum = transform.make_output_vec();
-        if transform.process(&mut time, &mut spectrum).is_ok() {
-            // A mean is one more draw of what is slow: it is measured by the slowest lines where those are
-            // louder than white noise.
-            let slowest = &spectrum[1..(1 + SLOWEST).min(spectrum.len())];
-            let power: f64 = slowest.iter().map(|z| z.norm_sqr()).sum();
-            let slow = (power / (slowest.len().max(1) as f64 * live)).max(1.0);
-            tests.push(Test::of(
-                format!("{record}: {channel}, mean"),
-                mean.abs() * (live / slow).sqrt(),
-            ));
-            let mut low = FIRST_LINE;
-            for edge in BANDS {
-                let high = ((edge * n as f64).round() as usize).min(spectrum.len() - 1);
-                if high < low + 2 {
-                    continue;
-                }
-                let power: f64 = spectrum[low..high].iter().map(|z| z.norm_sqr()).sum();
-                let count = (high - low) as f64;
-                let band = Test::of(
-                    format!("{record}: {channel}, below {edge} of the sampling rate"),
-                    chi_square_deviate(2.0 * power / (KNOWN.powi(2) * live), 2.0 * count),
-                );
-                let share = |line: usize| line as f64 / n as f64;
-                tests.push(band.at(
-                    Some(channel),
-                    Part::Band(share(low), share(high)),
-                    power / (live * count),
-                ));
-                low = high;
+        for edge in BANDS {
+            let high = ((edge * n as f64).round() as usize).min(spectrum.len() - 1);
+            if high < low + 2 {
+                continue;
             }
+            let power = power(&spectrum[low..high]);
+            let count = (high - low) as f64;
+            let band = Test::of(
+                format!("{record}: {channel}, below {edge} of the sampling rate"),
+                chi_square_deviate(2.0 * power / (KNOWN.powi(2) * live), 2.0 * count),
+            );
+            tests.push(band.at(
+                Some(channel),
+                Part::Band(share(low), share(high)),
+                power / (live * count),
+            ));
+            low = high;
         }
-        for (name, regressor) in regressors {
+        for (name, regressor) in known {
             // What they share with the mean is seen there.
             let centre = regressor.iter().sum::<f64>() / regressor.len().max(1) as f64;
             let size: f64 = regressor.iter().map(|g| (g - centre).powi(2)).sum();
@@ -204,6 +237,47 @@ pub fn tests(
     parts.retain(|part| !are_bursts || part.deviate <= LARGEST_DEVIATE);
     tests.extend(parts);
     tests
+}
+
+/// `series` without its straight line, where it is not zero.
+fn without_line(series: &[f64]) -> Vec<f64> {
+    let live = || series.iter().enumerate().filter(|(_, r)| **r != 0.0);
+    let count = live().count().max(1) as f64;
+    let middle = live().map(|(k, _)| k as f64).sum::<f64>() / count;
+    let mean = live().map(|(_, r)| r).sum::<f64>() / count;
+    let (mut along, mut size) = (0.0, 0.0);
+    for (k, r) in live() {
+        let off = k as f64 - middle;
+        along += off * r;
+        size += off * off;
+    }
+    let slope = along / f64::max(size, f64::MIN_POSITIVE);
+    let line = |k: usize| mean + slope * (k as f64 - middle);
+    let all = series.iter().enumerate();
+    all.map(|(k, r)| if *r == 0.0 { 0.0 } else { r - line(k) })
+        .collect()
+}
+
+/// `series` without its mean and what is slower than line `end` of its periodogram, where it is not zero.
+fn without_slow(series: &[f64], end: usize) -> Vec<f64> {
+    let mut planner = RealFftPlanner::<f64>::new();
+    let forward = planner.plan_fft_forward(series.len());
+    let back = planner.plan_fft_inverse(series.len());
+    let mut spectrum = forward.make_output_vec();
+    let mut fast = series.to_vec();
+    let done = forward.process(&mut fast, &mut spectrum);
+    let end = end.min(spectrum.len());
+    spectrum[..end].fill(Complex::default());
+    match done.and_then(|()| back.process(&mut spectrum, &mut fast)) {
+        Ok(()) => {
+            let count = series.len() as f64;
+            let pairs = fast.iter().zip(series);
+            pairs
+                .map(|(value, was)| if *was == 0.0 { 0.0 } else { value / count })
+                .collect()
+        }
+        Err(_) => series.to_vec(),
+    }
 }
 
 /// How much the rig moves in every part of `samples` among `n`: the median over the `regressors` of the share of
@@ -288,6 +362,7 @@ pub(crate) fn left_over<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usi
             mine,
             model.channels(),
             &model.regressors(record),
+            model.drifts_below(),
         ));
     }
     let nuisance = &fit.point.nuisance;
@@ -348,7 +423,7 @@ mod tests {
     fn white_noise_of_unit_variance_passes_every_test() {
         let noise = white(8192);
         let regressors = [("ramp".to_string(), (0..4096).map(f64::from).collect())];
-        let all = tests("record", &noise, &["one", "two"], &regressors);
+        let all = tests("record", &noise, &["one", "two"], &regressors, 0.0);
         // A mean square, a mean, bands and a regressor for each channel, and the parts of the record.
         assert!(all.len() > 60, "{}", all.len());
         for test in &all {
@@ -374,7 +449,7 @@ mod tests {
             let own = noise.chunks_exact_mut(2).enumerate();
             own.filter(|(i, _)| loud.contains(i))
                 .for_each(|(_, row)| row[1] *= 5.0);
-            let all = tests("record", &noise, &["one", "two"], &[]);
+            let all = tests("record", &noise, &["one", "two"], &[], 0.0);
             all.iter()
                 .filter(|test| test.deviate > LARGEST_DEVIATE)
                 .count()
@@ -393,11 +468,38 @@ mod tests {
     fn noise_is_known_to_a_tenth() {
         let worst = |factor: f64| {
             let noise: Vec<f64> = white(40_000).iter().map(|value| factor * value).collect();
-            let all = tests("record", &noise, &["one"], &[]);
+            let all = tests("record", &noise, &["one"], &[], 0.0);
             all.iter().map(|test| test.deviate).fold(0.0, f64::max)
         };
         assert!(worst(1.1) < LARGEST_DEVIATE);
         assert!(worst(1.33) > LARGEST_DEVIATE);
+    }
+
+    /// A zero that wanders by as much as the noise is loud: along a line, and about it.
+    #[test]
+    fn a_drift_of_a_zero_is_not_a_model_s_error_and_what_moves_faster_is() {
+        let n = 18_000;
+        let failed = |drift: f64, rise: f64, tone: f64, turns: f64| {
+            let mut noise = white(n);
+            let share = |k: usize| k as f64 / n as f64;
+            for (k, value) in noise.iter_mut().enumerate() {
+                *value += rise * share(k);
+                *value += tone * (std::f64::consts::TAU * turns * share(k)).sin();
+            }
+            let signal = |k: usize| (std::f64::consts::TAU * turns * share(k)).sin();
+            let regressors = [("signal".to_string(), (0..n).map(signal).collect())];
+            let all = tests("record", &noise, &["one"], &regressors, drift);
+            let failed = all.iter().filter(|test| test.deviate > LARGEST_DEVIATE);
+            failed.map(|test| test.what.clone()).collect::<Vec<_>>()
+        };
+        // Nine turns in the record.
+        let drift = 0.0005;
+        for (rise, tone) in [(2.0, 0.0), (0.0, 0.15), (-2.0, -0.15)] {
+            assert!(!failed(0.0, rise, tone, 4.0).is_empty());
+            assert_eq!(failed(drift, rise, tone, 4.0), Vec::<String>::new());
+            assert!(failed(drift, rise, 0.15, 20.0).contains(&"record: one against signal".into()));
+        }
+        assert_eq!(failed(drift, 0.0, 0.5, 4.0), ["record: one, drift"]);
     }
 
     #[test]
@@ -406,7 +508,7 @@ mod tests {
         for (k, value) in noise.iter_mut().enumerate() {
             *value += 0.7 * (std::f64::consts::TAU * 0.1 * k as f64).sin();
         }
-        let all = tests("record", &noise, &["one"], &[]);
+        let all = tests("record", &noise, &["one"], &[], 0.0);
         let bands = all
             .iter()
             .filter(|test| test.what.contains("sampling rate"));

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use plant::identified::effects::{self, Effects, Reporting};
+use plant::identified::effects::Effects;
 use plant::identified::shake_table::ShakeTable;
 use plant::sensors::instrumentation::Instrumentation;
 use plant::specimens::linear::LinearSpecimen;
@@ -12,7 +12,7 @@ use super::experiment::{self, SeparatingExperiment};
 use super::gain::{Gain, gain};
 use super::health::{RelationReport, health};
 use super::left_over::{self, Residual};
-use super::mains::{Line, line};
+use super::mains::{Line, line, readable};
 use super::relations::{misfit, relations};
 use super::sentence::{MOST, of_courses, of_findings, said, sentence};
 use crate::case::{
@@ -674,25 +674,4 @@ fn described(parts: &[Disturbance], period: f64, size: impl Fn(f64) -> String) -
     } else {
         format!(" ({})", parts.join(", "))
     }
-}
-
-/// Two quadratures as amplitude and phase, if the effect is reported in this form.
-fn readable(mut named: Vec<NamedEffect>) -> Vec<NamedEffect> {
-    for effect in &mut named {
-        let reporting = effects::find(effect.effect).map(|known| known.reporting);
-        if let (Some(Reporting::AmplitudeAndPhase), [a, b]) =
-            (reporting, effect.parameters.as_mut_slice())
-        {
-            let (p, q) = (a.value, b.value);
-            let amplitude = p.hypot(q);
-            a.name = "amplitude".into();
-            a.value = amplitude;
-            b.name = "phase".into();
-            b.value = q.atan2(p);
-            b.unit = "rad";
-            b.standard_error /= amplitude.max(f64::MIN_POSITIVE);
-            b.is_shape = true;
-        }
-    }
-    named
 }

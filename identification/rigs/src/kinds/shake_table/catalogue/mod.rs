@@ -324,6 +324,10 @@ impl ExtensibleModel for ShakeTableModel {
         among.iter().copied().filter(is_quiet).collect()
     }
 
+    fn drifts_below(&self) -> f64 {
+        DRIFT_BELOW * self.period
+    }
+
     // From the measured signals one sample before: the noise of the sample itself is in its
     // innovation.
     fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)> {
