@@ -574,6 +574,24 @@ mod tests {
         );
     }
 
+    /// Columns softer by nine stated deviations: the nominal stiffness fits them as well, and only its prior tells.
+    #[test]
+    fn an_effect_that_is_nearly_a_nominal_parameter_is_found() {
+        let mut rig = IdentifiedRig {
+            specimen: Some(LinearSpecimen::default()),
+            ..Default::default()
+        };
+        if let Some(specimen) = &mut rig.specimen {
+            specimen.stiffness *= 0.91;
+        }
+        let mut model = model(&rig, &stated(), 35);
+        let judgement = judge(&mut model, &[0], &[1], Observer::none()).unwrap();
+        let named = (Verdict::Named, vec!["specimen_stiffness"]);
+        assert_eq!(said(&judgement), named);
+        let change = &judgement.effects[0].parameters[0];
+        assert!((change.value + 0.09).abs() < 0.03, "{change:?}");
+    }
+
     /// An accelerometer that loses a tenth at 4.8 s, under a model whose accelerometer is off throughout.
     #[test]
     fn when_an_effect_begins_is_found() {
