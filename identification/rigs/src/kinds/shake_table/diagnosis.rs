@@ -9,6 +9,7 @@ use plant::specimens::linear::LinearSpecimen;
 
 use super::course::{Course, courses};
 use super::experiment::{self, SeparatingExperiment};
+use super::friction::{by_cause, cause, note};
 use super::gain::{Gain, gain};
 use super::health::{RelationReport, health};
 use super::left_over::{self, Residual};
@@ -371,7 +372,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         .filter_map(|((effect, without), deviations)| {
             let own = compared(&prediction(&model, without.as_ref()?, held_out)?);
             Some(Ablation {
-                effect: effect.effect,
+                effect: by_cause(effect.clone()).effect,
                 without_nrmse: own.before_nrmse,
                 with_nrmse: own.after_nrmse,
                 without_ratio: own.before_ratio,
@@ -447,6 +448,15 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         )
         .filter(|(_, error)| error.is_finite())
         .collect();
+    notes.extend(note(&effects));
+    let effects: Vec<NamedEffect> = effects.into_iter().map(by_cause).collect();
+    for own in &mut judgement.candidates {
+        let effects = std::mem::take(&mut own.effects);
+        own.effects = effects.into_iter().map(by_cause).collect();
+    }
+    for set in &mut judgement.alternatives {
+        set.iter_mut().for_each(|effect| *effect = cause(effect));
+    }
     let findings: Vec<Finding> = model
         .nominal_rig()
         .parameters()
