@@ -296,8 +296,8 @@ pub struct Motion<'a> {
     all: &'a [f64],
 }
 
-/// How much the rig moves in every part of every record: the median over the record's regressors of their power
-/// there, in their mean power over all records, since a burst is in some of those, too.
+/// How much the rig moves in every part of every record. That is the median, over the record's regressors, of their
+/// power there in their mean power over all records: a burst is in some of those, too.
 fn motions(records: &[Vec<(String, Vec<f64>)>]) -> Vec<Vec<f64>> {
     let count = records.first().map_or(0, Vec::len);
     let power = |signal: &[f64]| signal.iter().map(|g| g * g).sum::<f64>();

@@ -8,9 +8,9 @@ use strangers::table::case::{Case as StrangeCase, Kind};
 use units::constants::{INCH, LBF};
 
 /// Bristles by LuGre's equation, integrated with the rig, under noises of another form: 0.5763 lbf and a bump of
-/// 0.9865 lbf. `--ignored` because it takes a minute.
+/// 0.9865 lbf. It takes half a minute.
 #[test]
-#[ignore = "slow: one minute"]
+#[ignore = "slow: half a minute"]
 fn bristles_of_another_rig_are_found_as_its_friction() {
     let drawn = StrangeCase::draw(52107, Kind::One, &[]);
     let hidden = &drawn.truth.effects[0];
