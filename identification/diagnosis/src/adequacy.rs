@@ -1,6 +1,9 @@
 //! Is the residual noise? Every test gives a normal deviate; the largest one decides.
 
+use std::cell::OnceCell;
+
 use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
 
 use super::fit::Fit;
 use super::model::ExtensibleModel;
@@ -18,6 +21,8 @@ const KNOWN: f64 = 1.25;
 const KNOWN_WHOLE: f64 = 1.12;
 /// As [`KNOWN`], of a part of a record: slow noise wanders.
 const KNOWN_PART: f64 = 1.4;
+/// As [`KNOWN`], of the drift of a sensor's zero beside a straight line: one record's says little of another's.
+const KNOWN_DRIFT: f64 = 4.0;
 /// Deviations of the nominal parameters in those stated, up to which they say nothing of the model: a noise of
 /// another form than was learned bends them a little. Those farther off are findings of the report.
 const KNOWN_SPREAD: f64 = 1.6;
@@ -85,6 +90,8 @@ const FIRST_LINE: usize = 2;
 const PARTS: usize = 40;
 /// Parts of a record, of forty, that may be louder than the rest: bursts of a noise, which no model explains.
 const BURSTS: usize = 8;
+/// Parts that one of them touches at most.
+const ONE_BURST: usize = 2;
 /// Standard deviations by which their motion may rank above the middle.
 const WITH_THE_MOTION: f64 = 1.5;
 /// Slowest lines of a periodogram that a mean is measured by.
@@ -104,12 +111,16 @@ pub fn chi_square_deviate(sum: f64, count: f64) -> f64 {
 }
 
 /// Looks at whitened residuals, `channels` a sample, with the channels' names; `regressors` are
-/// functions of state and command that a wrong model leaves traces of.
+/// functions of state and command that a wrong model leaves traces of, `motion` how much the rig moves in the
+/// record's parts. Errors slower than `drift`, a share of
+/// the sampling rate, are the drift of a sensor's zero where they are loud, and told from the rest.
 pub fn tests(
     record: &str,
     residuals: &[f64],
     channels: &[&str],
     regressors: &[(String, Vec<f64>)],
+    drift: f64,
+    motion: &Motion<'_>,
 ) -> Vec<Test> {
     let width = channels.len();
     let n = residuals.len() / width.max(1);
@@ -117,59 +128,84 @@ pub fn tests(
     if n < 64 {
         return tests;
     }
-    let samples = (n / PARTS).max(16);
-    let motion = motion(regressors, samples, n);
-    let steady = without_bursts(residuals, width, samples, &motion);
-    let mut planner = RealFftPlanner::<f64>::new();
-    let transform = planner.plan_fft_forward(n);
+    let samples = part_of(n);
+    let mut steady = without_bursts(residuals, width, samples, motion);
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let spectrum_of = |series: &[f64]| {
+        let mut spectrum = transform.make_output_vec();
+        let done = transform.process(&mut series.to_vec(), &mut spectrum);
+        done.is_ok().then_some(spectrum)
+    };
+    let power = |lines: &[Complex<f64>]| lines.iter().map(|z| z.norm_sqr()).sum::<f64>();
+    let slow = FIRST_LINE..((drift * n as f64).ceil() as usize).clamp(FIRST_LINE, n / 2);
+    let share = |line: usize| line as f64 / n as f64;
+    let faster = OnceCell::new();
     for (c, channel) in channels.iter().enumerate() {
-        let series: Vec<f64> = steady.iter().skip(c).step_by(width).copied().collect();
-        let energy: f64 = series.iter().map(|r| r * r).sum();
-        if energy == 0.0 {
-            continue;
-        }
+        let mut series: Vec<f64> = steady.iter().skip(c).step_by(width).copied().collect();
         let live = series.iter().filter(|r| **r != 0.0).count() as f64;
+        let Some(mut spectrum) = spectrum_of(&series).filter(|_| live > 0.0) else {
+            continue;
+        };
+        // A mean is one more draw of what is slow: it is measured by the slowest lines where those are
+        // louder than white noise.
+        let mean = series.iter().sum::<f64>() / live;
+        let slowest = &spectrum[1..(1 + SLOWEST).min(spectrum.len())];
+        let level = (power(slowest) / (slowest.len().max(1) as f64 * live)).max(1.0);
+        tests.push(Test::of(
+            format!("{record}: {channel}, mean"),
+            mean.abs() * (live / level).sqrt(),
+        ));
+        let mut low = FIRST_LINE;
+        let mut known = regressors;
+        let count = slow.len() as f64;
+        if power(&spectrum[slow.clone()]) > KNOWN.powi(2) * count * live {
+            let mut rest = without_line(&series);
+            let drifted = spectrum_of(&rest).map_or(0.0, |own| power(&own[slow.clone()]));
+            let test = Test::of(
+                format!("{record}: {channel}, drift"),
+                chi_square_deviate(2.0 * drifted / (KNOWN_DRIFT.powi(2) * live), 2.0 * count),
+            );
+            let part = Part::Band(share(slow.start), share(slow.end));
+            tests.push(test.at(Some(channel), part, drifted / (count * live)));
+            rest = without_slow(&rest, slow.end);
+            if let Some(own) = spectrum_of(&rest) {
+                for (row, value) in steady.chunks_exact_mut(width).zip(&rest) {
+                    row[c] = *value;
+                }
+                (series, spectrum, low) = (rest, own, slow.end);
+                known = faster.get_or_init(|| {
+                    let all = regressors.iter();
+                    all.map(|(name, g)| (name.clone(), without_slow(g, slow.end)))
+                        .collect::<Vec<_>>()
+                });
+            }
+        }
+        let energy: f64 = series.iter().map(|r| r * r).sum();
         let mean_square = energy / live;
         let whole = Test::of(
             format!("{record}: {channel}, mean square {mean_square:.3}"),
             chi_square_deviate(energy / KNOWN_WHOLE.powi(2), live),
         );
         tests.push(whole.at(Some(channel), Part::Whole, mean_square));
-        let mean = series.iter().sum::<f64>() / live;
-        let mut time = series.clone();
-        let mut spectrum = transform.make_output_vec();
-        if transform.process(&mut time, &mut spectrum).is_ok() {
-            // A mean is one more draw of what is slow: it is measured by the slowest lines where those are
-            // louder than white noise.
-            let slowest = &spectrum[1..(1 + SLOWEST).min(spectrum.len())];
-            let power: f64 = slowest.iter().map(|z| z.norm_sqr()).sum();
-            let slow = (power / (slowest.len().max(1) as f64 * live)).max(1.0);
-            tests.push(Test::of(
-                format!("{record}: {channel}, mean"),
-                mean.abs() * (live / slow).sqrt(),
-            ));
-            let mut low = FIRST_LINE;
-            for edge in BANDS {
-                let high = ((edge * n as f64).round() as usize).min(spectrum.len() - 1);
-                if high < low + 2 {
-                    continue;
-                }
-                let power: f64 = spectrum[low..high].iter().map(|z| z.norm_sqr()).sum();
-                let count = (high - low) as f64;
-                let band = Test::of(
-                    format!("{record}: {channel}, below {edge} of the sampling rate"),
-                    chi_square_deviate(2.0 * power / (KNOWN.powi(2) * live), 2.0 * count),
-                );
-                let share = |line: usize| line as f64 / n as f64;
-                tests.push(band.at(
-                    Some(channel),
-                    Part::Band(share(low), share(high)),
-                    power / (live * count),
-                ));
-                low = high;
+        for edge in BANDS {
+            let high = ((edge * n as f64).round() as usize).min(spectrum.len() - 1);
+            if high < low + 2 {
+                continue;
             }
+            let power = power(&spectrum[low..high]);
+            let count = (high - low) as f64;
+            let band = Test::of(
+                format!("{record}: {channel}, below {edge} of the sampling rate"),
+                chi_square_deviate(2.0 * power / (KNOWN.powi(2) * live), 2.0 * count),
+            );
+            tests.push(band.at(
+                Some(channel),
+                Part::Band(share(low), share(high)),
+                power / (live * count),
+            ));
+            low = high;
         }
-        for (name, regressor) in regressors {
+        for (name, regressor) in known {
             // What they share with the mean is seen there.
             let centre = regressor.iter().sum::<f64>() / regressor.len().max(1) as f64;
             let size: f64 = regressor.iter().map(|g| (g - centre).powi(2)).sum();
@@ -200,39 +236,103 @@ pub fn tests(
     let loud: Vec<usize> = (0..parts.len())
         .filter(|i| parts[*i].deviate > LARGEST_DEVIATE)
         .collect();
-    let are_bursts = are_bursts(&loud, &motion);
+    let are_bursts = motion.are_bursts(&loud);
     parts.retain(|part| !are_bursts || part.deviate <= LARGEST_DEVIATE);
     tests.extend(parts);
     tests
 }
 
-/// How much the rig moves in every part of `samples` among `n`: the median over the `regressors` of the share of
-/// their power, since a burst is in some of those, too.
-fn motion(regressors: &[(String, Vec<f64>)], samples: usize, n: usize) -> Vec<f64> {
-    let shares: Vec<Vec<f64>> = regressors
-        .iter()
-        .map(|(_, signal)| {
-            let power = |part: &[f64]| part.iter().map(|g| g * g).sum::<f64>();
-            let all = power(signal).max(f64::MIN_POSITIVE);
-            let parts = signal.chunks_exact(samples);
-            parts.map(|part| power(part) / all).collect()
-        })
-        .collect();
-    (0..n / samples)
-        .map(|i| {
-            let mut own: Vec<f64> = shares
-                .iter()
-                .filter_map(|share| share.get(i).copied())
-                .collect();
-            own.sort_by(f64::total_cmp);
-            own.get(own.len() / 2).copied().unwrap_or_default()
-        })
+/// `series` without its straight line, where it is not zero.
+fn without_line(series: &[f64]) -> Vec<f64> {
+    let live = || series.iter().enumerate().filter(|(_, r)| **r != 0.0);
+    let count = live().count().max(1) as f64;
+    let middle = live().map(|(k, _)| k as f64).sum::<f64>() / count;
+    let mean = live().map(|(_, r)| r).sum::<f64>() / count;
+    let (mut along, mut size) = (0.0, 0.0);
+    for (k, r) in live() {
+        let off = k as f64 - middle;
+        along += off * r;
+        size += off * off;
+    }
+    let slope = along / f64::max(size, f64::MIN_POSITIVE);
+    let line = |k: usize| mean + slope * (k as f64 - middle);
+    let all = series.iter().enumerate();
+    all.map(|(k, r)| if *r == 0.0 { 0.0 } else { r - line(k) })
         .collect()
+}
+
+/// `series` without its mean and what is slower than line `end` of its periodogram, where it is not zero.
+fn without_slow(series: &[f64], end: usize) -> Vec<f64> {
+    let mut planner = RealFftPlanner::<f64>::new();
+    let forward = planner.plan_fft_forward(series.len());
+    let back = planner.plan_fft_inverse(series.len());
+    let mut spectrum = forward.make_output_vec();
+    let mut fast = series.to_vec();
+    let done = forward.process(&mut fast, &mut spectrum);
+    let end = end.min(spectrum.len());
+    spectrum[..end].fill(Complex::default());
+    match done.and_then(|()| back.process(&mut spectrum, &mut fast)) {
+        Ok(()) => {
+            let count = series.len() as f64;
+            let pairs = fast.iter().zip(series);
+            pairs
+                .map(|(value, was)| if *was == 0.0 { 0.0 } else { value / count })
+                .collect()
+        }
+        Err(_) => series.to_vec(),
+    }
+}
+
+/// Samples in a part of a record of `n`.
+fn part_of(n: usize) -> usize {
+    (n / PARTS).max(16)
+}
+
+/// How much a rig moves in the parts of its records.
+pub struct Motion<'a> {
+    /// In those of a record.
+    own: &'a [f64],
+    /// In those of all records.
+    all: &'a [f64],
+}
+
+/// How much the rig moves in every part of every record. That is the median, over the record's regressors, of their
+/// power there in their mean power over all records: a burst is in some of those, too.
+fn motions(records: &[Vec<(String, Vec<f64>)>]) -> Vec<Vec<f64>> {
+    let count = records.first().map_or(0, Vec::len);
+    let power = |signal: &[f64]| signal.iter().map(|g| g * g).sum::<f64>();
+    let mean = |i: usize| {
+        let signals = || records.iter().filter_map(|own| Some(&own.get(i)?.1));
+        let samples: usize = signals().map(Vec::len).sum();
+        let sum: f64 = signals().map(|signal| power(signal)).sum();
+        (sum / samples.max(1) as f64).max(f64::MIN_POSITIVE)
+    };
+    let means: Vec<f64> = (0..count).map(mean).collect();
+    let in_parts = |own: &Vec<(String, Vec<f64>)>| -> Vec<f64> {
+        let n = own.first().map_or(0, |(_, signal)| signal.len());
+        let samples = part_of(n);
+        let part = |i: usize| {
+            let part = i * samples..(i + 1) * samples;
+            let pairs = own.iter().zip(&means);
+            let mut all: Vec<f64> = pairs
+                .filter_map(|((_, signal), mean)| Some(power(signal.get(part.clone())?) / mean))
+                .collect();
+            all.sort_by(f64::total_cmp);
+            all.get(all.len() / 2).copied().unwrap_or_default()
+        };
+        (0..n / samples).map(part).collect()
+    };
+    records.iter().map(in_parts).collect()
 }
 
 /// `residuals` with zeros in the parts of `samples` in which a channel has a burst of noise: one would be in the
 /// channel's bands and means as well.
-fn without_bursts(residuals: &[f64], width: usize, samples: usize, motion: &[f64]) -> Vec<f64> {
+fn without_bursts(
+    residuals: &[f64],
+    width: usize,
+    samples: usize,
+    motion: &Motion<'_>,
+) -> Vec<f64> {
     let mut steady = residuals.to_vec();
     for channel in 0..width {
         let is_loud = |part: &[f64]| {
@@ -246,7 +346,7 @@ fn without_bursts(residuals: &[f64], width: usize, samples: usize, motion: &[f64
             .filter(|(_, part)| is_loud(part))
             .map(|(i, _)| i)
             .collect();
-        if are_bursts(&loud, motion) {
+        if motion.are_bursts(&loud) {
             for i in loud {
                 let part = &mut steady[i * samples * width..(i + 1) * samples * width];
                 let own = part.iter_mut().skip(channel).step_by(width);
@@ -257,29 +357,54 @@ fn without_bursts(residuals: &[f64], width: usize, samples: usize, motion: &[f64
     steady
 }
 
-/// Whether `loud` parts of a record are bursts of a noise: few, and no more where there is more `motion`, as
-/// those of a wrong model are.
-fn are_bursts(loud: &[usize], motion: &[f64]) -> bool {
-    let rank = |own: &usize| {
-        let less = motion.iter().filter(|other| **other < motion[*own]).count();
-        let same = motion
-            .iter()
-            .filter(|other| **other == motion[*own])
-            .count();
-        (less as f64 + 0.5 * same as f64) / motion.len() as f64
-    };
-    let count = loud.len() as f64;
-    let mean = loud.iter().map(rank).sum::<f64>() / count.max(1.0);
-    // Ranks of parts that have nothing to do with the motion are even between 0 and 1.
-    let deviation = 1.0 / (12.0 * count.max(1.0)).sqrt();
-    (1..=BURSTS).contains(&loud.len()) && mean < 0.5 + WITH_THE_MOTION * deviation
+impl Motion<'_> {
+    /// Whether `loud` parts of a record are bursts of a noise: few, and no more where there is more motion, as
+    /// those of a wrong model are. A single burst may be where a record of low level moves most, as long as other
+    /// records are quiet where they move as much.
+    fn are_bursts(&self, loud: &[usize]) -> bool {
+        let count = loud.len() as f64;
+        // Ranks of parts that have nothing to do with the motion are even between 0 and 1.
+        let deviation = 1.0 / (12.0 * count.max(1.0)).sqrt();
+        let is_even = |among: &[f64]| {
+            let ranks = loud.iter().filter_map(|i| {
+                let own = self.own.get(*i)?;
+                let less = among.iter().filter(|other| *other < own).count();
+                let same = among.iter().filter(|other| *other == own).count();
+                Some((less as f64 + 0.5 * same as f64) / among.len() as f64)
+            });
+            let mean = ranks.sum::<f64>() / count.max(1.0);
+            mean < 0.5 + WITH_THE_MOTION * deviation
+        };
+        (1..=BURSTS).contains(&loud.len())
+            && (is_even(self.own) || loud.len() <= ONE_BURST && is_even(self.all))
+    }
+}
+
+/// Tests of nominal parameters, in their stated standard deviations: of all together, and of the farthest, which
+/// is no less a trace where the others are as stated.
+fn of_parameters(nuisance: &[f64]) -> [Test; 2] {
+    let squares: f64 = nuisance.iter().map(|p| p * p).sum();
+    let farthest = nuisance.iter().fold(0.0f64, |most, p| most.max(p.abs()));
+    [
+        Test::of(
+            "nominal parameters against their stated uncertainty".into(),
+            chi_square_deviate(squares / KNOWN_SPREAD.powi(2), nuisance.len() as f64),
+        ),
+        Test::of(
+            "the farthest nominal parameter against its stated uncertainty".into(),
+            farthest / KNOWN_SPREAD,
+        ),
+    ]
 }
 
 /// Tests of whether what `fit` leaves over on `records` is noise, and its parameters plausible.
 pub(crate) fn left_over<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usize]) -> Vec<Test> {
     let mut all = Vec::new();
     let mut rest = fit.residuals.as_slice();
-    for &record in records {
+    let regressors: Vec<_> = records.iter().map(|r| model.regressors(*r)).collect();
+    let motions = motions(&regressors);
+    let of_all: Vec<f64> = motions.iter().flatten().copied().collect();
+    for ((&record, regressors), own) in records.iter().zip(&regressors).zip(&motions) {
         let count = model.residual_count(record).min(rest.len());
         let (mine, others) = rest.split_at(count);
         rest = others;
@@ -287,17 +412,12 @@ pub(crate) fn left_over<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usi
             model.record_name(record),
             mine,
             model.channels(),
-            &model.regressors(record),
+            regressors,
+            model.drifts_below(),
+            &Motion { own, all: &of_all },
         ));
     }
-    let nuisance = &fit.point.nuisance;
-    all.push(Test::of(
-        "nominal parameters against their stated uncertainty".into(),
-        chi_square_deviate(
-            nuisance.iter().map(|p| p * p).sum::<f64>() / KNOWN_SPREAD.powi(2),
-            nuisance.len() as f64,
-        ),
-    ));
+    all.extend(of_parameters(&fit.point.nuisance));
     let priors = fit.point.prior_rows(model.candidates());
     for (_, off, spread) in priors {
         all.push(Test::of(
@@ -337,6 +457,8 @@ mod tests {
         assert_eq!(chi_square_deviate(7.0, 0.0), 0.0);
     }
 
+    const STILL: Motion<'_> = Motion { own: &[], all: &[] };
+
     /// Normal values by the sum of twelve uniform ones.
     fn white(samples: usize) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(11);
@@ -348,7 +470,7 @@ mod tests {
     fn white_noise_of_unit_variance_passes_every_test() {
         let noise = white(8192);
         let regressors = [("ramp".to_string(), (0..4096).map(f64::from).collect())];
-        let all = tests("record", &noise, &["one", "two"], &regressors);
+        let all = tests("record", &noise, &["one", "two"], &regressors, 0.0, &STILL);
         // A mean square, a mean, bands and a regressor for each channel, and the parts of the record.
         assert!(all.len() > 60, "{}", all.len());
         for test in &all {
@@ -374,7 +496,7 @@ mod tests {
             let own = noise.chunks_exact_mut(2).enumerate();
             own.filter(|(i, _)| loud.contains(i))
                 .for_each(|(_, row)| row[1] *= 5.0);
-            let all = tests("record", &noise, &["one", "two"], &[]);
+            let all = tests("record", &noise, &["one", "two"], &[], 0.0, &STILL);
             all.iter()
                 .filter(|test| test.deviate > LARGEST_DEVIATE)
                 .count()
@@ -383,9 +505,41 @@ mod tests {
         assert_eq!(failed(1000..1300), 0);
         assert!(failed(4000..8000) > 25);
         // Where there is most motion it is.
-        let motion: Vec<f64> = (0..40).map(f64::from).collect();
-        assert!(are_bursts(&[3, 12, 30], &motion));
-        assert!(!are_bursts(&[35, 37, 38], &motion));
+        let own: Vec<f64> = (0..40).map(f64::from).collect();
+        let motion = Motion {
+            own: &own,
+            all: &own,
+        };
+        assert!(motion.are_bursts(&[3, 12, 30]));
+        assert!(!motion.are_bursts(&[35, 37, 38]) && !motion.are_bursts(&[39]));
+        // Unless other records move more and are quiet there.
+        let all: Vec<f64> = (0..120).map(f64::from).collect();
+        let motion = Motion {
+            own: &own,
+            all: &all,
+        };
+        assert!(motion.are_bursts(&[39]) && motion.are_bursts(&[38, 39]));
+        assert!(!motion.are_bursts(&[35, 37, 38]));
+    }
+
+    #[test]
+    fn a_part_s_motion_is_known_among_all_records() {
+        let record = |size: f64| {
+            let signal = |scale: f64| {
+                let moving = |k: usize| scale * size * f64::from(u8::from(k / 20 == 7));
+                (0..800).map(moving).collect::<Vec<f64>>()
+            };
+            let rest = vec![1.0; 800];
+            vec![
+                ("one".into(), signal(3.0)),
+                ("two".into(), signal(0.1)),
+                ("sign".into(), rest),
+            ]
+        };
+        let found = motions(&[record(2.0), record(1.0)]);
+        assert_eq!(found[0].len(), 40);
+        assert!((found[0][7] / found[1][7] - 4.0).abs() < 1e-9);
+        assert_eq!(found[0][8], 0.0);
     }
 
     /// A level that is a tenth off says nothing of the model, one that is a third off does.
@@ -393,11 +547,51 @@ mod tests {
     fn noise_is_known_to_a_tenth() {
         let worst = |factor: f64| {
             let noise: Vec<f64> = white(40_000).iter().map(|value| factor * value).collect();
-            let all = tests("record", &noise, &["one"], &[]);
+            let all = tests("record", &noise, &["one"], &[], 0.0, &STILL);
             all.iter().map(|test| test.deviate).fold(0.0, f64::max)
         };
         assert!(worst(1.1) < LARGEST_DEVIATE);
         assert!(worst(1.33) > LARGEST_DEVIATE);
+    }
+
+    /// A zero that wanders by as much as the noise is loud: along a line, and about it.
+    #[test]
+    fn a_drift_of_a_zero_is_not_a_model_s_error_and_what_moves_faster_is() {
+        let n = 18_000;
+        let failed = |drift: f64, rise: f64, tone: f64, turns: f64| {
+            let mut noise = white(n);
+            let share = |k: usize| k as f64 / n as f64;
+            for (k, value) in noise.iter_mut().enumerate() {
+                *value += rise * share(k);
+                *value += tone * (std::f64::consts::TAU * turns * share(k)).sin();
+            }
+            let signal = |k: usize| (std::f64::consts::TAU * turns * share(k)).sin();
+            let regressors = [("signal".to_string(), (0..n).map(signal).collect())];
+            let all = tests("record", &noise, &["one"], &regressors, drift, &STILL);
+            let failed = all.iter().filter(|test| test.deviate > LARGEST_DEVIATE);
+            failed.map(|test| test.what.clone()).collect::<Vec<_>>()
+        };
+        // Nine turns in the record.
+        let drift = 0.0005;
+        for (rise, tone) in [(2.0, 0.0), (0.0, 0.15), (-2.0, -0.15)] {
+            assert!(!failed(0.0, rise, tone, 4.0).is_empty());
+            assert_eq!(failed(drift, rise, tone, 4.0), Vec::<String>::new());
+            assert!(failed(drift, rise, 0.15, 20.0).contains(&"record: one against signal".into()));
+        }
+        assert_eq!(failed(drift, 0.0, 0.5, 4.0), ["record: one, drift"]);
+    }
+
+    /// Play that the noises took up left one parameter of fifteen eleven deviations off, and three at three.
+    #[test]
+    fn one_parameter_that_is_far_off_fails_where_all_together_pass() {
+        let worst = |farthest: f64| {
+            let mut nuisance = [0.0; 15];
+            nuisance[..4].copy_from_slice(&[farthest, 3.4, -2.4, -3.0]);
+            of_parameters(&nuisance).map(|test| test.deviate)
+        };
+        let [together, alone] = worst(-11.4);
+        assert!(together < LARGEST_DEVIATE && alone > LARGEST_DEVIATE);
+        assert!(worst(-8.0).iter().all(|own| *own < LARGEST_DEVIATE));
     }
 
     #[test]
@@ -406,7 +600,7 @@ mod tests {
         for (k, value) in noise.iter_mut().enumerate() {
             *value += 0.7 * (std::f64::consts::TAU * 0.1 * k as f64).sin();
         }
-        let all = tests("record", &noise, &["one"], &[]);
+        let all = tests("record", &noise, &["one"], &[], 0.0, &STILL);
         let bands = all
             .iter()
             .filter(|test| test.what.contains("sampling rate"));

@@ -43,6 +43,9 @@ const NOISE_OF_A_RACE: f64 = 1e4;
 /// is due to further effects. Saves time only.
 pub(crate) const NEARLY_NOISE: f64 = 4.0 * LARGEST_DEVIATE;
 
+/// Share of the catalogue's weakest size at which an effect without a threshold is looked at.
+const NEARLY_NOTHING: f64 = 0.02;
+
 /// Rounds of a fit at most; curved valleys take many.
 pub(crate) const ROUNDS: usize = 12;
 /// And of one that only ranks.
@@ -322,7 +325,11 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
         let Some(predictor) = self.model.predictor(&parent.fit.point) else {
             return Vec::new();
         };
-        let Some(scorer) = parent.jacobian.scorer(self.model, &parent.fit) else {
+        // Derivatives that were carried along are too rough to tell an effect from the nominal parameter that it is
+        // nearly equal to.
+        let exact = Jacobian::at(self.model, &parent.fit, &self.records);
+        let exact = exact.as_ref().unwrap_or(&parent.jacobian);
+        let Some(scorer) = exact.scorer(self.model, &parent.fit) else {
             return Vec::new();
         };
         let mut promising = Vec::new();
@@ -334,14 +341,20 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
             for start in &candidate.starts {
                 let off = candidate.nearly_off(start);
                 let off_at = |share| -> Vec<f64> { off.iter().map(|at| at(share)).collect() };
-                // A difference to a weak effect: thresholds have no derivative at nothing.
+                // A difference to a weak effect: thresholds have no derivative at nothing. What has one may be nearly
+                // the same as a nominal parameter, but for its curvature.
                 let mut point = parent.fit.point.clone();
                 point.effects.push((effect, off_at(0.5)));
                 if tried.contains(&point.effects) || self.observer.is_over() {
                     continue;
                 }
                 tried.push(point.effects.clone());
-                let with = residuals(self.model, &predictor, &point, &self.records);
+                let mut near = point.clone();
+                if candidate.is_linear {
+                    near.effects.pop();
+                    near.effects.push((effect, off_at(NEARLY_NOTHING)));
+                }
+                let with = residuals(self.model, &predictor, &near, &self.records);
                 let Some(with) = with else { continue };
                 let pairs = with.iter().zip(&parent.fit.residuals);
                 let column: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
@@ -369,7 +382,7 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
             }
             seen.push(effect);
             // A size far from nothing, a delay of some samples, may be beyond a ridge.
-            let known = &parent.jacobian;
+            let known = exact;
             let mut points = vec![point];
             if candidates[effect].starts.len() > 1 {
                 let starts = candidates[effect].starts.iter();
@@ -386,9 +399,7 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
                 .min_by(|a, b| a.cost.total_cmp(&b.cost))
                 .and_then(|near| fit(self.model, &near.point, &self.records, known, 4));
             best.extend(short.and_then(|short| {
-                let known = parent
-                    .jacobian
-                    .extended(self.model, &short, &self.records)?;
+                let known = exact.extended(self.model, &short, &self.records)?;
                 self.sketch(&short, known)
             }));
         }

@@ -24,6 +24,12 @@ pub trait ExtensibleModel: Sync {
     /// one value a sample.
     fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)>;
 
+    /// Share of the sampling rate below which the noise of a sensor is the drift of its zero, of which one record
+    /// says little of another's.
+    fn drifts_below(&self) -> f64 {
+        0.0
+    }
+
     /// The same rig with the noises that fit `residuals`, those of `records` after one another at
     /// `point`; none where they cannot be learned.
     fn with_learned_noise(

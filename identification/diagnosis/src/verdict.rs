@@ -158,6 +158,12 @@ pub fn estimates(candidates: &[Candidate], point: &Point, deviations: &[f64]) ->
         .collect()
 }
 
+/// Whether `set` has all effects of `best` and more. What it has more did not pay, though its score may be lower, as
+/// by an effect that a noise of another form imitates: it says nothing against the effects that both have.
+fn extends(set: &[&str], best: &[&str]) -> bool {
+    set.len() > best.len() && best.iter().all(|name| set.contains(name))
+}
+
 fn names<M: ExtensibleModel>(model: &M, hypothesis: &Hypothesis) -> Vec<&'static str> {
     let effects = hypothesis.effects();
     effects
@@ -496,7 +502,7 @@ fn weigh<M: ExtensibleModel>(
     for other in &others {
         let behind = other.score - best.score;
         let set = names(model, other);
-        if named && !nested(&set) {
+        if named && !nested(&set) && !extends(&set, &best_names) {
             weight += (-0.5 * behind).exp();
             if behind < RIVAL_WITHIN && set.len() == best_names.len() {
                 alternatives.push(set);
@@ -577,4 +583,18 @@ fn weigh<M: ExtensibleModel>(
         unseen_gains,
         nominal: nominal_point,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_further_effect_that_does_not_pay_is_not_a_rival_and_another_one_is() {
+        let best = ["displacement_lag"];
+        assert!(extends(&["load_cell_scale", "displacement_lag"], &best));
+        assert!(!extends(&["displacement_lag"], &best));
+        assert!(!extends(&["command_delay"], &best));
+        assert!(!extends(&["command_delay", "load_cell_scale"], &best));
+    }
 }

@@ -124,6 +124,7 @@ families! {
     specimen: SpecimenEffects,
     directional_friction: DirectionalFriction,
     fading_friction: FadingFriction,
+    presliding_friction: PreslidingFriction,
 }
 
 const fn is_on_specimen<F: Family>() -> bool {

@@ -2,17 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use plant::identified::effects::{self, Effects, Reporting};
+use plant::identified::effects::Effects;
 use plant::identified::shake_table::ShakeTable;
 use plant::sensors::instrumentation::Instrumentation;
 use plant::specimens::linear::LinearSpecimen;
 
 use super::course::{Course, courses};
 use super::experiment::{self, SeparatingExperiment};
+use super::friction::{by_cause, cause, note};
 use super::gain::{Gain, gain};
 use super::health::{RelationReport, health};
 use super::left_over::{self, Residual};
-use super::mains::{Line, line};
+use super::mains::{Line, line, readable};
 use super::relations::{misfit, relations};
 use super::sentence::{MOST, of_courses, of_findings, said, sentence};
 use crate::case::{
@@ -371,7 +372,7 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         .filter_map(|((effect, without), deviations)| {
             let own = compared(&prediction(&model, without.as_ref()?, held_out)?);
             Some(Ablation {
-                effect: effect.effect,
+                effect: by_cause(effect.clone()).effect,
                 without_nrmse: own.before_nrmse,
                 with_nrmse: own.after_nrmse,
                 without_ratio: own.before_ratio,
@@ -447,6 +448,15 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         )
         .filter(|(_, error)| error.is_finite())
         .collect();
+    notes.extend(note(&effects));
+    let effects: Vec<NamedEffect> = effects.into_iter().map(by_cause).collect();
+    for own in &mut judgement.candidates {
+        let effects = std::mem::take(&mut own.effects);
+        own.effects = effects.into_iter().map(by_cause).collect();
+    }
+    for set in &mut judgement.alternatives {
+        set.iter_mut().for_each(|effect| *effect = cause(effect));
+    }
     let findings: Vec<Finding> = model
         .nominal_rig()
         .parameters()
@@ -674,25 +684,4 @@ fn described(parts: &[Disturbance], period: f64, size: impl Fn(f64) -> String) -
     } else {
         format!(" ({})", parts.join(", "))
     }
-}
-
-/// Two quadratures as amplitude and phase, if the effect is reported in this form.
-fn readable(mut named: Vec<NamedEffect>) -> Vec<NamedEffect> {
-    for effect in &mut named {
-        let reporting = effects::find(effect.effect).map(|known| known.reporting);
-        if let (Some(Reporting::AmplitudeAndPhase), [a, b]) =
-            (reporting, effect.parameters.as_mut_slice())
-        {
-            let (p, q) = (a.value, b.value);
-            let amplitude = p.hypot(q);
-            a.name = "amplitude".into();
-            a.value = amplitude;
-            b.name = "phase".into();
-            b.value = q.atan2(p);
-            b.unit = "rad";
-            b.standard_error /= amplitude.max(f64::MIN_POSITIVE);
-            b.is_shape = true;
-        }
-    }
-    named
 }

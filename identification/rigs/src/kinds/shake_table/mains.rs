@@ -7,6 +7,9 @@
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
+use diagnosis::NamedEffect;
+use plant::identified::effects::{self, Reporting};
+
 /// Nominal frequencies, Hz, and how far the mains may be from them.
 const NOMINAL: [f64; 2] = [50.0, 60.0];
 const OFF: f64 = 0.5;
@@ -84,9 +87,33 @@ fn spectrum(series: &[f64], period: f64, frequency: f64) -> Complex<f64> {
     sum * (2.0 / n)
 }
 
+/// Two quadratures as amplitude and phase, if the effect is reported in this form. A line that was read from the
+/// spectra has its amplitude already.
+pub fn readable(mut named: Vec<NamedEffect>) -> Vec<NamedEffect> {
+    for effect in &mut named {
+        let reporting = effects::find(effect.effect).map(|known| known.reporting);
+        if let (Some(Reporting::AmplitudeAndPhase), [a, b]) =
+            (reporting, effect.parameters.as_mut_slice())
+            && !b.is_shape
+        {
+            let (p, q) = (a.value, b.value);
+            let amplitude = p.hypot(q);
+            a.name = "amplitude".into();
+            a.value = amplitude;
+            b.name = "phase".into();
+            b.value = q.atan2(p);
+            b.unit = "rad";
+            b.standard_error /= amplitude.max(f64::MIN_POSITIVE);
+            b.is_shape = true;
+        }
+    }
+    named
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use diagnosis::ParameterEstimate;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
@@ -131,5 +158,34 @@ mod tests {
         let records = records(0.0, 50.0);
         let series: Vec<&[f64]> = records.iter().map(Vec::as_slice).collect();
         assert_eq!(line(&series, 2e-3), None);
+    }
+
+    #[test]
+    fn quadratures_become_an_amplitude_and_an_amplitude_stays() {
+        let named = |parameters: [(&str, f64, bool); 2]| {
+            let parameters = parameters.map(|(name, value, is_shape)| ParameterEstimate {
+                name: name.into(),
+                value,
+                unit: "m/s^2",
+                standard_error: 0.01,
+                is_shape,
+            });
+            let effect = NamedEffect {
+                effect: "mains_hum",
+                parameters: parameters.into(),
+                confidence: 0.95,
+            };
+            let said = readable(vec![effect]).remove(0).parameters;
+            said.into_iter()
+                .map(|p| (p.name, p.value))
+                .collect::<Vec<_>>()
+        };
+        let of_quadratures = named([("in_phase", 0.03, false), ("quadrature", 0.04, false)]);
+        assert_eq!(of_quadratures[0], ("amplitude".into(), 0.05));
+        let of_a_line = named([("amplitude", 0.03, false), ("frequency", 49.99, true)]);
+        assert_eq!(
+            of_a_line,
+            [("amplitude".into(), 0.03), ("frequency".into(), 49.99)]
+        );
     }
 }

@@ -5,6 +5,7 @@ mod course;
 mod diagnosis;
 pub mod experiment;
 mod extended;
+mod friction;
 pub mod gain;
 mod health;
 pub mod left_over;

@@ -324,6 +324,10 @@ impl ExtensibleModel for ShakeTableModel {
         among.iter().copied().filter(is_quiet).collect()
     }
 
+    fn drifts_below(&self) -> f64 {
+        DRIFT_BELOW * self.period
+    }
+
     // From the measured signals one sample before: the noise of the sample itself is in its
     // innovation.
     fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)> {
@@ -568,6 +572,24 @@ mod tests {
             (bias.value - 0.6).abs() < 4.0 * bias.standard_error,
             "{bias:?}"
         );
+    }
+
+    /// Columns softer by nine stated deviations: the nominal stiffness fits them as well, and only its prior tells.
+    #[test]
+    fn an_effect_that_is_nearly_a_nominal_parameter_is_found() {
+        let mut rig = IdentifiedRig {
+            specimen: Some(LinearSpecimen::default()),
+            ..Default::default()
+        };
+        if let Some(specimen) = &mut rig.specimen {
+            specimen.stiffness *= 0.91;
+        }
+        let mut model = model(&rig, &stated(), 35);
+        let judgement = judge(&mut model, &[0], &[1], Observer::none()).unwrap();
+        let named = (Verdict::Named, vec!["specimen_stiffness"]);
+        assert_eq!(said(&judgement), named);
+        let change = &judgement.effects[0].parameters[0];
+        assert!((change.value + 0.09).abs() < 0.03, "{change:?}");
     }
 
     /// An accelerometer that loses a tenth at 4.8 s, under a model whose accelerometer is off throughout.
