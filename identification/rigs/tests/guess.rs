@@ -9,13 +9,14 @@ use diagnosis::{Observer, Verdict};
 use rigs::kinds::guess::guess;
 use rigs::kinds::{ExtendedRig, diagnose};
 
-/// A German file of `x' = K (1.05 r(t - 12 ms) - x)`, exactly, in millimetres with decimal commas and a title.
-fn german(file: &Path, seconds: f64, seed: f64) {
+/// A German file of `x' = K (1.05 r(t - 12 ms) - x)`, at most `rail` (mm/s), in small steps of which each is exact
+/// for a constant command, in millimetres with decimal commas and a title.
+fn german(file: &Path, seconds: f64, seed: f64, size: f64, rail: f64) {
     let (gain, period, delay) = (30.0, 0.004, 0.012);
     let late = (delay / period) as usize;
     let command = |k: usize| {
         let t = k as f64 * period;
-        let tone = |f: f64, a: f64| a * (std::f64::consts::TAU * f * t + seed * f).sin();
+        let tone = |f: f64, a: f64| size * a * (std::f64::consts::TAU * f * t + seed * f).sin();
         tone(0.31, 3.0)
             + tone(0.83, 2.0)
             + tone(1.9, 1.0)
@@ -25,15 +26,19 @@ fn german(file: &Path, seconds: f64, seed: f64) {
     };
     let comma = |value: f64| format!("{value:.5}").replace('.', ",");
     let mut text = String::from("Rütteltisch, Versuch 1\nZeit [s];Sollwert [mm];Weg [mm]\n");
-    let begin = 1.05 * command(0);
-    let (mut x, keep) = (begin, (-gain * period).exp());
+    const STEPS: usize = 100;
+    let step = period / STEPS as f64;
+    let (mut x, keep) = (1.05 * command(0), (-gain * step).exp());
     for k in 0..(seconds / period) as usize {
         let noise = 0.002 * (k as f64 * 91.7 + seed).sin();
         let (t, r) = (comma(k as f64 * period), comma(command(k)));
         writeln!(text, "{t};{r};{}", comma(x + noise)).unwrap();
         let [now, next] = [k, k + 1].map(|k| 1.05 * command(k.saturating_sub(late)));
-        let slope = (next - now) / period;
-        x = next - slope / gain + (x - (now - slope / gain)) * keep;
+        for part in 0..STEPS {
+            let r = now + (next - now) * (part as f64 + 0.5) / STEPS as f64;
+            let most = rail * step;
+            x += ((r - x) * (1.0 - keep)).clamp(-most, most);
+        }
     }
     std::fs::write(file, text).unwrap();
 }
@@ -42,8 +47,8 @@ fn german(file: &Path, seconds: f64, seed: f64) {
 fn two_files_alone_are_answered_with_delay_and_scale_in_the_first_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let files = ["eins.csv", "zwei.csv"].map(|name| folder.path().join(name));
-    german(&files[0], 20.0, 1.0);
-    german(&files[1], 12.0, 2.0);
+    german(&files[0], 20.0, 1.0, 1.0, f64::INFINITY);
+    german(&files[1], 12.0, 2.0, 1.0, f64::INFINITY);
     let guessed = guess(&files, None).unwrap();
     assert_eq!(guessed.description.kind, "closed_loop_actuator");
     let found = diagnose(&guessed.description, &guessed.measurement, Observer::none()).unwrap();
@@ -64,6 +69,31 @@ fn two_files_alone_are_answered_with_delay_and_scale_in_the_first_sentence() {
     std::fs::write(&path, &guessed.text).unwrap();
     let errors = ExtendedRig::read(&path).unwrap().validate(&files).unwrap();
     assert_eq!(errors.len(), 2);
+}
+
+#[test]
+fn a_rail_that_one_file_does_not_reach_hides_no_cause() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = ["laut.csv", "leise.csv"].map(|name| folder.path().join(name));
+    german(&files[0], 20.0, 1.0, 1.0, 35.0);
+    german(&files[1], 12.0, 2.0, 0.2, 35.0);
+    let guessed = guess(&files, None).unwrap();
+    let found = diagnose(&guessed.description, &guessed.measurement, Observer::none()).unwrap();
+    let sentence = found.sentence();
+    assert_eq!(found.verdict, Verdict::Named, "{sentence}");
+    let scale = found.causes.iter().find(|own| own.found.name == "scale");
+    assert!(
+        (scale.unwrap().found.value - 1.05).abs() < 2e-3,
+        "{found:?}"
+    );
+    let [(effect, values)] = &found.confirmed.effects[..] else {
+        panic!("{found:?}");
+    };
+    assert_eq!(effect, "speed_limit");
+    assert!((0.035 * values[0].value - 1.0).abs() < 0.01, "{values:?}");
+    assert_eq!(found.confirmed.on_one_part, ["speed_limit"]);
+    assert!(sentence.contains("the other not reaching it"), "{sentence}");
+    assert!(sentence.contains("all of the error"), "{sentence}");
 }
 
 #[test]

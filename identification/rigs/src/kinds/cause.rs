@@ -234,6 +234,19 @@ mod tests {
     }
 
     #[test]
+    fn a_spring_explains_a_table_that_moves_less_where_no_integral_works_against_it() {
+        let with = |integral: f64| [found("integral", integral, 0.0, "1/s")];
+        let or = |scale: f64, all: &[NamedValue]| {
+            let cause = Cause::of(found("scale", scale, 1e-3, "1"), (1.0, 0.01)).unwrap();
+            cause.or(all).map(|(name, _)| name)
+        };
+        assert_eq!(or(0.95, &with(0.0)), Some("table_spring"));
+        assert_eq!(or(0.95, &with(0.5)), None);
+        assert_eq!(or(1.05, &with(0.0)), None);
+        assert_eq!(or(0.95, &[]), None);
+    }
+
+    #[test]
     fn an_effect_has_its_parameters_beside_it() {
         let width = found("half_width", 3.6e-5, 1e-6, "m");
         assert_eq!(
