@@ -321,9 +321,7 @@ pub fn least_squares<M: SimulatedModel>(
         let columns: Vec<&Vec<f64>> = held.iter().chain(&own).collect();
         let (hessian, gradient) = normal(model, &best.point, &columns, &best.errors, variance);
         let before = best.cost;
-        let mut active: Vec<bool> = (0..count)
-            .map(|i| is_free(i) && hessian[(i, i)] > 0.0)
-            .collect();
+        let mut active: Vec<bool> = (0..count).map(|i| hessian[(i, i)] > 0.0).collect();
         let (mut has_learned, damped) = (false, damping);
         for _ in 0..if is_fresh { 8 } else { 2 } {
             let Some(step) = step(&hessian, &gradient, &active, damping) else {
