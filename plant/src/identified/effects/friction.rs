@@ -43,6 +43,28 @@ pub(super) const COULOMB_FORCE: Parameter = Parameter::new(
 )
 .positive(0.4 * LBF, 4.0 * LBF);
 
+/// The bump of an effect of friction.
+pub(super) const STRIBECK_FORCE: Parameter = Parameter::new(
+    "stribeck_force",
+    FORCE,
+    "Breakaway bump above the Coulomb force at low speed; 0 is off",
+)
+.positive(0.8 * LBF, 3.0 * LBF);
+
+/// The velocity over which the bump fades.
+pub(super) const STRIBECK_VELOCITY: Parameter = Parameter::new(
+    "stribeck_velocity",
+    VELOCITY,
+    "Velocity at which the bump has fallen to 1/e",
+)
+.shape(
+    Scale::Logarithmic,
+    0.5 * INCH,
+    0.7,
+    (0.1 * INCH, 3.0 * INCH),
+)
+.min(1e-6);
+
 /// The velocity over which friction changes its sign.
 pub(super) const TRANSITION_VELOCITY: Parameter = Parameter::new(
     "transition_velocity",
@@ -85,26 +107,8 @@ impl Family for FrictionEffects {
                 COULOMB_FORCE
                     .on_table(|e| &mut e.friction.coulomb_force)
                     .of(vocabulary::COULOMB_FRICTION),
-                Parameter::new(
-                    "stribeck_force",
-                    FORCE,
-                    "Breakaway bump above the Coulomb force at low speed; 0 is off",
-                )
-                .positive(0.8 * LBF, 3.0 * LBF)
-                .on_table(|e| &mut e.friction.stribeck_force),
-                Parameter::new(
-                    "stribeck_velocity",
-                    VELOCITY,
-                    "Velocity at which the bump has fallen to 1/e",
-                )
-                .shape(
-                    Scale::Logarithmic,
-                    0.5 * INCH,
-                    0.7,
-                    (0.1 * INCH, 3.0 * INCH),
-                )
-                .on_table(|e| &mut e.friction.stribeck_velocity)
-                .min(1e-6),
+                STRIBECK_FORCE.on_table(|e| &mut e.friction.stribeck_force),
+                STRIBECK_VELOCITY.on_table(|e| &mut e.friction.stribeck_velocity),
                 Parameter::new(
                     "stribeck_exponent",
                     RATIO,

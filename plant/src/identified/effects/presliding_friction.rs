@@ -1,7 +1,7 @@
 //! Dry friction whose contact gives way elastically before it slides.
 
-use super::friction::{COULOMB_FORCE, STICKS};
-use super::quantity::{FORCE, LENGTH, VELOCITY};
+use super::friction::{COULOMB_FORCE, STICKS, STRIBECK_FORCE, STRIBECK_VELOCITY};
+use super::quantity::LENGTH;
 use super::{Component, Effect, Family, Parameter, Scale, TableMotion};
 use crate::ModelError;
 use units::constants::{INCH, LBF};
@@ -68,27 +68,11 @@ impl Family for PreslidingFriction {
             )
             .on_table(|e| &mut e.presliding_friction.presliding_displacement)
             .min(1e-9),
-            Parameter::new(
-                "stribeck_force",
-                FORCE,
-                "Breakaway bump above the Coulomb force at low speed",
-            )
-            .positive(0.8 * LBF, 3.0 * LBF)
-            .on_table(|e| &mut e.presliding_friction.stribeck_force)
-            .without_switch(),
-            Parameter::new(
-                "stribeck_velocity",
-                VELOCITY,
-                "Velocity at which the bump has fallen to 1/e",
-            )
-            .shape(
-                Scale::Logarithmic,
-                0.5 * INCH,
-                0.7,
-                (0.1 * INCH, 3.0 * INCH),
-            )
-            .on_table(|e| &mut e.presliding_friction.stribeck_velocity)
-            .min(1e-6),
+            STRIBECK_FORCE
+                .about("Breakaway bump above the Coulomb force at low speed")
+                .on_table(|e| &mut e.presliding_friction.stribeck_force)
+                .without_switch(),
+            STRIBECK_VELOCITY.on_table(|e| &mut e.presliding_friction.stribeck_velocity),
         ],
         starts: &[
             &[1.0 * LBF, 1e-3 * INCH, 0.3 * LBF, 0.5 * INCH],
