@@ -44,10 +44,11 @@ const CLEARLY: f64 = 0.9;
 const ENDED: usize = 3;
 /// Seed of those starts.
 pub const STARTS_SEED: u64 = 15;
-/// Steps of a first look, of a fit to the end, and of one that begins near its end.
+/// Steps of a first look and of a fit to the end.
 const LOOK: usize = 6;
 const TO_THE_END: usize = 40;
-const AGAIN: usize = 12;
+/// Steps of a fit that begins near its end.
+pub const AGAIN: usize = 12;
 
 /// A model fitted to a part.
 #[derive(Debug, Clone)]

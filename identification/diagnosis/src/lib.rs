@@ -15,7 +15,8 @@ mod verdict;
 
 pub use adequacy::{Part, Place, Test};
 pub use cross_validation::{
-    Rival, Selected, Simulated, completed, looked, nominal, refit, select, select_jointly, settled,
+    AGAIN, Rival, Selected, Simulated, completed, looked, nominal, refit, select, select_jointly,
+    settled,
 };
 pub use fit::{Fit, Jacobian, evaluate, residuals};
 pub use least_squares::WEAK;

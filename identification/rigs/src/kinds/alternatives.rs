@@ -2,7 +2,7 @@
 //! another of its class, and without what is not needed.
 
 use super::PartReport;
-use super::confirmed::unfit;
+use super::confirmed::{unfit, without_effect};
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts};
 use super::readings::{Crossed, NEEDED};
@@ -173,11 +173,8 @@ pub(super) fn least_needed<M: InParts>(
     most: f64,
     asked: &mut Option<Vec<Item>>,
 ) -> Option<(Point, Crossed)> {
-    let effects = point.effects.iter().map(|(i, _)| {
-        let mut left = point.clone();
-        left.effects.retain(|(known, _)| known != i);
-        (Item::Effect(*i), left)
-    });
+    let effects = point.effects.iter();
+    let effects = effects.map(|(i, _)| (Item::Effect(*i), without_effect(point, *i)));
     let nominal = (0..point.nuisance.len())
         .filter_map(|i| Some((Item::Nominal(i), measured.without(point, i)?)));
     let items = effects.chain(nominal);

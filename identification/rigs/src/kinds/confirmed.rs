@@ -10,8 +10,8 @@ use super::readings::NEEDED;
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
 use diagnosis::{
-    Free, Point, Role, all_errors, completed, estimates, least_squares, looked, refit, settled,
-    squares,
+    AGAIN, Free, Point, Role, all_errors, completed, estimates, least_squares, looked, refit,
+    settled, squares,
 };
 use recordings::mean_and_deviation;
 
@@ -26,8 +26,6 @@ const CLEAR: f64 = 1.96;
 const LEAST: f64 = 0.5;
 /// Factor by which the squared error on all data grows without an effect that one part of them need not show.
 const VITAL: f64 = 4.0;
-/// Steps of a fit that begins near its end.
-const AGAIN: usize = 12;
 /// Samples that a file must bring to be fitted by itself.
 const FEWEST: usize = 500;
 
@@ -145,6 +143,13 @@ pub(super) fn unfit<M: InParts>(
     refused
 }
 
+/// `point` without an effect.
+pub(super) fn without_effect(point: &Point, effect: usize) -> Point {
+    let mut without = point.clone();
+    without.effects.retain(|(known, _)| *known != effect);
+    without
+}
+
 /// Errors on `record` of the fit without an effect and of the one with it.
 fn without_and_with<M: InParts>(
     measured: &M,
@@ -152,9 +157,7 @@ fn without_and_with<M: InParts>(
     effect: usize,
     record: usize,
 ) -> Option<[Vec<f64>; 2]> {
-    let mut without = point.clone();
-    without.effects.retain(|(index, _)| *index != effect);
-    let without = settled(measured, &without, record)?;
+    let without = settled(measured, &without_effect(point, effect), record)?;
     Some([&without, point].map(|point| all_errors(measured, point, record)))
 }
 
@@ -175,36 +178,28 @@ fn is_felt<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize
 fn is_silent<M: InParts>(measured: &M, fits: &Fits, effect: usize, part: Part) -> bool {
     let all = &fits.everything.0;
     let is_vital = || {
-        let mut without = all.clone();
-        without.effects.retain(|(index, _)| *index != effect);
-        let without = looked(measured, &without, EVERYTHING)?;
+        let without = looked(measured, &without_effect(all, effect), EVERYTHING)?;
         let [bare, with] =
             [&without, all].map(|point| squares(&all_errors(measured, point, EVERYTHING)));
         Some(bare > VITAL * with)
     };
-    let held = || {
+    let is_as_good = || {
         let (own, record) = (&fits.parts[part as usize].0, part as usize);
+        // A fit keeps the effects and their order.
+        let at = own.effects.iter().position(|(known, _)| *known == effect)?;
         let mut held = own.clone();
-        let mut from = own.nuisance.len();
-        let mut place = 0..0;
-        for (i, values) in &mut held.effects {
-            if *i == effect {
-                let known = all.effects.iter().find(|(known, _)| known == i)?;
-                values.clone_from(&known.1);
-                place = from..from + values.len();
-            }
-            from += values.len();
-        }
+        held.effects[at].clone_from(&all.effects[at]);
+        let before = &held.effects[..at];
+        let from =
+            held.nuisance.len() + before.iter().map(|(_, values)| values.len()).sum::<usize>();
+        let place = from..from + held.effects[at].1.len();
         let is_free = |i: usize| !place.contains(&i);
         let held = least_squares(measured, &held, record, &Free::Chosen(&is_free), AGAIN)?;
         let [bare, _] = without_and_with(measured, own, effect, record)?;
-        Some(!clearly_better(
-            &held.errors,
-            &bare,
-            &lengths(measured, record),
-        ))
+        let lengths = lengths(measured, record);
+        Some(!clearly_better(&held.errors, &bare, &lengths))
     };
-    is_vital() == Some(true) && held() == Some(true)
+    is_vital() == Some(true) && is_as_good() == Some(true)
 }
 
 /// Samples of each file in `record`, of those that have some.
@@ -330,6 +325,32 @@ fn fits<M: InParts>(measured: &M, start: &Point) -> Option<Fits> {
     })
 }
 
+/// The effects that are unfit in all data or in a part, and the names of those on which one part is silent.
+fn refused_by<M: InParts>(measured: &M, fits: &Fits) -> (Vec<Refused>, Vec<String>) {
+    let of = |(point, deviations): &(Point, Vec<f64>), record: usize| {
+        unfit(measured, point, deviations, record)
+    };
+    let has = |list: &[Refused], i: usize| list.iter().any(|(known, _)| *known == i);
+    let mut out = of(&fits.everything, EVERYTHING);
+    let parts = [Part::Fitted, Part::LeftOut];
+    let own = parts.map(|part| of(&fits.parts[part as usize], part as usize));
+    let mut silent = Vec::new();
+    for part in parts {
+        for (i, reason) in &own[part as usize] {
+            if has(&out, *i) {
+                continue;
+            }
+            let is_shown = !has(&own[part.other() as usize], *i);
+            if is_shown && is_silent(measured, fits, *i, part) {
+                silent.push(measured.name(*i));
+            } else {
+                out.push((*i, reason.clone()));
+            }
+        }
+    }
+    (out, silent)
+}
+
 /// What is found beside the effects, and the model; none where it cannot be fitted. Effects of
 /// `start` that turn out to be unfit leave it, each with its reason.
 pub(super) fn confirm<M: InParts>(
@@ -342,24 +363,7 @@ pub(super) fn confirm<M: InParts>(
     let mut start = start.clone();
     let (fits, on_one_part) = loop {
         let fits = fits(measured, &start)?;
-        let on = |(point, deviations): &(Point, Vec<f64>), record: usize| {
-            unfit(measured, point, deviations, record)
-        };
-        let mut out = on(&fits.everything, EVERYTHING);
-        let parts = [Part::Fitted, Part::LeftOut];
-        let own = parts.map(|part| on(&fits.parts[part as usize], part as usize));
-        let has = |list: &[Refused], i: usize| list.iter().any(|(known, _)| *known == i);
-        let mut silent = Vec::new();
-        for part in parts {
-            for (i, reason) in &own[part as usize] {
-                let is_shown = !has(&out, *i) && !has(&own[part.other() as usize], *i);
-                if is_shown && is_silent(measured, &fits, *i, part) {
-                    silent.push(measured.name(*i));
-                } else if !has(&out, *i) {
-                    out.push((*i, reason.clone()));
-                }
-            }
-        }
+        let (out, silent) = refused_by(measured, &fits);
         if out.is_empty() {
             break (fits, silent);
         }
