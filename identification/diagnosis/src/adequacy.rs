@@ -112,8 +112,8 @@ pub fn chi_square_deviate(sum: f64, count: f64) -> f64 {
 
 /// Looks at whitened residuals, `channels` a sample, with the channels' names; `regressors` are
 /// functions of state and command that a wrong model leaves traces of, `motion` how much the rig moves in the
-/// record's parts. Errors slower than `drift`, a share of
-/// the sampling rate, are the drift of a sensor's zero where they are loud, and told from the rest.
+/// record's parts. Loud errors slower than `drift`, a share of the sampling rate, are the drift of a sensor's zero and
+/// have a test of their own.
 pub fn tests(
     record: &str,
     residuals: &[f64],
@@ -130,7 +130,8 @@ pub fn tests(
     }
     let samples = part_of(n);
     let mut steady = without_bursts(residuals, width, samples, motion);
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let mut planner = RealFftPlanner::<f64>::new();
+    let transform = planner.plan_fft_forward(n);
     let spectrum_of = |series: &[f64]| {
         let mut spectrum = transform.make_output_vec();
         let done = transform.process(&mut series.to_vec(), &mut spectrum);
@@ -167,7 +168,7 @@ pub fn tests(
             );
             let part = Part::Band(share(slow.start), share(slow.end));
             tests.push(test.at(Some(channel), part, drifted / (count * live)));
-            rest = without_slow(&rest, slow.end);
+            rest = without_slow(&mut planner, &rest, slow.end);
             if let Some(own) = spectrum_of(&rest) {
                 for (row, value) in steady.chunks_exact_mut(width).zip(&rest) {
                     row[c] = *value;
@@ -175,7 +176,7 @@ pub fn tests(
                 (series, spectrum, low) = (rest, own, slow.end);
                 known = faster.get_or_init(|| {
                     let all = regressors.iter();
-                    all.map(|(name, g)| (name.clone(), without_slow(g, slow.end)))
+                    all.map(|(name, g)| (name.clone(), without_slow(&mut planner, g, slow.end)))
                         .collect::<Vec<_>>()
                 });
             }
@@ -262,8 +263,7 @@ fn without_line(series: &[f64]) -> Vec<f64> {
 }
 
 /// `series` without its mean and what is slower than line `end` of its periodogram, where it is not zero.
-fn without_slow(series: &[f64], end: usize) -> Vec<f64> {
-    let mut planner = RealFftPlanner::<f64>::new();
+fn without_slow(planner: &mut RealFftPlanner<f64>, series: &[f64], end: usize) -> Vec<f64> {
     let forward = planner.plan_fft_forward(series.len());
     let back = planner.plan_fft_inverse(series.len());
     let mut spectrum = forward.make_output_vec();
@@ -380,8 +380,8 @@ impl Motion<'_> {
     }
 }
 
-/// Tests of nominal parameters, in their stated standard deviations: of all together, and of the farthest, which
-/// is no less a trace where the others are as stated.
+/// Tests of nominal parameters, in their stated standard deviations: of all together, and of the farthest. One that is
+/// far off shows a wrong model even if all others are as stated.
 fn of_parameters(nuisance: &[f64]) -> [Test; 2] {
     let squares: f64 = nuisance.iter().map(|p| p * p).sum();
     let farthest = nuisance.iter().fold(0.0f64, |most, p| most.max(p.abs()));
