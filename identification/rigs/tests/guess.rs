@@ -9,8 +9,8 @@ use diagnosis::{Observer, Verdict};
 use rigs::kinds::guess::guess;
 use rigs::kinds::{ExtendedRig, diagnose};
 
-/// A German file of `x' = K (1.05 r(t - 12 ms) - x)`, at most `rail` (mm/s), in small steps of which each is exact
-/// for a constant command, in millimetres with decimal commas and a title.
+/// A German file of `x' = K (1.05 r(t - 12 ms) - x)`, at most `rail` (mm/s), in millimetres with decimal commas and a
+/// title. Every small step is exact for a constant command.
 fn german(file: &Path, seconds: f64, seed: f64, size: f64, rail: f64) {
     let (gain, period, delay) = (30.0, 0.004, 0.012);
     let late = (delay / period) as usize;
