@@ -470,6 +470,17 @@ mod tests {
         };
         let passage = declared.between(alone("m"), alone("m")).unwrap();
         assert!((passage.of(1.0) - 25.4).abs() < 1e-12);
+        // A declared unit without a definition is the FMU's, where the FMU has one of that name.
+        let odd_inch = unit("in", METRE, 0.03, 0.0);
+        let declared = Way {
+            start: Some(DeclaredUnit {
+                name: "in".into(),
+                base: None,
+            }),
+            hops: Vec::new(),
+        };
+        let passage = declared.between(odd_inch, unit("mm", METRE, 0.001, 0.0));
+        assert!((passage.unwrap().of(1.0) - 30.0).abs() < 1e-12);
         let suppressed = Hop {
             suppresses_units: true,
             ..Hop::default()
