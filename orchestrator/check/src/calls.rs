@@ -70,7 +70,7 @@ pub(super) enum RunError {
     /// A call that it did not complete.
     #[error(transparent)]
     Call(#[from] Box<CallError>),
-    /// It is no system by itself.
+    /// It is not a system by itself.
     #[error(transparent)]
     System(#[from] SystemError),
     /// The master cannot begin.

@@ -153,7 +153,7 @@ pub enum VariantFault {
     /// A description that is not XML.
     #[error(transparent)]
     Xml(#[from] roxmltree::Error),
-    /// An attribute that is to be replaced.
+    /// An attribute to replace is missing.
     #[error("an attribute `{0}` is missing")]
     NoAttribute(&'static str),
     /// Neither GUID nor instantiation token.
