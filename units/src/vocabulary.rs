@@ -69,6 +69,8 @@ names! {
     HARMONIC_CANCELLATION "harmonic_cancellation";
     SPECIMEN_FORCE "specimen_force";
     COMMAND_WEIGHT "command_weight";
+    DAMPING_RATIO "damping_ratio";
+    STRIBECK_VELOCITY "stribeck_velocity";
     CONVERTER_QUANTUM "converter_quantum";
     CONVERTER_LIMIT "converter_limit";
 }

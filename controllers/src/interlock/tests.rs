@@ -191,6 +191,16 @@ fn the_accumulator_gives_a_peak_and_the_pump_no_more_than_it_can_for_long() {
     let (trip, time) = drawn(40.0 * cubic_inch, 3000);
     assert_eq!(trip, Trip::Flow);
     assert!((time - f64::ln(4.0 / 3.0)).abs() < 2.0 * H, "{time}");
+    // A mean over twice the time takes twice as long.
+    let slower = Interlock {
+        flow_time: 2.0,
+        ..watched
+    };
+    let (slower, _) = run(slower, 3000, |_, input| {
+        input.supply_flow = 40.0 * INCH.powi(3);
+    });
+    let late = slower.memory.trip_time;
+    assert!((late - 2.0 * f64::ln(4.0 / 3.0)).abs() < 2.0 * H, "{late}");
     let off = Interlock {
         flow_limit: 0.0,
         ..watched

@@ -7,6 +7,9 @@ use controllers::ModelError;
 /// Derivatives that are given: the signal itself and five more.
 pub const DERIVATIVES: usize = 6;
 
+/// Name of the parameter of components that sets the window.
+pub const WINDOW_SAMPLES: &str = "window_samples";
+
 /// Longest window, samples.
 const LONGEST: usize = 32;
 
@@ -31,7 +34,7 @@ impl Extrapolation {
         ModelError::require_finite("lead_samples", lead)?;
         if window <= degree || window > LONGEST {
             return Err(ModelError::Parameter {
-                name: "window_samples",
+                name: WINDOW_SAMPLES,
                 value: window as f64,
                 expected: "more samples than the degree, at most 32",
             });
@@ -43,7 +46,7 @@ impl Extrapolation {
         });
         let Ok(fit) = basis.svd(true, true).pseudo_inverse(1e-14) else {
             return Err(ModelError::Parameter {
-                name: "window_samples",
+                name: WINDOW_SAMPLES,
                 value: window as f64,
                 expected: "a window that determines the polynomial",
             });

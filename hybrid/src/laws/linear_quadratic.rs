@@ -4,6 +4,7 @@
 use crate::vrths::TransferSystemParameters;
 use nalgebra::{DMatrix, DVector};
 use plant::linear::{StateSpace, discrete_riccati};
+use units::vocabulary;
 
 use super::TrackingInput;
 use super::extrapolation::{DERIVATIVES, Extrapolation};
@@ -68,7 +69,7 @@ impl LinearQuadraticTracking {
         period: f64,
     ) -> Result<Self, ModelError> {
         plant.validate()?;
-        ModelError::require_positive("command_weight", design.command_weight)?;
+        ModelError::require_positive(vocabulary::COMMAND_WEIGHT, design.command_weight)?;
         let denominator = plant.denominator();
         let mut a = DMatrix::zeros(STATES, STATES);
         let mut b = DMatrix::zeros(STATES, 1);

@@ -16,6 +16,7 @@ mod coupler;
 pub mod criteria;
 mod frame;
 pub mod laws;
+pub mod names;
 mod newmark;
 mod perturbation;
 mod plant;

@@ -76,6 +76,31 @@ struct Found {
     left: Vec<String>,
 }
 
+/// Where a MAT file is damaged.
+#[derive(Debug, thiserror::Error)]
+enum Damage {
+    #[error("it ends within an element")]
+    Short,
+    #[error("an element is longer than the file")]
+    Long,
+    #[error("a small element of {0} bytes")]
+    Small(usize),
+    #[error("a compressed variable cannot be read: {0}")]
+    Compressed(#[from] std::io::Error),
+    #[error("its variables have more than 1 GB")]
+    Large,
+    #[error("`{name}` has {values} values, not {count}")]
+    Count {
+        name: String,
+        values: usize,
+        count: f64,
+    },
+    #[error("the names of the fields of `{0}`")]
+    Fields(String),
+    #[error("numbers of the unknown type {0}")]
+    Type(u32),
+}
+
 /// The table in a MAT file.
 ///
 /// # Errors
@@ -104,11 +129,10 @@ pub(super) fn table(file: &Path, bytes: &[u8]) -> Result<Text, DataError> {
                 COMPRESSED => {
                     let mut whole = Vec::new();
                     let most = LARGEST - total;
-                    let read = ZlibDecoder::new(data).take(most).read_to_end(&mut whole);
-                    read.map_err(|error| format!("a compressed variable cannot be read: {error}"))?;
+                    ZlibDecoder::new(data).take(most).read_to_end(&mut whole)?;
                     total += whole.len() as u64;
                     if total == LARGEST {
-                        return Err("its variables have more than 1 GB".to_owned());
+                        return Err(Damage::Large);
                     }
                     reader.elements(&whole, &mut |kind, data| {
                         reader.variable(kind, data, &mut found)
@@ -118,7 +142,11 @@ pub(super) fn table(file: &Path, bytes: &[u8]) -> Result<Text, DataError> {
             },
         )
         .map_err(|what| fault(format!("a damaged MAT file: {what}")))?;
-    let text = written(&found).map_err(fault)?;
+    let text = written(&found).ok_or_else(|| {
+        fault(
+            "a MAT file without a vector; expected a column of numbers for each channel".to_owned(),
+        )
+    })?;
     let note = match found.left.as_slice() {
         [] => None,
         left => Some(format!("of the MAT file {} was not read", left.join(", "))),
@@ -127,7 +155,7 @@ pub(super) fn table(file: &Path, bytes: &[u8]) -> Result<Text, DataError> {
 }
 
 /// What is done with an element of a type.
-type Taking<'a> = dyn FnMut(u32, &[u8]) -> Result<(), String> + 'a;
+type Taking<'a> = dyn FnMut(u32, &[u8]) -> Result<(), Damage> + 'a;
 
 #[derive(Clone, Copy)]
 struct Reader {
@@ -135,11 +163,11 @@ struct Reader {
 }
 
 impl Reader {
-    fn word(self, bytes: &[u8]) -> Result<u32, String> {
+    fn word(self, bytes: &[u8]) -> Result<u32, Damage> {
         let four: [u8; 4] = bytes
             .get(..4)
             .and_then(|four| four.try_into().ok())
-            .ok_or("it ends within an element")?;
+            .ok_or(Damage::Short)?;
         Ok(if self.little {
             u32::from_le_bytes(four)
         } else {
@@ -148,14 +176,13 @@ impl Reader {
     }
 
     /// The first element: type, data, and what follows it.
-    fn element(self, bytes: &[u8]) -> Result<(u32, &[u8], &[u8]), String> {
+    fn element(self, bytes: &[u8]) -> Result<(u32, &[u8], &[u8]), Damage> {
         let first = self.word(bytes)?;
-        let ends = || "an element is longer than the file".to_owned();
         // Small ones have their length beside the type.
         let (kind, length, begin, end) = if first >> 16 != 0 {
             let length = (first >> 16) as usize;
             if length > 4 {
-                return Err(format!("a small element of {length} bytes"));
+                return Err(Damage::Small(length));
             }
             (first & 0xffff, length, 4, 8)
         } else {
@@ -167,11 +194,11 @@ impl Reader {
             };
             (first, length, 8, 8 + padded)
         };
-        let data = bytes.get(begin..begin + length).ok_or_else(ends)?;
+        let data = bytes.get(begin..begin + length).ok_or(Damage::Long)?;
         Ok((kind, data, bytes.get(end..).unwrap_or_default()))
     }
 
-    fn elements(self, mut bytes: &[u8], take: &mut Taking<'_>) -> Result<(), String> {
+    fn elements(self, mut bytes: &[u8], take: &mut Taking<'_>) -> Result<(), Damage> {
         while !bytes.is_empty() {
             let (kind, data, rest) = self.element(bytes)?;
             take(kind, data)?;
@@ -180,7 +207,7 @@ impl Reader {
         Ok(())
     }
 
-    fn variable(self, kind: u32, data: &[u8], found: &mut Found) -> Result<(), String> {
+    fn variable(self, kind: u32, data: &[u8], found: &mut Found) -> Result<(), Damage> {
         if kind == MATRIX {
             self.matrix(data, "", 0, found)
         } else {
@@ -195,7 +222,7 @@ impl Reader {
         name: &str,
         depth: usize,
         found: &mut Found,
-    ) -> Result<(), String> {
+    ) -> Result<(), Damage> {
         if data.is_empty() {
             return Ok(());
         }
@@ -216,7 +243,11 @@ impl Reader {
             let (kind, real, _) = self.element(rest)?;
             let values = self.numbers(kind, real)?;
             if values.len() as f64 != count {
-                return Err(format!("`{name}` has {} values, not {count}", values.len()));
+                return Err(Damage::Count {
+                    name: name.to_owned(),
+                    values: values.len(),
+                    count,
+                });
             }
             if flags & COMPLEX != 0 || sizes.len() != 2 {
                 found.left.push(format!(
@@ -237,7 +268,7 @@ impl Reader {
             let length = self.numbers(kind, length)?.first().copied().unwrap_or(0.0) as usize;
             let (_, names, mut rest) = self.element(rest)?;
             if length == 0 || names.len() % length != 0 {
-                return Err(format!("the names of the fields of `{name}`"));
+                return Err(Damage::Fields(name.to_owned()));
             }
             for field in names.chunks(length) {
                 let field = String::from_utf8_lossy(field);
@@ -261,7 +292,7 @@ impl Reader {
     }
 
     /// Numbers of a type, which may be smaller than that of their array.
-    fn numbers(self, kind: u32, data: &[u8]) -> Result<Vec<f64>, String> {
+    fn numbers(self, kind: u32, data: &[u8]) -> Result<Vec<f64>, Damage> {
         macro_rules! all {
             ($number:ty, $size:literal) => {{
                 let all = data.chunks_exact($size).map(|bytes| {
@@ -287,13 +318,13 @@ impl Reader {
             9 => all!(f64, 8),
             12 => all!(i64, 8),
             13 => all!(u64, 8),
-            other => return Err(format!("numbers of the unknown type {other}")),
+            other => return Err(Damage::Type(other)),
         })
     }
 }
 
-/// The table as text: a header, and a line for each sample.
-fn written(found: &Found) -> Result<String, String> {
+/// The table as text: a header, and a line for each sample; none without a vector.
+fn written(found: &Found) -> Option<String> {
     let mut columns: Vec<(String, &[f64])> = Vec::new();
     for one in &found.variables {
         let long = one.rows.max(one.columns);
@@ -314,9 +345,7 @@ fn written(found: &Found) -> Result<String, String> {
             .count()
     };
     let lengths = columns.iter().map(|(_, own)| own.len());
-    let length = lengths.max_by_key(|length| (count(*length), *length));
-    let length = length
-        .ok_or("a MAT file without a vector; expected a column of numbers for each channel")?;
+    let length = lengths.max_by_key(|length| (count(*length), *length))?;
     columns.retain(|(_, own)| own.len() == length);
     let is_time = |name: &str| {
         let name = name.to_lowercase();
@@ -364,7 +393,7 @@ fn written(found: &Found) -> Result<String, String> {
         text += &cells.collect::<Vec<_>>().join(",");
     }
     text.push('\n');
-    Ok(text)
+    Some(text)
 }
 
 #[cfg(test)]

@@ -67,21 +67,24 @@ pub fn why(error: &io::Error) -> String {
 /// Why it cannot be read, as [`why`] puts it, or the line that is not UTF-8.
 pub fn read_written(file: &Path) -> io::Result<String> {
     let bytes = read_bytes(file)?;
-    let fault = |reason: String| io::Error::new(io::ErrorKind::InvalidData, reason);
     let binary = || fault("holds binary data, text was expected".to_string());
     match &bytes[..] {
-        [0xef, 0xbb, 0xbf, rest @ ..] => utf8(rest).map_err(fault),
+        [0xef, 0xbb, 0xbf, rest @ ..] => utf8(rest),
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes).ok_or_else(binary),
         [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes).ok_or_else(binary),
-        all => utf8(all).map_err(fault),
+        all => utf8(all),
     }
 }
 
-fn utf8(bytes: &[u8]) -> Result<String, String> {
+fn fault(reason: String) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, reason)
+}
+
+fn utf8(bytes: &[u8]) -> io::Result<String> {
     let read = std::str::from_utf8(bytes).map_err(|error| {
         let before = &bytes[..error.valid_up_to()];
         let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
-        format!("line {line} is not UTF-8; save the file as UTF-8")
+        fault(format!("line {line} is not UTF-8; save the file as UTF-8"))
     })?;
     Ok(read.to_string())
 }

@@ -7,8 +7,11 @@ use std::time::Duration;
 
 use super::{Findings, derivatives};
 use fmi_import::{
-    Datum, Fmu, Instance, Interface, Isolation, Kind, Options, Processes, Progress, State, Variable,
+    CallError, Datum, Fmu, FmuError, Instance, Interface, Isolation, Kind, Options, Processes,
+    Progress, State, Variable,
 };
+use fmi_master::MasterError;
+use fmi_system::SystemError;
 
 /// Steps that are made.
 const STEPS: usize = 20;
@@ -58,9 +61,36 @@ pub(super) fn plan(fmu: &Fmu) -> (f64, f64) {
     }
 }
 
-pub(super) fn instance(fmu: &Arc<Fmu>, options: &Options) -> Result<Instance, String> {
+/// Why an FMU does not run.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum RunError {
+    /// An instance cannot be made.
+    #[error(transparent)]
+    Fmu(#[from] FmuError),
+    /// A call that it did not complete.
+    #[error(transparent)]
+    Call(#[from] Box<CallError>),
+    /// It is not a system by itself.
+    #[error(transparent)]
+    System(#[from] SystemError),
+    /// The master cannot begin.
+    #[error(transparent)]
+    Master(#[from] MasterError),
+    /// Too few or too many steps.
+    #[error("{duration} s are {steps:e} steps of {step} s")]
+    Steps {
+        /// Time of the run, s.
+        duration: f64,
+        /// How many.
+        steps: f64,
+        /// One step, s.
+        step: f64,
+    },
+}
+
+pub(super) fn instance(fmu: &Arc<Fmu>, options: &Options) -> Result<Instance, FmuError> {
     let mut processes = Processes::new(options);
-    Instance::within(fmu, "validated", &mut processes, true).map_err(|error| error.to_string())
+    Instance::within(fmu, "validated", &mut processes, true)
 }
 
 fn in_order(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) -> Option<Rows> {
@@ -76,7 +106,7 @@ fn in_order(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) -> Optio
         }
         Err(reason)
             if fmu.description.interface == Interface::ModelExchange
-                && reason.contains("did not return") =>
+                && reason.to_string().contains("did not return") =>
         {
             findings.warning(
                 "library",
@@ -85,26 +115,25 @@ fn in_order(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) -> Optio
             None
         }
         Err(reason) => {
-            findings.error("library", reason);
+            findings.error("library", reason.to_string());
             None
         }
     }
 }
 
 /// A run as the standard orders its calls; every variable is read after each step.
-fn run(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) -> Result<Rows, String> {
+fn run(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) -> Result<Rows, RunError> {
     let (step, stop) = plan(fmu);
     let mut instance = instance(fmu, options)?;
-    let text = |error: Box<fmi_import::CallError>| error.to_string();
-    instance.enter_initialization(0.0, stop).map_err(text)?;
-    instance.exit_initialization().map_err(text)?;
+    instance.enter_initialization(0.0, stop)?;
+    instance.exit_initialization()?;
     let mut rows = vec![read(findings, &mut instance)?];
     for k in 0..STEPS {
         let time = k as f64 * step;
         if time + step > stop * (1.0 + 1e-9) {
             break;
         }
-        let progress = instance.do_step(time, step).map_err(text)?;
+        let progress = instance.do_step(time, step)?;
         rows.push(read(findings, &mut instance)?);
         if let Progress::Ended(at) = progress {
             findings.note("library", format!("it ended its run by itself at {at} s"));
@@ -122,7 +151,7 @@ fn run(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) -> Result<Row
 }
 
 /// Every variable that can be read.
-fn read(findings: &mut Findings, instance: &mut Instance) -> Result<Vec<Datum>, String> {
+fn read(findings: &mut Findings, instance: &mut Instance) -> Result<Vec<Datum>, Box<CallError>> {
     let fmu = instance.fmu.clone();
     let mut row = Vec::new();
     let variables = fmu.description.variables.iter();
@@ -155,7 +184,7 @@ fn read_one(
     instance: &mut Instance,
     variable: &Variable,
     row: &mut Vec<Datum>,
-) -> Result<(), String> {
+) -> Result<(), Box<CallError>> {
     let references = [variable.reference];
     let size = variable.element.1;
     let outcome = if variable.kind.is_exact() {
@@ -171,7 +200,7 @@ fn read_one(
         let is_dead = error.outcome.contains("its process");
         let message = format!("`{}`: {} {}", variable.name, error.call, error.outcome);
         if is_dead {
-            return Err(error.to_string());
+            return Err(error);
         }
         findings.error("library", message);
     }
@@ -202,18 +231,15 @@ fn two_at_once(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options, alone
     if fmu.description.only_one_per_process {
         return;
     }
-    let both = || -> Result<[Rows; 2], String> {
+    let both = || -> Result<[Rows; 2], RunError> {
         let mut processes = Processes::new(options);
-        let mut make = |name: &str| {
-            Instance::within(fmu, name, &mut processes, false).map_err(|error| error.to_string())
-        };
+        let mut make = |name: &str| Instance::within(fmu, name, &mut processes, false);
         let mut all = [make("first")?, make("second")?];
-        let text = |error: Box<fmi_import::CallError>| error.to_string();
         let (step, stop) = plan(fmu);
         let mut rows = [Rows::new(), Rows::new()];
         for instance in &mut all {
-            instance.enter_initialization(0.0, stop).map_err(text)?;
-            instance.exit_initialization().map_err(text)?;
+            instance.enter_initialization(0.0, stop)?;
+            instance.exit_initialization()?;
         }
         let quiet = &mut Findings::default();
         for (rows, instance) in rows.iter_mut().zip(&mut all) {
@@ -221,7 +247,7 @@ fn two_at_once(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options, alone
         }
         for k in 0..alone.len().saturating_sub(1) {
             for (rows, instance) in rows.iter_mut().zip(&mut all) {
-                instance.do_step(k as f64 * step, step).map_err(text)?;
+                instance.do_step(k as f64 * step, step)?;
                 rows.push(read(quiet, instance)?);
             }
         }
@@ -252,34 +278,33 @@ fn from_a_state(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) {
         );
         return;
     }
-    let tried = || -> Result<bool, String> {
-        let text = |error: Box<fmi_import::CallError>| error.to_string();
+    let tried = || -> Result<bool, RunError> {
         let (step, stop) = plan(fmu);
         let mut instance = instance(fmu, options)?;
-        instance.enter_initialization(0.0, stop).map_err(text)?;
-        instance.exit_initialization().map_err(text)?;
+        instance.enter_initialization(0.0, stop)?;
+        instance.exit_initialization()?;
         let steps = ((stop / step).round() as usize).clamp(1, STEPS);
         let half = steps / 2;
         for k in 0..half {
-            instance.do_step(k as f64 * step, step).map_err(text)?;
+            instance.do_step(k as f64 * step, step)?;
         }
         let mut state = State::default();
-        instance.save_state(&mut state).map_err(text)?;
+        instance.save_state(&mut state)?;
         let quiet = &mut Findings::default();
         let mut rows: [Rows; 2] = [Rows::new(), Rows::new()];
         for (pass, rows) in rows.iter_mut().enumerate() {
             if pass > 0 {
-                instance.restore_state(&state).map_err(text)?;
+                instance.restore_state(&state)?;
             }
             for k in half..steps {
-                let progress = instance.do_step(k as f64 * step, step).map_err(text)?;
+                let progress = instance.do_step(k as f64 * step, step)?;
                 rows.push(read(quiet, &mut instance)?);
                 if progress != Progress::Whole {
                     break;
                 }
             }
         }
-        instance.free_state(state).map_err(text)?;
+        instance.free_state(state)?;
         Ok(rows[0] == rows[1])
     };
     match tried() {

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use zip::ZipArchive;
 
 use super::Findings;
+use super::calls::RunError;
 use fmi_import::{Fmu, Isolation, Kind, Options};
 use fmi_master::{Algorithm, Outcome, Pace, Plan, Samples, Simulation};
 use fmi_system::{Files, SystemFile, assemble};
@@ -132,13 +133,17 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path, guest:
 }
 
 /// Runs the FMU alone for `duration` seconds in steps of `step` seconds.
-fn run(path: &Path, step: f64, duration: f64, guest: Option<&Path>) -> Result<Outcome, String> {
+fn run(path: &Path, step: f64, duration: f64, guest: Option<&Path>) -> Result<Outcome, RunError> {
     let steps = (duration / step).round();
     if !(1.0..=MOST_STEPS).contains(&steps) {
-        return Err(format!("{duration} s are {steps:e} steps of {step} s"));
+        return Err(RunError::Steps {
+            duration,
+            steps,
+            step,
+        });
     }
     let file = SystemFile::of_fmu(path);
-    let system = assemble(&file, &[], &mut Files::of(&file)).map_err(|error| error.to_string())?;
+    let system = assemble(&file, &[], &mut Files::of(&file))?;
     // A row at the end, too.
     let rows = steps as usize + 1;
     let plan = Plan {
@@ -152,8 +157,7 @@ fn run(path: &Path, step: f64, duration: f64, guest: Option<&Path>) -> Result<Ou
         guest: guest.map(Path::to_path_buf),
         ..Options::default()
     };
-    let simulation = Simulation::planned(&system, &Samples::none(step), &plan, &options);
-    let simulation = simulation.map_err(|error| error.to_string())?;
+    let simulation = Simulation::planned(&system, &Samples::none(step), &plan, &options)?;
     Ok(simulation.run(rows, Pace::Fastest, &mut |_| {}))
 }
 

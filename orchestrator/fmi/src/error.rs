@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::archive::file_name;
+use super::call::Lost;
 
 /// An FMU that cannot be used.
 #[derive(Debug, Error)]
@@ -120,5 +121,95 @@ fn said(messages: &[String]) -> String {
     match messages {
         [] => " and logged nothing".to_string(),
         messages => format!(": {}", messages.join("; ")),
+    }
+}
+
+/// Why an instance cannot be made.
+#[derive(Debug, Error)]
+pub(super) enum InstanceError {
+    /// The loader refuses the library.
+    #[error("the library cannot be loaded: {}", with_causes(.0))]
+    Library(#[from] libloading::Error),
+    /// Functions that the library lacks.
+    #[error("{}", lacking(.0))]
+    Lacking(Vec<String>),
+    /// A text that C cannot take.
+    #[error("`{}` has a zero in it", .0.escape_debug())]
+    Zero(String),
+    /// The FMU gave no instance.
+    #[error("the FMU refused")]
+    Refused,
+    /// Clocks that nobody can tick.
+    #[error(
+        "its input clock `{0}` has to be ticked from outside, which is possible in co-simulation with \
+         hasEventMode=\"true\" only; export it with event mode"
+    )]
+    Clock(String),
+    /// An interface for real-time schedulers.
+    #[error(
+        "it supports only scheduled execution: a real-time scheduler must call its parts, which a co-simulation \
+         cannot do"
+    )]
+    Scheduled,
+    /// What computes the instance cannot begin, in its own words.
+    #[error("{reason}")]
+    StandIn {
+        /// Why.
+        reason: String,
+    },
+    /// It needs a process of its own.
+    #[error(
+        "it needs a process of its own, and no program is named that can be one (`Options::guest`)"
+    )]
+    NoGuest,
+    /// No memory for another process.
+    #[error(
+        "no memory can be shared with another process: {0}; raise the limit of the size of files (ulimit -f), or \
+         choose --isolate none"
+    )]
+    Memory(std::io::Error),
+    /// A process that does not begin.
+    #[error("{}: the process for FMUs cannot be started: {error}", program.display())]
+    NotStarted {
+        /// The program.
+        program: PathBuf,
+        /// The operating system's word.
+        error: std::io::Error,
+    },
+    /// A process that began and does not answer.
+    #[error("{}: the process for FMUs {}", program.display(), gone.0)]
+    Gone {
+        /// The program.
+        program: PathBuf,
+        /// What became of it.
+        gone: Lost,
+    },
+    /// Another process could not make the instance.
+    #[error("{}", .0.0)]
+    Apart(Lost),
+    /// What to make cannot be handed over.
+    #[error(transparent)]
+    Setup(#[from] serde_json::Error),
+}
+
+/// The loader's word, with the causes that it does not name itself.
+fn with_causes(error: &libloading::Error) -> String {
+    let mut reason = error.to_string();
+    let mut source = std::error::Error::source(error);
+    while let Some(cause) = source {
+        let text = cause.to_string();
+        if !reason.contains(&text) {
+            reason += &format!(": {text}");
+        }
+        source = cause.source();
+    }
+    reason
+}
+
+fn lacking(names: &[String]) -> String {
+    match names {
+        [] => "the library lacks functions".to_string(),
+        [name] => format!("the library lacks the function {name}"),
+        names => format!("the library lacks the functions {}", names.join(", ")),
     }
 }

@@ -1,8 +1,10 @@
 //! Which process an instance lives in.
 
 use std::collections::HashSet;
+use std::fmt::Display;
 use std::sync::{Arc, Mutex};
 
+use super::error::InstanceError;
 use super::isolation::Host;
 use super::native::{self, printing::Diverted};
 use super::{Fmu, FmuError, Isolation, Options};
@@ -42,7 +44,7 @@ impl<'a> Processes<'a> {
     ///
     /// # Errors
     /// No process can be started.
-    pub(super) fn place(&mut self, fmu: &Fmu, alone: bool) -> Result<Option<Place>, String> {
+    pub(super) fn place(&mut self, fmu: &Fmu, alone: bool) -> Result<Option<Place>, InstanceError> {
         let apart = match self.options.isolation {
             Isolation::All => true,
             Isolation::Foreign => !fmu.is_own,
@@ -71,18 +73,14 @@ impl<'a> Processes<'a> {
         self.diverted
     }
 
-    fn start(&self) -> Result<Place, String> {
+    fn start(&self) -> Result<Place, InstanceError> {
         let Some(program) = &self.options.guest else {
-            return Err(NO_GUEST.to_string());
+            return Err(InstanceError::NoGuest);
         };
         let host = Host::start(program, self.options.call_limit)?;
         Ok(Arc::new(Mutex::new(host)))
     }
 }
-
-/// No program was named.
-const NO_GUEST: &str = "it needs a process of its own, and no program is named that can be one \
-                        (`Options::guest`)";
 
 /// What to do where a library takes Python's functions from whoever loads it, as PythonFMU's does.
 const PYTHON: &str = "it runs Python, whose library must be loaded before it: set LD_PRELOAD to \
@@ -97,7 +95,8 @@ fn lacks_python(reason: &str) -> bool {
 }
 
 /// Wraps the reason why an instance cannot be made.
-pub(super) fn refused(fmu: &Fmu, instance: &str, mut reason: String) -> FmuError {
+pub(super) fn refused(fmu: &Fmu, instance: &str, reason: impl Display) -> FmuError {
+    let mut reason = reason.to_string();
     let description = &fmu.description;
     if lacks_python(&reason) {
         reason += &format!("; {PYTHON}");

@@ -6,6 +6,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::call::{Call, Endpoint, Function, Lost, Scalar, Stepped, Values};
+use super::error::InstanceError;
 use super::{Causality, FmiVersion, Fmu, Kind, Variable, convert};
 
 /// What computes one instance.
@@ -106,10 +107,10 @@ impl Computed {
     ///
     /// # Errors
     /// What is computed cannot begin.
-    pub(super) fn new(stand_in: &StandIn, fmu: &Fmu, name: &str) -> Result<Self, String> {
+    pub(super) fn new(stand_in: &StandIn, fmu: &Fmu, name: &str) -> Result<Self, InstanceError> {
         let description = &fmu.description;
         let mut computed = Self {
-            behaviour: (stand_in.0)(name)?,
+            behaviour: (stand_in.0)(name).map_err(|reason| InstanceError::StandIn { reason })?,
             version: description.version,
             slots: HashMap::new(),
             inputs: Vec::new(),
@@ -184,19 +185,19 @@ impl Computed {
     }
 
     /// The values and the own state as bytes.
-    fn state(&mut self) -> Result<Vec<u8>, String> {
+    fn state(&mut self) -> Result<Vec<u8>, Lost> {
         let values = self.inputs.iter().chain(&self.outputs);
         let mut bytes: Vec<u8> = values.flat_map(|value| value.to_le_bytes()).collect();
-        bytes.extend(self.behaviour.save()?);
+        bytes.extend(self.behaviour.save().map_err(Lost)?);
         Ok(bytes)
     }
 
-    fn take_state(&mut self, bytes: &[u8]) -> Result<(), String> {
+    fn take_state(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         let count = self.inputs.len() + self.outputs.len();
         let Some((values, own)) = bytes.split_at_checked(8 * count) else {
-            return Err("is given a state of another component".to_string());
+            return Err(Lost("is given a state of another component".to_string()));
         };
-        self.behaviour.restore(own)?;
+        self.behaviour.restore(own).map_err(Lost)?;
         let places = self.inputs.iter_mut().chain(&mut self.outputs);
         for (place, bytes) in places.zip(values.chunks_exact(8)) {
             let mut value = [0; 8];
@@ -220,7 +221,7 @@ impl Endpoint for Computed {
                 call.numbers[0] = time + step;
             }
             Function::GetState => {
-                let state = self.state().map_err(Lost)?;
+                let state = self.state()?;
                 if call.handle == 0 {
                     self.handles += 1;
                     call.handle = self.handles;
@@ -231,7 +232,7 @@ impl Endpoint for Computed {
                 let state = self.saved.remove(&call.handle).unwrap_or_default();
                 let taken = self.take_state(&state);
                 self.saved.insert(call.handle, state);
-                taken.map_err(Lost)?;
+                taken?;
             }
             Function::FreeState => {
                 self.saved.remove(&call.handle);

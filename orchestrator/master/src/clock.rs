@@ -89,3 +89,23 @@ impl Clock {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_of_late_ticks_are_counted_in_microseconds() {
+        let mut clock = Clock::new(1.0, 0);
+        clock.ticks = 200;
+        clock.missed = 3;
+        clock.worst = Duration::from_millis(7);
+        (clock.late[10], clock.late[40], clock.late[400]) = (150, 47, 3);
+        let found = clock.statistics();
+        assert_eq!((found.deadlines, found.missed), (199, 3));
+        assert!((found.worst_s - 7e-3).abs() < 1e-12);
+        assert!((found.jitter_median_s - 10e-6).abs() < 1e-12);
+        // 197 of 200 are no later than 40 us, which is less than 99 of 100.
+        assert!((found.jitter_p99_s - 400e-6).abs() < 1e-12);
+    }
+}

@@ -1,6 +1,8 @@
 //! The parts of this installation, missing parts, and what to do.
 
 use std::collections::BTreeMap;
+use std::error::Error;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -90,11 +92,11 @@ pub fn examine() -> Examination {
 }
 
 /// Whether files can be made in a folder.
-fn writable(folder: &Path) -> Result<(), String> {
+fn writable(folder: &Path) -> io::Result<()> {
     let tried = tempfile::Builder::new()
         .prefix(".shakebench-doctor-")
         .tempfile_in(folder);
-    tried.map(drop).map_err(|error| error.to_string())
+    tried.map(drop)
 }
 
 fn folder_for_results() -> Finding {
@@ -104,7 +106,7 @@ fn folder_for_results() -> Finding {
     Finding {
         part: "present folder",
         state: if is_good { State::Good } else { State::Absent },
-        found: tried.map_or_else(|error| error, |()| "can be written".to_string()),
+        found: tried.map_or_else(|error| error.to_string(), |()| "can be written".to_string()),
         needed_for: "results without --out",
         cure: (!is_good).then(|| "change to another folder, or give --out".to_string()),
     }
@@ -165,7 +167,7 @@ fn components() -> Vec<Finding> {
                     *platforms.entry(platform).or_default() += 1;
                 }
             }
-            Err(error) => faults.push(error),
+            Err(error) => faults.push(error.to_string()),
         }
     }
     let hint = "install again; if a library cannot be mapped, set TMPDIR to a folder from which \
@@ -186,10 +188,10 @@ fn components() -> Vec<Finding> {
 }
 
 /// The platforms of a component that is whole and can be instantiated here.
-fn load(fmu: &PackedFmu) -> Result<Vec<String>, String> {
-    supply::check(fmu).map_err(|error| error.to_string())?;
-    let opened = Fmu::open_own(&fmu.path).map_err(|error| error.to_string())?;
-    Instance::new(&opened, "doctor", &program::options()).map_err(|error| error.to_string())?;
+fn load(fmu: &PackedFmu) -> Result<Vec<String>, Box<dyn Error>> {
+    supply::check(fmu)?;
+    let opened = Fmu::open_own(&fmu.path)?;
+    Instance::new(&opened, "doctor", &program::options())?;
     Ok(opened.platforms.clone())
 }
 

@@ -68,7 +68,7 @@ pub enum PackError {
         /// The FMU.
         path: PathBuf,
         /// What is wrong and what was expected.
-        problem: String,
+        problem: VariantFault,
     },
     /// There are no packed FMUs, and no sources to build them from.
     #[error(
@@ -119,12 +119,57 @@ pub enum PackError {
         first: PathBuf,
         /// The other.
         second: PathBuf,
-        /// In what they differ, as a clause.
-        problem: String,
+        /// In what they differ.
+        problem: Difference,
     },
     /// FMUs could not be packed earlier in this process.
     #[error("{0}")]
     Earlier(String),
+}
+
+/// In what two FMUs of one component differ.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum Difference {
+    /// A file that only one of them has.
+    #[error("only one has `{0}`")]
+    Lone(String),
+    /// Two libraries for one platform.
+    #[error("each has another `{0}`")]
+    Library(String),
+    /// Another file.
+    #[error("`{0}` differs")]
+    Content(String),
+}
+
+/// Why an FMU cannot be varied.
+#[derive(Debug, Error)]
+pub enum VariantFault {
+    /// It has start values of its own.
+    #[error("is a variant itself, expected an original")]
+    Variant,
+    /// No description, or not text.
+    #[error("has no readable modelDescription.xml")]
+    NoDescription,
+    /// A description that is not XML.
+    #[error(transparent)]
+    Xml(#[from] roxmltree::Error),
+    /// An attribute to replace is missing.
+    #[error("an attribute `{0}` is missing")]
+    NoAttribute(&'static str),
+    /// Neither GUID nor instantiation token.
+    #[error("the token is missing")]
+    NoToken,
+    /// A name that no parameter has.
+    #[error("`{0}` is not a parameter of it")]
+    NotAParameter(String),
+    /// A value for a parameter of another type.
+    #[error("`{name}` = {value} is neither Float64 nor an enumeration")]
+    Type {
+        /// The parameter.
+        name: String,
+        /// The value.
+        value: f64,
+    },
 }
 
 fn places(beside: &[PathBuf]) -> String {

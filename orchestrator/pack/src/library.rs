@@ -76,8 +76,8 @@ impl Library for FmuLibrary {
         set: &str,
         component: &Description,
         directory: Option<&Path>,
-    ) -> Result<Vec<(usize, Value)>, String> {
-        parameter_sets::parameters(set, component, directory)
+    ) -> Result<Vec<(usize, Value)>, Box<dyn Error + Send + Sync>> {
+        Ok(parameter_sets::parameters(set, component, directory)?)
     }
 }
 

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::archive::{Entries, PackedFmu, fmus_in, read_archive, write_archive};
-use super::error::{PackError, file_error};
+use super::error::{Difference, PackError, file_error};
 use fmi_import::FmiVersion;
 
 /// Joins the FMUs of several folders (each with `fmi2/NAME.fmu` and `fmi3/NAME.fmu`) into `out`.
@@ -57,7 +57,7 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<PackedFmu>, PackErro
 }
 
 /// Adds the libraries of one archive to those of another that is otherwise the same.
-fn join(together: &mut Entries, other: Entries) -> Result<(), String> {
+fn join(together: &mut Entries, other: Entries) -> Result<(), Difference> {
     let is_library = |name: &str| name.starts_with("binaries/");
     // An empty folder may have an entry of its own or not.
     let rest = |entries: &Entries| -> Vec<String> {
@@ -68,18 +68,15 @@ fn join(together: &mut Entries, other: Entries) -> Result<(), String> {
     if here != there {
         let lone = here.iter().find(|name| !there.contains(name));
         let lone = lone.or_else(|| there.iter().find(|name| !here.contains(name)));
-        return Err(format!(
-            "only one has `{}`",
-            lone.map_or("", String::as_str)
-        ));
+        return Err(Difference::Lone(lone.cloned().unwrap_or_default()));
     }
     for (name, content) in other {
         match together.get(&name) {
             Some(same) if *same == content => {}
             Some(_) if is_library(&name) => {
-                return Err(format!("each has another `{name}`"));
+                return Err(Difference::Library(name));
             }
-            Some(_) => return Err(format!("`{name}` differs")),
+            Some(_) => return Err(Difference::Content(name)),
             None => {
                 together.insert(name, content);
             }
@@ -126,7 +123,7 @@ mod tests {
             ),
         ] {
             let problem = join(&mut linux.clone(), other).unwrap_err();
-            assert!(problem.contains(word), "{problem}");
+            assert!(problem.to_string().contains(word), "{problem}");
         }
     }
 }

@@ -81,10 +81,17 @@ impl fmt::Display for Platform {
     }
 }
 
-impl FromStr for Platform {
-    type Err = String;
+/// A text that is not a platform.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` is not a platform; expected x86_64 or aarch64, a dash, and linux, windows or darwin, as in x86_64-windows"
+)]
+pub struct UnknownPlatform(pub String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for Platform {
+    type Err = UnknownPlatform;
+
+    fn from_str(text: &str) -> Result<Self, UnknownPlatform> {
         let known = text.split_once('-').and_then(|(processor, name)| {
             let mut systems = System::ALL.into_iter();
             let system = systems.find(|system| system.name() == name)?;
@@ -94,13 +101,7 @@ impl FromStr for Platform {
                 system,
             })
         });
-        known.ok_or_else(|| {
-            format!(
-                "`{text}` is not a platform; expected x86_64 or aarch64, a dash, and linux, \
-                 windows \
-                 or darwin, as in x86_64-windows"
-            )
-        })
+        known.ok_or_else(|| UnknownPlatform(text.to_string()))
     }
 }
 

@@ -7,7 +7,7 @@ use roxmltree::{Document, Node};
 
 use super::annotation::escape;
 use super::archive::{Entries, archive_bytes, read_archive, write_archive};
-use super::error::{PackError, file_error};
+use super::error::{PackError, VariantFault, file_error};
 
 /// A parameter that starts differently.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,19 +52,19 @@ fn variant(
     model_name: Option<&str>,
     start_values: &[StartValue],
 ) -> Result<Entries, PackError> {
-    let fail = |problem: String| PackError::Variant {
+    let fail = |problem: VariantFault| PackError::Variant {
         path: original.into(),
         problem,
     };
     let mut entries = read_archive(original)?;
     let resource = format!("resources/{START_VALUES}");
     if entries.contains_key(&resource) {
-        return Err(fail("is a variant itself, expected an original".into()));
+        return Err(fail(VariantFault::Variant));
     }
     let description = entries
         .get("modelDescription.xml")
         .and_then(|text| String::from_utf8(text.clone()).ok())
-        .ok_or_else(|| fail("has no readable modelDescription.xml".into()))?;
+        .ok_or_else(|| fail(VariantFault::NoDescription))?;
     let lines = start_values
         .iter()
         .map(|start| format!("{},{}\n", start.name, start.value));
@@ -91,15 +91,15 @@ fn change(
     model_name: Option<&str>,
     start_values: &[StartValue],
     table: &str,
-) -> Result<String, String> {
-    let document = Document::parse(description).map_err(|e| e.to_string())?;
+) -> Result<String, VariantFault> {
+    let document = Document::parse(description)?;
     let root = document.root_element();
     let mut changes: Vec<(Range<usize>, String)> = Vec::new();
-    let mut replace = |node: Node, attribute: &str, value: String| -> Result<(), String> {
+    let mut replace = |node: Node, attribute: &'static str, value: String| {
         let found = node.attribute_node(attribute);
-        let place = found.ok_or_else(|| format!("an attribute `{attribute}` is missing"))?;
+        let place = found.ok_or(VariantFault::NoAttribute(attribute))?;
         changes.push((place.range_value(), escape(&value)));
-        Ok(())
+        Ok::<(), VariantFault>(())
     };
     if let Some(name) = model_name {
         replace(root, "modelName", name.into())?;
@@ -109,14 +109,14 @@ fn change(
     } else {
         "instantiationToken"
     };
-    let token = root.attribute(name).ok_or("the token is missing")?;
+    let token = root.attribute(name).ok_or(VariantFault::NoToken)?;
     replace(root, name, variant_token(token, table))?;
     for start in start_values {
         let variable = root
             .descendants()
             .filter(|node| node.attribute("causality") == Some("parameter"))
             .find(|node| node.attribute("name") == Some(&start.name))
-            .ok_or_else(|| format!("`{}` is not a parameter of it", start.name))?;
+            .ok_or_else(|| VariantFault::NotAParameter(start.name.clone()))?;
         // In FMI 2.0 type and start value stand in an element of their own.
         let typed = variable.first_element_child().unwrap_or(variable);
         let fits = match typed.tag_name().name() {
@@ -125,10 +125,10 @@ fn change(
             _ => false,
         };
         if !fits {
-            return Err(format!(
-                "`{}` = {} is neither Float64 nor an enumeration",
-                start.name, start.value
-            ));
+            return Err(VariantFault::Type {
+                name: start.name.clone(),
+                value: start.value,
+            });
         }
         replace(typed, "start", start.value.to_string())?;
         if !start.note.is_empty() {

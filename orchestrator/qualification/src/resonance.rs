@@ -403,6 +403,31 @@ mod tests {
         }
     }
 
+    /// Of a frequency that grows evenly in octaves, `(high - low) T / ln(high / low)` cycles pass in T; one octave
+    /// takes 30 s at two a minute.
+    #[test]
+    fn a_sweep_has_the_cycles_of_its_band_and_the_level_of_its_search() {
+        let search = Search {
+            level_g: 0.1,
+            octaves_per_minute: 2.0,
+            band_hz: [2.0, 16.0],
+        };
+        let motion = excitation(&search, Excitation::Sweep, 1, 0.002, 10.0);
+        let crossings = motion
+            .displacement
+            .windows(2)
+            .filter(|pair| pair[0] * pair[1] < 0.0);
+        let cycles = 0.5 * crossings.count() as f64;
+        let expected = 14.0 * 90.0 / f64::ln(8.0);
+        assert!((cycles - expected).abs() < 2.0, "{cycles} {expected}");
+        let middle = &motion.acceleration[motion.len() / 3..motion.len() / 2];
+        let peak = motion::peak(middle) / (0.1 * STANDARD_GRAVITY);
+        assert!((peak - 1.0).abs() < 0.03, "{peak}");
+        // A table of a tenth of a millimetre moves no further.
+        let short = excitation(&search, Excitation::Sweep, 1, 0.002, 1e-4);
+        assert!(motion::peak(&short.displacement) <= 1.000_001e-4);
+    }
+
     #[test]
     fn five_percent_less_stiffness_is_a_shift_and_none_is_not() {
         let before = search(6.0, 0.04, Excitation::Sweep, 3).resonances;

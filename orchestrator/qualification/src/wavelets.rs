@@ -261,6 +261,24 @@ impl Wavelet {
 mod tests {
     use super::*;
 
+    /// Lightly damped oscillators answer in a narrower band: 36 in an octave in place of 24.
+    #[test]
+    fn an_aim_has_more_oscillators_where_they_are_damped_less() {
+        for (damping, per_octave) in [(2.0, 36.0), (5.0, 24.0)] {
+            let rule = Rule::ieee693("any", 1.0, damping);
+            let aim = Aim::of(&rule, 1.1, [1.0, 1.3]);
+            let octaves = (rule.band_hz[1] / rule.band_hz[0]).log2();
+            // Both ends are among them.
+            assert_eq!(
+                aim.frequencies.len(),
+                (octaves * per_octave).ceil() as usize + 1
+            );
+            assert_eq!(aim.required.len(), aim.frequencies.len());
+            let (f, required) = (aim.frequencies[7], aim.required[7]);
+            assert!((required / (STANDARD_GRAVITY * rule.required(f)) - 1.0).abs() < 1e-12);
+        }
+    }
+
     #[test]
     fn a_wavelet_is_one_motion_and_at_rest_at_both_ends() {
         let dt = 0.002;

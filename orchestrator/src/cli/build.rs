@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 
 use laboratory::error::Error;
-use pack::{self, FmiVersion, Platform};
+use pack::{self, FmiVersion, Platform, UnknownPlatform};
 
 /// Options of `shakebench build`.
 #[derive(Debug, Args)]
@@ -56,7 +56,8 @@ fn libraries(text: &str) -> Result<(Platform, PathBuf), String> {
     if !folder.is_dir() {
         return Err(format!("{}: no such folder", folder.display()));
     }
-    Ok((platform.parse()?, folder))
+    let platform: Result<Platform, UnknownPlatform> = platform.parse();
+    Ok((platform.map_err(|error| error.to_string())?, folder))
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

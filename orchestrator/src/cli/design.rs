@@ -1,5 +1,6 @@
 //! `shakebench design`
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -7,7 +8,7 @@ use clap::Args;
 
 use super::quantity::whole;
 use super::{figures, multivariable};
-use laboratory::design::{self, LoopName, Options, Synthesis, model};
+use laboratory::design::{self, LoopName, NoLinearModel, Options, Synthesis, UnknownLoop, model};
 use laboratory::error::Error;
 use laboratory::results::unused;
 use pages::report::columns::aligned;
@@ -77,16 +78,20 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
         return on_model(arguments, path);
     }
-    let fault = |option| move |reason| Error::Option { option, reason };
+    let fault = |option, error: &dyn Display| Error::Option {
+        option,
+        reason: error.to_string(),
+    };
     let only = arguments.only.as_deref().map(str::parse).transpose();
     let specimen = arguments.specimen.as_deref().map(str::parse).transpose();
     let options = Options {
-        only: only.map_err(fault("--loop"))?,
+        only: only.map_err(|error: UnknownLoop| fault("--loop", &error))?,
         crossover: arguments.crossover,
-        specimen: specimen.map_err(fault("--specimen"))?.unwrap_or_default(),
+        specimen: specimen
+            .map_err(|error: NoLinearModel| fault("--specimen", &error))?
+            .unwrap_or_default(),
     };
-    let design =
-        design::design(&options).map_err(|error| fault("--crossover")(error.to_string()))?;
+    let design = design::design(&options).map_err(|error| fault("--crossover", &error))?;
     let folder = arguments.out.clone();
     let folder =
         folder.unwrap_or_else(|| unused(Path::new("shakebench-results/design"), |_| false));

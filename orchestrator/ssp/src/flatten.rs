@@ -153,7 +153,7 @@ impl Flat<'_> {
         }
         for connection in &system.connections {
             let done = self.wiring.connect(&place.path, system, connection);
-            done.map_err(|reason| self.fault(place, connection.line, reason))?;
+            done.map_err(|error| self.fault(place, connection.line, error.to_string()))?;
         }
         for connector in &system.connectors {
             let port = (place.path.clone(), connector.name.clone());
@@ -208,7 +208,8 @@ impl Flat<'_> {
                 found.ok_or_else(|| wrong(format!("there is no system with the id `{id}`")))?;
             return self.system(structure, &system.clone(), place, &bindings);
         }
-        let file = resolve(base, uri, !self.package.is_unpacked()).map_err(wrong)?;
+        let file = resolve(base, uri, !self.package.is_unpacked())
+            .map_err(|error| wrong(error.to_string()))?;
         match kind {
             "application/x-fmu-sharedlibrary" => {}
             "application/x-ssp-definition" => {
@@ -313,12 +314,13 @@ impl Flat<'_> {
         let wrong = |reason: String| self.fault(place, line, reason);
         if file.in_component {
             let fmu = fmu.ok_or_else(|| wrong("a system has no FMU to look in".to_string()))?;
-            let inside = resolve("", &file.uri, false).map_err(wrong)?;
+            let inside = resolve("", &file.uri, false).map_err(|error| wrong(error.to_string()))?;
             let text = self.package.text_within(fmu, &inside);
             let read = text.and_then(|text| read(&text));
             return read.map_err(|fault| at(self.package, &format!("{fmu}/{inside}"), fault));
         }
-        let name = resolve(base, &file.uri, !self.package.is_unpacked()).map_err(wrong)?;
+        let name = resolve(base, &file.uri, !self.package.is_unpacked())
+            .map_err(|error| wrong(error.to_string()))?;
         let text = self.package.text(&name).and_then(|text| read(&text));
         text.map_err(|fault| at(self.package, &name, fault))
     }
@@ -342,7 +344,7 @@ impl Flat<'_> {
         let root_inputs = self
             .wiring
             .resolve(self.components.keys())
-            .map_err(|reason| wrong(self.package, reason))?;
+            .map_err(|error| wrong(self.package, error.to_string()))?;
         for wire in &root_inputs.wires {
             let (from, to) = (name(&wire.from), name(&wire.to));
             out.connections.push(Link {

@@ -135,21 +135,43 @@ fn utf8(bytes: Vec<u8>) -> Result<String, Fault> {
     })
 }
 
+/// A URI that names no file of the archive.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{uri}` {fault}")]
+pub(super) struct UriError {
+    uri: String,
+    fault: UriFault,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum UriFault {
+    #[error("is not UTF-8")]
+    Encoding,
+    #[error("is not relative to the archive, and others are not supported")]
+    Absolute,
+    #[error("points outside the archive")]
+    Outside,
+    #[error("names no file")]
+    NoFile,
+}
+
 /// The file that a URI names, relative to the folder `base` in the archive; out of it where it `is_open`,
 /// a folder on the disk.
 ///
 /// # Errors
 /// A URI that is not a relative path, or one that leads out of an archive.
-pub(super) fn resolve(base: &str, uri: &str, is_open: bool) -> Result<String, String> {
+pub(super) fn resolve(base: &str, uri: &str, is_open: bool) -> Result<String, UriError> {
     let decoded = percent_decode_str(uri).decode_utf8();
-    let decoded = decoded.map_err(|_| format!("`{uri}` is not UTF-8"))?;
+    let fault = |fault| UriError {
+        uri: uri.to_string(),
+        fault,
+    };
+    let decoded = decoded.map_err(|_| fault(UriFault::Encoding))?;
     let has_scheme = decoded
         .split_once(':')
         .is_some_and(|(scheme, _)| !scheme.contains('/'));
     if has_scheme || decoded.starts_with('/') || decoded.contains('\\') || decoded.contains('\0') {
-        return Err(format!(
-            "`{uri}` is not relative to the archive, and others are not supported"
-        ));
+        return Err(fault(UriFault::Absolute));
     }
     let mut parts: Vec<&str> = base.split('/').filter(|part| !part.is_empty()).collect();
     for part in decoded.split('/') {
@@ -159,12 +181,12 @@ pub(super) fn resolve(base: &str, uri: &str, is_open: bool) -> Result<String, St
                 parts.pop();
             }
             ".." if is_open => parts.push(".."),
-            ".." => return Err(format!("`{uri}` points outside the archive")),
+            ".." => return Err(fault(UriFault::Outside)),
             part => parts.push(part),
         }
     }
     if parts.last().is_none_or(|part| *part == "..") {
-        return Err(format!("`{uri}` names no file"));
+        return Err(fault(UriFault::NoFile));
     }
     Ok(parts.join("/"))
 }

@@ -7,6 +7,44 @@ use super::structure::{Connection, Element, Kind, System};
 use fmi_system::{DeclaredUnit, Hop, Way};
 use units::hint;
 
+/// Why connections do not hold.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(super) enum WireError {
+    /// Two ends that do the same.
+    #[error("`{start}` and `{end}` both {what} values")]
+    SameWay {
+        /// Where it begins.
+        start: String,
+        /// Where it ends.
+        end: String,
+        /// `give` or `take`.
+        what: &'static str,
+    },
+    /// A connector with two sources.
+    #[error("`{connector}` is already driven by `{first}`")]
+    DrivenTwice {
+        /// The connector.
+        connector: String,
+        /// What the first connection takes its value from.
+        first: String,
+    },
+    /// A connector or element that a system does not have.
+    #[error("{owner} has no {what} `{name}`{hint}")]
+    Unknown {
+        /// The system or element.
+        owner: String,
+        /// `connector` or `element`.
+        what: &'static str,
+        /// What was looked for.
+        name: String,
+        /// The nearest name.
+        hint: String,
+    },
+    /// Connectors that drive each other.
+    #[error("`{0}` drives itself through connectors")]
+    Circle(String),
+}
+
 /// A connector: the path of its element, and its name.
 pub(super) type Port = (Vec<String>, String);
 
@@ -81,7 +119,7 @@ impl Wiring {
         path: &[String],
         system: &System,
         connection: &Connection,
-    ) -> Result<(), String> {
+    ) -> Result<(), WireError> {
         let start = self.end(path, system, &connection.start)?;
         let end = self.end(path, system, &connection.end)?;
         let hop = Hop {
@@ -89,18 +127,17 @@ impl Wiring {
             suppresses_units: connection.suppresses_units,
             transformation: connection.transformation.clone(),
         };
+        let same = |what| WireError::SameWay {
+            start: start.label.clone(),
+            end: end.label.clone(),
+            what,
+        };
         let forwards = match (start.gives, end.gives) {
             (Some(true), Some(true)) => {
-                return Err(format!(
-                    "`{}` and `{}` both give values",
-                    start.label, end.label
-                ));
+                return Err(same("give"));
             }
             (Some(false), Some(false)) => {
-                return Err(format!(
-                    "`{}` and `{}` both take values",
-                    start.label, end.label
-                ));
+                return Err(same("take"));
             }
             (Some(true), _) | (_, Some(false)) => true,
             (Some(false), _) | (_, Some(true)) => false,
@@ -118,11 +155,10 @@ impl Wiring {
             self.units.entry(from.port.clone()).or_insert(unit);
         }
         if let Some((first, _)) = self.drivers.get(&to.port) {
-            return Err(format!(
-                "`{}` is already driven by `{}`",
-                to.label,
-                label(first)
-            ));
+            return Err(WireError::DrivenTwice {
+                connector: to.label,
+                first: label(first),
+            });
         }
         self.drivers.insert(to.port, (from.port, hop));
         Ok(())
@@ -133,16 +169,17 @@ impl Wiring {
         path: &[String],
         system: &System,
         (element, connector): &(Option<String>, String),
-    ) -> Result<Found, String> {
+    ) -> Result<Found, WireError> {
         let Some(element) = element else {
             let own = system.connectors.iter().find(|own| own.name == *connector);
             let own = own.ok_or_else(|| {
                 let known = system.connectors.iter().map(|own| own.name.as_str());
-                format!(
-                    "the system `{}` has no connector `{connector}`{}",
-                    system.name,
-                    hint(connector, known)
-                )
+                WireError::Unknown {
+                    owner: format!("the system `{}`", system.name),
+                    what: "connector",
+                    name: connector.clone(),
+                    hint: hint(connector, known),
+                }
             })?;
             return Ok(Found {
                 label: connector.clone(),
@@ -159,21 +196,24 @@ impl Wiring {
         let found = system.elements.iter().find(|own| own.name() == element);
         let found = found.ok_or_else(|| {
             let known = system.elements.iter().map(|own| own.name());
-            format!(
-                "the system `{}` has no element `{element}`{}",
-                system.name,
-                hint(element, known)
-            )
+            WireError::Unknown {
+                owner: format!("the system `{}`", system.name),
+                what: "element",
+                name: element.clone(),
+                hint: hint(element, known),
+            }
         })?;
         let own = found.connectors().iter().find(|own| own.name == *connector);
         // Some tools list no connectors: the FMU has them.
         let is_listed = !found.connectors().is_empty() || !matches!(found, Element::Component(_));
         if own.is_none() && is_listed {
             let known = found.connectors().iter().map(|own| own.name.as_str());
-            return Err(format!(
-                "`{element}` has no connector `{connector}`{}",
-                hint(connector, known)
-            ));
+            return Err(WireError::Unknown {
+                owner: format!("`{element}`"),
+                what: "connector",
+                name: connector.clone(),
+                hint: hint(connector, known),
+            });
         }
         let below = [path, std::slice::from_ref(element)].concat();
         let (port, is_signal) = self.port(below, connector);
@@ -198,7 +238,7 @@ impl Wiring {
     pub(super) fn resolve<'a>(
         &self,
         components: impl Iterator<Item = &'a Vec<String>>,
-    ) -> Result<Wires, String> {
+    ) -> Result<Wires, WireError> {
         let components: HashSet<&Vec<String>> = components.collect();
         let mut wires = Wires::default();
         let mut driven: Vec<&Port> = self.drivers.keys().collect();
@@ -213,7 +253,7 @@ impl Wiring {
             let mut seen = HashSet::new();
             while let Some((from, hop)) = self.drivers.get(port) {
                 if !seen.insert(port) {
-                    return Err(format!("`{}` drives itself through connectors", label(to)));
+                    return Err(WireError::Circle(label(to)));
                 }
                 hops.insert(0, hop.clone());
                 port = from;

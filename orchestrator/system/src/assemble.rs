@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::checked::{Component, DEFAULT_PERIOD, System};
 use super::connection::connect;
 use super::ending::{end, stop};
-use super::error::SystemError;
+use super::error::{Misfit, SystemError};
 use super::file::{ComponentFile, SystemFile};
 use super::fitted::{resized, stepped, with_units};
 use super::given::{put, set, values};
@@ -31,20 +31,17 @@ pub fn assemble(
     settings: &[String],
     library: &mut dyn Library,
 ) -> Result<System, SystemError> {
-    let at = |place: String, reason: String| file.fault(&place, reason);
     if file.components.is_empty() {
-        return Err(at("components".to_string(), "there is none".to_string()));
+        return Err(file.fault("components", Misfit::NoComponent));
     }
     let mut notes = file.notes.clone();
     let mut components = Vec::new();
     for (name, part) in &file.components {
-        let place = format!("components.{name}");
         // Components of archives bear the names of the systems that they stand in before theirs.
         let has_point = name.contains('.') && file.package.is_none();
         if name == "reference" || name.is_empty() || has_point {
-            let reason = "this name is not allowed for a component (`reference` is the motion, \
-                and `.` separates component and variable)";
-            return Err(at(place, reason.to_string()));
+            let place = format!("components.{name}");
+            return Err(file.fault(&place, Misfit::ComponentName));
         }
         let fmu = library
             .fmu(&part.fmu)
@@ -61,7 +58,7 @@ pub fn assemble(
         set(&mut components, setting, library).map_err(|reason| SystemError::Place {
             origin: "command line".to_string(),
             place: format!("--set {setting}"),
-            reason,
+            reason: Box::new(reason),
         })?;
     }
     let mut connections = Vec::new();
@@ -81,8 +78,10 @@ pub fn assemble(
         let connection = connect(&components, &tables, link).map_err(wrong)?;
         let input = (connection.component, connection.input);
         if let Some(first) = driven.insert(input, link) {
-            let (to, first) = (&link.to, &first.from);
-            return Err(wrong(format!("`{to}` is already driven by `{first}`")));
+            return Err(wrong(Misfit::DrivenTwice {
+                input: link.to.to_string(),
+                source_before: first.from.to_string(),
+            }));
         }
         connections.push(connection);
     }
@@ -200,18 +199,18 @@ fn component(
     library: &mut dyn Library,
     notes: &mut Vec<String>,
 ) -> Result<Component, SystemError> {
-    let at = |place: &str, reason| file.fault(&format!("components.{name}{place}"), reason);
+    let at = |place: &str, reason: Misfit| file.fault(&format!("components.{name}{place}"), reason);
     let fmu = stepped(fmu, name, part, settings)
-        .map_err(|(key, reason)| at(&format!(".{key}"), reason))?;
+        .map_err(|(key, reason)| at(&format!(".{key}"), reason.into()))?;
     let fmu = resized(fmu, name, part, settings).map_err(|reason| at("", reason))?;
     let fmu = with_units(fmu, part)
-        .map_err(|(variable, reason)| at(&format!(".units.{variable}"), reason))?;
+        .map_err(|(variable, reason)| at(&format!(".units.{variable}"), reason.into()))?;
     let fmu = with_locals(fmu, file, name, part, notes);
     let description = &fmu.description;
     let mut parameters = Vec::new();
     if let Some(model) = &part.model {
         let set = library.parameters(model, description, file.directory.as_deref());
-        parameters = set.map_err(|reason| at(".model", reason))?;
+        parameters = set.map_err(|reason| at(".model", reason.into()))?;
     }
     let mut inputs = Vec::new();
     for (variable, written) in &part.parameters {
@@ -228,8 +227,9 @@ fn component(
             ));
             continue;
         }
-        let found = find_settable(&fmu, variable).map_err(|reason| at(&place, reason))?;
-        let read = values(&fmu, variable, found, written).map_err(|reason| at(&place, reason))?;
+        let found = find_settable(&fmu, variable).map_err(|reason| at(&place, reason.into()))?;
+        let read =
+            values(&fmu, variable, found, written).map_err(|reason| at(&place, reason.into()))?;
         for (position, value) in read {
             match description.variables[position].causality {
                 Causality::Input => put(&mut inputs, position, value),
@@ -243,16 +243,17 @@ fn component(
             Some(elements) => elements,
             None => {
                 let found = find(&fmu, variable, Causality::Input);
-                let position = found.map_err(|reason| at(&place, reason))?;
+                let position = found.map_err(|reason| at(&place, reason.into()))?;
                 position..position + 1
             }
         };
-        let read = values(&fmu, variable, found, written).map_err(|reason| at(&place, reason))?;
+        let read =
+            values(&fmu, variable, found, written).map_err(|reason| at(&place, reason.into()))?;
         read.into_iter()
             .for_each(|(position, value)| put(&mut inputs, position, value));
     }
     let period = match &part.period {
-        Some(written) => Some(value::time(written).map_err(|reason| at(".period", reason))?),
+        Some(written) => Some(value::time(written).map_err(|reason| at(".period", reason.into()))?),
         // No period is invented for an FMU of somebody else.
         None => sampled(&fmu)
             .then(|| {
@@ -265,13 +266,12 @@ fn component(
     for (alias, variable) in &part.aliases {
         let place = format!(".aliases.{alias}");
         let found = find(&fmu, variable, Causality::Output);
-        let found = found.map_err(|reason| at(&place, reason))?;
+        let found = found.map_err(|reason| at(&place, reason.into()))?;
         if description
             .position(alias)
             .is_some_and(|known| known != found)
         {
-            let reason = format!("`{alias}` is a variable of it");
-            return Err(at(&place, reason));
+            return Err(at(&place, Misfit::AliasTaken(alias.clone())));
         }
         aliases.push((alias.clone(), found));
     }
@@ -336,14 +336,13 @@ fn with_locals(
 fn tables(file: &SystemFile) -> Result<Vec<InputTable>, SystemError> {
     let mut tables = file.own_tables.clone();
     for (name, table) in &file.tables {
-        let at = |reason| file.fault(&format!("tables.{name}"), reason);
+        let at = |reason: Misfit| file.fault(&format!("tables.{name}"), reason);
         if name == "reference" || name.contains('.') || file.components.contains_key(name) {
-            let reason = "this name belongs to the motion or a component, or has a `.`";
-            return Err(at(reason.to_string()));
+            return Err(at(Misfit::TableName));
         }
         let place = file.directory.as_deref().unwrap_or(Path::new(""));
         let read = InputTable::read(name, &place.join(&table.file), table.between);
-        tables.push(read.map_err(|error| at(error.to_string()))?);
+        tables.push(read.map_err(|error| at(error.into()))?);
     }
     Ok(tables)
 }

@@ -1,11 +1,61 @@
 //! Connections checked against the FMUs: names, types and units.
 
 use super::checked::{Component, Connection, Source};
+use super::error::Misfit;
 use super::link::{Link, Origin};
 use super::lookup::{component_index, find};
-use super::passage::End;
+use super::passage::{End, WayError};
 use super::table::InputTable;
 use fmi_import::{Causality, Kind, Ticks, Variable};
+
+/// Why a connection does not hold.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ConnectionError {
+    /// An end whose type cannot drive the other's.
+    #[error("`{from}` is a {kind} and cannot drive the {other} `{to}`")]
+    Types {
+        /// Where it begins.
+        from: String,
+        /// The type there.
+        kind: &'static str,
+        /// Where it ends.
+        to: String,
+        /// The type there.
+        other: &'static str,
+    },
+    /// Units or values that cannot be converted.
+    #[error("`{from}` does not fit `{to}`: {reason}")]
+    Way {
+        /// Where it begins.
+        from: String,
+        /// Where it ends.
+        to: String,
+        /// Why not.
+        reason: Box<WayError>,
+    },
+    /// A clock that nothing can trigger.
+    #[error(
+        "the clock `{component}.{clock}` ticks at its own times, expected one with \
+         intervalVariability=\"triggered\"; remove the connection"
+    )]
+    OwnTimes {
+        /// The component.
+        component: String,
+        /// The clock.
+        clock: String,
+    },
+    /// A clock of an FMU without event mode.
+    #[error(
+        "the clock `{component}.{clock}` can be connected in co-simulation with hasEventMode=\"true\" only; \
+         export the FMU with event mode"
+    )]
+    NoEventMode {
+        /// The component.
+        component: String,
+        /// The clock.
+        clock: String,
+    },
+}
 
 /// The connection of a link, after its names, types and units were checked.
 ///
@@ -15,7 +65,7 @@ pub(super) fn connect(
     components: &[Component],
     tables: &[InputTable],
     link: &Link,
-) -> Result<Connection, String> {
+) -> Result<Connection, Misfit> {
     let Link { from, to, .. } = link;
     let component = component_index(components, &to.component)?;
     let input = find(&components[component].fmu, &to.variable, Causality::Input)?;
@@ -40,8 +90,7 @@ pub(super) fn connect(
         Origin::Output(name) => {
             let table = tables.iter().position(|table| table.name == name.component);
             if let Some(table) = table {
-                let column = tables[table].find(&name.variable);
-                let column = column.map_err(|error| error.to_string())?;
+                let column = tables[table].find(&name.variable)?;
                 // What a table holds, it holds for this input: whole numbers and truth values too.
                 let start = End {
                     kind: match target.kind {
@@ -68,13 +117,23 @@ pub(super) fn connect(
             }
         }
     };
-    if !link.way.maps() {
-        fits(start.kind, target).map_err(|reason| format!("`{from}` {reason} `{to}`"))?;
+    if !link.way.maps() && !start.kind.drives(&target.kind) {
+        let types = ConnectionError::Types {
+            from: from.to_string(),
+            kind: start.kind.name(),
+            to: to.to_string(),
+            other: target.kind.name(),
+        };
+        return Err(types.into());
     }
     let passage = link
         .way
         .between(start, end(target))
-        .map_err(|reason| format!("`{from}` does not fit `{to}`: {reason}"))?;
+        .map_err(|reason| ConnectionError::Way {
+            from: from.to_string(),
+            to: to.to_string(),
+            reason: Box::new(reason),
+        })?;
     Ok(Connection {
         source,
         component,
@@ -93,35 +152,25 @@ fn end(variable: &Variable) -> End<'_> {
 }
 
 /// Whether an input clock ticks when another one does.
-fn triggers(component: &Component, input: usize) -> Result<(), String> {
+fn triggers(component: &Component, input: usize) -> Result<(), ConnectionError> {
     has_events(component, input)?;
     let description = &component.fmu.description;
     if description.ticks(input) == Some(Ticks::Triggered) {
         return Ok(());
     }
-    let (name, clock) = (&component.name, &description.variables[input].name);
-    Err(format!(
-        "the clock `{name}.{clock}` ticks at its own times, expected one with \
-         intervalVariability=\"triggered\"; remove the connection"
-    ))
+    Err(ConnectionError::OwnTimes {
+        component: component.name.clone(),
+        clock: description.variables[input].name.clone(),
+    })
 }
 
-fn has_events(component: &Component, clock: usize) -> Result<(), String> {
+fn has_events(component: &Component, clock: usize) -> Result<(), ConnectionError> {
     let description = &component.fmu.description;
     if description.has_stepped_events() {
         return Ok(());
     }
-    let (name, clock) = (&component.name, &description.variables[clock].name);
-    Err(format!(
-        "the clock `{name}.{clock}` can be connected in co-simulation with hasEventMode=\"true\" only; \
-         export the FMU with event mode"
-    ))
-}
-
-fn fits(kind: &Kind, target: &Variable) -> Result<(), String> {
-    if kind.drives(&target.kind) {
-        return Ok(());
-    }
-    let (from, to) = (kind.name(), target.kind.name());
-    Err(format!("is a {from} and cannot drive the {to}"))
+    Err(ConnectionError::NoEventMode {
+        component: component.name.clone(),
+        clock: description.variables[clock].name.clone(),
+    })
 }

@@ -1,7 +1,7 @@
 //! What ends a run early, and what is stopped then.
 
 use super::checked::{Component, End};
-use super::error::SystemError;
+use super::error::{Misfit, SystemError};
 use super::file::SystemFile;
 use super::link::VariableName;
 use super::lookup::{component_index, find};
@@ -12,11 +12,13 @@ use fmi_import::{Causality, Kind};
 pub(super) fn end(file: &SystemFile, components: &[Component]) -> Result<Option<End>, SystemError> {
     let at = |place: &str| {
         let place = format!("experiment.{place}");
-        move |reason| file.fault(&place, reason)
+        move |reason: Misfit| file.fault(&place, reason)
     };
     let experiment = &file.experiment;
     let after = experiment.end_after.as_ref().map(value::time).transpose();
-    let after = after.map_err(at("end_after"))?.unwrap_or(0.0);
+    let after = after
+        .map_err(|reason| at("end_after")(reason.into()))?
+        .unwrap_or(0.0);
     let Some(name) = &experiment.end_when else {
         return Ok(None);
     };
@@ -26,7 +28,10 @@ pub(super) fn end(file: &SystemFile, components: &[Component]) -> Result<Option<
         let (component, variable) = position(components, name, Causality::Output)?;
         match &components[component].fmu.description.variables[variable].kind {
             Kind::Enumeration(_) => Ok((component, variable)),
-            _ => Err(format!("`{name}` is not an enumeration")),
+            _ => Err(Misfit::Type {
+                name: name.to_string(),
+                expected: "an enumeration",
+            }),
         }
     });
     let cause = cause.transpose().map_err(at("end_cause"))?;
@@ -50,11 +55,14 @@ fn truth(
     components: &[Component],
     name: &VariableName,
     causality: Causality,
-) -> Result<(usize, usize), String> {
+) -> Result<(usize, usize), Misfit> {
     let (component, variable) = position(components, name, causality)?;
     match components[component].fmu.description.variables[variable].kind {
         Kind::Boolean => Ok((component, variable)),
-        _ => Err(format!("`{name}` is not Boolean")),
+        _ => Err(Misfit::Type {
+            name: name.to_string(),
+            expected: "Boolean",
+        }),
     }
 }
 
@@ -63,7 +71,7 @@ fn position(
     components: &[Component],
     name: &VariableName,
     causality: Causality,
-) -> Result<(usize, usize), String> {
+) -> Result<(usize, usize), Misfit> {
     let component = component_index(components, &name.component)?;
     let variable = find(&components[component].fmu, &name.variable, causality)?;
     Ok((component, variable))

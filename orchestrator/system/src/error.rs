@@ -6,6 +6,15 @@ use thiserror::Error;
 
 use fmi_import::FmuError;
 
+use super::connection::ConnectionError;
+use super::fitted::FitError;
+use super::given::SettingError;
+use super::link::LinkError;
+use super::lookup::NameError;
+use super::table::TableError;
+use super::terminals::TerminalError;
+use super::value::ValueError;
+
 /// Why a system cannot be run. Every message names the file (or built-in system) and the place.
 #[derive(Debug, Error)]
 pub enum SystemError {
@@ -33,7 +42,7 @@ pub enum SystemError {
         /// The place: a connection, a component, a parameter.
         place: String,
         /// What is wrong and what was expected.
-        reason: String,
+        reason: Box<Misfit>,
     },
     /// No built-in system, rig part or file of that name.
     #[error("{what} `{name}` is unknown{hint}")]
@@ -69,5 +78,71 @@ pub enum SystemError {
         component: String,
         /// What was looked for where.
         reason: String,
+    },
+}
+
+/// What does not hold at a place of a system.
+#[derive(Debug, Error)]
+pub enum Misfit {
+    /// A connection that cannot be read.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// A component or variable that is not there, or is of another causality.
+    #[error(transparent)]
+    Name(#[from] NameError),
+    /// A value that does not fit its variable.
+    #[error(transparent)]
+    Value(#[from] ValueError),
+    /// A setting that cannot be carried out.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A connection whose ends do not fit.
+    #[error(transparent)]
+    Connection(#[from] ConnectionError),
+    /// Terminals that do not fit.
+    #[error(transparent)]
+    Terminal(#[from] TerminalError),
+    /// An input table that cannot be read.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// An FMU that cannot be used as the system asks.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// An FMU whose arrays cannot have the sizes that the system gives.
+    #[error(transparent)]
+    Fmu(#[from] FmuError),
+    /// What the library, or whoever uses the system, found.
+    #[error(transparent)]
+    Outside(#[from] Box<dyn std::error::Error + Send + Sync>),
+    /// A system without components.
+    #[error("there is none")]
+    NoComponent,
+    /// A component whose name means something else.
+    #[error(
+        "this name is not allowed for a component (`reference` is the motion, and `.` separates component and \
+         variable)"
+    )]
+    ComponentName,
+    /// A table whose name means something else.
+    #[error("this name belongs to the motion or a component, or has a `.`")]
+    TableName,
+    /// An input with two sources.
+    #[error("`{input}` is already driven by `{source_before}`")]
+    DrivenTwice {
+        /// The input.
+        input: String,
+        /// What the first connection takes its value from.
+        source_before: String,
+    },
+    /// A further name of an output that is taken.
+    #[error("`{0}` is a variable of it")]
+    AliasTaken(String),
+    /// A variable of another type than the experiment needs.
+    #[error("`{name}` is not {expected}")]
+    Type {
+        /// The variable, with its component.
+        name: String,
+        /// The type.
+        expected: &'static str,
     },
 }

@@ -25,13 +25,14 @@
 //! ```
 
 use std::collections::BTreeMap;
+use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::error::SystemError;
+use super::error::{Misfit, SystemError};
 use super::library::Archive;
 use super::link::{self, Link, Origin, VariableName};
 use super::passage::{Hop, Transformation, Way};
@@ -371,8 +372,12 @@ impl SystemFile {
 
     /// An error at a place in this file.
     #[must_use]
-    pub fn at_fault(&self, place: &str, reason: String) -> SystemError {
-        self.fault(place, reason)
+    pub fn at_fault(
+        &self,
+        place: &str,
+        reason: impl Into<Box<dyn Error + Send + Sync>>,
+    ) -> SystemError {
+        self.fault(place, reason.into())
     }
 
     /// Adds a component, in place of one of the same name.
@@ -407,7 +412,7 @@ impl SystemFile {
             let links = links.map_err(|reason| SystemError::Place {
                 origin: origin.to_string(),
                 place: format!("connection `{connection}` (line {line})"),
-                reason,
+                reason: Box::new(reason.into()),
             })?;
             connections.extend(links.into_iter().map(|link| Link {
                 way: way.clone(),
@@ -497,11 +502,11 @@ impl SystemFile {
     }
 
     /// What does not hold at a place in this file.
-    pub(super) fn fault(&self, place: &str, reason: String) -> SystemError {
+    pub(super) fn fault(&self, place: &str, reason: impl Into<Misfit>) -> SystemError {
         SystemError::Place {
             origin: self.origin.clone(),
             place: place.to_string(),
-            reason,
+            reason: Box::new(reason.into()),
         }
     }
 

@@ -2,11 +2,41 @@
 
 use std::sync::Arc;
 
+use super::error::Misfit;
 use super::file::{ComponentFile, Stepping};
 use super::given::as_toml;
 use super::value::{self, Value};
-use fmi_import::{BaseUnit, Fmu, Interface, Kind};
+use fmi_import::{BaseUnit, Fmu, FmuError, Interface, Kind};
 use units::{Unit, hint};
+
+/// Why an FMU cannot be used as the file or the command line asks.
+#[derive(Debug, thiserror::Error)]
+pub enum FitError {
+    /// An interface of no name.
+    #[error("`{0}`: expected `co-simulation` or `model-exchange`")]
+    Interface(String),
+    /// A tolerance that is not a number.
+    #[error("`{0}`: expected a number between 1e-12 and 0.01")]
+    NotANumber(String),
+    /// A tolerance that is too small or too large.
+    #[error("{0}: expected a number between 1e-12 and 0.01")]
+    Tolerance(f64),
+    /// An interface that the FMU does not offer.
+    #[error("it offers model exchange only; remove this line")]
+    ModelExchangeOnly,
+    /// It does not become what is asked.
+    #[error(transparent)]
+    Fmu(#[from] FmuError),
+    /// A unit for a variable that is not there.
+    #[error("no such variable{hint}")]
+    NoVariable {
+        /// The nearest name.
+        hint: String,
+    },
+    /// A unit for a variable that is not a real number.
+    #[error("a {0} has no unit")]
+    NoUnit(&'static str),
+}
 
 /// The FMU with arrays as large as the structural parameters say that the file or the command line
 /// gives.
@@ -15,7 +45,7 @@ pub(super) fn resized(
     name: &str,
     part: &ComponentFile,
     settings: &[String],
-) -> Result<Arc<Fmu>, String> {
+) -> Result<Arc<Fmu>, Misfit> {
     let description = &fmu.description;
     let structural = |variable: &str| {
         let position = description.position(variable)?;
@@ -59,7 +89,7 @@ pub(super) fn resized(
     if sizes.is_empty() {
         return Ok(fmu);
     }
-    fmu.resized(&sizes).map_err(|error| error.to_string())
+    Ok(fmu.resized(&sizes)?)
 }
 
 /// Names that `--set component.NAME=VALUE` gives to how a component is stepped, unless they are variables
@@ -78,7 +108,7 @@ pub(super) fn stepped(
     name: &str,
     part: &ComponentFile,
     settings: &[String],
-) -> Result<Arc<Fmu>, (&'static str, String)> {
+) -> Result<Arc<Fmu>, (&'static str, FitError)> {
     let set = |key: &str| {
         let found = settings.iter().rev().find_map(|setting| {
             let (variable, text) = setting.split_once('=')?;
@@ -91,14 +121,14 @@ pub(super) fn stepped(
         Some("model-exchange") => Some(Stepping::ModelExchange),
         Some("co-simulation") => Some(Stepping::CoSimulation),
         Some(other) => {
-            let reason = format!("`{other}`: expected `co-simulation` or `model-exchange`");
+            let reason = FitError::Interface(other.to_string());
             return Err(("interface", reason));
         }
         None => part.interface,
     };
     let tolerance = match set("tolerance") {
         Some(text) => Some(text.parse().map_err(|_| {
-            let reason = format!("`{text}`: expected a number between 1e-12 and 0.01");
+            let reason = FitError::NotANumber(text.clone());
             ("tolerance", reason)
         })?),
         None => part.tolerance,
@@ -106,17 +136,15 @@ pub(super) fn stepped(
     if let Some(tolerance) = tolerance
         && !(1e-12..=1e-2).contains(&tolerance)
     {
-        let reason = format!("{tolerance}: expected a number between 1e-12 and 0.01");
-        return Err(("tolerance", reason));
+        return Err(("tolerance", FitError::Tolerance(tolerance)));
     }
     let offered = fmu.description.interface;
     let fmu = match interface {
         Some(Stepping::ModelExchange) => fmu
             .for_model_exchange()
-            .map_err(|error| ("interface", error.to_string()))?,
+            .map_err(|error| ("interface", error.into()))?,
         Some(Stepping::CoSimulation) if offered == Interface::ModelExchange => {
-            let reason = "it offers model exchange only; remove this line".to_string();
-            return Err(("interface", reason));
+            return Err(("interface", FitError::ModelExchangeOnly));
         }
         _ => fmu,
     };
@@ -132,13 +160,13 @@ pub(super) fn stepped(
 pub(super) fn with_units(
     fmu: Arc<Fmu>,
     part: &ComponentFile,
-) -> Result<Arc<Fmu>, (String, String)> {
+) -> Result<Arc<Fmu>, (String, FitError)> {
     if part.units.is_empty() {
         return Ok(fmu);
     }
     let mut changed = Fmu::clone(&fmu);
     for (variable, unit) in &part.units {
-        let fault = |reason: String| (variable.clone(), reason);
+        let fault = |reason: FitError| (variable.clone(), reason);
         let found = fmu
             .description
             .array(variable)
@@ -146,7 +174,9 @@ pub(super) fn with_units(
         let found = found.ok_or_else(|| {
             let known = fmu.description.variables.iter();
             let known = known.map(|variable| variable.name.as_str());
-            fault(format!("no such variable{}", hint(variable, known)))
+            fault(FitError::NoVariable {
+                hint: hint(variable, known),
+            })
         })?;
         // A unit that only FMUs know is taken by its name.
         let parsed = Unit::parse(unit).ok().and_then(|unit| unit.base_unit());
@@ -161,8 +191,7 @@ pub(super) fn with_units(
         for position in found {
             let variable = &mut changed.description.variables[position];
             if !matches!(variable.kind, Kind::Float64 | Kind::Float32) {
-                let kind = variable.kind.name();
-                return Err(fault(format!("a {kind} has no unit")));
+                return Err(fault(FitError::NoUnit(variable.kind.name())));
             }
             variable.unit = Some(unit.clone());
             variable.base_unit = base;

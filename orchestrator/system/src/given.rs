@@ -3,10 +3,38 @@
 use std::ops::Range;
 
 use super::checked::Component;
+use super::error::Misfit;
 use super::library::Library;
 use super::lookup::{component_index, find_settable};
-use super::value::{self, Setting, Value};
+use super::value::{self, Setting, Value, ValueError};
 use fmi_import::{Causality, Fmu, Kind, Variable};
+
+/// Why a setting of the command line is not carried out.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SettingError {
+    /// Not a variable and a value.
+    #[error("expected component.variable=VALUE, such as control.valve_limit=\"5 V\"")]
+    Form,
+    /// An array without elements.
+    #[error("`{0}` has no elements")]
+    Empty(String),
+    /// A number without a unit for a variable that has one.
+    #[error(
+        "`{text}` has no unit, and `{name}` is in {unit}; expected a number with its unit, such as \
+         {name}=\"{text} {unit}\"{}",
+        shown.as_ref().map_or(String::new(), |own| format!(" or \"{text} {own}\""))
+    )]
+    NoUnit {
+        /// What was written.
+        text: String,
+        /// The variable.
+        name: String,
+        /// Its unit.
+        unit: String,
+        /// The unit in which it is shown, where that is another one.
+        shown: Option<String>,
+    },
+}
 
 pub(super) fn put(values: &mut Vec<(usize, Value)>, position: usize, value: Value) {
     match values.iter_mut().find(|(known, _)| *known == position) {
@@ -21,9 +49,8 @@ pub(super) fn set(
     components: &mut [Component],
     setting: &str,
     library: &mut dyn Library,
-) -> Result<(), String> {
-    let expected = "expected component.variable=VALUE, such as control.valve_limit=\"5 V\"";
-    let (name, text) = setting.split_once('=').ok_or(expected)?;
+) -> Result<(), Misfit> {
+    let (name, text) = setting.split_once('=').ok_or(SettingError::Form)?;
     let name = name.trim();
     // Components of archives have points in their names: the longest name that fits counts.
     let fitting = components.iter().filter_map(|part| {
@@ -35,7 +62,7 @@ pub(super) fn set(
     let (component, variable) = match longest {
         Some(found) => found,
         None => {
-            let (component, variable) = name.split_once('.').ok_or(expected)?;
+            let (component, variable) = name.split_once('.').ok_or(SettingError::Form)?;
             (component.to_string(), variable)
         }
     };
@@ -61,7 +88,7 @@ pub(super) fn set(
         &mut part.parameters
     };
     let Some(first) = first else {
-        return Err(format!("`{variable}` has no elements"));
+        return Err(SettingError::Empty(variable.to_string()).into());
     };
     ask_for_unit(first, variable, text.trim())?;
     let written = as_toml(first, text.trim());
@@ -86,7 +113,7 @@ pub(super) fn as_toml(variable: &Variable, text: &str) -> Setting {
 
 /// A number alone for a variable with a unit is refused: on a command line nobody sees which unit
 /// is meant, and the file's is rarely the laboratory's. Zero is zero in every unit.
-fn ask_for_unit(variable: &Variable, name: &str, text: &str) -> Result<(), String> {
+fn ask_for_unit(variable: &Variable, name: &str, text: &str) -> Result<(), SettingError> {
     let is_float = matches!(variable.kind, Kind::Float64 | Kind::Float32);
     let unit = variable.unit.as_deref().unwrap_or_default();
     let has_dimension = matches!(
@@ -97,11 +124,12 @@ fn ask_for_unit(variable: &Variable, name: &str, text: &str) -> Result<(), Strin
         Ok(number) if is_float && has_dimension && number != 0.0 => {
             let shown = variable.display_unit.as_deref();
             let shown = shown.filter(|own| *own != unit);
-            let or = shown.map_or(String::new(), |own| format!(" or \"{text} {own}\""));
-            Err(format!(
-                "`{text}` has no unit, and `{name}` is in {unit}; expected a number with its unit, \
-                 such as {name}=\"{text} {unit}\"{or}"
-            ))
+            Err(SettingError::NoUnit {
+                text: text.to_string(),
+                name: name.to_string(),
+                unit: unit.to_string(),
+                shown: shown.map(str::to_string),
+            })
         }
         _ => Ok(()),
     }
@@ -114,7 +142,7 @@ pub(super) fn values(
     name: &str,
     positions: Range<usize>,
     written: &Setting,
-) -> Result<Vec<(usize, Value)>, String> {
+) -> Result<Vec<(usize, Value)>, ValueError> {
     let variables = &fmu.description.variables;
     if fmu.description.array(name).is_none() {
         let position = positions.start;
@@ -138,10 +166,10 @@ pub(super) fn values(
         _ => None,
     };
     if one.is_none() && list.len() != count {
-        return Err(format!(
-            "{} values for an array of {count} elements",
-            list.len()
-        ));
+        return Err(ValueError::Count {
+            given: list.len(),
+            elements: count,
+        });
     }
     positions
         .enumerate()

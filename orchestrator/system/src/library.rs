@@ -29,9 +29,9 @@ pub trait Library {
         set: &str,
         component: &Description,
         directory: Option<&Path>,
-    ) -> Result<Vec<(usize, Value)>, String> {
+    ) -> Result<Vec<(usize, Value)>, Box<dyn Error + Send + Sync>> {
         let _ = (component, directory);
-        Err(format!("`{set}`: no set of parameters is known here"))
+        Err(format!("`{set}`: no set of parameters is known here").into())
     }
 }
 

@@ -141,21 +141,51 @@ impl VariableName {
     }
 }
 
-impl FromStr for VariableName {
-    type Err = String;
+/// Why a text is not a connection, or an end of one.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LinkError {
+    /// An end without a component.
+    #[error("`{0}` should read component.variable")]
+    Name(String),
+    /// A quantity that the reference does not have.
+    #[error("the reference has no `{name}`{hint} (or `displacement[3]`, three samples ahead)")]
+    Reference {
+        /// What was looked for.
+        name: String,
+        /// The nearest name.
+        hint: String,
+    },
+    /// No arrow between two ends.
+    #[error("expected \"component.output -> component.input\"")]
+    Arrow,
+    /// Ranges of two lengths.
+    #[error("{left} values on the left and {right} on the right")]
+    Counts {
+        /// Values on the left.
+        left: usize,
+        /// Values on the right.
+        right: usize,
+    },
+    /// A range that cannot be read.
+    #[error("`{0}` has no range such as [1..15]")]
+    Range(String),
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for VariableName {
+    type Err = LinkError;
+
+    fn from_str(text: &str) -> Result<Self, LinkError> {
         let (component, variable) = text
             .split_once('.')
-            .ok_or_else(|| format!("`{text}` should read component.variable"))?;
+            .ok_or_else(|| LinkError::Name(text.to_string()))?;
         Ok(Self::new(component, variable))
     }
 }
 
 impl TryFrom<String> for VariableName {
-    type Error = String;
+    type Error = LinkError;
 
-    fn try_from(text: String) -> Result<Self, String> {
+    fn try_from(text: String) -> Result<Self, LinkError> {
         text.parse()
     }
 }
@@ -179,20 +209,19 @@ impl Origin {
 }
 
 impl FromStr for Origin {
-    type Err = String;
+    type Err = LinkError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, LinkError> {
         let name: VariableName = text.parse()?;
         if name.component != "reference" {
             return Ok(Self::Output(name));
         }
         reference(&name.variable).ok_or_else(|| {
             let known = Quantity::ALL.into_iter().map(Quantity::name);
-            format!(
-                "the reference has no `{0}`{1} (or `displacement[3]`, three samples ahead)",
-                name.variable,
-                hint(&name.variable, known)
-            )
+            LinkError::Reference {
+                hint: hint(&name.variable, known),
+                name: name.variable,
+            }
         })
     }
 }
@@ -222,9 +251,9 @@ impl From<Link> for String {
 }
 
 impl TryFrom<String> for Link {
-    type Error = String;
+    type Error = LinkError;
 
-    fn try_from(text: String) -> Result<Self, String> {
+    fn try_from(text: String) -> Result<Self, LinkError> {
         let (from, to) = ends(&text)?;
         Ok(Self {
             from: from.parse()?,
@@ -246,10 +275,8 @@ impl Link {
 }
 
 /// Both sides of a connection.
-fn ends(text: &str) -> Result<(&str, &str), String> {
-    let (from, to) = text
-        .split_once("->")
-        .ok_or("expected \"component.output -> component.input\"")?;
+fn ends(text: &str) -> Result<(&str, &str), LinkError> {
+    let (from, to) = text.split_once("->").ok_or(LinkError::Arrow)?;
     Ok((from.trim(), to.trim()))
 }
 
@@ -257,15 +284,12 @@ fn ends(text: &str) -> Result<(&str, &str), String> {
 ///
 /// # Errors
 /// What was expected.
-pub(super) fn parse(text: &str, line: usize) -> Result<Vec<Link>, String> {
+pub(super) fn parse(text: &str, line: usize) -> Result<Vec<Link>, LinkError> {
     let (from, to) = ends(text)?;
     let (from, to) = (expand(from)?, expand(to)?);
     if from.len() != to.len() {
-        return Err(format!(
-            "{} values on the left and {} on the right",
-            from.len(),
-            to.len()
-        ));
+        let (left, right) = (from.len(), to.len());
+        return Err(LinkError::Counts { left, right });
     }
     let link = |(from, to): (String, String)| {
         Ok(Link {
@@ -278,7 +302,7 @@ pub(super) fn parse(text: &str, line: usize) -> Result<Vec<Link>, String> {
     from.into_iter().zip(to).map(link).collect()
 }
 
-fn expand(end: &str) -> Result<Vec<String>, String> {
+fn expand(end: &str) -> Result<Vec<String>, LinkError> {
     let range = end
         .strip_suffix(']')
         .and_then(|rest| rest.rsplit_once('['))
@@ -291,7 +315,7 @@ fn expand(end: &str) -> Result<Vec<String>, String> {
         (Some(first), Some(last)) if first <= last => Ok((first..=last)
             .map(|index| format!("{name}[{index}]"))
             .collect()),
-        _ => Err(format!("`{end}` has no range such as [1..15]")),
+        _ => Err(LinkError::Range(end.to_string())),
     }
 }
 
@@ -330,6 +354,9 @@ mod tests {
         assert_eq!((quantity, ahead), (Quantity::Acceleration.second(), 3));
         assert!(quantity.is_second() && !Quantity::Acceleration.is_second());
         let refused = "reference.displacement_z".parse::<Origin>().unwrap_err();
-        assert!(refused.contains("no `displacement_z`"), "{refused}");
+        assert!(
+            matches!(&refused, LinkError::Reference { name, .. } if name == "displacement_z"),
+            "{refused}"
+        );
     }
 }

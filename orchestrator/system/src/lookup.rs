@@ -6,17 +6,59 @@ use super::checked::Component;
 use fmi_import::{Causality, Fmu};
 use units::hint;
 
+/// Why a name of a system leads to no component or variable.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NameError {
+    /// No such component.
+    #[error("there is no component `{name}`{hint}")]
+    Component {
+        /// What was looked for.
+        name: String,
+        /// The nearest name.
+        hint: String,
+    },
+    /// No such variable of that causality.
+    #[error("{model} ({file}) has no {expected} `{name}`{hint}")]
+    Variable {
+        /// The model.
+        model: String,
+        /// The FMU's file.
+        file: String,
+        /// The causality.
+        expected: &'static str,
+        /// What was looked for.
+        name: String,
+        /// The nearest name.
+        hint: String,
+    },
+    /// A variable of another causality.
+    #[error("`{name}` is {found}, expected {expected}{}", if *is_computed { ": its FMU computes it" } else { "" })]
+    Causality {
+        /// The variable.
+        name: String,
+        /// Its causality, with an article.
+        found: String,
+        /// The causality that is needed.
+        expected: &'static str,
+        /// Whether a value was to be set that the FMU computes.
+        is_computed: bool,
+    },
+}
+
 /// The position of a component.
 ///
 /// # Errors
 /// No such name (with the nearest one).
-pub(super) fn component_index(components: &[Component], name: &str) -> Result<usize, String> {
+pub(super) fn component_index(components: &[Component], name: &str) -> Result<usize, NameError> {
     components
         .iter()
         .position(|part| part.name == name)
         .ok_or_else(|| {
             let known = components.iter().map(|part| part.name.as_str());
-            format!("there is no component `{name}`{}", hint(name, known))
+            NameError::Component {
+                name: name.to_string(),
+                hint: hint(name, known),
+            }
         })
 }
 
@@ -24,23 +66,28 @@ pub(super) fn component_index(components: &[Component], name: &str) -> Result<us
 ///
 /// # Errors
 /// Another causality, or no such name (with the nearest one).
-pub(super) fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, String> {
+pub(super) fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize, NameError> {
     let description = &fmu.description;
-    let word = words(causality);
     let Some(position) = description.position(name) else {
         let known = description
             .of(causality)
             .map(|index| description.variables[index].name.as_str());
-        return Err(format!(
-            "{} ({}) has no {word} `{name}`{}",
-            description.model_name,
-            fmu.file_name(),
-            hint(name, known)
-        ));
+        return Err(NameError::Variable {
+            model: description.model_name.clone(),
+            file: fmu.file_name(),
+            expected: words(causality),
+            name: name.to_string(),
+            hint: hint(name, known),
+        });
     };
     let found = description.variables[position].causality;
     if found != causality {
-        return Err(format!("`{name}` is {}, expected {word}", article(found)));
+        return Err(NameError::Causality {
+            name: name.to_string(),
+            found: article(found),
+            expected: words(causality),
+            is_computed: false,
+        });
     }
     Ok(position)
 }
@@ -49,7 +96,7 @@ pub(super) fn find(fmu: &Fmu, name: &str, causality: Causality) -> Result<usize,
 ///
 /// # Errors
 /// A variable that the FMU computes, or no such name (with the nearest one).
-pub(super) fn find_settable(fmu: &Fmu, name: &str) -> Result<Range<usize>, String> {
+pub(super) fn find_settable(fmu: &Fmu, name: &str) -> Result<Range<usize>, NameError> {
     let description = &fmu.description;
     let found = description
         .array(name)
@@ -61,13 +108,23 @@ pub(super) fn find_settable(fmu: &Fmu, name: &str) -> Result<Range<usize>, Strin
             if first.is_none_or(|variable| variable.is_settable) {
                 return Ok(found);
             }
-            find(
-                fmu,
-                &description.variables[found.start].name,
-                Causality::Parameter,
-            )
-            .map(|_| found)
-            .map_err(|reason| format!("{reason}: its FMU computes it"))
+            let name = &description.variables[found.start].name;
+            find(fmu, name, Causality::Parameter)
+                .map(|_| found)
+                .map_err(|error| match error {
+                    NameError::Causality {
+                        name,
+                        found,
+                        expected,
+                        ..
+                    } => NameError::Causality {
+                        name,
+                        found,
+                        expected,
+                        is_computed: true,
+                    },
+                    other => other,
+                })
         }
     }
 }

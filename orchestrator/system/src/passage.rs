@@ -2,7 +2,7 @@
 //! transformations that a file gives.
 
 use fmi_import::{BaseUnit, Kind, Linear};
-use units::Unit;
+use units::{Unit, UnitError};
 
 /// A unit that a file names, and what it is in SI where the file says so.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,12 +116,62 @@ pub struct End<'a> {
     pub base: Option<BaseUnit>,
 }
 
+/// Why no value can pass between two ends.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum WayError {
+    /// A unit that cannot be read, or two of different quantities.
+    #[error(transparent)]
+    Unit(#[from] UnitError),
+    /// One unit's name for two units.
+    #[error("both are in `{name}`, but that is {from} in one FMU and {to} in the other")]
+    TwoMeanings {
+        /// The unit.
+        name: String,
+        /// In SI, where the way begins.
+        from: String,
+        /// In SI, where it ends.
+        to: String,
+    },
+    /// Units of different quantities.
+    #[error("`{from}` is {from_si} and `{to}` is {to_si}")]
+    Quantities {
+        /// Where the way begins.
+        from: String,
+        /// The same in SI.
+        from_si: String,
+        /// Where it ends.
+        to: String,
+        /// The same in SI.
+        to_si: String,
+    },
+    /// A map and a factor on one way.
+    #[error("values are both mapped and scaled; expected one of the two")]
+    MappedAndScaled,
+    /// A linear transformation of something else.
+    #[error("a linear transformation is for real numbers, and this is a {0}")]
+    NotReal(&'static str),
+    /// An endless transformation.
+    #[error("factor {factor} and offset {offset} are not finite")]
+    NotFinite {
+        /// The factor.
+        factor: f64,
+        /// The offset.
+        offset: f64,
+    },
+    /// Names for something without choices.
+    #[error("names are mapped, and this is a {0}")]
+    NoChoices(&'static str),
+    /// A name that is not among the choices.
+    #[error("`{0}` is not a choice")]
+    NotAChoice(String),
+}
+
 impl Way {
     /// What comes of a value between two ends.
     ///
     /// # Errors
     /// Units that do not fit, transformations that do not fit the types.
-    pub(super) fn between(&self, from: End, to: End) -> Result<Passage, String> {
+    pub(super) fn between(&self, from: End, to: End) -> Result<Passage, WayError> {
         let mut passage = Passage {
             factor: 1.0,
             offset: 0.0,
@@ -152,7 +202,7 @@ impl Way {
             passage.transform(&hop.transformation, from.kind, to.kind)?;
         }
         if !passage.map.is_empty() && (passage.factor != 1.0 || passage.offset != 0.0) {
-            return Err("values are both mapped and scaled; expected one of the two".to_string());
+            return Err(WayError::MappedAndScaled);
         }
         Ok(passage)
     }
@@ -186,40 +236,35 @@ impl Passage {
         transformation: &Transformation,
         from: &Kind,
         to: &Kind,
-    ) -> Result<(), String> {
+    ) -> Result<(), WayError> {
         let map = match transformation {
             Transformation::None => return Ok(()),
             Transformation::Linear { factor, offset } => {
                 let is_float = |kind: &Kind| matches!(kind, Kind::Float64 | Kind::Float32);
                 if !is_float(to) {
-                    let name = to.name();
-                    return Err(format!(
-                        "a linear transformation is for real numbers, and this is a {name}"
-                    ));
+                    return Err(WayError::NotReal(to.name()));
                 }
+                let (factor, offset) = (*factor, *offset);
                 if !(factor.is_finite() && offset.is_finite()) {
-                    return Err(format!(
-                        "factor {factor} and offset {offset} are not finite"
-                    ));
+                    return Err(WayError::NotFinite { factor, offset });
                 }
-                self.then(*factor, *offset);
+                self.then(factor, offset);
                 return Ok(());
             }
             Transformation::Numbers(map) => map.clone(),
             Transformation::Names(names) => {
-                let value = |kind: &Kind, name: &String| -> Result<f64, String> {
+                let value = |kind: &Kind, name: &String| {
                     let Kind::Enumeration(items) = kind else {
-                        let kind = kind.name();
-                        return Err(format!("names are mapped, and this is a {kind}"));
+                        return Err(WayError::NoChoices(kind.name()));
                     };
                     let item = items.iter().find(|item| item.name == *name);
                     item.map(|item| item.value as f64)
-                        .ok_or_else(|| format!("`{name}` is not a choice"))
+                        .ok_or_else(|| WayError::NotAChoice(name.clone()))
                 };
                 let pairs = names.iter();
                 pairs
                     .map(|(source, target)| Ok((value(from, source)?, value(to, target)?)))
-                    .collect::<Result<Vec<_>, String>>()?
+                    .collect::<Result<Vec<_>, WayError>>()?
             }
         };
         self.map = if self.map.is_empty() {
@@ -255,7 +300,7 @@ fn declared<'a>(unit: Option<&'a DeclaredUnit>, own: NamedUnit<'a>) -> NamedUnit
 ///
 /// # Errors
 /// Units of different quantities, or the same name for two.
-pub(super) fn conversion(from: NamedUnit, to: NamedUnit) -> Result<(f64, f64), String> {
+pub(super) fn conversion(from: NamedUnit, to: NamedUnit) -> Result<(f64, f64), WayError> {
     let ((Some(name), base), (Some(target), target_base)) = (from, to) else {
         return Ok((1.0, 0.0));
     };
@@ -263,28 +308,26 @@ pub(super) fn conversion(from: NamedUnit, to: NamedUnit) -> Result<(f64, f64), S
         if name == target {
             return Ok((1.0, 0.0));
         }
-        let unit = |text: &str| Unit::parse(text).map_err(|error| error.to_string());
-        let factor = unit(name)?.factor_to(&unit(target)?);
-        return factor
-            .map(|factor| (factor, 0.0))
-            .map_err(|error| error.to_string());
+        let factor = Unit::parse(name)?.factor_to(&Unit::parse(target)?)?;
+        return Ok((factor, 0.0));
     };
     if base == target_base {
         return Ok((1.0, 0.0));
     }
     if name == target {
-        return Err(format!(
-            "both are in `{name}`, but that is {} in one FMU and {} in the other",
-            in_si(&base),
-            in_si(&target_base)
-        ));
+        return Err(WayError::TwoMeanings {
+            name: name.to_string(),
+            from: in_si(&base),
+            to: in_si(&target_base),
+        });
     }
     if base.exponents != target_base.exponents {
-        return Err(format!(
-            "`{name}` is {} and `{target}` is {}",
-            in_si(&base),
-            in_si(&target_base)
-        ));
+        return Err(WayError::Quantities {
+            from: name.to_string(),
+            from_si: in_si(&base),
+            to: target.to_string(),
+            to_si: in_si(&target_base),
+        });
     }
     // Written units that our own grammar knows keep its factors, which are exact.
     let known = || Some((Unit::parse(name).ok()?, Unit::parse(target).ok()?));
@@ -394,11 +437,13 @@ mod tests {
             unit("degC", KELVIN, 1.0, 273.15),
         );
         let said = Way::default().between(inch, celsius).unwrap_err();
+        let said = said.to_string();
         for part in ["`in`", "0.0254 m", "`degC`", "1 K + 273.15"] {
             assert!(said.contains(part), "{said} lacks {part}");
         }
         let other = unit("in", METRE, 0.03, 0.0);
         let said = Way::default().between(inch, other).unwrap_err();
+        let said = said.to_string();
         assert!(
             said.contains("0.0254 m") && said.contains("0.03 m"),
             "{said}"
@@ -425,6 +470,17 @@ mod tests {
         };
         let passage = declared.between(alone("m"), alone("m")).unwrap();
         assert!((passage.of(1.0) - 25.4).abs() < 1e-12);
+        // A declared unit without a definition is the FMU's, where the FMU has one of that name.
+        let odd_inch = unit("in", METRE, 0.03, 0.0);
+        let declared = Way {
+            start: Some(DeclaredUnit {
+                name: "in".into(),
+                base: None,
+            }),
+            hops: Vec::new(),
+        };
+        let passage = declared.between(odd_inch, unit("mm", METRE, 0.001, 0.0));
+        assert!((passage.unwrap().of(1.0) - 30.0).abs() < 1e-12);
         let suppressed = Hop {
             suppresses_units: true,
             ..Hop::default()
@@ -446,7 +502,7 @@ mod tests {
             base: None,
         };
         let said = way(vec![linear(2.0, 0.0)]).between(whole, whole);
-        assert!(said.unwrap_err().contains("Int32"));
+        assert_eq!(said, Err(WayError::NotReal("Int32")));
         let endless = way(vec![linear(f64::INFINITY, 0.0)]);
         assert!(endless.between(alone("m"), alone("m")).is_err());
     }
@@ -501,13 +557,10 @@ mod tests {
             }])
         };
         assert_eq!(names("grün").between(from, to).unwrap().of(1.0), 9.0);
-        assert!(
-            names("blau")
-                .between(from, to)
-                .unwrap_err()
-                .contains("`blau`")
-        );
-        assert!(names("grün").between(plain, to).is_err());
+        let unknown = names("blau").between(from, to);
+        assert_eq!(unknown, Err(WayError::NotAChoice("blau".into())));
+        let plain_number = names("grün").between(plain, to);
+        assert_eq!(plain_number, Err(WayError::NoChoices("Float64")));
         // Mapped and scaled at once is refused.
         let both = way(vec![numbers(&[(1.0, 2.0)]), linear(3.0, 0.0)]);
         assert!(both.between(plain, plain).is_err());

@@ -8,6 +8,105 @@ use super::checked::Component;
 use super::link::{Link, Origin, VariableName};
 use super::passage::{Hop, Transformation, Way};
 
+/// Why two terminals are not connected.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TerminalError {
+    /// A member without a variable.
+    #[error(
+        "the member `{member}` of the terminal `{terminal}` is the variable `{variable}`, which the FMU does \
+         not have"
+    )]
+    NoVariable {
+        /// The member.
+        member: String,
+        /// The terminal, with its component.
+        terminal: String,
+        /// The variable.
+        variable: String,
+    },
+    /// A terminal and something else.
+    #[error("`{terminal}` is a terminal and `{mate}` is not{hint}")]
+    NotATerminal {
+        /// The terminal, with its component.
+        terminal: String,
+        /// The other end.
+        mate: VariableName,
+        /// The nearest terminal.
+        hint: String,
+    },
+    /// A transformation on the way between terminals.
+    #[error("terminals are connected as they are; connect their variables")]
+    Transformed,
+    /// Terminals of two kinds.
+    #[error("the terminal `{first}` is of the kind `{kind}`, and `{second}` of the kind `{other}`")]
+    Kinds {
+        /// The one.
+        first: String,
+        /// Its kind.
+        kind: String,
+        /// The other.
+        second: String,
+        /// Its kind.
+        other: String,
+    },
+    /// Terminals that differ, or have something that cannot be connected.
+    #[error("the terminals `{first}` and `{second}` have {what}")]
+    Differ {
+        /// The one.
+        first: String,
+        /// The other.
+        second: String,
+        /// What does not fit.
+        what: &'static str,
+    },
+    /// A plug that lacks a member.
+    #[error(
+        "the terminal `{terminal}` has no member `{member}`; plugs fit where both have the same members"
+    )]
+    NoMember {
+        /// The terminal that lacks it.
+        terminal: String,
+        /// The member of the other one.
+        member: String,
+    },
+    /// Sequences of two lengths.
+    #[error("the terminal `{first}` has {members} members and `{second}` has {others}")]
+    Counts {
+        /// The one.
+        first: String,
+        /// How many it has.
+        members: usize,
+        /// The other.
+        second: String,
+        /// How many that has.
+        others: usize,
+    },
+    /// A rule of somebody else.
+    #[error(
+        "the matching rule `{rule}` of the terminal `{terminal}` is not one of `plug`, `bus` and `sequence`; \
+         connect the variables one by one"
+    )]
+    Rule {
+        /// The rule.
+        rule: String,
+        /// The terminal.
+        terminal: String,
+    },
+    /// Two inputs, two outputs, or something else.
+    #[error(
+        "the member `{member}` is not an output of one of the terminals `{first}` and `{second}` and an input \
+         of the other"
+    )]
+    Direction {
+        /// The member.
+        member: String,
+        /// The one.
+        first: String,
+        /// The other.
+        second: String,
+    },
+}
+
 /// One side: the component's name, its description, and the terminal.
 struct Side<'a> {
     component: &'a str,
@@ -34,19 +133,16 @@ impl<'a> Side<'a> {
         format!("{}.{}", self.component, self.terminal.name)
     }
 
-    fn causality(&self, member: &Member) -> Result<Causality, String> {
+    fn causality(&self, member: &Member) -> Result<Causality, TerminalError> {
         let array = self.description.array(&member.variable);
         let position = self.description.position(&member.variable);
         let position = position.or(array.map(|elements| elements.start));
         position
             .map(|at| self.description.variables[at].causality)
-            .ok_or_else(|| {
-                format!(
-                    "the member `{}` of the terminal `{}` is the variable `{}`, which the FMU does not have",
-                    member.name,
-                    self.shown(),
-                    member.variable
-                )
+            .ok_or_else(|| TerminalError::NoVariable {
+                member: member.name.clone(),
+                terminal: self.shown(),
+                variable: member.variable.clone(),
             })
     }
 }
@@ -55,7 +151,7 @@ impl<'a> Side<'a> {
 ///
 /// # Errors
 /// A terminal connected to a variable, or two that do not fit, with what differs.
-pub(super) fn members(components: &[Component], link: &Link) -> Result<Vec<Link>, String> {
+pub(super) fn members(components: &[Component], link: &Link) -> Result<Vec<Link>, TerminalError> {
     let Origin::Output(from) = &link.from else {
         return Ok(vec![link.clone()]);
     };
@@ -72,14 +168,15 @@ pub(super) fn members(components: &[Component], link: &Link) -> Result<Vec<Link>
             let known = part.map(|part| part.fmu.description.terminals.iter());
             let known = known.into_iter().flatten();
             let known = known.map(|terminal| terminal.name.as_str());
-            return Err(format!(
-                "`{name}` is a terminal and `{mate}` is not{}",
-                hint(&mate.variable, known)
-            ));
+            return Err(TerminalError::NotATerminal {
+                terminal: name,
+                mate: mate.clone(),
+                hint: hint(&mate.variable, known),
+            });
         }
     };
     if link.way != Way::default() {
-        return Err("terminals are connected as they are; connect their variables".to_string());
+        return Err(TerminalError::Transformed);
     }
     let pairs = pairs(&one, &other)?;
     let links = pairs
@@ -89,25 +186,35 @@ pub(super) fn members(components: &[Component], link: &Link) -> Result<Vec<Link>
 }
 
 /// The members that belong together.
-fn pairs<'a>(one: &Side<'a>, other: &Side<'a>) -> Result<Vec<(&'a Member, &'a Member)>, String> {
+fn pairs<'a>(
+    one: &Side<'a>,
+    other: &Side<'a>,
+) -> Result<Vec<(&'a Member, &'a Member)>, TerminalError> {
     let (a, b) = (one.terminal, other.terminal);
     let (first, second) = (one.shown(), other.shown());
     if let (Some(this), Some(that)) = (&a.kind, &b.kind)
         && this != that
     {
-        return Err(format!(
-            "the terminal `{first}` is of the kind `{this}`, and `{second}` of the kind `{that}`"
-        ));
+        return Err(TerminalError::Kinds {
+            first,
+            kind: this.clone(),
+            second,
+            other: that.clone(),
+        });
     }
+    let differ = |what| {
+        let (first, second) = (one.shown(), other.shown());
+        Err(TerminalError::Differ {
+            first,
+            second,
+            what,
+        })
+    };
     if a.rule != b.rule {
-        return Err(format!(
-            "the terminals `{first}` and `{second}` have different matching rules"
-        ));
+        return differ("different matching rules");
     }
     if a.has_streams || b.has_streams {
-        return Err(format!(
-            "the terminals `{first}` and `{second}` have stream variables; connect the variables one by one"
-        ));
+        return differ("stream variables; connect the variables one by one");
     }
     let mate = |member: &Member| b.members.iter().find(|mate| mate.name == member.name);
     let named = a
@@ -124,37 +231,34 @@ fn pairs<'a>(one: &Side<'a>, other: &Side<'a>) -> Result<Vec<(&'a Member, &'a Me
                 missing.map(|member| member.name.clone())
             };
             let lacking = lacks(b, a)
-                .map(|name| (&second, name))
-                .or(lacks(a, b).map(|name| (&first, name)));
-            if let Some((side, name)) = lacking {
-                return Err(format!(
-                    "the terminal `{side}` has no member `{name}`; plugs fit where both have the same members"
-                ));
+                .map(|name| (second, name))
+                .or(lacks(a, b).map(|name| (first, name)));
+            if let Some((terminal, member)) = lacking {
+                return Err(TerminalError::NoMember { terminal, member });
             }
             named.collect()
         }
         MatchingRule::Bus => named.collect(),
         MatchingRule::Sequence => {
             if a.members.len() != b.members.len() {
-                return Err(format!(
-                    "the terminal `{first}` has {} members and `{second}` has {}",
-                    a.members.len(),
-                    b.members.len()
-                ));
+                return Err(TerminalError::Counts {
+                    first,
+                    members: a.members.len(),
+                    second,
+                    others: b.members.len(),
+                });
             }
             a.members.iter().zip(&b.members).collect()
         }
         MatchingRule::Other(rule) => {
-            return Err(format!(
-                "the matching rule `{rule}` of the terminal `{first}` is not one of `plug`, `bus` and \
-                 `sequence`; connect the variables one by one"
-            ));
+            return Err(TerminalError::Rule {
+                rule: rule.clone(),
+                terminal: first,
+            });
         }
     };
     if found.is_empty() {
-        return Err(format!(
-            "the terminals `{first}` and `{second}` have no member in common"
-        ));
+        return differ("no member in common");
     }
     Ok(found)
 }
@@ -165,19 +269,18 @@ fn joined(
     other: &Side,
     (member, mate): (&Member, &Member),
     link: &Link,
-) -> Result<Link, String> {
+) -> Result<Link, TerminalError> {
     use Causality::{Input, Output};
     let forward = match (one.causality(member)?, other.causality(mate)?) {
         (Input, Output) => false,
         (Output | Causality::Local, Input) => true,
         (Input, Causality::Local) => false,
         _ => {
-            return Err(format!(
-                "the member `{}` is not an output of one of the terminals `{}` and `{}` and an input of the other",
-                member.name,
-                one.shown(),
-                other.shown()
-            ));
+            return Err(TerminalError::Direction {
+                member: member.name.clone(),
+                first: one.shown(),
+                second: other.shown(),
+            });
         }
     };
     let (from, to) = match forward {

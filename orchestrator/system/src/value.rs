@@ -5,8 +5,65 @@ use units::hint;
 
 use serde::{Deserialize, Serialize};
 
-use super::passage::{End, Way};
+use super::passage::{End, Way, WayError};
 use fmi_import::{Datum, Kind, Variable};
+
+/// Why what was written is not a value.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ValueError {
+    /// Not a number with a unit, or of another quantity.
+    #[error(transparent)]
+    Unit(#[from] units::UnitError),
+    /// It cannot be converted to the variable.
+    #[error(transparent)]
+    Way(#[from] WayError),
+    /// Not a share.
+    #[error(transparent)]
+    Share(#[from] NotAShare),
+    /// Something else than a number.
+    #[error("`{written}` is not a number in {unit}")]
+    NotANumber {
+        /// What was written.
+        written: String,
+        /// The unit.
+        unit: String,
+    },
+    /// A value of another type.
+    #[error("`{written}` is not a value for a {kind}; expected {expected}")]
+    Type {
+        /// What was written.
+        written: String,
+        /// The variable's type.
+        kind: &'static str,
+        /// What was expected.
+        expected: String,
+    },
+    /// A name that is not among the choices.
+    #[error("`{name}` is not a choice{hint}")]
+    NotAChoice {
+        /// What was written.
+        name: String,
+        /// The nearest name.
+        hint: String,
+    },
+    /// Several values for one variable.
+    #[error("`{0}` is not a single value")]
+    Several(String),
+    /// Another number of values than an array has elements.
+    #[error("{given} values for an array of {elements} elements")]
+    Count {
+        /// The values.
+        given: usize,
+        /// The elements.
+        elements: usize,
+    },
+    /// Not a time.
+    #[error("`{0}` is not a time, expected \"2 ms\"")]
+    NotATime(String),
+    /// A time that is not positive.
+    #[error("{0} s is not a valid time, expected more than 0 s")]
+    Time(f64),
+}
 
 /// A value for a variable, in the variable's own unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -114,14 +171,15 @@ impl Setting {
     ///
     /// # Errors
     /// What is wrong and what was expected.
-    pub(super) fn number(&self, unit: &str) -> Result<f64, String> {
+    pub(super) fn number(&self, unit: &str) -> Result<f64, ValueError> {
         match self {
             Self::Number(number) => Ok(*number),
             Self::Integer(number) => Ok(*number as f64),
-            Self::Text(text) => units::value_in(text, unit).map_err(|error| error.to_string()),
-            Self::Boolean(_) | Self::List(_) | Self::Declared(_) => {
-                Err(format!("`{self}` is not a number in {unit}"))
-            }
+            Self::Text(text) => Ok(units::value_in(text, unit)?),
+            Self::Boolean(_) | Self::List(_) | Self::Declared(_) => Err(ValueError::NotANumber {
+                written: self.to_string(),
+                unit: unit.to_string(),
+            }),
         }
     }
 }
@@ -130,12 +188,13 @@ impl Setting {
 ///
 /// # Errors
 /// What is wrong and what was expected.
-pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, String> {
+pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, ValueError> {
     let misfit = |expected: &str| {
-        Err(format!(
-            "`{written}` is not a value for a {}; expected {expected}",
-            variable.kind.name()
-        ))
+        Err(ValueError::Type {
+            written: written.to_string(),
+            kind: variable.kind.name(),
+            expected: expected.to_string(),
+        })
     };
     match (&variable.kind, written) {
         (_, Setting::Declared(declared)) => read_declared(variable, declared),
@@ -188,7 +247,10 @@ pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, Stri
                 .map(|item| Value::Number(item.value as f64))
                 .ok_or_else(|| {
                     let known = items.iter().map(|item| item.name.as_str());
-                    format!("`{name}` is not a choice{}", hint(name, known))
+                    ValueError::NotAChoice {
+                        name: name.clone(),
+                        hint: hint(name, known),
+                    }
                 })
         }
         (Kind::Enumeration(_), _) => misfit("the name of a choice"),
@@ -203,7 +265,7 @@ pub(super) fn read(variable: &Variable, written: &Setting) -> Result<Value, Stri
 }
 
 /// A value of a parameter set: its unit is converted, then it is transformed as the file says.
-fn read_declared(variable: &Variable, declared: &Declared) -> Result<Value, String> {
+fn read_declared(variable: &Variable, declared: &Declared) -> Result<Value, ValueError> {
     let Declared { value, way } = declared;
     let end = End {
         kind: &variable.kind,
@@ -242,7 +304,7 @@ fn read_declared(variable: &Variable, declared: &Declared) -> Result<Value, Stri
             Value::Number(number) => Ok(Value::Number(passage.of(number))),
             other => Ok(other),
         },
-        Setting::List(_) | Setting::Declared(_) => Err(format!("`{value}` is not a single value")),
+        Setting::List(_) | Setting::Declared(_) => Err(ValueError::Several(value.to_string())),
     }
 }
 
@@ -250,27 +312,25 @@ fn read_declared(variable: &Variable, declared: &Declared) -> Result<Value, Stri
 ///
 /// # Errors
 /// What was expected.
-pub(super) fn time(written: &Setting) -> Result<f64, String> {
+pub(super) fn time(written: &Setting) -> Result<f64, ValueError> {
     let seconds = match written {
         Setting::Boolean(_) | Setting::List(_) => {
-            return Err(format!("`{written}` is not a time, expected \"2 ms\""));
+            return Err(ValueError::NotATime(written.to_string()));
         }
         _ => written.number("s")?,
     };
     if seconds.is_finite() && seconds > 0.0 {
         return Ok(seconds);
     }
-    Err(format!(
-        "{seconds} s is not a valid time, expected more than 0 s"
-    ))
+    Err(ValueError::Time(seconds))
 }
 
 /// A positive share in a system file, per cent: a number, or a text such as `"0.1 %"`.
 ///
 /// # Errors
 /// What was expected.
-pub(super) fn share(written: &Setting) -> Result<f64, String> {
-    percent(&written.to_string()).map_err(|error| error.to_string())
+pub(super) fn share(written: &Setting) -> Result<f64, ValueError> {
+    Ok(percent(&written.to_string())?)
 }
 
 /// A text that is not a positive share.
@@ -290,7 +350,7 @@ pub fn percent(text: &str) -> Result<f64, NotAShare> {
 }
 
 /// A number in the variable's unit, which may follow it.
-fn number(variable: &Variable, text: &str) -> Result<f64, String> {
+fn number(variable: &Variable, text: &str) -> Result<f64, ValueError> {
     let unit = variable.unit.as_deref().unwrap_or("");
     // Units that only the FMU knows may be written as it writes them.
     if let Some(alone) = text.trim().strip_suffix(unit)
@@ -299,5 +359,5 @@ fn number(variable: &Variable, text: &str) -> Result<f64, String> {
     {
         return Ok(number);
     }
-    units::value_in(text, unit).map_err(|error| error.to_string())
+    Ok(units::value_in(text, unit)?)
 }

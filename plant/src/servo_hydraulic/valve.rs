@@ -193,6 +193,57 @@ mod tests {
     }
 
     #[test]
+    fn the_opening_lacks_the_overlap_and_what_is_lost_near_null() {
+        let valve = ServoValve {
+            travel_limit: 5.0,
+            overlap: 0.2,
+            ..ServoValve::default()
+        };
+        for (spool, opening) in [
+            (0.1, 0.0),
+            (-0.2, 0.0),
+            (1.2, 1.0),
+            (-1.2, -1.0),
+            (9.0, 4.8),
+        ] {
+            assert!((valve.opening(spool) - opening).abs() < 1e-12, "{spool}");
+        }
+        let lossy = ServoValve {
+            null_loss: 0.4,
+            null_width: 0.3,
+            ..valve
+        };
+        // One width past the overlap, 0.4/e is lost; far from null nothing.
+        let expected = 0.3 * (1.0 - 0.4 * f64::exp(-1.0));
+        assert!((lossy.opening(0.5) - expected).abs() < 1e-12);
+        assert!((lossy.opening(-0.5) + expected).abs() < 1e-12);
+        assert!((lossy.opening(4.0) - 3.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_valve_that_opens_to_one_side_alone_is_refused() {
+        let with = |asymmetry| ServoValve {
+            asymmetry,
+            ..ServoValve::default()
+        };
+        for asymmetry in [-0.9, 0.0, 0.9] {
+            assert_eq!(with(asymmetry).validate(), Ok(()));
+        }
+        for asymmetry in [-1.0, 1.0, 2.0] {
+            let said = with(asymmetry).validate().unwrap_err().to_string();
+            assert!(
+                said.contains("expected a number between -1 and 1"),
+                "{said}"
+            );
+        }
+        let backwards = ServoValve {
+            frequency: -1.0,
+            ..ServoValve::default()
+        };
+        assert!(backwards.validate().is_err());
+    }
+
+    #[test]
     fn the_spool_slews_no_faster_than_its_limit_and_small_steps_do_not_meet_it() {
         let valve = ServoValve {
             slew_limit: 500.0,

@@ -221,7 +221,8 @@ impl Given {
         let own = fmu(part, library).map_err(|reason| wrong(format!("`{name}`: {reason}")))?;
         let is_sampled = part.period.is_some() || self.period.is_some();
         for (input, source) in &self.sources {
-            let from: Origin = source.parse().map_err(|reason: String| wrong(reason))?;
+            let from = source.parse::<Origin>();
+            let from = from.map_err(|error| wrong(error.to_string()))?;
             let to = VariableName::new(&name, input);
             file.connections.retain(|link| link.to != to);
             file.connect(from, to);

@@ -5,7 +5,7 @@ use controllers::Controller;
 use fmu_kit::{Component, ComponentResult, Terminal, Variable};
 use hybrid::laws::TrackingInput;
 use hybrid::laws::adaptive_inverse::AdaptiveInverse as Law;
-use hybrid::laws::extrapolation::Extrapolation;
+use hybrid::laws::extrapolation::{Extrapolation, WINDOW_SAMPLES};
 use hybrid::vrths::{Deviation, PERIOD, TransferSystemParameters};
 use serde::{Deserialize, Serialize};
 use units::vocabulary;
@@ -65,7 +65,7 @@ impl Component for AdaptiveInverse {
             parameter("a3_deviation", s.deviation.actuator_a3, "Standard deviation of the actuator's a3 at the start", "1/s").min(0.0);
             parameter("corner", s.corner, "Corner of each lag of the estimation's filter", "rad/s");
             parameter("error_variance", s.error_variance, "Variance of the filtered equation's error times its correlation in samples", "m2");
-            parameter("window_samples", s.window, "Samples that the derivatives of the desired displacement are fitted to").min(6.0).max(32.0);
+            parameter(WINDOW_SAMPLES, s.window, "Samples that the derivatives of the desired displacement are fitted to").min(6.0).max(32.0);
         });
         variables
     }

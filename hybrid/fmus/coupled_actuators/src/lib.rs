@@ -2,6 +2,7 @@
 //! Two coupled actuators as an FMU.
 
 use fmu_kit::{Component, ComponentResult, Variable};
+use hybrid::marths::names::{COMMAND, STROKE};
 use hybrid::marths::{Deviation, PERIOD, Pair, Plant, PlantParameters};
 use serde::{Deserialize, Serialize};
 
@@ -28,10 +29,10 @@ impl Component for CoupledActuators {
 
     fn variables() -> Vec<Variable<Self>> {
         let mut variables = fmu_kit::table! { Self, s:
-            input("command[1]", s.command[0], "Command of actuator 1", "m" => "mm").nominal(5e-3);
-            input("command[2]", s.command[1], "Command of actuator 2", "m" => "mm").nominal(5e-3);
-            output("stroke[1]", s.stroke[0], "Stroke of actuator 1", "m" => "mm").nominal(5e-3);
-            output("stroke[2]", s.stroke[1], "Stroke of actuator 2", "m" => "mm").nominal(5e-3);
+            input(COMMAND[0], s.command[0], "Command of actuator 1", "m" => "mm").nominal(5e-3);
+            input(COMMAND[1], s.command[1], "Command of actuator 2", "m" => "mm").nominal(5e-3);
+            output(STROKE[0], s.stroke[0], "Stroke of actuator 1", "m" => "mm").nominal(5e-3);
+            output(STROKE[1], s.stroke[1], "Stroke of actuator 2", "m" => "mm").nominal(5e-3);
             parameter("column_1_zero[1]", s.parameters.first_zeros[0], "First zero of column 1", "rad/s");
             parameter("column_1_zero[2]", s.parameters.first_zeros[1], "Second zero of column 1", "rad/s");
             parameter("column_1_pole[1]", s.parameters.columns[0].poles[0], "First pole of column 1", "rad/s");

@@ -2,7 +2,9 @@
 //! Tracking laws for two coupled actuators as an FMU.
 
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Variable};
+use hybrid::laws::extrapolation::WINDOW_SAMPLES;
 use hybrid::marths::laws::{DecentralisedAdaptive, NoControl, Predictive, PredictiveDesign};
+use hybrid::marths::names::{COMMAND, MEASURED_STROKE};
 use hybrid::marths::{PERIOD, Pair, Volts};
 use serde::{Deserialize, Serialize};
 
@@ -49,8 +51,8 @@ const LAWS: Enumeration = Enumeration {
 const SIGNALS: [&str; 4] = [
     "target[1]",
     "target[2]",
-    "measured_stroke[1]",
-    "measured_stroke[2]",
+    MEASURED_STROKE[0],
+    MEASURED_STROKE[1],
 ];
 
 impl Component for CoupledTracking {
@@ -64,16 +66,16 @@ impl Component for CoupledTracking {
         let mut variables = fmu_kit::table! { Self, s:
             input("target[1]", s.target[0], "Target stroke of actuator 1", "m" => "mm").nominal(5e-3);
             input("target[2]", s.target[1], "Target stroke of actuator 2", "m" => "mm").nominal(5e-3);
-            input("measured_stroke[1]", s.measured[0], "Measured stroke of actuator 1", "m" => "mm").nominal(5e-3);
-            input("measured_stroke[2]", s.measured[1], "Measured stroke of actuator 2", "m" => "mm").nominal(5e-3);
-            output("command[1]", s.command[0], "Command of actuator 1", "m" => "mm").discrete().nominal(5e-3).depends_on(&SIGNALS, Dependent);
-            output("command[2]", s.command[1], "Command of actuator 2", "m" => "mm").discrete().nominal(5e-3).depends_on(&SIGNALS, Dependent);
+            input(MEASURED_STROKE[0], s.measured[0], "Measured stroke of actuator 1", "m" => "mm").nominal(5e-3);
+            input(MEASURED_STROKE[1], s.measured[1], "Measured stroke of actuator 2", "m" => "mm").nominal(5e-3);
+            output(COMMAND[0], s.command[0], "Command of actuator 1", "m" => "mm").discrete().nominal(5e-3).depends_on(&SIGNALS, Dependent);
+            output(COMMAND[1], s.command[1], "Command of actuator 2", "m" => "mm").discrete().nominal(5e-3).depends_on(&SIGNALS, Dependent);
             output("volt[1]", s.volt[0], "Command 1 in volt", "V").discrete().nominal(1.0).depends_on(&SIGNALS, Dependent);
             output("volt[2]", s.volt[1], "Command 2 in volt", "V").discrete().nominal(1.0).depends_on(&SIGNALS, Dependent);
             parameter("adaptive", s.design.adaptive, "Whether the model of `predictive` follows the measurement");
             parameter("horizon_samples", s.design.horizon, "Horizon of `predictive`, samples").min(2.0).max(24.0);
             parameter("order", s.design.order, "Order of the polynomials that continue the targets").min(0.0).max(5.0);
-            parameter("window_samples", s.design.window, "Samples that they are fitted to").min(6.0).max(32.0);
+            parameter(WINDOW_SAMPLES, s.design.window, "Samples that they are fitted to").min(6.0).max(32.0);
             parameter("effort", s.design.effort, "Weight of the commands against the strokes' errors").min(0.0);
         };
         variables

@@ -5,6 +5,7 @@ use fmu_kit::{
     Causality, Component, ComponentResult, Dependency::Dependent, Enumeration, Item, Variable,
 };
 use hybrid::marths::Coupler;
+use hybrid::marths::names::MEASURED_STROKE;
 use plant::ModelError;
 use plant::platform::{MOST, Platform, Pose};
 use serde::{Deserialize, Serialize};
@@ -159,18 +160,10 @@ const POSE: [&str; 6] = [
     "rotation[3]",
 ];
 
-const MEASURED: [&str; MOST] = [
-    "measured_stroke[1]",
-    "measured_stroke[2]",
-    "measured_stroke[3]",
-    "measured_stroke[4]",
-    "measured_stroke[5]",
-    "measured_stroke[6]",
-    "measured_stroke[7]",
-    "measured_stroke[8]",
-];
-
 const GEOMETRY: [&str; 4] = ["points", "directions", "bases", "free"];
+
+// A name for each actuator that a platform may have.
+const _: () = assert!(MEASURED_STROKE.len() == MOST);
 
 impl Component for PlatformKinematics {
     const NAME: &'static str = "PlatformKinematics";
@@ -188,8 +181,8 @@ impl Component for PlatformKinematics {
         };
         let back = |variable: Variable<Self>| {
             variable
-                .depends_on(&MEASURED, Dependent)
-                .initially_depends_on(&MEASURED)
+                .depends_on(&MEASURED_STROKE, Dependent)
+                .initially_depends_on(&MEASURED_STROKE)
                 .initially_depends_on(&GEOMETRY)
                 .initially_depends_on(&["way_back", "tolerance"])
         };

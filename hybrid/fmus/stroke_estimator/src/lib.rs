@@ -3,6 +3,7 @@
 
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
 use hybrid::marths::laws::{Estimator, PredictiveDesign};
+use hybrid::marths::names::{COMMAND, MEASURED_STROKE, STROKE};
 use hybrid::marths::{PERIOD, Pair};
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,7 @@ pub struct StrokeEstimator {
     stroke: Pair,
 }
 
-const MEASURED: [&str; 2] = ["measured_stroke[1]", "measured_stroke[2]"];
+const MEASURED: [&str; 2] = [MEASURED_STROKE[0], MEASURED_STROKE[1]];
 
 impl Component for StrokeEstimator {
     const NAME: &'static str = "StrokeEstimator";
@@ -27,12 +28,12 @@ impl Component for StrokeEstimator {
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:
-            input("command[1]", s.command[0], "Command of actuator 1, one sample before", "m" => "mm").nominal(5e-3);
-            input("command[2]", s.command[1], "Command of actuator 2, one sample before", "m" => "mm").nominal(5e-3);
-            input("measured_stroke[1]", s.measured[0], "Measured stroke of actuator 1", "m" => "mm").nominal(5e-3);
-            input("measured_stroke[2]", s.measured[1], "Measured stroke of actuator 2", "m" => "mm").nominal(5e-3);
-            output("stroke[1]", s.stroke[0], "Estimated stroke of actuator 1", "m" => "mm").discrete().nominal(5e-3).depends_on(&MEASURED, Dependent);
-            output("stroke[2]", s.stroke[1], "Estimated stroke of actuator 2", "m" => "mm").discrete().nominal(5e-3).depends_on(&MEASURED, Dependent);
+            input(COMMAND[0], s.command[0], "Command of actuator 1, one sample before", "m" => "mm").nominal(5e-3);
+            input(COMMAND[1], s.command[1], "Command of actuator 2, one sample before", "m" => "mm").nominal(5e-3);
+            input(MEASURED_STROKE[0], s.measured[0], "Measured stroke of actuator 1", "m" => "mm").nominal(5e-3);
+            input(MEASURED_STROKE[1], s.measured[1], "Measured stroke of actuator 2", "m" => "mm").nominal(5e-3);
+            output(STROKE[0], s.stroke[0], "Estimated stroke of actuator 1", "m" => "mm").discrete().nominal(5e-3).depends_on(&MEASURED, Dependent);
+            output(STROKE[1], s.stroke[1], "Estimated stroke of actuator 2", "m" => "mm").discrete().nominal(5e-3).depends_on(&MEASURED, Dependent);
         }
     }
 

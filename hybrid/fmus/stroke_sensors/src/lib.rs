@@ -2,6 +2,7 @@
 //! Stroke sensors of two actuators as an FMU.
 
 use fmu_kit::{Component, ComponentResult, Dependency::Dependent, Variable};
+use hybrid::marths::names::{MEASURED_STROKE, STROKE};
 use hybrid::marths::{NOISE, PERIOD, Pair};
 use plant::sensors::channel::Noise;
 use serde::{Deserialize, Serialize};
@@ -38,10 +39,10 @@ impl Component for StrokeSensors {
 
     fn variables() -> Vec<Variable<Self>> {
         fmu_kit::table! { Self, s:
-            input("stroke[1]", s.stroke[0], "Stroke of actuator 1", "m" => "mm").nominal(5e-3);
-            input("stroke[2]", s.stroke[1], "Stroke of actuator 2", "m" => "mm").nominal(5e-3);
-            output("measured_stroke[1]", s.measured[0], "Stroke 1 with noise", "m" => "mm").discrete().nominal(5e-3).depends_on(&["stroke[1]"], Dependent);
-            output("measured_stroke[2]", s.measured[1], "Stroke 2 with noise", "m" => "mm").discrete().nominal(5e-3).depends_on(&["stroke[2]"], Dependent);
+            input(STROKE[0], s.stroke[0], "Stroke of actuator 1", "m" => "mm").nominal(5e-3);
+            input(STROKE[1], s.stroke[1], "Stroke of actuator 2", "m" => "mm").nominal(5e-3);
+            output(MEASURED_STROKE[0], s.measured[0], "Stroke 1 with noise", "m" => "mm").discrete().nominal(5e-3).depends_on(&[STROKE[0]], Dependent);
+            output(MEASURED_STROKE[1], s.measured[1], "Stroke 2 with noise", "m" => "mm").discrete().nominal(5e-3).depends_on(&[STROKE[1]], Dependent);
             parameter("noise", s.noise, "White noise of each sensor, one standard deviation", "m" => "mm").min(0.0);
             parameter("seed", s.seed, "Seed of the noise").min(0.0);
             parameter("stream", s.stream, "Number of the draws that the seed stands for").min(0.0);

@@ -4,6 +4,7 @@ use controllers::mpc::kalman::SteadyStateKalmanFilter;
 use nalgebra::{DMatrix, SMatrix, SVector};
 use plant::ModelError;
 use plant::linear::discrete_riccati;
+use units::vocabulary;
 
 use super::{Inverse, Law};
 use crate::marths::{NOISE, Pair, PlantParameters, Volts};
@@ -64,7 +65,7 @@ impl LinearQuadratic {
         window: usize,
     ) -> Result<Self, ModelError> {
         let inverse = Inverse::new(plant, order, window)?;
-        ModelError::require_positive("command_weight", design.command_weight)?;
+        ModelError::require_positive(vocabulary::COMMAND_WEIGHT, design.command_weight)?;
         // Both maps are linear: their columns are what unit states and commands give.
         let unit = |place: usize| -> [[f64; 4]; 2] {
             [0, 1].map(|i| std::array::from_fn(|k| f64::from(u8::from(4 * i + k == place))))
@@ -92,7 +93,7 @@ impl LinearQuadratic {
         let x = discrete_riccati(&a, &b, &(c.transpose() * &c), &weight)?;
         let bx = b.transpose() * &x;
         let unsolvable = ModelError::Parameter {
-            name: "command_weight",
+            name: vocabulary::COMMAND_WEIGHT,
             value: design.command_weight,
             expected: "a weight with which the gain can be computed",
         };

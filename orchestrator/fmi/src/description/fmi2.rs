@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use fmi_rs::model_description::fmi2;
 use roxmltree::Node;
 
-use super::structure::{Dependencies, units};
+use super::structure::{Dependencies, DescriptionError, units};
 use super::{
     Causality, Description, FmiVersion, Interface, Item, Kind, Variability, Variable, default_stop,
     preferred_step,
@@ -36,8 +36,12 @@ fn items(declared: &Node) -> Vec<Item> {
 }
 
 /// Reads the text; `exchange`: model exchange goes before co-simulation.
-pub(super) fn read(text: &str, root: Node, exchange: bool) -> Result<Description, String> {
-    let file = fmi2::ModelDescription::from_string(text).map_err(|error| error.to_string())?;
+pub(super) fn read(
+    text: &str,
+    root: Node,
+    exchange: bool,
+) -> Result<Description, DescriptionError> {
+    let file = fmi2::ModelDescription::from_string(text)?;
     let types = types(root);
     let units = units(root);
     let mut variables = Vec::with_capacity(file.modelVariables.len());
@@ -140,7 +144,7 @@ pub(super) fn read(text: &str, root: Node, exchange: bool) -> Result<Description
         .map(|it| &it.modelIdentifier)
         .or(exchange.map(|it| &it.modelIdentifier))
     else {
-        return Err("neither <CoSimulation> nor <ModelExchange>".to_string());
+        return Err(DescriptionError::NoInterface2);
     };
     let flag = |co: fn(&fmi2::CoSimulation) -> bool, me: fn(&fmi2::ModelExchange) -> bool| {
         steps.map(co).or(exchange.map(me)).unwrap_or(false)

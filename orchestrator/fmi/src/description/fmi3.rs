@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use fmi_rs::model_description::fmi3;
 use roxmltree::Node;
 
-use super::structure::{Dependencies, MOST_ELEMENTS, element_names, units};
+use super::structure::{Dependencies, DescriptionError, MOST_ELEMENTS, element_names, units};
 use super::{
     BaseUnit, Causality, Description, FmiVersion, InputClock, Interface, Item, Kind, Sizes, Ticks,
     Variability, Variable, default_stop, preferred_step,
@@ -18,8 +18,8 @@ pub(super) fn read(
     root: Node,
     sizes: &Sizes,
     exchange: bool,
-) -> Result<Description, String> {
-    let file = fmi3::ModelDescription::from_string(text).map_err(|error| error.to_string())?;
+) -> Result<Description, DescriptionError> {
+    let file = fmi3::ModelDescription::from_string(text)?;
     let types: HashMap<&str, &fmi3::TypeDefinition> = file
         .typeDefinitions
         .iter()
@@ -41,8 +41,7 @@ pub(super) fn read(
             dimensions.push(match dimension {
                 fmi3::Dimension::Fixed { start } => *start,
                 fmi3::Dimension::Variable { valueReference } => {
-                    size(*valueReference, &structural, sizes)
-                        .map_err(|reason| format!("`{}`: {reason}", variable.name))?
+                    size(&variable.name, *valueReference, &structural, sizes)?
                 }
             });
         }
@@ -51,9 +50,7 @@ pub(super) fn read(
             .try_fold(1_usize, |a, &b| a.checked_mul(b));
         let count = count.filter(|count| variables.len() + count <= MOST_ELEMENTS);
         let Some(count) = count else {
-            return Err(format!(
-                "the arrays have more than {MOST_ELEMENTS} elements together"
-            ));
+            return Err(DescriptionError::Elements);
         };
         let first = variables.len();
         let one = scalar(variable, &types, &units);
@@ -102,7 +99,7 @@ pub(super) fn read(
         .or(exchange.map(|it| &it.modelIdentifier))
         .or(scheduled.map(|it| &it.modelIdentifier));
     let Some(identifier) = identifier else {
-        return Err("none of <CoSimulation>, <ModelExchange> and <ScheduledExecution>".to_string());
+        return Err(DescriptionError::NoInterface3);
     };
     let flag = |co: fn(&fmi3::CoSimulation) -> bool, me: fn(&fmi3::ModelExchange) -> bool| {
         steps.map(co).or(exchange.map(me)).unwrap_or(false)
@@ -219,23 +216,31 @@ fn input_clocks(variables: &[fmi3::ModelVariable]) -> Vec<InputClock> {
     clocks.into_iter().map(|(_, clock)| clock).collect()
 }
 
-/// The value of the structural parameter `reference`.
+/// The value of the structural parameter `reference`, which is a size of the array of that name.
 fn size(
+    array: &str,
     reference: u32,
     structural: &HashMap<u32, &fmi3::ModelVariable>,
     sizes: &Sizes,
-) -> Result<usize, String> {
+) -> Result<usize, DescriptionError> {
     let variable = structural.get(&reference);
-    let variable = variable.ok_or("its size is a variable that is not a structural parameter")?;
+    let array = || array.to_string();
+    let variable = variable.ok_or_else(|| DescriptionError::NotStructural { array: array() })?;
     let size = match sizes.get(&reference) {
         Some(&size) => size,
         None => {
             let start = variable.variableType.start().unwrap_or_default();
             let start = start.first().and_then(|text| text.parse().ok());
-            start.ok_or_else(|| format!("its size `{}` has no start value", variable.name))?
+            start.ok_or_else(|| DescriptionError::NoSize {
+                array: array(),
+                size: variable.name.clone(),
+            })?
         }
     };
-    usize::try_from(size).map_err(|_| format!("its size {size} is too large"))
+    usize::try_from(size).map_err(|_| DescriptionError::Size {
+        array: array(),
+        size,
+    })
 }
 
 /// Start values of the elements; one value stands for all.

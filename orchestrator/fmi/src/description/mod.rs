@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 pub use clock::{InputClock, Ticks};
 pub use kind::{Item, Kind};
+use structure::DescriptionError;
 pub use structure::{BaseUnit, NotANumber};
 pub use terminal::{Flow, MatchingRule, Member, Terminal};
 
@@ -322,9 +323,10 @@ pub(super) fn read(
         fmu: fmu.to_path_buf(),
         reason,
     };
+    let refused = |error: DescriptionError| wrong(error.to_string());
     let bytes = fs::read(unpacked.join("modelDescription.xml"))
         .map_err(|error| wrong(format!("cannot be read ({error})")))?;
-    let text = structure::decode(bytes).map_err(wrong)?;
+    let text = structure::decode(bytes).map_err(refused)?;
     super::archive::check_attributes(&text).map_err(|doubt| wrong(doubt.to_string()))?;
     let xml = roxmltree::Document::parse(&text)
         .map_err(|error| wrong(format!("not well-formed XML: {error}")))?;
@@ -341,9 +343,9 @@ pub(super) fn read(
                 "the attribute fmiVersion is missing, expected \"2.0\" or \"3.0\"".to_string(),
             ));
         }
-        Some("2.0") => fmi2::read(&text, root, exchange).map_err(wrong)?,
+        Some("2.0") => fmi2::read(&text, root, exchange).map_err(refused)?,
         Some(version) if version.starts_with("3.") => {
-            fmi3::read(&text, root, sizes, exchange).map_err(wrong)?
+            fmi3::read(&text, root, sizes, exchange).map_err(refused)?
         }
         Some("1.0") => {
             let tool = root.attribute("generationTool");
@@ -384,7 +386,7 @@ pub(super) fn read(
             remark.push_str(" ...");
         }
     }
-    structure::name(&mut description, root).map_err(wrong)?;
+    structure::name(&mut description, root).map_err(refused)?;
     Ok(description)
 }
 

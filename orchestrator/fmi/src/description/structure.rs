@@ -3,9 +3,71 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use fmi_rs::model_description::ModelDescriptionError;
 use roxmltree::Node;
 
 use super::{Causality, Description, Variable};
+
+/// Why a description cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum DescriptionError {
+    /// Not text in its encoding.
+    #[error("cannot be read as UTF-8 text ({0})")]
+    Encoding(#[from] std::string::FromUtf8Error),
+    /// Not XML.
+    #[error(transparent)]
+    Xml(#[from] roxmltree::Error),
+    /// Not as the schema has it.
+    #[error(transparent)]
+    Schema(#[from] ModelDescriptionError),
+    /// No interface of FMI 2.0.
+    #[error("neither <CoSimulation> nor <ModelExchange>")]
+    NoInterface2,
+    /// No interface of FMI 3.0.
+    #[error("none of <CoSimulation>, <ModelExchange> and <ScheduledExecution>")]
+    NoInterface3,
+    /// Arrays that nobody could hold.
+    #[error("the arrays have more than {MOST_ELEMENTS} elements together")]
+    Elements,
+    /// An array whose size is another variable.
+    #[error("`{array}`: its size is a variable that is not a structural parameter")]
+    NotStructural {
+        /// The array.
+        array: String,
+    },
+    /// An array whose size has no value.
+    #[error("`{array}`: its size `{size}` has no start value")]
+    NoSize {
+        /// The array.
+        array: String,
+        /// The structural parameter.
+        size: String,
+    },
+    /// An array that is too large for this computer.
+    #[error("`{array}`: its size {size} is too large")]
+    Size {
+        /// The array.
+        array: String,
+        /// Its size.
+        size: u64,
+    },
+    /// An output of no variable.
+    #[error("<ModelStructure> lists an output that is not among the variables")]
+    Output,
+    /// Two variables of one name.
+    #[error("the variable `{name}` occurs twice (as number {first} and {second})")]
+    Twice {
+        /// The name.
+        name: String,
+        /// The first one's number, from 1.
+        first: usize,
+        /// The second one's.
+        second: usize,
+    },
+    /// An alias that is another variable's name.
+    #[error("the alias `{0}` is also a variable")]
+    Alias(String),
+}
 
 /// A unit in SI: `value_si = factor value + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,7 +193,7 @@ impl Dependencies {
         variables: &mut [Variable],
         output: usize,
         known: Option<Vec<usize>>,
-    ) -> Result<(), String> {
+    ) -> Result<(), DescriptionError> {
         let is_input = |index: &usize| {
             variables
                 .get(*index)
@@ -155,10 +217,8 @@ impl Dependencies {
                 all.clone()
             }
         };
-        let output = variables.get_mut(output).ok_or_else(|| {
-            "<ModelStructure> lists an output that is not among the variables".to_string()
-        })?;
-        output.dependencies = dependencies;
+        let output = variables.get_mut(output);
+        output.ok_or(DescriptionError::Output)?.dependencies = dependencies;
         Ok(())
     }
 }
@@ -167,7 +227,10 @@ impl Dependencies {
 ///
 /// # Errors
 /// A name that occurs twice.
-pub(super) fn name(description: &mut Description, root: roxmltree::Node) -> Result<(), String> {
+pub(super) fn name(
+    description: &mut Description,
+    root: roxmltree::Node,
+) -> Result<(), DescriptionError> {
     for (index, variable) in description.variables.iter().enumerate() {
         let (element, size) = variable.element;
         if let Some((array, _)) = variable.name.rsplit_once('[')
@@ -180,12 +243,11 @@ pub(super) fn name(description: &mut Description, root: roxmltree::Node) -> Resu
                 .insert(array.to_string(), index..index + size);
         }
         if let Some(first) = description.positions.insert(variable.name.clone(), index) {
-            return Err(format!(
-                "the variable `{}` occurs twice (as number {} and {})",
-                variable.name,
-                first + 1,
-                index + 1
-            ));
+            return Err(DescriptionError::Twice {
+                name: variable.name.clone(),
+                first: first + 1,
+                second: index + 1,
+            });
         }
     }
     let aliases = root
@@ -215,7 +277,7 @@ pub(super) fn name(description: &mut Description, root: roxmltree::Node) -> Resu
         } else if let Some(&index) = description.positions.get(variable) {
             let first = description.positions.insert(alias.to_string(), index);
             if first.is_some_and(|first| first != index) {
-                return Err(format!("the alias `{alias}` is also a variable"));
+                return Err(DescriptionError::Alias(alias.to_string()));
             }
         }
     }
@@ -226,11 +288,11 @@ pub(super) fn name(description: &mut Description, root: roxmltree::Node) -> Resu
 ///
 /// # Errors
 /// Another encoding, or bytes that do not fit it.
-pub(super) fn decode(bytes: Vec<u8>) -> Result<String, String> {
+pub(super) fn decode(bytes: Vec<u8>) -> Result<String, DescriptionError> {
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]).to_lowercase();
     let declared = head.split_once("?>").map_or("", |(head, _)| head);
     if declared.contains("iso-8859-1") || declared.contains("us-ascii") {
         return Ok(bytes.iter().map(|&byte| char::from(byte)).collect());
     }
-    String::from_utf8(bytes).map_err(|error| format!("cannot be read as UTF-8 text ({error})"))
+    Ok(String::from_utf8(bytes)?)
 }

@@ -5,6 +5,8 @@ use std::path::Path;
 
 use roxmltree::{Document, Node};
 
+use super::structure::{DescriptionError, decode};
+
 /// Terminals within terminals further down are not read.
 const DEEPEST: usize = 16;
 
@@ -62,17 +64,17 @@ pub enum Flow {
 ///
 /// # Errors
 /// A file that is not XML.
-pub(super) fn read(unpacked: &Path) -> Result<Vec<Terminal>, String> {
+pub(super) fn read(unpacked: &Path) -> Result<Vec<Terminal>, DescriptionError> {
     let path = unpacked.join("terminalsAndIcons/terminalsAndIcons.xml");
     let Ok(bytes) = std::fs::read(path) else {
         return Ok(Vec::new());
     };
-    let text = super::structure::decode(bytes)?;
+    let text = decode(bytes)?;
     of(&text)
 }
 
-fn of(text: &str) -> Result<Vec<Terminal>, String> {
-    let document = Document::parse(text).map_err(|error| error.to_string())?;
+fn of(text: &str) -> Result<Vec<Terminal>, DescriptionError> {
+    let document = Document::parse(text)?;
     let mut all = Vec::new();
     for list in children(document.root_element(), "Terminals") {
         for terminal in children(list, "Terminal") {

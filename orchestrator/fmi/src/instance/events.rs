@@ -1,5 +1,6 @@
 //! What has to be known of an FMU whose events are handled outside of it.
 
+use super::super::error::InstanceError;
 use super::super::native::Events;
 use super::super::{Causality, Description, Kind, Ticks};
 
@@ -7,16 +8,12 @@ use super::super::{Causality, Description, Kind, Ticks};
 ///
 /// # Errors
 /// Clocks that cannot be ticked: what there is instead.
-pub(super) fn of(description: &Description) -> Result<Option<Events>, String> {
+pub(super) fn of(description: &Description) -> Result<Option<Events>, InstanceError> {
     if !description.has_stepped_events() {
         let mut inputs = description.input_clocks.iter();
         return match inputs.find(|clock| clock.ticks != Ticks::Triggered) {
             None => Ok(None),
-            Some(clock) => Err(format!(
-                "its input clock `{}` has to be ticked from outside, which is possible in \
-                 co-simulation with hasEventMode=\"true\" only; export it with event mode",
-                clock.name
-            )),
+            Some(clock) => Err(InstanceError::Clock(clock.name.clone())),
         };
     }
     let outputs = description.of(Causality::Output);

@@ -9,6 +9,7 @@ mod values;
 use std::sync::Arc;
 
 use super::call::{Call, Endpoint, Function, Lost, Values};
+use super::error::InstanceError;
 use super::isolation::Remote;
 use super::messages::{Messages, TELLING};
 use super::native::{self, Events, Mode, Setup, Sink, WithEvents};
@@ -92,9 +93,7 @@ impl Instance {
             Interface::CoSimulation => false,
             Interface::ModelExchange => true,
             Interface::ScheduledExecution => {
-                let reason = "it supports only scheduled execution: a real-time scheduler must call its \
-                    parts, which a co-simulation cannot do";
-                return Err(refused(fmu, name, reason.to_string()));
+                return Err(refused(fmu, name, InstanceError::Scheduled));
             }
         };
         let events = events::of(description);
@@ -165,7 +164,7 @@ impl Instance {
             if let Some(trace) = &options.trace {
                 let outcome = match &made {
                     Ok(_) => Ok(0),
-                    Err(reason) => Err(Lost(reason.clone())),
+                    Err(error) => Err(Lost(error.to_string())),
                 };
                 trace.end(version, &Call::plain(Function::Instantiate), &outcome);
             }
@@ -185,7 +184,8 @@ impl Instance {
             }
         }
         let has_events = events.is_some();
-        let endpoint = made.map_err(|mut reason| {
+        let endpoint = made.map_err(|error| {
+            let mut reason = error.to_string();
             for message in messages.take() {
                 reason += &format!("; it says: {}", message.text);
             }

@@ -80,7 +80,8 @@ fn carry_out(
                 instance: number,
                 ring,
             });
-            let endpoint = native::instantiate(&setup, sink).map_err(Lost)?;
+            let endpoint =
+                native::instantiate(&setup, sink).map_err(|error| Lost(error.to_string()))?;
             instances.insert(number, endpoint);
             Ok(0)
         }

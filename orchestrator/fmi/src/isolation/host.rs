@@ -8,6 +8,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::super::call::{Call, Lost, Values};
+use super::super::error::InstanceError;
 use super::super::native::Sink;
 use super::frame::Frame;
 use super::leftovers::{self, Mark};
@@ -59,14 +60,8 @@ impl Host {
     ///
     /// # Errors
     /// It cannot be started.
-    pub(in super::super) fn start(program: &Path, limit: Duration) -> Result<Self, String> {
-        let no_memory = |error| {
-            format!(
-                "no memory can be shared with another process: {error}; raise the limit of the size of \
-                 files (ulimit -f), or choose --isolate none"
-            )
-        };
-        let (frame, way) = Frame::create().map_err(no_memory)?;
+    pub(in super::super) fn start(program: &Path, limit: Duration) -> Result<Self, InstanceError> {
+        let (frame, way) = Frame::create().map_err(InstanceError::Memory)?;
         let mark = Mark::new();
         let mut command = Command::new(program);
         command
@@ -89,11 +84,9 @@ impl Host {
             // SAFETY: as above.
             unsafe { std::os::unix::process::CommandExt::pre_exec(&mut command, inherit) };
         }
-        let mut child = command.spawn().map_err(|error| {
-            format!(
-                "{}: the process for FMUs cannot be started: {error}",
-                program.display()
-            )
+        let mut child = command.spawn().map_err(|error| InstanceError::NotStarted {
+            program: program.to_path_buf(),
+            error,
         })?;
         let sinks = Sinks::default();
         let readers = vec![
@@ -117,9 +110,11 @@ impl Host {
         take_short_turns();
         // The first answer says that the memory is mapped there; then its name can go.
         host.frame.turn().give(GUEST);
-        host.wait(Duration::from_secs(30)).map_err(|Lost(reason)| {
-            format!("{}: the process for FMUs {reason}", program.display())
-        })?;
+        host.wait(Duration::from_secs(30))
+            .map_err(|gone| InstanceError::Gone {
+                program: program.to_path_buf(),
+                gone,
+            })?;
         drop(way);
         Ok(host)
     }

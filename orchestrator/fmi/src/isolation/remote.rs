@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::super::call::{
     AHEAD, Call, Culprit, Endpoint, Foreseen, Function, Lost, Scalar, Values, Wire,
 };
+use super::super::error::InstanceError;
 use super::super::native::{Setup, Sink};
 use super::host::{Answer, Host};
 use super::parcel;
@@ -96,15 +97,15 @@ impl Remote {
         setup: &Setup,
         sink: Arc<dyn Sink>,
         is_traced: bool,
-    ) -> Result<Self, String> {
-        let text = serde_json::to_vec(setup).map_err(|error| error.to_string())?;
+    ) -> Result<Self, InstanceError> {
+        let text = serde_json::to_vec(setup)?;
         let mut guest = host.lock().unwrap_or_else(PoisonError::into_inner);
         let instance = guest.enroll(sink);
         let mut call = Call::plain(Function::Instantiate);
         call.values = Values::In(&text);
         match guest.call(instance, &[], &mut call, &mut Vec::new()) {
             Answer::Called(Ok(_)) | Answer::Other(..) => {}
-            Answer::Called(Err(Lost(reason))) => return Err(reason),
+            Answer::Called(Err(lost)) => return Err(InstanceError::Apart(lost)),
         }
         drop(guest);
         Ok(Self {

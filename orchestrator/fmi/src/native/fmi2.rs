@@ -8,6 +8,7 @@ use percent_encoding::{AsciiSet, CONTROLS, utf8_percent_encode};
 
 use super::super::FmiVersion;
 use super::super::call::{Call, Endpoint, Function, Lost, Scalar, Stepped, Values};
+use super::super::error::InstanceError;
 use super::callbacks::{Callbacks, Environment};
 use super::library::Functions;
 use super::state::StateFunctions;
@@ -95,7 +96,7 @@ pub(super) struct Fmi2 {
 }
 
 impl Fmi2 {
-    pub(super) fn new(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Self, String> {
+    pub(super) fn new(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Self, InstanceError> {
         let mut f = Functions::load(&setup.library, "fmi2")?;
         // SAFETY: the types are those of the standard's headers.
         let (instantiate, table) = unsafe {
@@ -113,7 +114,7 @@ impl Fmi2 {
             let names = ["Real", "Integer", "Boolean", "String"];
             let (Some(setup_experiment), Some(enter), Some(exit), Some(free)) = needed else {
                 f.finish()?;
-                return Err("the library lacks functions".to_string());
+                return Err(InstanceError::Lacking(Vec::new()));
             };
             let table = Table {
                 setup_experiment,
@@ -145,7 +146,7 @@ impl Fmi2 {
         };
         let library = f.finish()?;
         let Some(instantiate) = instantiate else {
-            return Err("the library lacks functions".to_string());
+            return Err(InstanceError::Lacking(Vec::new()));
         };
         let environment = Environment::new(sink);
         let callbacks = Callbacks::new(&environment);
@@ -168,7 +169,7 @@ impl Fmi2 {
             )
         };
         if instance.is_null() {
-            return Err("the FMU refused".to_string());
+            return Err(InstanceError::Refused);
         }
         Ok(Self {
             table,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::super::FmiVersion;
 use super::super::call::{Call, Endpoint, Function, Lost, Scalar, Stepped, Values};
+use super::super::error::InstanceError;
 use super::callbacks::{Environment, intermediate_update, log_message};
 use super::library::Functions;
 use super::state::StateFunctions;
@@ -127,7 +128,7 @@ pub(super) struct Fmi3 {
 }
 
 impl Fmi3 {
-    pub(super) fn new(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Self, String> {
+    pub(super) fn new(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Self, InstanceError> {
         let mut f = Functions::load(&setup.library, "fmi3")?;
         // SAFETY: the types are those of the standard's headers.
         let table = unsafe {
@@ -142,7 +143,7 @@ impl Fmi3 {
             );
             let (Some(enter), Some(exit), Some(free)) = needed else {
                 f.finish()?;
-                return Err("the library lacks functions".to_string());
+                return Err(InstanceError::Lacking(Vec::new()));
             };
             Table {
                 enter_initialization: enter,
@@ -193,7 +194,7 @@ impl Fmi3 {
                 Mode::CoSimulation { ref events, .. } => {
                     let make = f.needed::<InstantiateCoSimulation>("InstantiateCoSimulation");
                     let library = f.finish()?;
-                    let make = make.ok_or("the library lacks functions")?;
+                    let make = make.ok_or(InstanceError::Lacking(Vec::new()))?;
                     // Nothing is asked for between communication points, so that no variables are
                     // required there. A step may be returned from early where events are handled
                     // outside and the rest of the step may be shorter.
@@ -210,7 +211,7 @@ impl Fmi3 {
                 Mode::ModelExchange { .. } => {
                     let make = f.needed::<InstantiateModelExchange>("InstantiateModelExchange");
                     let library = f.finish()?;
-                    let make = make.ok_or("the library lacks functions")?;
+                    let make = make.ok_or(InstanceError::Lacking(Vec::new()))?;
                     (
                         make(name, token, resources, false, setup.logging, to, log),
                         library,
@@ -219,7 +220,7 @@ impl Fmi3 {
             }
         };
         if instance.is_null() {
-            return Err("the FMU refused".to_string());
+            return Err(InstanceError::Refused);
         }
         Ok(Self {
             table,

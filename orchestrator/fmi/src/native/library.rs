@@ -4,6 +4,8 @@ use std::path::Path;
 
 use libloading::Library;
 
+use super::super::error::InstanceError;
+
 /// A loaded library that names the functions it lacks.
 pub(super) struct Functions {
     library: Library,
@@ -17,21 +19,9 @@ impl Functions {
     ///
     /// # Errors
     /// The loader's own reason.
-    pub(super) fn load(path: &Path, prefix: &'static str) -> Result<Self, String> {
+    pub(super) fn load(path: &Path, prefix: &'static str) -> Result<Self, InstanceError> {
         // SAFETY: an FMU's library runs code of its own when it is loaded; that is what it is for.
-        let library = unsafe { open(path) };
-        let library = library.map_err(|error| {
-            let mut reason = format!("the library cannot be loaded: {error}");
-            let mut source = std::error::Error::source(&error);
-            while let Some(cause) = source {
-                let cause_text = cause.to_string();
-                if !reason.contains(&cause_text) {
-                    reason += &format!(": {cause_text}");
-                }
-                source = cause.source();
-            }
-            reason
-        })?;
+        let library = unsafe { open(path) }?;
         Ok(Self {
             library,
             prefix,
@@ -67,15 +57,11 @@ impl Functions {
     ///
     /// # Errors
     /// Needed functions that it lacks.
-    pub(super) fn finish(self) -> Result<Library, String> {
-        if self.missing.is_empty() {
-            return Ok(self.library);
+    pub(super) fn finish(self) -> Result<Library, InstanceError> {
+        match self.missing.is_empty() {
+            true => Ok(self.library),
+            false => Err(InstanceError::Lacking(self.missing)),
         }
-        Err(format!(
-            "the library lacks the function{} {}",
-            if self.missing.len() == 1 { "" } else { "s" },
-            self.missing.join(", ")
-        ))
     }
 }
 

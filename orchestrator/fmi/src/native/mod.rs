@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use super::FmiVersion;
 use super::call::{Call, Endpoint, Lost, Texts, Values};
+use super::error::InstanceError;
 
 pub(super) use events::{Events, WithEvents};
 
@@ -75,7 +76,10 @@ pub(super) const DISCARD: i32 = 2;
 ///
 /// # Errors
 /// The loader's reason, functions that are missing, or an FMU that refuses.
-pub(super) fn instantiate(setup: &Setup, sink: Arc<dyn Sink>) -> Result<Box<dyn Endpoint>, String> {
+pub(super) fn instantiate(
+    setup: &Setup,
+    sink: Arc<dyn Sink>,
+) -> Result<Box<dyn Endpoint>, InstanceError> {
     let events_sink = sink.clone();
     let endpoint = match setup.version {
         FmiVersion::V2 => {
@@ -153,8 +157,8 @@ pub(super) fn print_by_the_line() {
     unsafe { callbacks::shakebench_print_by_the_line() }
 }
 
-fn text_for_c(text: &str) -> Result<CString, String> {
-    CString::new(text).map_err(|_| format!("`{}` has a zero in it", text.escape_debug()))
+fn text_for_c(text: &str) -> Result<CString, InstanceError> {
+    CString::new(text).map_err(|_| InstanceError::Zero(text.to_string()))
 }
 
 /// The first of the values, in the layout of C.

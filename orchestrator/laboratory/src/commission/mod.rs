@@ -272,9 +272,9 @@ pub fn commission(request: &Request, tell: &dyn Fn(&str)) -> Result<Commissioned
         warnings.insert(0, refused(validation_percent, &causes));
         ModelDesign::without(MODEL.into(), request.seed)
     } else {
-        let model = ControlModel::new(&file, MODEL).map_err(|reason| Error::Option {
+        let model = ControlModel::new(&file, MODEL).map_err(|error| Error::Option {
             option: "--plant",
-            reason,
+            reason: error.to_string(),
         })?;
         tell("designing controllers");
         let design = model::on_model(
@@ -429,7 +429,7 @@ pub fn rules_on_recordings(
     set: Vec<String>,
     duration: f64,
     seed: u64,
-) -> Result<Rules, String> {
+) -> Result<Rules, Error> {
     let asked = Request {
         plant: plant.to_string(),
         specimen: built_in::NONE.to_string(),
@@ -444,9 +444,9 @@ pub fn rules_on_recordings(
         played: 10.0,
         fmi: FmiVersion::V3,
     };
-    let recording = record_excitation(&asked).map_err(|error| error.to_string())?;
-    let found = identify(&[recording], Settings::default()).map_err(|error| error.to_string())?;
-    let mut file = found.model_file().map_err(|error| error.to_string())?;
+    let recording = record_excitation(&asked)?;
+    let found = identify(&[recording], Settings::default())?;
+    let mut file = found.model_file()?;
     file.sensor_delay = file.command_delay.map(|late| late.min(SAMPLING_PERIOD));
     Ok(Rules::new(ControlModel::new(&file, "the rig's model")?))
 }

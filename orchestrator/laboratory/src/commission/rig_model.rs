@@ -65,7 +65,7 @@ fn parameters(
         ),
         (vocabulary::COULOMB_FRICTION, friction),
         ("static_friction", friction * (1.0 + shape.excess)),
-        ("stribeck_velocity", shape.stribeck_velocity),
+        (vocabulary::STRIBECK_VELOCITY, shape.stribeck_velocity),
         ("seal_viscous_friction", rig.seal_damping),
         ("seal_stiffness", (friction / shape.presliding).max(1.0)),
         (

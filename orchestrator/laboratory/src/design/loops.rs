@@ -121,15 +121,17 @@ impl fmt::Display for LoopName {
     }
 }
 
-impl FromStr for LoopName {
-    type Err = String;
+/// A name that no loop has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not a loop; expected one of {known}", known = LoopName::ALL.map(LoopName::name).join(", "))]
+pub struct UnknownLoop(pub String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for LoopName {
+    type Err = UnknownLoop;
+
+    fn from_str(text: &str) -> Result<Self, UnknownLoop> {
         let found = Self::ALL.into_iter().find(|name| name.name() == text);
-        found.ok_or_else(|| {
-            let known = Self::ALL.map(Self::name).join(", ");
-            format!("`{text}` is not a loop; expected one of {known}")
-        })
+        found.ok_or_else(|| UnknownLoop(text.to_string()))
     }
 }
 

@@ -22,8 +22,8 @@ use serde::Serialize;
 use units::constants::SAMPLING_PERIOD;
 
 pub use figures::{Figures, LoopFigures};
-pub use loops::LoopName;
 use loops::NamedLoop;
+pub use loops::{LoopName, UnknownLoop};
 pub use page::{thesis_figures, write};
 pub use table::table;
 
@@ -60,16 +60,19 @@ impl Specimen {
     }
 }
 
-impl FromStr for Specimen {
-    type Err = String;
+/// A specimen around which no loop can be designed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` has no linear model; expected none or linear")]
+pub struct NoLinearModel(pub String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for Specimen {
+    type Err = NoLinearModel;
+
+    fn from_str(text: &str) -> Result<Self, NoLinearModel> {
         match text {
             "none" => Ok(Self::None),
             "linear" => Ok(Self::Linear),
-            other => Err(format!(
-                "`{other}` has no linear model; expected none or linear"
-            )),
+            other => Err(NoLinearModel(other.to_string())),
         }
     }
 }

@@ -138,9 +138,9 @@ pub struct ModelDesign {
 /// # Errors
 /// A file at fault, an unknown controller.
 pub fn design(options: &Options) -> Result<ModelDesign, Error> {
-    let model = ControlModel::read(&options.model).map_err(|reason| Error::Option {
+    let model = ControlModel::read(&options.model).map_err(|error| Error::Option {
         option: "--model",
-        reason,
+        reason: error.to_string(),
     })?;
     on_model(&model, options)
 }

@@ -9,6 +9,7 @@ pub mod on_rig;
 mod page;
 pub mod replay;
 
+use identification::IdentificationError;
 use serde::{Deserialize, Serialize};
 use units::vocabulary;
 
@@ -337,9 +338,9 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
 
 /// The model on which the controllers of the request are tuned.
 pub(crate) fn control_model(request: &Request) -> Result<Option<ControlModel>, Error> {
-    let fault = |reason| Error::Option {
+    let fault = |error: IdentificationError| Error::Option {
         option: "--control-model",
-        reason,
+        reason: error.to_string(),
     };
     match &request.control_model {
         Some(path) => ControlModel::read(path).map(Some).map_err(fault),

@@ -155,7 +155,7 @@ impl Library for Shared<'_> {
         set: &str,
         component: &Description,
         directory: Option<&Path>,
-    ) -> Result<Vec<(usize, Value)>, String> {
+    ) -> Result<Vec<(usize, Value)>, Box<dyn std::error::Error + Send + Sync>> {
         self.library().parameters(set, component, directory)
     }
 }

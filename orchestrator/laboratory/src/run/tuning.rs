@@ -21,10 +21,6 @@ const ALL: &str = "all";
 /// # Errors
 /// A parameter that there is not or that cannot be changed, bounds that do not hold its value.
 pub fn panel(system: &System, wanted: &[String], period: f64) -> Result<Panel, Error> {
-    let fault = |reason: String| Error::Option {
-        option: "--tune",
-        reason,
-    };
     let mut tunables: Vec<Tunable> = Vec::new();
     let mut add = |new: Tunable| {
         tunables.retain(|own| own.variable != new.variable);
@@ -45,7 +41,7 @@ pub fn panel(system: &System, wanted: &[String], period: f64) -> Result<Panel, E
         all.for_each(&mut add);
     }
     for text in wanted.iter().filter(|name| *name != ALL) {
-        add(one(system, text).map_err(fault)?);
+        add(one(system, text)?);
     }
     if tunables.is_empty() {
         let reason = "the system has no tunable parameter whose value is not 0; state one with its bounds as \
@@ -53,6 +49,13 @@ pub fn panel(system: &System, wanted: &[String], period: f64) -> Result<Panel, E
         return Err(fault(reason.to_string()));
     }
     Ok(Panel::new(tunables, (CHANGE / period).round() as usize))
+}
+
+fn fault(reason: String) -> Error {
+    Error::Option {
+        option: "--tune",
+        reason,
+    }
 }
 
 /// The parameters of a system that the standard lets be changed between steps.
@@ -91,7 +94,7 @@ fn usual_bounds(variable: &Variable, start: f64) -> Option<(f64, f64)> {
 }
 
 /// A parameter as a user names it.
-fn one(system: &System, text: &str) -> Result<Tunable, String> {
+fn one(system: &System, text: &str) -> Result<Tunable, Error> {
     let (name, bounds) = match text.split_once('=') {
         Some((name, bounds)) => (name.trim(), Some(bounds)),
         None => (text.trim(), None),
@@ -101,27 +104,30 @@ fn one(system: &System, text: &str) -> Result<Tunable, String> {
         (component, variable)
     });
     let Some((component, variable)) = found.filter(|(_, variable)| is_tunable(variable)) else {
-        return Err(not_tunable(system, name));
+        return Err(fault(not_tunable(system, name)));
     };
-    let start = start(component, variable)
-        .ok_or_else(|| format!("`{name}` has no value at the beginning; give one with --set"))?;
+    let start = start(component, variable).ok_or_else(|| {
+        fault(format!(
+            "`{name}` has no value at the beginning; give one with --set"
+        ))
+    })?;
     let (low, high) = match bounds {
         Some(bounds) => stated(variable, name, bounds)?,
         None => usual_bounds(variable, start).ok_or_else(|| {
-            format!(
+            fault(format!(
                 "`{name}` is {start} at the beginning, so half and twice its value cannot be its bounds; \
                  expected {name}=LOW..HIGH"
-            )
+            ))
         })?,
     };
     if !(low..=high).contains(&start) {
-        return Err(format!(
+        return Err(fault(format!(
             "`{name}` is {start} at the beginning, which is outside of {low} to {high}{}",
             variable
                 .unit
                 .as_ref()
                 .map_or(String::new(), |unit| format!(" {unit}")),
-        ));
+        )));
     }
     Ok(Tunable {
         variable: name.to_string(),
@@ -132,7 +138,7 @@ fn one(system: &System, text: &str) -> Result<Tunable, String> {
 }
 
 /// Bounds as `LOW..HIGH`, both with units.
-fn stated(variable: &Variable, name: &str, text: &str) -> Result<(f64, f64), String> {
+fn stated(variable: &Variable, name: &str, text: &str) -> Result<(f64, f64), Error> {
     let unit = variable.unit.as_deref().unwrap_or_default();
     let expected = || match unit {
         "" => format!("expected {name}=LOW..HIGH"),
@@ -140,17 +146,19 @@ fn stated(variable: &Variable, name: &str, text: &str) -> Result<(f64, f64), Str
     };
     let (low, high) = text
         .split_once("..")
-        .ok_or_else(|| format!("`{text}` is not a range; {}", expected()))?;
+        .ok_or_else(|| fault(format!("`{text}` is not a range; {}", expected())))?;
     let read = |text: &str| {
         let number = text.trim().parse::<f64>().ok();
         // Zero is zero in every unit.
         match number.filter(|number| unit.is_empty() || *number == 0.0) {
             Some(number) => Ok(number),
-            None if number.is_some() => {
-                Err(format!("`{}` has no unit; {}", text.trim(), expected()))
-            }
+            None if number.is_some() => Err(fault(format!(
+                "`{}` has no unit; {}",
+                text.trim(),
+                expected()
+            ))),
             None => units::value_in(text.trim(), unit)
-                .map_err(|error| format!("`{}`: {error}; {}", text.trim(), expected())),
+                .map_err(|error| fault(format!("`{}`: {error}; {}", text.trim(), expected()))),
         }
     };
     let (low, high) = (read(low)?, read(high)?);
@@ -160,15 +168,15 @@ fn stated(variable: &Variable, name: &str, text: &str) -> Result<(f64, f64), Str
         && low.is_finite()
         && high.is_finite();
     if low >= high {
-        return Err(format!("`{text}` holds no values; {}", expected()));
+        return Err(fault(format!("`{text}` holds no values; {}", expected())));
     }
     if !is_accepted {
         let side = |bound: Option<f64>| bound.map_or("any".to_string(), |bound| bound.to_string());
-        return Err(format!(
+        return Err(fault(format!(
             "`{text}` is beyond what the FMU accepts for `{name}`, {} to {} {unit}",
             side(least),
             side(most)
-        ));
+        )));
     }
     Ok((low, high))
 }

@@ -11,6 +11,7 @@ use units::vocabulary;
 use units::vocabulary::LOOP_DELAY_SAMPLES;
 
 use super::control_model::ControlModel;
+use super::rule::TuningError;
 use super::tuning::{Rules, hydraulics, set};
 use fmi_system::{ComponentFile, Setting};
 
@@ -26,7 +27,7 @@ pub(super) fn unyielding(specimen: &YieldingSpecimen) -> LinearSpecimen {
 impl Rules {
     /// Valve, oil and table as the model has them, or as they come nearest to it. The actuator that the thesis
     /// prints has none: for it they are those of the physical rig's commissioning.
-    pub(super) fn known_rig(&self) -> Result<KnownRig, String> {
+    pub(super) fn known_rig(&self) -> Result<KnownRig, TuningError> {
         let model = &self.model;
         let with = |own: &HydraulicRig| KnownRig {
             hydraulics: hydraulics(own),
@@ -40,13 +41,13 @@ impl Rules {
             let is_printed = self.suite.is_none();
             match ControlModel::commissioned()?.hydraulics {
                 Some((own, _)) if is_printed => Ok(with(&own)),
-                _ => Err(error.to_string()),
+                _ => Err(error.into()),
             }
         })
     }
 
     /// The aids of operators on the model's rig.
-    fn aids(&self, specimen: Option<&YieldingSpecimen>) -> Result<OperatorAids, String> {
+    fn aids(&self, specimen: Option<&YieldingSpecimen>) -> Result<OperatorAids, TuningError> {
         let model = &self.model;
         let rig = self.known_rig()?;
         let own = specimen.map(unyielding);
@@ -56,7 +57,7 @@ impl Rules {
             period: model.measurements().period,
             specimen: own.as_ref(),
         };
-        let mut aids = design.tuned().map_err(|error| error.to_string())?;
+        let mut aids = design.tuned()?;
         if let Some((own, shape)) = &model.hydraulics {
             aids.friction.friction = own.seal_friction;
             aids.friction.shape = *shape;
@@ -65,21 +66,21 @@ impl Rules {
     }
 
     /// These rules on the rig as it is to a controller behind a stabilised actuator.
-    pub(super) fn behind_stabilisation(&self) -> Result<&Self, String> {
-        let own = self.stabilised.get_or_init(|| {
-            let mut model = self.model.clone();
-            let gain = self.aids(None)?.pressure.gain;
-            // The command is held for half a period in the mean.
-            let late = model.late + 0.5 * model.measurements().period;
-            model.rig = stabilised(&model.rig, gain, late);
-            model.hydraulics = None;
-            let rules = match &self.suite {
-                Some(_) => Self::new(model),
-                None => Self::unprinted(model),
-            };
-            Ok(Box::new(rules))
-        });
-        own.as_deref().map_err(Clone::clone)
+    pub(super) fn behind_stabilisation(&self) -> Result<&Self, TuningError> {
+        if let Some(own) = self.stabilised.get() {
+            return Ok(own);
+        }
+        let mut model = self.model.clone();
+        let gain = self.aids(None)?.pressure.gain;
+        // The command is held for half a period on average.
+        let late = model.late + 0.5 * model.measurements().period;
+        model.rig = stabilised(&model.rig, gain, late);
+        model.hydraulics = None;
+        let rules = match &self.suite {
+            Some(_) => Self::new(model),
+            None => Self::unprinted(model),
+        };
+        Ok(self.stabilised.get_or_init(|| Box::new(rules)))
     }
 
     /// What is known of the rig, friction, corners and gains.
@@ -87,7 +88,7 @@ impl Rules {
         &self,
         component: &mut ComponentFile,
         specimen: Option<&YieldingSpecimen>,
-    ) -> Result<(), String> {
+    ) -> Result<(), TuningError> {
         if let Some(curve) = self.model.curve {
             set(component, &curve.named());
             set(component, &self.known_rig()?.hydraulics.named());

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use controllers::preview::model::Hydraulics;
 use controllers::tuning::suite::{Measurements, Suite};
+use identification::IdentificationError;
 use identification::closed_loop::equations::{HydraulicRig, PARAMETERS};
 use identification::closed_loop::friction::SealShape;
 use identification::identify::model_file::{ModelFile, Units};
@@ -99,8 +100,8 @@ impl ControlModel {
     ///
     /// # Errors
     /// A file at fault, or one whose data did not determine the actuator.
-    pub fn read(path: &Path) -> Result<Self, String> {
-        let file = ModelFile::read(path).map_err(|error| error.to_string())?;
+    pub fn read(path: &Path) -> Result<Self, IdentificationError> {
+        let file = ModelFile::read(path)?;
         Self::new(&file, &path.display().to_string())
     }
 
@@ -108,9 +109,9 @@ impl ControlModel {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn commissioned() -> Result<Self, String> {
+    pub fn commissioned() -> Result<Self, IdentificationError> {
         const NAME: &str = "the built-in model of the physical rig";
-        let file = ModelFile::parse(COMMISSIONED, NAME).map_err(|error| error.to_string())?;
+        let file = ModelFile::parse(COMMISSIONED, NAME)?;
         Self::new(&file, NAME)
     }
 
@@ -118,10 +119,9 @@ impl ControlModel {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn new(file: &ModelFile, name: &str) -> Result<Self, String> {
-        let said = |error: identification::IdentificationError| error.to_string();
-        let rig = file.shake_table(name).map_err(said)?;
-        let units: Units = file.units(name).map_err(said)?;
+    pub fn new(file: &ModelFile, name: &str) -> Result<Self, IdentificationError> {
+        let rig = file.shake_table(name)?;
+        let units: Units = file.units(name)?;
         let noise = |channel: &str| {
             let value = file.noise.as_ref().and_then(|noise| noise.get(channel));
             value.and_then(toml::Value::as_float).unwrap_or(0.0) * units.length
@@ -134,8 +134,8 @@ impl ControlModel {
             late: late.max(0.0),
             delay: (late / SAMPLING_PERIOD).round().max(0.0) as usize,
             noise: Noise::of(noise("displacement"), noise("acceleration")),
-            specimen: file.specimen(name).map_err(said)?,
-            hydraulics: file.hydraulic_rig(name).map_err(said)?,
+            specimen: file.specimen(name)?,
+            hydraulics: file.hydraulic_rig(name)?,
             curve: file.valve_curve(),
             command_delay: samples as usize,
             fraction: command - samples * SAMPLING_PERIOD,

@@ -1,8 +1,46 @@
 //! The rules by which controllers can be tuned.
 
+use std::path::PathBuf;
+
+use identification::IdentificationError;
+use plant::ModelError;
 use serde::Deserialize;
 use serde::de::IntoDeserializer;
-use serde::de::value::Error;
+use serde::de::value::Error as UnknownRule;
+
+/// Why the controllers of a system cannot be tuned.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum TuningError {
+    /// A rule refuses the model.
+    #[error(transparent)]
+    Refused(#[from] ModelError),
+    /// The model cannot be read.
+    #[error(transparent)]
+    Model(#[from] IdentificationError),
+    /// A component asks for a rule that there is not.
+    #[error(transparent)]
+    Rule(#[from] UnknownRule),
+    /// A model for parameters that are printed.
+    #[error("printed parameters do not use `--control-model`; expected one of the two")]
+    Printed,
+    /// A plant that nobody has commissioned.
+    #[error(
+        "there is no tuning for the plant `{plant}`: the printed one was made for it; expected \
+         `--plant servohydraulic`, `--tuning printed` or `--control-model FILE`"
+    )]
+    NoTuning {
+        /// The plant.
+        plant: String,
+    },
+    /// The rules refuse the model of a file.
+    #[error("{}: {reason}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: Box<TuningError>,
+    },
+}
 
 /// How a component is tuned; a built-in system's file says it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -47,8 +85,7 @@ impl Rule {
     ///
     /// # Errors
     /// No such rule, with those that there are.
-    pub fn named(name: &str) -> Result<Self, String> {
-        let deserializer = IntoDeserializer::<Error>::into_deserializer(name);
-        Self::deserialize(deserializer).map_err(|error| error.to_string())
+    pub fn named(name: &str) -> Result<Self, UnknownRule> {
+        Self::deserialize(name.into_deserializer())
     }
 }

@@ -9,18 +9,21 @@ use units::vocabulary;
 use units::Parameters as _;
 
 use super::aids::unyielding;
+use super::rule::TuningError;
 use super::tuning::{Rules, set};
 use fmi_system::ComponentFile;
 use fmi_system::Setting;
 
 impl Rules {
     /// Model and hold.
-    pub(super) fn adaptive_inverse(&self, component: &mut ComponentFile) -> Result<(), String> {
+    pub(super) fn adaptive_inverse(
+        &self,
+        component: &mut ComponentFile,
+    ) -> Result<(), TuningError> {
         let rig = self.known_rig()?;
         let measurements = self.model.measurements();
         let (delay, period) = (measurements.delay(), measurements.period);
-        let gains = ThreeVariableGains::tuned(&self.model.rig, delay, period);
-        let gains = gains.map_err(|error| error.to_string())?;
+        let gains = ThreeVariableGains::tuned(&self.model.rig, delay, period)?;
         set(component, &rig.named());
         set(component, &[("hold_gain", 0.5 * gains.proportional)]);
         component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
@@ -32,7 +35,7 @@ impl Rules {
         &self,
         component: &mut ComponentFile,
         specimen: Option<&YieldingSpecimen>,
-    ) -> Result<(), String> {
+    ) -> Result<(), TuningError> {
         let variant = match component.parameters.get("variant") {
             Some(Setting::Text(name)) if name == "dynamic-surface" => Variant::DynamicSurface,
             Some(Setting::Text(name)) if name == "receding-horizon" => Variant::RecedingHorizon,
@@ -49,8 +52,7 @@ impl Rules {
             },
             ..usual
         };
-        let tuned = own.tuned(measurements.late, specimen.map(unyielding).as_ref());
-        let tuned = tuned.map_err(|error| error.to_string())?;
+        let tuned = own.tuned(measurements.late, specimen.map(unyielding).as_ref())?;
         let noise = &tuned.uncertainty.measurement;
         set(component, &tuned.rig.named());
         set(

@@ -39,12 +39,13 @@ use controllers::preview::feedback::Uncertainty;
 use controllers::preview::model::{Hydraulics, RigModel};
 use controllers::tuning::acceleration_tracking::{AccelerationTuning, Shaping};
 use controllers::tuning::suite::{Member, Suite};
+use identification::IdentificationError;
 use identification::closed_loop::equations::HydraulicRig;
 use serde::{Deserialize, Serialize};
 use units::Parameters as _;
 
 use super::control_model::ControlModel;
-use super::rule::Rule;
+use super::rule::{Rule, TuningError};
 use fmi_system::Setting;
 use fmi_system::{ComponentFile, SystemFile};
 use fmi_system::{Link, Origin};
@@ -83,7 +84,7 @@ impl Wanted<'_> {
     ///
     /// # Errors
     /// A model file at fault.
-    pub(super) fn has_curve(&self) -> Result<bool, String> {
+    pub(super) fn has_curve(&self) -> Result<bool, IdentificationError> {
         match (self.rules, self.model) {
             (Some(rules), _) => Ok(rules.model.curve.is_some()),
             (None, Some(path)) if self.tuning != Some(Tuning::Printed) => {
@@ -103,16 +104,14 @@ pub(super) fn apply(
     plant: &SystemFile,
     specimen: Option<&YieldingSpecimen>,
     wanted: Wanted<'_>,
-) -> Result<(), String> {
+) -> Result<(), TuningError> {
     if let Some(rules) = wanted.rules {
         return rules.apply(file, specimen, wanted.inside);
     }
     let own;
     let rules = match (wanted.tuning, wanted.model, plant.commissioned) {
         (Some(Tuning::Printed), Some(_), _) => {
-            return Err(
-                "printed parameters do not use `--control-model`; expected one of the two".into(),
-            );
+            return Err(TuningError::Printed);
         }
         (Some(Tuning::Printed), None, true) => return Ok(()),
         (Some(Tuning::Printed) | None, None, false) => {
@@ -120,21 +119,27 @@ pub(super) fn apply(
             &own
         }
         (Some(Tuning::Tuned), None, false) => {
-            return Err(format!(
-                "there is no tuning for the plant `{}`: the printed one was made for it; \
-                 expected `--plant servohydraulic`, `--tuning printed` or `--control-model FILE`",
-                plant.name
-            ));
+            return Err(TuningError::NoTuning {
+                plant: plant.name.clone(),
+            });
         }
         (_, Some(path), _) => {
             own = Rules::new(ControlModel::read(path)?);
             let applied = own.apply(file, specimen, wanted.inside);
-            return applied.map_err(|error| format!("{}: {error}", path.display()));
+            return applied.map_err(|error| TuningError::File {
+                path: path.to_path_buf(),
+                reason: Box::new(error),
+            });
         }
         (_, None, true) => {
-            static RULES: OnceLock<Result<Rules, String>> = OnceLock::new();
-            let rules = RULES.get_or_init(|| Ok(Rules::new(ControlModel::commissioned()?)));
-            rules.as_ref().map_err(Clone::clone)?
+            static RULES: OnceLock<Rules> = OnceLock::new();
+            match RULES.get() {
+                Some(rules) => rules,
+                None => {
+                    let model = ControlModel::commissioned()?;
+                    RULES.get_or_init(|| Rules::new(model))
+                }
+            }
         }
     };
     rules.apply(file, specimen, wanted.inside)
@@ -145,7 +150,10 @@ pub(super) fn apply(
 ///
 /// # Errors
 /// A model that cannot be read.
-pub(super) fn rigid_mass(plant: &SystemFile, wanted: Wanted<'_>) -> Result<Option<f64>, String> {
+pub(super) fn rigid_mass(
+    plant: &SystemFile,
+    wanted: Wanted<'_>,
+) -> Result<Option<f64>, IdentificationError> {
     let of = |model: &ControlModel| model.hydraulics.map(|_| model.rig.table.mass);
     match (wanted.rules, wanted.tuning, wanted.model) {
         (Some(rules), ..) => Ok(of(&rules.model)),
@@ -207,7 +215,7 @@ pub struct Rules {
     /// Of the controllers whose parameters the thesis prints; none: those stay as printed.
     pub(super) suite: Option<Suite>,
     /// The same behind a stabilised actuator, once it was asked for.
-    pub(super) stabilised: OnceLock<Result<Box<Rules>, String>>,
+    pub(super) stabilised: OnceLock<Box<Rules>>,
 }
 
 pub(super) fn set(component: &mut ComponentFile, values: &[(&str, f64)]) {
@@ -241,7 +249,7 @@ impl Rules {
         file: &mut SystemFile,
         specimen: Option<&YieldingSpecimen>,
         inside: bool,
-    ) -> Result<(), String> {
+    ) -> Result<(), TuningError> {
         let own = if inside {
             self.model.specimen.map(Into::into)
         } else {
@@ -275,7 +283,7 @@ impl Rules {
         &self,
         file: &mut SystemFile,
         specimen: Option<&YieldingSpecimen>,
-    ) -> Result<(), String> {
+    ) -> Result<(), TuningError> {
         let identified = self.model.specimen.map(|own| own.mass);
         let specimen_mass = identified.or(specimen.map(|own| own.mass));
         for (name, component) in &mut file.components {
@@ -302,20 +310,18 @@ impl Rules {
                 Rule::SurfaceControl => self.surface_control(component, specimen)?,
                 Rule::TrajectoryTracking => {
                     let tuning = AccelerationTracking::trajectory;
-                    let own = tuning(&self.model.rig, &self.model.measurements());
-                    let own = own.map_err(|error| error.to_string())?;
+                    let own = tuning(&self.model.rig, &self.model.measurements())?;
                     self.acceleration_tracking(component, name, &own, &mut file.connections);
                 }
                 Rule::DualLoop => {
                     let tuning = AccelerationTracking::dual_loop;
-                    let own = tuning(&self.model.rig, &self.model.measurements());
-                    let own = own.map_err(|error| error.to_string())?;
+                    let own = tuning(&self.model.rig, &self.model.measurements())?;
                     self.acceleration_tracking(component, name, &own, &mut file.connections);
                 }
                 Rule::MinimalControlSynthesis => {
                     let own =
                         MinimalControlSynthesis::tuned(&self.model.rig, &self.model.measurements());
-                    set(component, &own.map_err(|error| error.to_string())?.named());
+                    set(component, &own?.named());
                     let wanted = |variable: &str| variable == "wanted_displacement";
                     let delay = self.model.delay as isize;
                     place_references(&mut file.connections, name, wanted, -delay);
@@ -340,7 +346,7 @@ impl Rules {
                     Member::SlidingMode
                 }
                 Rule::ForcePid => {
-                    let found = suite.sliding_mode().map_err(|error| error.to_string())?;
+                    let found = suite.sliding_mode()?;
                     let force = &found.force;
                     let gains = [
                         (vocabulary::PROPORTIONAL_GAIN, force.proportional),
@@ -350,7 +356,7 @@ impl Rules {
                     continue;
                 }
                 Rule::UnderPrediction => {
-                    let mpc = suite.mpc().map_err(|error| error.to_string())?;
+                    let mpc = suite.mpc()?;
                     set(component, &mpc.low_level.gains.named());
                     continue;
                 }
@@ -364,7 +370,7 @@ impl Rules {
                 | Rule::AdaptiveInverse
                 | Rule::MinimalControlSynthesis => continue,
             };
-            let values = suite.named(member).map_err(|error| error.to_string())?;
+            let values = suite.named(member)?;
             for (parameter, value) in values {
                 component.set(&parameter, value);
             }
@@ -392,10 +398,10 @@ impl Rules {
         &self,
         component: &mut ComponentFile,
         specimen: Option<&YieldingSpecimen>,
-    ) -> Result<(), String> {
+    ) -> Result<(), TuningError> {
         self.linear_quadratic_gaussian(component, specimen)?;
         let period = self.model.measurements().period;
-        let shaping = Shaping::inverse(&self.model.rig, period).map_err(|e| e.to_string())?;
+        let shaping = Shaping::inverse(&self.model.rig, period)?;
         for (name, gain) in SHAPES.into_iter().zip(shaping.gains) {
             component.set(name, gain);
         }
@@ -418,7 +424,7 @@ impl Rules {
         &self,
         component: &mut ComponentFile,
         specimen: Option<&YieldingSpecimen>,
-    ) -> Result<(), String> {
+    ) -> Result<(), TuningError> {
         self.linear_quadratic_gaussian(component, specimen)?;
         if let Some((own, shape)) = &self.model.hydraulics {
             set(
@@ -456,7 +462,7 @@ impl Rules {
         &self,
         component: &mut ComponentFile,
         specimen: Option<&YieldingSpecimen>,
-    ) -> Result<(), String> {
+    ) -> Result<(), TuningError> {
         let mut own = preview_control(&self.model);
         own.load.specimen = specimen.copied();
         let identified = self.model.specimen.map(YieldingSpecimen::from);
@@ -465,7 +471,7 @@ impl Rules {
         } else {
             own.tuned()
         };
-        let tuned = tuned.map_err(|error| error.to_string())?;
+        let tuned = tuned?;
         let noise = &self.model.noise;
         self.model(component);
         if let Some(own) = self.model.whole_samples() {

@@ -365,6 +365,40 @@ mod tests {
         assert!(found[2] > steady && found[2] < 2.5 * steady, "{}", found[2]);
     }
 
+    /// Against the largest or smallest of ten thousand values of the cubic.
+    #[test]
+    fn the_extremum_of_a_cubic_is_that_of_its_values() {
+        for (values, rates) in [
+            ([0.0, 0.0], [1.0, -1.0]),
+            ([0.2, 0.3], [2.0, -0.5]),
+            ([-0.4, 0.1], [-3.0, 4.0]),
+            ([1.0, 1.1], [0.01, -5.0]),
+            ([0.5, -0.5], [0.3, -0.2]),
+            ([0.0, 1.0], [-1.0, 1.0]),
+        ] {
+            let ([from, to], [rate, last]) = (values, rates);
+            // Hermite's form, in place of powers.
+            let at = |s: f64| {
+                let (s2, s3) = (s * s, s * s * s);
+                from * (2.0 * s3 - 3.0 * s2 + 1.0)
+                    + rate * (s3 - 2.0 * s2 + s)
+                    + to * (3.0 * s2 - 2.0 * s3)
+                    + last * (s3 - s2)
+            };
+            let all = (0..=10_000).map(|k| at(f64::from(k) * 1e-4));
+            let expected = match rate > 0.0 {
+                true => all.fold(f64::NEG_INFINITY, f64::max),
+                false => all.fold(f64::INFINITY, f64::min),
+            };
+            let (found, place) = extremum(values, rates);
+            assert!(
+                (found - expected).abs() < 1e-7,
+                "{values:?} {rates:?}: {found} {expected}"
+            );
+            assert!((at(place) - found).abs() < 1e-12, "{place}");
+        }
+    }
+
     /// A step of the ground's acceleration: `1 + exp(-zeta pi / sqrt(1 - zeta²))`.
     #[test]
     fn a_step_overshoots_as_in_the_closed_form() {

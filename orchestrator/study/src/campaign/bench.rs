@@ -7,7 +7,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::command::{command, quoted};
 use super::factor::Values;
 use super::journal::Head;
-use super::row::{FIGURES, figures, nominal, number_unit, output, outputs, times, written};
+use super::row::{
+    FIGURES, VariableError, figures, nominal, number_unit, output, outputs, times, written,
+};
 use super::runs::Runs;
 use super::setting::{Key, OWN_MODEL};
 use super::study::{Limit, Study};
@@ -120,16 +122,16 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// A signal that the system has not, a unit that does not fit.
-    pub fn limit(&self, system: &System, limit: &Limit) -> Result<f64, String> {
+    pub fn limit(&self, system: &System, limit: &Limit) -> Result<f64, Error> {
         let unit = match &limit.signal {
             Some(signal) => {
                 let (component, position) = output(system, signal).ok_or_else(|| {
                     let known: Vec<String> = outputs(system).collect();
                     let hint = hint(signal, known.iter().map(String::as_str));
-                    format!(
+                    self.study.fault(&format!(
                         "[limits] `{signal}` is not an output of {}{hint}",
                         system.name
-                    )
+                    ))
                 })?;
                 component.fmu.description.variables[position]
                     .unit
@@ -141,7 +143,10 @@ impl<'a> Bench<'a> {
                 .find(|(name, _)| *name == limit.column)
                 .map_or(String::new(), |(_, unit)| (*unit).to_string()),
         };
-        let named = |reason: String| format!("[limits] {}: {reason}", limit.column);
+        let named = |reason: String| {
+            let reason = format!("[limits] {}: {reason}", limit.column);
+            self.study.fault(&reason)
+        };
         let value = match &limit.written {
             Setting::Integer(number) => *number as f64,
             Setting::Number(number) => *number,
@@ -171,8 +176,7 @@ impl<'a> Bench<'a> {
     pub fn limits(&self) -> Result<Vec<(String, f64)>, Error> {
         let (_, assembled, _) = self.request(&self.study.settings(0))?;
         let limits = self.study.limits.iter().map(|limit| {
-            let value = self.limit(&assembled.system, limit);
-            let value = value.map_err(|reason| self.study.fault(&reason))?;
+            let value = self.limit(&assembled.system, limit)?;
             Ok((limit.column.clone(), value))
         });
         limits.collect()
@@ -272,9 +276,8 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// A variable that its systems have not, or one that is not a number.
-    pub fn nominal(&self, name: &str) -> Result<(f64, String), String> {
-        let request = self.request(&self.study.settings(0));
-        let (_, assembled, _) = request.map_err(|error| error.to_string())?;
+    pub fn nominal(&self, name: &str) -> Result<(f64, String), VariableError> {
+        let (_, assembled, _) = self.request(&self.study.settings(0))?;
         nominal(&assembled.system, name)
     }
 
@@ -299,7 +302,8 @@ impl<'a> Bench<'a> {
         for (key, value, is_relative) in variables {
             for name in key.variables() {
                 let set = match is_relative {
-                    true => times(&assembled.system, name, value).map_err(fault)?,
+                    true => times(&assembled.system, name, value)
+                        .map_err(|error| fault(error.to_string()))?,
                     false => value.to_string(),
                 };
                 request.set.push(format!("{name}={set}"));
@@ -376,7 +380,8 @@ impl<'a> Bench<'a> {
         let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
         let set = rig.into_iter().cloned().collect();
         let found = place.get_or_insert_with(|| {
-            rules_on_recordings(&request.plant, set, RECORDED, self.study.seed).map(Arc::new)
+            let rules = rules_on_recordings(&request.plant, set, RECORDED, self.study.seed);
+            rules.map(Arc::new).map_err(|error| error.to_string())
         });
         found.clone().map_err(|reason| Error::Option {
             option: "control_model = \"own\"",
@@ -458,7 +463,7 @@ impl Runs for Bench<'_> {
                 fault(format!("a run with {}: {error}", all.join(", ")))
             })?;
             for limit in &self.study.limits {
-                self.limit(&prepared.system, limit).map_err(fault)?;
+                self.limit(&prepared.system, limit)?;
             }
         }
         let columns = self.columns()?;

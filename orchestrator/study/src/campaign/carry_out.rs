@@ -29,19 +29,21 @@ pub struct Shard {
     pub of: u64,
 }
 
+/// A text that is not a share of a study's runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("expected I/N with 1 <= I <= N, such as 1/4")]
+pub struct NotAShard;
+
 impl FromStr for Shard {
-    type Err = String;
+    type Err = NotAShard;
 
     /// Reads `I/N`.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = "expected I/N with 1 <= I <= N, such as 1/4";
-        let (part, of) = text.split_once('/').ok_or(expected)?;
-        let part = part.trim().parse().map_err(|_| expected)?;
-        let of = of.trim().parse().map_err(|_| expected)?;
-        match (1..=of).contains(&part) {
-            true => Ok(Self { part, of }),
-            false => Err(expected.to_string()),
-        }
+    fn from_str(text: &str) -> Result<Self, NotAShard> {
+        let (part, of) = text.split_once('/').ok_or(NotAShard)?;
+        let part = part.trim().parse().map_err(|_| NotAShard)?;
+        let of = of.trim().parse().map_err(|_| NotAShard)?;
+        let shard = (1..=of).contains(&part).then_some(Self { part, of });
+        shard.ok_or(NotAShard)
     }
 }
 

@@ -28,6 +28,43 @@ const LONGEST_SOBOL: u64 = 1 << 16;
 /// Most dimensions of the library's sequence.
 const MOST_DIMENSIONS: usize = 256;
 
+/// Most runs of a study.
+const MOST_RUNS: u64 = 1_000_000_000;
+
+/// Why a design does not fit the factors of a study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum DesignError {
+    /// Every combination of what is drawn.
+    #[error(
+        "`full` takes every combination of lists; expected design = \"sobol\" with `runs`, or {{ range = [..], \
+         steps = N }} instead of a distribution"
+    )]
+    NotLists,
+    /// A number of runs for every combination.
+    #[error("`runs` belongs to the sampled designs; `full` takes every combination")]
+    RunsOfFull,
+    /// No number of runs.
+    #[error("`runs` is missing, such as runs = 64")]
+    NoRuns,
+    /// No runs.
+    #[error("runs = 0; expected 1 or more")]
+    Zero,
+    /// Too many runs.
+    #[error("{0} runs; expected at most {MOST_RUNS}")]
+    TooMany(u64),
+    /// More than the sequence has.
+    #[error(
+        "{points} points in {dimensions} dimensions; this sequence has at most {LONGEST_SOBOL} in \
+         {MOST_DIMENSIONS}; expected design = \"latin-hypercube\" or \"random\""
+    )]
+    Sequence {
+        /// Points that are needed.
+        points: u64,
+        /// Dimensions that are needed.
+        dimensions: usize,
+    },
+}
+
 /// The points of a design.
 #[derive(Debug, Clone)]
 pub struct Points {
@@ -51,28 +88,20 @@ impl Points {
         counts: Vec<Option<usize>>,
         runs: Option<u64>,
         seed: u64,
-    ) -> Result<Self, String> {
-        const MOST: u64 = 1_000_000_000;
+    ) -> Result<Self, DesignError> {
         let runs = match (design, runs) {
             (Design::Full, None) => counts
                 .iter()
                 .try_fold(1_u64, |all, count| all.checked_mul((*count)? as u64))
-                .ok_or(
-                    "`full` takes every combination of lists; expected design = \"sobol\" with \
-                     `runs`, or { range = [..], steps = N } instead of a distribution",
-                )?,
-            (Design::Full, Some(_)) => {
-                return Err(
-                    "`runs` belongs to the sampled designs; `full` takes every combination".into(),
-                );
-            }
-            (_, None) => return Err("`runs` is missing, such as runs = 64".into()),
-            (_, Some(0)) => return Err("runs = 0; expected 1 or more".into()),
+                .ok_or(DesignError::NotLists)?,
+            (Design::Full, Some(_)) => return Err(DesignError::RunsOfFull),
+            (_, None) => return Err(DesignError::NoRuns),
+            (_, Some(0)) => return Err(DesignError::Zero),
             (Design::Saltelli, Some(runs)) => runs.saturating_mul(counts.len() as u64 + 2),
             (_, Some(runs)) => runs,
         };
-        if runs > MOST {
-            return Err(format!("{runs} runs; expected at most {MOST}"));
+        if runs > MOST_RUNS {
+            return Err(DesignError::TooMany(runs));
         }
         let dimensions = match design {
             Design::Saltelli => 2 * counts.len(),
@@ -84,10 +113,7 @@ impl Points {
                 _ => runs,
             };
             if points > LONGEST_SOBOL || dimensions > MOST_DIMENSIONS {
-                return Err(format!(
-                    "{points} points in {dimensions} dimensions; this sequence has at most {LONGEST_SOBOL} in \
-                     {MOST_DIMENSIONS}; expected design = \"latin-hypercube\" or \"random\""
-                ));
+                return Err(DesignError::Sequence { points, dimensions });
             }
         }
         let mut drawn = Vec::new();
@@ -249,7 +275,9 @@ mod tests {
     #[test]
     fn designs_that_do_not_fit_are_refused() {
         let error = |design, counts: &[Option<usize>], runs| {
-            Points::new(design, counts.to_vec(), runs, 1).unwrap_err()
+            Points::new(design, counts.to_vec(), runs, 1)
+                .unwrap_err()
+                .to_string()
         };
         assert!(error(Design::Full, &[Some(2), None], None).contains("steps"));
         assert!(error(Design::Full, &[Some(2)], Some(5)).contains("sampled designs"));

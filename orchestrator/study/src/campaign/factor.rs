@@ -4,7 +4,7 @@ use serde::Deserialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use fmi_system::Setting;
-use units::Quantity;
+use units::{Quantity, UnitError};
 
 /// What a factor may be.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +41,71 @@ pub enum Distribution {
     Integers(i64, i64),
 }
 
+/// Why a factor is not one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FactorError {
+    /// A table with other keys or types.
+    #[error("{}", .0.message())]
+    Table(#[from] toml::de::Error),
+    /// A number or unit that cannot be read.
+    #[error(transparent)]
+    Unit(#[from] UnitError),
+    /// A single value.
+    #[error(
+        "{0} is a single value; expected a list such as [1, 2] or a distribution such as {{ uniform = [1, 2] }}; \
+         values that are the same in all runs belong in [fixed]"
+    )]
+    Single(toml::Value),
+    /// A list of nothing.
+    #[error("is an empty list")]
+    Empty,
+    /// A value that is listed twice.
+    #[error("has `{0}` twice")]
+    Twice(String),
+    /// No distribution, or several.
+    #[error("expected one of list, range, uniform, loguniform, normal, lognormal, integers")]
+    Kinds,
+    /// A key without the one that it belongs to.
+    #[error("`{key}` belongs to {owner}")]
+    Belongs {
+        /// The key.
+        key: &'static str,
+        /// Where it belongs.
+        owner: &'static str,
+    },
+    /// A range without its number of values.
+    #[error("`range` needs `steps`, such as {{ range = [0.2, 1.0], steps = 5 }}")]
+    NoSteps,
+    /// A number of values that is too small or too large.
+    #[error("steps = {0}; expected 2 to {MOST_VALUES}")]
+    Steps(usize),
+    /// Bounds in the wrong order.
+    #[error("the range from {low} to {high} is empty")]
+    EmptyRange {
+        /// The lower bound.
+        low: f64,
+        /// The upper bound.
+        high: f64,
+    },
+    /// Relative values with a unit.
+    #[error("relative values are multiples of the system's own; expected plain numbers, not {0}")]
+    RelativeUnit(String),
+    /// Not a number.
+    #[error("`{0}` is not a number")]
+    NotANumber(String),
+    /// A number without the unit of the other one.
+    #[error("`{written}` has no unit; expected {unit}")]
+    NoUnit {
+        /// What was written.
+        written: String,
+        /// The unit.
+        unit: String,
+    },
+    /// A number that has to be positive.
+    #[error("{0} is not positive")]
+    NotPositive(f64),
+}
+
 /// A factor's table as written.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -66,36 +131,30 @@ impl Values {
     ///
     /// # Errors
     /// What is wrong and what was expected.
-    pub fn read(written: &toml::Value) -> Result<(Self, Option<Vec<String>>), String> {
-        let plain = |error: toml::de::Error| error.message().to_string();
+    pub fn read(written: &toml::Value) -> Result<(Self, Option<Vec<String>>), FactorError> {
         let table = match written {
             toml::Value::Array(_) => {
-                let list = written.clone().try_into().map_err(plain)?;
+                let list = written.clone().try_into()?;
                 return Ok((Self::list(list)?, None));
             }
             toml::Value::Table(table) => table.clone(),
-            single => {
-                return Err(format!(
-                    "{single} is a single value; expected a list such as [1, 2] or a distribution such as \
-                     {{ uniform = [1, 2] }}; values that are the same in all runs belong in [fixed]"
-                ));
-            }
+            single => return Err(FactorError::Single(single.clone())),
         };
-        let mut written: Written = toml::Value::Table(table).try_into().map_err(plain)?;
+        let mut written: Written = toml::Value::Table(table).try_into()?;
         let of = written.of.take();
         Ok((written.check()?, of))
     }
 
-    fn list(values: Vec<Setting>) -> Result<Self, String> {
+    fn list(values: Vec<Setting>) -> Result<Self, FactorError> {
         if values.is_empty() {
-            return Err("is an empty list".to_string());
+            return Err(FactorError::Empty);
         }
         for (place, value) in values.iter().enumerate() {
             if values[..place]
                 .iter()
                 .any(|other| other.to_string() == value.to_string())
             {
-                return Err(format!("has `{value}` twice"));
+                return Err(FactorError::Twice(value.to_string()));
             }
         }
         Ok(Self::List(values))
@@ -130,7 +189,7 @@ impl Values {
 }
 
 impl Written {
-    fn check(self) -> Result<Values, String> {
+    fn check(self) -> Result<Values, FactorError> {
         let Self {
             list,
             range,
@@ -153,25 +212,27 @@ impl Written {
             integers.is_some(),
         ];
         if given.iter().filter(|given| **given).count() != 1 {
-            return Err(
-                "expected one of list, range, uniform, loguniform, normal, lognormal, integers"
-                    .to_string(),
-            );
+            return Err(FactorError::Kinds);
         }
         if range.is_none() && steps.is_some() {
-            return Err("`steps` belongs to `range`".to_string());
+            return Err(FactorError::Belongs {
+                key: "steps",
+                owner: "`range`",
+            });
         }
         if relative && (list.is_some() || range.is_some() || integers.is_some()) {
-            return Err("`relative` belongs to a distribution".to_string());
+            return Err(FactorError::Belongs {
+                key: "relative",
+                owner: "a distribution",
+            });
         }
         if let Some(values) = list {
             return Values::list(values);
         }
         if let Some([low, high]) = range {
-            let steps =
-                steps.ok_or("`range` needs `steps`, such as { range = [0.2, 1.0], steps = 5 }")?;
+            let steps = steps.ok_or(FactorError::NoSteps)?;
             if !(2..=MOST_VALUES).contains(&steps) {
-                return Err(format!("steps = {steps}; expected 2 to {MOST_VALUES}"));
+                return Err(FactorError::Steps(steps));
             }
             let (low, high, unit) = pair(&low, &high)?;
             ordered(low, high)?;
@@ -188,7 +249,8 @@ impl Written {
         }
         if let Some([low, high]) = integers {
             if low > high {
-                return Err(format!("the range from {low} to {high} is empty"));
+                let (low, high) = (low as f64, high as f64);
+                return Err(FactorError::EmptyRange { low, high });
             }
             return Ok(Values::Drawn(Drawn {
                 distribution: Distribution::Integers(low, high),
@@ -215,7 +277,7 @@ impl Written {
             positive(deviation)?;
             (Distribution::Normal(mean, deviation), unit)
         } else {
-            let [median, deviation] = lognormal.ok_or("expected a distribution")?;
+            let [median, deviation] = lognormal.ok_or(FactorError::Kinds)?;
             let (median, unit) = quantity(&median)?;
             positive(median)?;
             let deviation = match share(&deviation) {
@@ -226,10 +288,7 @@ impl Written {
             (Distribution::LogNormal(median, deviation), unit)
         };
         if relative && !unit.is_empty() {
-            return Err(format!(
-                "relative values are multiples of the system's own; expected plain numbers, not \
-                 {unit}"
-            ));
+            return Err(FactorError::RelativeUnit(unit));
         }
         Ok(Values::Drawn(Drawn {
             distribution,
@@ -275,34 +334,37 @@ pub(crate) fn with_unit(value: f64, unit: &str) -> Setting {
 }
 
 /// A number with the text of its unit.
-fn quantity(written: &Setting) -> Result<(f64, String), String> {
+fn quantity(written: &Setting) -> Result<(f64, String), FactorError> {
     match written {
         Setting::Integer(number) => Ok((*number as f64, String::new())),
         Setting::Number(number) if number.is_finite() => Ok((*number, String::new())),
         Setting::Text(text) => {
-            let found = Quantity::parse(text).map_err(|error| error.to_string())?;
+            let found = Quantity::parse(text)?;
             Ok((found.value, found.unit.text))
         }
-        other => Err(format!("`{other}` is not a number")),
+        other => Err(FactorError::NotANumber(other.to_string())),
     }
 }
 
 /// Two numbers in the unit of the first.
-fn pair(first: &Setting, second: &Setting) -> Result<(f64, f64, String), String> {
+fn pair(first: &Setting, second: &Setting) -> Result<(f64, f64, String), FactorError> {
     let (low, unit) = quantity(first)?;
     Ok((low, deviation(second, &unit)?, unit))
 }
 
 /// A number in `unit`.
-fn deviation(written: &Setting, unit: &str) -> Result<f64, String> {
+fn deviation(written: &Setting, unit: &str) -> Result<f64, FactorError> {
     let (value, own) = quantity(written)?;
     if own == unit {
         return Ok(value);
     }
     if own.is_empty() {
-        return Err(format!("`{written}` has no unit; expected {unit}"));
+        return Err(FactorError::NoUnit {
+            written: written.to_string(),
+            unit: unit.to_string(),
+        });
     }
-    units::convert(value, &own, unit).map_err(|error| error.to_string())
+    Ok(units::convert(value, &own, unit)?)
 }
 
 /// The share in `"5 %"`.
@@ -314,17 +376,17 @@ fn share(written: &Setting) -> Option<f64> {
     Some(number / 100.0)
 }
 
-fn ordered(low: f64, high: f64) -> Result<(), String> {
+fn ordered(low: f64, high: f64) -> Result<(), FactorError> {
     match low < high {
         true => Ok(()),
-        false => Err(format!("the range from {low} to {high} is empty")),
+        false => Err(FactorError::EmptyRange { low, high }),
     }
 }
 
-fn positive(number: f64) -> Result<(), String> {
+fn positive(number: f64) -> Result<(), FactorError> {
     match number > 0.0 {
         true => Ok(()),
-        false => Err(format!("{number} is not positive")),
+        false => Err(FactorError::NotPositive(number)),
     }
 }
 
@@ -332,7 +394,7 @@ fn positive(number: f64) -> Result<(), String> {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Values, String> {
+    fn read(text: &str) -> Result<Values, FactorError> {
         let table: toml::Table = toml::from_str(&format!("x = {text}")).unwrap();
         Values::read(&table["x"]).map(|(values, _)| values)
     }
@@ -397,7 +459,7 @@ mod tests {
                 "plain numbers",
             ),
         ] {
-            let error = read(text).unwrap_err();
+            let error = read(text).unwrap_err().to_string();
             assert!(error.contains(expected), "{text}: {error}");
         }
     }

@@ -6,6 +6,7 @@ use super::table::Cell;
 use fmi_import::{Causality, Datum, Kind};
 use fmi_master::Outcome;
 use fmi_system::{Component, Link, Setting, System};
+use laboratory::error::Error;
 use laboratory::run::experiment::Prepared;
 use laboratory::run::summary::asked;
 use laboratory::run::table::Table;
@@ -110,37 +111,82 @@ pub(super) fn outputs(system: &System) -> impl Iterator<Item = String> {
     })
 }
 
+/// Why a study cannot vary a variable.
+#[derive(Debug, thiserror::Error)]
+pub enum VariableError {
+    /// The system of the study cannot be assembled.
+    #[error(transparent)]
+    System(#[from] Error),
+    /// No such variable.
+    #[error("`{name}` is not a variable of {system}{hint}")]
+    Unknown {
+        /// The variable.
+        name: String,
+        /// The system.
+        system: String,
+        /// The nearest one.
+        hint: String,
+    },
+    /// A variable of another type.
+    #[error("`{0}` is not a number")]
+    NotANumber(String),
+    /// A multiple of nothing.
+    #[error(
+        "`{name}` is 0 in {system}, and every multiple of it is 0; expected a distribution that is not relative"
+    )]
+    Zero {
+        /// The variable.
+        name: String,
+        /// The system.
+        system: String,
+    },
+    /// A multiple that is not a number.
+    #[error("`{factor}` is not a factor of `{name}`")]
+    Factor {
+        /// What was written.
+        factor: String,
+        /// The variable.
+        name: String,
+    },
+}
+
 /// A variable's value times a factor, as `--set` takes it.
-pub(super) fn times(system: &System, name: &str, factor: &Setting) -> Result<String, String> {
+pub(super) fn times(
+    system: &System,
+    name: &str,
+    factor: &Setting,
+) -> Result<String, VariableError> {
     let (nominal, unit) = nominal(system, name)?;
     match factor {
-        _ if nominal == 0.0 => Err(format!(
-            "`{name}` is 0 in {}, and every multiple of it is 0; expected a distribution that is \
-             not relative",
-            system.name
-        )),
+        _ if nominal == 0.0 => Err(VariableError::Zero {
+            name: name.to_string(),
+            system: system.name.clone(),
+        }),
         Setting::Number(factor) => Ok(with_unit(factor * nominal, &unit).to_string()),
-        other => Err(format!("`{other}` is not a factor of `{name}`")),
+        other => Err(VariableError::Factor {
+            factor: other.to_string(),
+            name: name.to_string(),
+        }),
     }
 }
 
 /// What a variable is when the study does not vary it, and its unit.
-pub(super) fn nominal(system: &System, name: &str) -> Result<(f64, String), String> {
+pub(super) fn nominal(system: &System, name: &str) -> Result<(f64, String), VariableError> {
     let (component, position) = system.variable(name).ok_or_else(|| {
         let known = system.components.iter().flat_map(|component| {
             let variables = component.fmu.description.variables.iter();
             variables.map(|variable| format!("{}.{}", component.name, variable.name))
         });
         let known: Vec<String> = known.collect();
-        format!(
-            "`{name}` is not a variable of {}{}",
-            system.name,
-            hint(name, known.iter().map(String::as_str))
-        )
+        VariableError::Unknown {
+            name: name.to_string(),
+            system: system.name.clone(),
+            hint: hint(name, known.iter().map(String::as_str)),
+        }
     })?;
     let variable = &component.fmu.description.variables[position];
     match component.start_value(&component.given(), position) {
         Datum::Number(number) => Ok((number, variable.unit.clone().unwrap_or_default())),
-        _ => Err(format!("`{name}` is not a number")),
+        _ => Err(VariableError::NotANumber(name.to_string())),
     }
 }

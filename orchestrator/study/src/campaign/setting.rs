@@ -6,12 +6,101 @@ use clap::ValueEnum;
 
 use fmi_import::FmiVersion;
 use fmi_master::Algorithm;
-use fmi_system::{Setting, SystemFile};
+use fmi_system::{Setting, SystemError, SystemFile};
+use laboratory::error::Error;
 use laboratory::run::experiment::{Request, is_file};
 use laboratory::systems::built_in;
 use laboratory::systems::tuning::Tuning;
 use motion::Scaling;
-use units::{STANDARD_GRAVITY, hint, value_in};
+use units::{STANDARD_GRAVITY, UnitError, hint, value_in};
+
+/// Why a study cannot fix or vary something.
+#[derive(Debug, thiserror::Error)]
+pub enum KeyError {
+    /// No such key.
+    #[error(
+        "is an unknown key{hint}; expected one of {}, or a variable as \"instance.variable\"",
+        KEYS.map(|(known, _)| known).join(", ")
+    )]
+    Unknown {
+        /// The nearest key.
+        hint: String,
+    },
+    /// Variables under a name that means something else.
+    #[error("a factor with `of` needs its own name; expected a name without a point")]
+    NameTaken,
+    /// Variables under a name, and none of them.
+    #[error("`of` is empty; expected variables")]
+    NoVariables,
+    /// Something else in place of a variable.
+    #[error("`{0}` is not a variable; expected \"instance.variable\"")]
+    NotAVariable(String),
+    /// A value of another kind.
+    #[error("`{value}` is not {expected}")]
+    Value {
+        /// What was written.
+        value: String,
+        /// What was expected.
+        expected: &'static str,
+    },
+    /// A name that is not among those that there are.
+    #[error("`{name}` is unknown{hint}; expected one of {known}")]
+    Name {
+        /// What was written.
+        name: String,
+        /// The nearest one.
+        hint: String,
+        /// All of them.
+        known: String,
+    },
+    /// A choice that is not among those of an option.
+    #[error("`{name}` is none of {known}")]
+    Choice {
+        /// What was written.
+        name: String,
+        /// All of them.
+        known: String,
+    },
+    /// A built-in system that there is not.
+    #[error(transparent)]
+    System(#[from] SystemError),
+    /// A number or unit that cannot be read.
+    #[error(transparent)]
+    Unit(#[from] UnitError),
+    /// One record in place of several.
+    #[error("a record is a file; expected a list of files or folders")]
+    NotFiles,
+    /// A folder of records that cannot be read.
+    #[error(transparent)]
+    Records(#[from] Error),
+    /// One key in both tables.
+    #[error("`{0}` is fixed and varies; expected one of the two")]
+    FixedAndVaries(String),
+    /// Two names of one key.
+    #[error("`{first}` and `{second}` are synonyms; expected one of them")]
+    Synonyms {
+        /// The one.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// Keys of which a run can have one only.
+    #[error("`{first}` and `{second}` exclude each other")]
+    Exclusive {
+        /// The one.
+        first: String,
+        /// The other.
+        second: String,
+    },
+}
+
+/// A value that is not what was expected.
+pub(super) fn misfit(value: &Setting, expected: &'static str) -> KeyError {
+    KeyError::Value {
+        value: value.to_string(),
+        expected,
+    }
+}
 
 /// A key of `[fixed]` or `[factors]`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -85,7 +174,7 @@ impl Key {
     ///
     /// # Errors
     /// An unknown name, with the nearest one.
-    pub fn of(name: &str) -> Result<Self, String> {
+    pub fn of(name: &str) -> Result<Self, KeyError> {
         if let Some((_, key)) = KEYS.iter().find(|(known, _)| *known == name) {
             return Ok(key.clone());
         }
@@ -96,33 +185,25 @@ impl Key {
             return Ok(Self::Variable(name.to_string()));
         }
         let known = KEYS.map(|(known, _)| known);
-        Err(format!(
-            "is an unknown key{}; expected one of {}, or a variable as \"instance.variable\"",
-            hint(name, known),
-            known.join(", ")
-        ))
+        Err(KeyError::Unknown {
+            hint: hint(name, known),
+        })
     }
 
     /// The key of several variables under a name of their own.
     ///
     /// # Errors
     /// A name that a key or a variable has, variables that are none.
-    pub fn together(name: &str, variables: Vec<String>) -> Result<Self, String> {
+    pub fn together(name: &str, variables: Vec<String>) -> Result<Self, KeyError> {
         if Self::of(name).is_ok() {
-            return Err(
-                "a factor with `of` needs its own name; expected a name without a \
-                 point"
-                    .to_string(),
-            );
+            return Err(KeyError::NameTaken);
         }
         if variables.is_empty() {
-            return Err("`of` is empty; expected variables".to_string());
+            return Err(KeyError::NoVariables);
         }
         for variable in &variables {
             if !matches!(Self::of(variable), Ok(Self::Variable(_))) {
-                return Err(format!(
-                    "`{variable}` is not a variable; expected \"instance.variable\""
-                ));
+                return Err(KeyError::NotAVariable(variable.clone()));
             }
         }
         Ok(Self::Variables(variables))
@@ -183,28 +264,28 @@ impl Key {
         value: &Setting,
         folder: &Path,
         request: &mut Request,
-    ) -> Result<(), String> {
+    ) -> Result<(), KeyError> {
         let text = || match value {
             Setting::Text(text) => Ok(text.clone()),
-            other => Err(format!("`{other}` is not text")),
+            other => Err(misfit(other, "text")),
         };
         let path = || text().map(|text| folder.join(text));
-        let number = || -> Result<f64, String> {
+        let number = || -> Result<f64, KeyError> {
             let number = self.number(value)?;
             match number > 0.0 && number.is_finite() {
                 true => Ok(number),
-                false => Err(format!("`{value}` is not positive")),
+                false => Err(misfit(value, "positive")),
             }
         };
         let known = |name: String, known: Vec<&str>| {
             if known.contains(&name.as_str()) {
                 return Ok(name);
             }
-            Err(format!(
-                "`{name}` is unknown{}; expected one of {}",
-                hint(&name, known.iter().copied()),
-                known.join(", ")
-            ))
+            Err(KeyError::Name {
+                hint: hint(&name, known.iter().copied()),
+                known: known.join(", "),
+                name,
+            })
         };
         match self {
             Self::System => {
@@ -212,7 +293,7 @@ impl Key {
                 request.system = match is_file(&name) {
                     true => folder.join(name).display().to_string(),
                     false => {
-                        built_in::check(&name).map_err(|error| error.to_string())?;
+                        built_in::check(&name)?;
                         name
                     }
                 };
@@ -237,7 +318,7 @@ impl Key {
                 request.fmi = match value {
                     Setting::Integer(2) => FmiVersion::V2,
                     Setting::Integer(3) => FmiVersion::V3,
-                    other => return Err(format!("`{other}` is not a version; expected 2 or 3")),
+                    other => return Err(misfit(other, "a version; expected 2 or 3")),
                 };
             }
             Self::Record => request.record = Some(path()?),
@@ -245,7 +326,7 @@ impl Key {
             Self::Seed => {
                 request.seed = match value {
                     Setting::Integer(seed) if *seed >= 0 => *seed as u64,
-                    other => return Err(format!("`{other}` is not a seed; expected 0, 1, 2, ...")),
+                    other => return Err(misfit(other, "a seed; expected 0, 1, 2, ...")),
                 };
             }
             Self::Scale => request.scaling = Some(Scaling::Factor(number()?)),
@@ -271,25 +352,26 @@ impl Key {
     ///
     /// # Errors
     /// No number, or a unit that does not fit.
-    pub(super) fn number(&self, value: &Setting) -> Result<f64, String> {
+    pub(super) fn number(&self, value: &Setting) -> Result<f64, KeyError> {
         match value {
             Setting::Number(number) => Ok(*number),
             Setting::Integer(number) => Ok(*number as f64),
-            Setting::Text(text) => {
-                value_in(text, self.unit().unwrap_or_default()).map_err(|error| error.to_string())
-            }
-            other => Err(format!("`{other}` is not a number")),
+            Setting::Text(text) => Ok(value_in(text, self.unit().unwrap_or_default())?),
+            other => Err(misfit(other, "a number")),
         }
     }
 }
 
-fn choice<T: ValueEnum>(name: &str) -> Result<T, String> {
+fn choice<T: ValueEnum>(name: &str) -> Result<T, KeyError> {
     T::from_str(name, false).map_err(|_| {
         let known: Vec<String> = T::value_variants()
             .iter()
             .filter_map(|one| Some(one.to_possible_value()?.get_name().to_string()))
             .collect();
-        format!("`{name}` is none of {}", known.join(", "))
+        KeyError::Choice {
+            name: name.to_string(),
+            known: known.join(", "),
+        }
     })
 }
 

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use super::analysis;
 use super::design::{Design, Points};
 use super::factor::Values;
-use super::setting::{self, Key};
+use super::setting::{self, Key, KeyError, misfit};
 use super::table::Table;
 use fmi_import::hexadecimal;
 use fmi_system::Setting;
@@ -146,20 +146,22 @@ impl Study {
         let folder = folder(path);
         let mut fixed = Vec::new();
         for (name, value) in written.fixed {
-            let key = Key::of(&name).map_err(at("fixed", &name))?;
+            let key = Key::of(&name);
+            let key = key.map_err(|error| at("fixed", &name)(error.to_string()))?;
             fixed.push((name, key, value));
         }
         let mut factors: Vec<Factor> = Vec::new();
         for (name, value) in written.factors {
             let at = at("factors", &name);
-            let (mut values, of) = Values::read(&alone(&name, value, &folder)).map_err(&at)?;
+            let read = Values::read(&alone(&name, value, &folder));
+            let (mut values, of) = read.map_err(|error| at(error.to_string()))?;
             let key = match of {
                 Some(variables) => Key::together(&name, variables),
                 None => Key::of(&name),
             };
-            let key = key.map_err(&at)?;
+            let key = key.map_err(|error| at(error.to_string()))?;
             if key == Key::Record {
-                values = whole_folders(values, &folder).map_err(&at)?;
+                values = whole_folders(values, &folder).map_err(|error| at(error.to_string()))?;
             }
             if values.is_relative() && key.variables().is_empty() {
                 return Err(at(
@@ -176,7 +178,7 @@ impl Study {
                     .to_string(),
             ));
         }
-        exclusive(&fixed, &factors).map_err(fault)?;
+        exclusive(&fixed, &factors).map_err(|error| fault(error.to_string()))?;
         let mut crossed = Vec::new();
         for name in &written.study.cross {
             let at = at("study", "cross");
@@ -212,7 +214,7 @@ impl Study {
             .map(|&place| factors[place].values.count())
             .collect();
         let points = Points::new(design, counts, written.study.runs, written.study.seed)
-            .map_err(at("study", "design"))?;
+            .map_err(|error| at("study", "design")(error.to_string()))?;
         let limits = written.limits.into_iter().map(|(name, written)| {
             let signal = name.contains('.').then(|| name.clone());
             Limit {
@@ -454,21 +456,20 @@ fn alone(name: &str, value: toml::Value, folder: &Path) -> toml::Value {
 }
 
 /// Folders in a list of records stand for all records in them.
-fn whole_folders(values: Values, folder: &Path) -> Result<Values, String> {
+fn whole_folders(values: Values, folder: &Path) -> Result<Values, KeyError> {
     let Values::List(list) = values else {
-        return Err("a record is a file; expected a list of files or folders".to_string());
+        return Err(KeyError::NotFiles);
     };
     let mut all = Vec::new();
     for value in list {
         let Setting::Text(name) = &value else {
-            return Err(format!("`{value}` is not a file"));
+            return Err(misfit(&value, "a file"));
         };
         if !folder.join(name).is_dir() {
             all.push(value);
             continue;
         }
-        let found = laboratory::comparison::Played::records_in(&folder.join(name));
-        for path in found.map_err(|error| error.to_string())? {
+        for path in laboratory::comparison::Played::records_in(&folder.join(name))? {
             if let Some(file) = path.file_name() {
                 let path = Path::new(name).join(file);
                 all.push(Setting::Text(path.display().to_string()));
@@ -479,7 +480,7 @@ fn whole_folders(values: Values, folder: &Path) -> Result<Values, String> {
 }
 
 /// A thing is fixed or varies, and is stated once.
-fn exclusive(fixed: &[(String, Key, Setting)], factors: &[Factor]) -> Result<(), String> {
+fn exclusive(fixed: &[(String, Key, Setting)], factors: &[Factor]) -> Result<(), KeyError> {
     let mut known: Vec<(&str, &Key)> = Vec::new();
     let all = fixed.iter().map(|(name, key, _)| (name.as_str(), key));
     for (name, key) in all.chain(
@@ -489,8 +490,11 @@ fn exclusive(fixed: &[(String, Key, Setting)], factors: &[Factor]) -> Result<(),
     ) {
         if let Some((other, _)) = known.iter().find(|(_, one)| *one == key) {
             return Err(match *other == name {
-                true => format!("`{name}` is fixed and varies; expected one of the two"),
-                false => format!("`{other}` and `{name}` are synonyms; expected one of them"),
+                true => KeyError::FixedAndVaries(name.to_string()),
+                false => KeyError::Synonyms {
+                    first: (*other).to_string(),
+                    second: name.to_string(),
+                },
             });
         }
         known.push((name, key));
@@ -505,7 +509,10 @@ fn exclusive(fixed: &[(String, Key, Setting)], factors: &[Factor]) -> Result<(),
             .map(|(name, _)| *name)
             .collect();
         if let [one, other, ..] = given[..] {
-            return Err(format!("`{one}` and `{other}` exclude each other"));
+            return Err(KeyError::Exclusive {
+                first: one.to_string(),
+                second: other.to_string(),
+            });
         }
     }
     Ok(())

@@ -118,7 +118,7 @@ impl Asked {
             {
                 return Err(at("the study already fixes or varies it".to_string()));
             }
-            let (before, unit) = bench.nominal(name).map_err(&at)?;
+            let (before, unit) = bench.nominal(name).map_err(|error| at(error.to_string()))?;
             let bound = |setting: &Setting| match setting {
                 Setting::Text(text) => value_in(text, &unit).map_err(|error| at(error.to_string())),
                 Setting::Integer(number) if unit.is_empty() => Ok(*number as f64),

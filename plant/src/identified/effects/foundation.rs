@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::quantity::{FREQUENCY, RATIO};
+use units::vocabulary;
 use super::{Component, Effect, Family, Parameter, Scale};
 use crate::ModelError;
 
@@ -64,7 +65,7 @@ impl Family for FoundationEffects {
                 .shape(Scale::Logarithmic, 12.0, 0.1, (4.0, 40.0))
                 .on_table(|e| &mut e.foundation.mass_ratio)
                 .min(1e-3),
-            Parameter::new("damping_ratio", RATIO, "Damping ratio of the reaction mass")
+            Parameter::new(vocabulary::DAMPING_RATIO, RATIO, "Damping ratio of the reaction mass")
                 .shape(Scale::Logarithmic, 0.05, 0.25, (0.01, 0.3))
                 .on_table(|e| &mut e.foundation.damping_ratio)
                 .min(0.0),

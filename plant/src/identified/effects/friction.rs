@@ -53,7 +53,7 @@ pub(super) const STRIBECK_FORCE: Parameter = Parameter::new(
 
 /// The velocity over which the bump fades.
 pub(super) const STRIBECK_VELOCITY: Parameter = Parameter::new(
-    "stribeck_velocity",
+    vocabulary::STRIBECK_VELOCITY,
     VELOCITY,
     "Velocity at which the bump has fallen to 1/e",
 )
@@ -136,7 +136,7 @@ impl Family for FrictionEffects {
     fn validate(&self) -> Result<(), ModelError> {
         ModelError::require_finite("coulomb_force", self.coulomb_force)?;
         ModelError::require_finite("stribeck_force", self.stribeck_force)?;
-        ModelError::require_positive("stribeck_velocity", self.stribeck_velocity)?;
+        ModelError::require_positive(vocabulary::STRIBECK_VELOCITY, self.stribeck_velocity)?;
         ModelError::require_positive("stribeck_exponent", self.stribeck_exponent)?;
         ModelError::require_positive("transition_velocity", self.transition_velocity)
     }

@@ -147,7 +147,7 @@ impl Family for SpecimenEffects {
                     .on_specimen(|s| &mut s.second_mode_mass_share)
                     .min(1e-3)
                     .max(0.95),
-                Parameter::new("damping_ratio", RATIO, "Damping ratio of it")
+                Parameter::new(vocabulary::DAMPING_RATIO, RATIO, "Damping ratio of it")
                     .shape(Scale::Logarithmic, 0.03, 0.4, (0.005, 0.2))
                     .on_specimen(|s| &mut s.second_mode_damping_ratio)
                     .min(0.0),

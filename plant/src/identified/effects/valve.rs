@@ -152,7 +152,7 @@ impl Family for ValveEffects {
                 .on_table(|e| &mut e.valve.spool_frequency)
                 .min(0.0)
                 .at_start(AtStart::ActuatorRates),
-                Parameter::new("damping_ratio", RATIO, "Damping ratio of the spool")
+                Parameter::new(vocabulary::DAMPING_RATIO, RATIO, "Damping ratio of the spool")
                     .shape(Scale::Logarithmic, 0.7, 0.15, (0.3, 1.5))
                     .on_table(|e| &mut e.valve.spool_damping)
                     .min(1e-3),

@@ -1,0 +1,298 @@
+//! Systems written as an archive and read again, and connections of archives that do not hold.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::cell::RefCell;
+use std::error::Error;
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+
+use fmi_import::FmiVersion;
+use fmi_ssp::export::{Experiment, Player, Start, Supply, contents};
+use fmi_system::{Files, Hop, Passage, System, SystemFile, Transformation, Value, assemble};
+use zip::{ZipWriter, write::SimpleFileOptions};
+
+fn zipped(path: &Path, files: &[(&str, &[u8])]) {
+    let mut archive = ZipWriter::new(File::create(path).unwrap());
+    for (name, content) in files {
+        archive
+            .start_file(*name, SimpleFileOptions::default())
+            .unwrap();
+        archive.write_all(content).unwrap();
+    }
+    archive.finish().unwrap();
+}
+
+/// A component of FMI 3.0 without a library: numbers in inches and millimetres, truth values, a choice.
+fn part(folder: &Path) {
+    let description = r#"<fmiModelDescription fmiVersion="3.0" modelName="Part" instantiationToken="1">
+        <CoSimulation modelIdentifier="Part"/>
+        <UnitDefinitions><Unit name="in"><BaseUnit m="1" factor="0.0254"/></Unit>
+        <Unit name="mm"><BaseUnit m="1" factor="0.001"/></Unit></UnitDefinitions>
+        <TypeDefinitions><EnumerationType name="Mode"><Item name="Slow" value="1"/><Item name="Fast" value="4"/>
+        </EnumerationType></TypeDefinitions>
+        <ModelVariables>
+        <Float64 name="in" valueReference="1" causality="input" unit="in" start="0"/>
+        <Float64 name="out" valueReference="2" causality="output" unit="mm" initial="calculated"/>
+        <Boolean name="stop" valueReference="3" causality="input" variability="discrete" start="false"/>
+        <Boolean name="done" valueReference="4" causality="output" variability="discrete" initial="calculated"/>
+        <Float64 name="gap" valueReference="5" causality="parameter" variability="fixed" unit="mm" start="1"/>
+        <Enumeration name="mode" declaredType="Mode" valueReference="6" causality="parameter" variability="fixed"
+            start="1"/>
+        <Int32 name="count" valueReference="7" causality="parameter" variability="fixed" start="3"/>
+        </ModelVariables>
+        <ModelStructure><Output valueReference="2" dependencies=""/><Output valueReference="4" dependencies=""/>
+        </ModelStructure></fmiModelDescription>"#;
+    zipped(
+        &folder.join("Part.fmu"),
+        &[("modelDescription.xml", description.as_bytes())],
+    );
+}
+
+/// Keeps what it is asked to start with; the FMU stays as it is.
+#[derive(Default)]
+struct Kept {
+    starts: RefCell<Vec<Start>>,
+}
+
+impl Supply for Kept {
+    fn player(&self) -> Result<Option<Player>, Box<dyn Error + Send + Sync>> {
+        Ok(None)
+    }
+
+    fn starting_with(
+        &self,
+        file: &Path,
+        starts: &[Start],
+    ) -> Result<Vec<u8>, Box<dyn Error + Send + Sync>> {
+        self.starts.borrow_mut().extend_from_slice(starts);
+        Ok(std::fs::read(file)?)
+    }
+}
+
+fn assembled(file: &SystemFile) -> System {
+    assemble(file, &[], &mut Files::of(file)).unwrap()
+}
+
+/// Connections by their ends, with what is done on the way, in the order of their names.
+fn connections(system: &System) -> Vec<(String, Passage)> {
+    let mut all: Vec<_> = system
+        .connections
+        .iter()
+        .map(|own| {
+            let part = &system.components[own.component];
+            let input = &part.fmu.description.variables[own.input].name;
+            let from = system.origin(own.source);
+            let ends = format!("{from} -> {}.{input}", part.name);
+            (ends, own.passage.clone())
+        })
+        .collect();
+    all.sort_by(|a, b| a.0.cmp(&b.0));
+    all
+}
+
+#[test]
+fn a_system_is_the_same_after_it_was_an_archive() {
+    let folder = tempfile::tempdir().unwrap();
+    part(folder.path());
+    let text = "connections = [\n\"a.out -> b.in\",\n\"a.done -> b.stop\",\n\
+                { connect = \"b.out -> a.in\", factor = 3.0, offset = 0.5 },\n]\n\
+                [components.a]\nfmu = \"Part.fmu\"\n[components.a.parameters]\ngap = \"0.5 in\"\ncount = 9\n\
+                [components.b]\nfmu = \"Part.fmu\"\n";
+    let path = folder.path().join("pair.toml");
+    std::fs::write(&path, text).unwrap();
+    let mut file = SystemFile::read(&path).unwrap();
+    // A truth value, turned round.
+    let turned = vec![(0.0, 1.0), (1.0, 0.0)];
+    file.connections[1].way.hops = vec![Hop {
+        transformation: Transformation::Numbers(turned.clone()),
+        ..Hop::default()
+    }];
+    let before = assembled(&file);
+    let supply = Kept::default();
+    let experiment = Experiment {
+        supply: &supply,
+        sampling: None,
+        step: 0.002,
+        duration: 3.0,
+        algorithm: "in-order".to_string(),
+        fmi: FmiVersion::V3,
+    };
+    let out = folder.path().join("pair.ssp");
+    let written = contents(&before, &experiment, &out).unwrap();
+    // Two components of one FMU: it is in the archive once.
+    let names: Vec<&str> = written.files.keys().map(String::as_str).collect();
+    assert_eq!(names, ["SystemStructure.ssd", "resources/Part.fmu"]);
+    assert_eq!(
+        written.files["resources/Part.fmu"],
+        std::fs::read(folder.path().join("Part.fmu")).unwrap()
+    );
+    let files: Vec<(&str, &[u8])> = written
+        .files
+        .iter()
+        .map(|(name, content)| (name.as_str(), content.as_slice()))
+        .collect();
+    zipped(&out, &files);
+
+    let read = fmi_ssp::read(&out.to_string_lossy()).unwrap();
+    assert_eq!(read.step().unwrap(), Some(0.002));
+    assert_eq!(read.duration().unwrap(), Some(3.0));
+    let after = assembled(&read);
+    let (before_all, after_all) = (connections(&before), connections(&after));
+    assert_eq!(before_all.len(), 3);
+    for ((ends, one), (others, other)) in before_all.iter().zip(&after_all) {
+        assert_eq!(ends, others);
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * a.abs();
+        assert!(
+            near(one.factor, other.factor) && near(one.offset, other.offset),
+            "{ends}"
+        );
+        assert_eq!(one.map, other.map, "{ends}");
+    }
+    // In the file: mm to in, then as it says.
+    let back = &before_all[2].1;
+    assert!((back.factor - 3.0 / 25.4).abs() < 1e-12, "{back:?}");
+    assert_eq!((back.offset, &before_all[0].1.map), (0.5, &turned));
+    for (one, other) in before.components.iter().zip(&after.components) {
+        let values = |system: &fmi_system::Component| -> Vec<(usize, Value)> {
+            let mut all = system.parameters.clone();
+            all.sort_by_key(|(position, _)| *position);
+            all
+        };
+        assert_eq!((&one.name, one.period), (&other.name, other.period));
+        assert_eq!(values(one), values(other), "{}", one.name);
+    }
+}
+
+#[test]
+fn files_of_other_start_values_have_names_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    part(folder.path());
+    let text = "[components.a]\nfmu = \"Part.fmu\"\n[components.a.parameters]\nmode = \"Fast\"\n\
+                [components.b]\nfmu = \"Part.fmu\"\n";
+    let path = folder.path().join("pair.toml");
+    std::fs::write(&path, text).unwrap();
+    let system = assembled(&SystemFile::read(&path).unwrap());
+    let supply = Kept::default();
+    let experiment = Experiment {
+        supply: &supply,
+        sampling: None,
+        step: 0.002,
+        duration: 1.0,
+        algorithm: "in-order".to_string(),
+        fmi: FmiVersion::V3,
+    };
+    let written = contents(&system, &experiment, &folder.path().join("pair.ssp")).unwrap();
+    let starts = supply.starts.borrow();
+    let names: Vec<&str> = written.files.keys().map(String::as_str).collect();
+    match starts.as_slice() {
+        [] => assert_eq!(names, ["SystemStructure.ssd", "resources/Part.fmu"]),
+        [own] => {
+            assert_eq!((own.name.as_str(), own.value), ("mode", 4.0));
+            let expected = [
+                "SystemStructure.ssd",
+                "resources/Part-2.fmu",
+                "resources/Part.fmu",
+            ];
+            assert_eq!(names, expected);
+        }
+        more => panic!("{more:?}"),
+    }
+}
+
+/// A description with two components and a system within, whose connections are `inner` and `outer`.
+fn description(inner: &str, outer: &str) -> String {
+    let component = |name: &str| {
+        format!(
+            r#"<ssd:Component name="{name}" type="application/x-fmu-sharedlibrary" source="{name}.fmu"><ssd:Connectors>
+            <ssd:Connector name="u" kind="input"><ssc:Real/></ssd:Connector>
+            <ssd:Connector name="y" kind="output"><ssc:Real/></ssd:Connector></ssd:Connectors></ssd:Component>"#
+        )
+    };
+    format!(
+        r#"<ssd:SystemStructureDescription version="1.0" name="pair"
+        xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+        xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"><ssd:System name="root"><ssd:Elements>
+        {}{}<ssd:System name="s"><ssd:Connectors>
+        <ssd:Connector name="i" kind="input"><ssc:Real/></ssd:Connector>
+        <ssd:Connector name="o" kind="output"><ssc:Real/></ssd:Connector></ssd:Connectors>
+        <ssd:Connections>{inner}</ssd:Connections></ssd:System>
+        </ssd:Elements><ssd:Connections>{outer}</ssd:Connections></ssd:System></ssd:SystemStructureDescription>"#,
+        component("a"),
+        component("b")
+    )
+}
+
+fn read(folder: &Path, inner: &str, outer: &[[&str; 4]]) -> Result<SystemFile, String> {
+    let outer: String = outer
+        .iter()
+        .map(|[element, connector, other, to]| {
+            format!(
+                r#"<ssd:Connection startElement="{element}" startConnector="{connector}" endElement="{other}" endConnector="{to}"/>"#
+            )
+        })
+        .collect();
+    let path = folder.join("SystemStructure.ssd");
+    std::fs::write(&path, description(inner, &outer)).unwrap();
+    fmi_ssp::read(&path.to_string_lossy()).map_err(|error| error.to_string())
+}
+
+#[test]
+fn values_go_through_systems_within_in_either_direction() {
+    let folder = tempfile::tempdir().unwrap();
+    let through = r#"<ssd:Connection startConnector="i" endConnector="o"/>"#;
+    for outer in [
+        [["a", "y", "s", "i"], ["s", "o", "b", "u"]],
+        // Kinds, not the order of the ends, give the direction.
+        [["s", "i", "a", "y"], ["b", "u", "s", "o"]],
+    ] {
+        let file = read(folder.path(), through, &outer).unwrap();
+        let links: Vec<String> = file.connections.iter().map(ToString::to_string).collect();
+        assert_eq!(links, ["a.y -> b.u"]);
+    }
+}
+
+#[test]
+fn connections_that_do_not_hold_are_refused_with_their_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let through = r#"<ssd:Connection startConnector="i" endConnector="o"/>"#;
+    let cases: [(&str, &[[&str; 4]], &str); 7] = [
+        (
+            "",
+            &[["a", "y", "b", "y"]],
+            "`a.y` and `b.y` both give values",
+        ),
+        (
+            "",
+            &[["a", "u", "b", "u"]],
+            "`a.u` and `b.u` both take values",
+        ),
+        (
+            "",
+            &[["a", "y", "b", "u"], ["b", "y", "b", "u"]],
+            "`b.u` is already driven by `a.y`",
+        ),
+        ("", &[["a", "z", "b", "u"]], "`a` has no connector `z`"),
+        (
+            "",
+            &[["c", "y", "b", "u"]],
+            "the system `root` has no element `c`",
+        ),
+        (
+            "",
+            &[["", "q", "b", "u"]],
+            "the system `root` has no connector `q`",
+        ),
+        (
+            through,
+            &[["s", "o", "s", "i"], ["s", "o", "b", "u"]],
+            "`b.u` drives itself through connectors",
+        ),
+    ];
+    for (inner, outer, expected) in cases {
+        let said = read(folder.path(), inner, outer).unwrap_err();
+        let (_, reason) = said.split_once(": ").unwrap();
+        assert!(reason.contains(expected), "{said}");
+    }
+}
