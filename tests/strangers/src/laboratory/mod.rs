@@ -59,6 +59,9 @@ pub struct Truth {
     pub is_railed: bool,
     /// Whether a spring holds the table, and no integral makes up for that.
     pub gives_way: bool,
+    /// By what share a valve's flow falls per speed, s/m.
+    #[serde(default)]
+    pub flow_falls: f64,
 }
 
 /// A laboratory's folder.
@@ -129,11 +132,11 @@ impl Faults {
                 )
             }
             5 => {
-                let force = table.rub(dice.between(2.0, 5.0));
+                let (force, error) = table.rub(dice.between(2.0, 5.0));
                 fault(
                     "friction is larger than usual",
                     &["friction"],
-                    &[(force, "N")],
+                    &[(force, "N"), (error, "m")],
                 )
             }
             6 => {
@@ -226,6 +229,7 @@ impl Laboratory {
                 faults: faults.said,
                 is_railed,
                 gives_way: table.gives_way(),
+                flow_falls: table.flow_falls(),
             },
             recordings,
         }

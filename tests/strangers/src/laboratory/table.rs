@@ -164,18 +164,32 @@ impl Table {
         }
     }
 
-    /// Friction times a factor; returns it in N.
-    pub fn rub(&mut self, factor: f64) -> f64 {
-        match &mut self.body {
+    /// Friction times a factor; returns it in N, and as the position error (m) that it holds: what a coil's or a
+    /// motor's resistance needs of the voltage at rest, or what the leak takes of the valve's flow.
+    pub fn rub(&mut self, factor: f64) -> (f64, f64) {
+        let (force, voltage) = match &mut self.body {
             Body::Hydraulic(rig) => {
                 rig.coulomb *= factor;
                 rig.breakaway *= factor;
-                rig.coulomb
+                let load = rig.coulomb / rig.area;
+                let flow = rig.flow_coefficient * ((rig.supply - load) / 2.0).sqrt();
+                (rig.coulomb, rig.leakage * load / flow)
             }
             Body::Electric(electric) => {
                 electric.coulomb *= factor;
-                electric.coulomb
+                let current = electric.coulomb / electric.constant;
+                (electric.coulomb, electric.resistance * current)
             }
+        };
+        (force, voltage / self.control.gain)
+    }
+
+    /// By what share an orifice's flow falls per speed, s/m: `v = w sqrt(1 - p / P)` at the load pressure
+    /// `p = c v / A` of viscous seals, to first order; 0 without a valve.
+    pub fn flow_falls(&self) -> f64 {
+        match &self.body {
+            Body::Hydraulic(rig) => rig.viscous / (2.0 * rig.area * rig.supply),
+            Body::Electric(_) => 0.0,
         }
     }
 
@@ -333,6 +347,72 @@ impl Electric {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn friction_holds_the_table_back_by_its_position_error() {
+        for seed in 0..12 {
+            let drive = [Drive::Hydraulic, Drive::Motor][seed as usize % 2];
+            let mut table = Table::draw(drive, &mut Dice::new(seed, 0));
+            let (force, expected) = table.rub(3.0);
+            let control = &mut table.control;
+            (control.kind, control.integral, control.derivative) = (Kind::Gain, 0.0, 0.0);
+            (control.feedforward, control.acceleration) = (0.0, 0.0);
+            if let Body::Hydraulic(rig) = &mut table.body {
+                rig.disturbance = 0.0;
+            }
+            // There and back at one speed: what differs is friction and the error of following.
+            let (rate, speed) = (100.0, 0.02);
+            let motion: Vec<f64> = (0..800)
+                .map(|k| speed * (4.0 - (f64::from(k) / rate - 4.0).abs()))
+                .collect();
+            let held = |table: &Table| {
+                let (readings, _) = table.play(&motion, rate, 0.0, 0.0);
+                let mean = |from: usize| {
+                    let own = (from..from + 100).map(|k| motion[k] - readings[k][0]);
+                    own.sum::<f64>() / 100.0
+                };
+                0.5 * (mean(280) - mean(680))
+            };
+            let with = held(&table);
+            // The load's pressure also takes a share of an orifice's flow, at any speed.
+            let share = match &mut table.body {
+                Body::Hydraulic(rig) => {
+                    (rig.coulomb, rig.breakaway) = (1e-3, 1e-3);
+                    0.5 * force / (rig.area * rig.supply)
+                }
+                Body::Electric(electric) => {
+                    electric.coulomb = 0.0;
+                    0.0
+                }
+            };
+            let found = with - (1.0 + share) * held(&table);
+            assert!(
+                (found / expected - 1.0).abs() < 0.05,
+                "{seed}: {found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_orifice_s_flow_falls_with_speed_by_the_seals_drag() {
+        let table = Table::draw(Drive::Hydraulic, &mut Dice::new(3, 0));
+        let expected = table.flow_falls();
+        let Body::Hydraulic(mut rig) = table.body else {
+            unreachable!("it is hydraulic");
+        };
+        (rig.coulomb, rig.breakaway, rig.disturbance) = (1e-3, 1e-3, 0.0);
+        // Long enough to settle, short enough for the stroke.
+        let speed = |voltage: f64| {
+            let mut state = rig.rest();
+            for k in 0..300 {
+                rig.advance(&mut state, 1e-3 * f64::from(k), 1e-3, voltage, 0.0);
+            }
+            state.values[5]
+        };
+        let (slow, fast) = (speed(0.2), speed(2.0));
+        let found = (10.0 * slow / fast - 1.0) / (10.0 * slow - slow);
+        assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+    }
 
     #[test]
     fn every_loop_follows_a_slow_motion() {
