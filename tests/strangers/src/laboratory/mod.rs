@@ -132,12 +132,10 @@ impl Faults {
                 )
             }
             5 => {
-                let (force, error) = table.rub(dice.between(2.0, 5.0));
-                fault(
-                    "friction is larger than usual",
-                    &["friction"],
-                    &[(force, "N"), (error, "m")],
-                )
+                let [slides, breaks] = table.rub(dice.between(2.0, 5.0));
+                let of = |(force, error): (f64, f64)| [(force, "N"), (error, "m")];
+                let sizes = [of(slides), of(breaks)].concat();
+                fault("friction is larger than usual", &["friction"], &sizes)
             }
             6 => {
                 let overlap = table.overlap(dice.between(0.05, 0.2));

@@ -164,24 +164,27 @@ impl Table {
         }
     }
 
-    /// Friction times a factor; returns it in N, and as the position error (m) that it holds: what a coil's or a
-    /// motor's resistance needs of the voltage at rest, or what the leak takes of the valve's flow.
-    pub fn rub(&mut self, factor: f64) -> (f64, f64) {
-        let (force, voltage) = match &mut self.body {
+    /// Friction times a factor; returns it in N while it slides and where it breaks away, and the position error (m)
+    /// that either holds: what a coil's or a motor's resistance needs of the voltage at rest, or what the leak takes
+    /// of the valve's flow.
+    pub fn rub(&mut self, factor: f64) -> [(f64, f64); 2] {
+        let held = match &mut self.body {
             Body::Hydraulic(rig) => {
                 rig.coulomb *= factor;
                 rig.breakaway *= factor;
-                let load = rig.coulomb / rig.area;
-                let flow = rig.flow_coefficient * ((rig.supply - load) / 2.0).sqrt();
-                (rig.coulomb, rig.leakage * load / flow)
+                [rig.coulomb, rig.breakaway].map(|force| {
+                    let load = force / rig.area;
+                    let flow = rig.flow_coefficient * ((rig.supply - load) / 2.0).sqrt();
+                    (force, rig.leakage * load / flow)
+                })
             }
             Body::Electric(electric) => {
                 electric.coulomb *= factor;
                 let current = electric.coulomb / electric.constant;
-                (electric.coulomb, electric.resistance * current)
+                [(electric.coulomb, electric.resistance * current); 2]
             }
         };
-        (force, voltage / self.control.gain)
+        held.map(|(force, voltage)| (force, voltage / self.control.gain))
     }
 
     /// By what share an orifice's flow falls per speed, s/m: `v = w sqrt(1 - p / P)` at the load pressure
@@ -353,7 +356,7 @@ mod tests {
         for seed in 0..12 {
             let drive = [Drive::Hydraulic, Drive::Motor][seed as usize % 2];
             let mut table = Table::draw(drive, &mut Dice::new(seed, 0));
-            let (force, expected) = table.rub(3.0);
+            let [(force, expected), _] = table.rub(3.0);
             let control = &mut table.control;
             (control.kind, control.integral, control.derivative) = (Kind::Gain, 0.0, 0.0);
             (control.feedforward, control.acceleration) = (0.0, 0.0);
