@@ -99,7 +99,10 @@ impl Faults {
             }
             1 => {
                 self.scale = sign * dice.between(0.03, 0.1);
-                let sizes = [(self.scale, "1"), (1.0 + self.scale, "1")];
+                // A spring takes its share of what the table moves.
+                let moves = (1.0 + self.scale) * table.reaches();
+                let alone = [(self.scale, "1"), (1.0 + self.scale, "1")];
+                let sizes = [alone, [(moves - 1.0, "1"), (moves, "1")]].concat();
                 fault(
                     "the table moves by another scale",
                     &["scale", "gain"],

@@ -237,6 +237,17 @@ impl Table {
         is_sprung && self.control.integral == 0.0
     }
 
+    /// Steady displacement over the command: below one where a spring holds the table and no integral makes up for it.
+    pub fn reaches(&self) -> f64 {
+        match &self.body {
+            Body::Electric(electric) if self.gives_way() => {
+                let push = self.control.gain * electric.constant / electric.resistance;
+                push / (push + electric.stiffness)
+            }
+            _ => 1.0,
+        }
+    }
+
     /// Displacement, acceleration and force at every sample of a reference that reaches the loop late and by
     /// another scale, and the share of the time at the voltage's rail.
     pub fn play(
@@ -391,6 +402,24 @@ mod tests {
             let found = with - (1.0 + share) * held(&table);
             assert!(
                 (found / expected - 1.0).abs() < 0.05,
+                "{seed}: {found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_table_on_a_spring_comes_to_rest_where_it_holds() {
+        for seed in 0..6 {
+            let mut table = Table::draw(Drive::Shaker, &mut Dice::new(seed, 0));
+            table.control.integral = 0.0;
+            let Body::Electric(electric) = &mut table.body else {
+                unreachable!("it is a shaker");
+            };
+            electric.coulomb = 0.0;
+            let (readings, _) = table.play(&[1e-3; 1000], 100.0, 0.0, 0.0);
+            let (found, expected) = (readings[999][0] / 1e-3, table.reaches());
+            assert!(
+                (found / expected - 1.0).abs() < 1e-3,
                 "{seed}: {found} {expected}"
             );
         }
