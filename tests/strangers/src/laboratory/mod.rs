@@ -103,11 +103,7 @@ impl Faults {
                 let moves = (1.0 + self.scale) * table.reaches();
                 let alone = [(self.scale, "1"), (1.0 + self.scale, "1")];
                 let sizes = [alone, [(moves - 1.0, "1"), (moves, "1")]].concat();
-                fault(
-                    "the table moves by another scale",
-                    &["scale", "gain"],
-                    &sizes,
-                )
+                fault("the table moves by another scale", &["scale"], &sizes)
             }
             2 => {
                 self.zero = sign * dice.between(0.02, 0.1) * reach;
@@ -128,11 +124,7 @@ impl Faults {
             4 => {
                 self.accelerometer = sign * dice.between(0.04, 0.15);
                 let sizes = [(self.accelerometer, "1"), (1.0 + self.accelerometer, "1")];
-                fault(
-                    "the accelerometer's scale is off",
-                    &["accel", "scale"],
-                    &sizes,
-                )
+                fault("the accelerometer's scale is off", &["accel"], &sizes)
             }
             5 => {
                 let [slides, breaks] = table.rub(dice.between(2.0, 5.0));

@@ -20,10 +20,17 @@ pub enum Worth {
     Refused,
 }
 
+/// Whether an effect of that name is `fault`. A sensor's scale is not the table's.
+fn is_of(name: &str, fault: &Fault) -> bool {
+    let is_sensor = name.contains("accel");
+    let mut words = fault.words.iter();
+    words.any(|word| name.contains(word.as_str()) && (!is_sensor || word == "accel"))
+}
+
 /// Whether `effect` says `fault` with its size: within its interval or a tenth.
 fn says(effect: &Value, fault: &Fault) -> bool {
     let name = effect["effect"].as_str().unwrap_or_default();
-    if !fault.words.iter().any(|word| name.contains(word.as_str())) {
+    if !is_of(name, fault) {
         return false;
     }
     let Some(parameters) = effect["parameters"].as_object() else {
@@ -76,10 +83,7 @@ pub fn worth(truth: &Truth, answer: &Answer) -> Worth {
             && !is_hedged
             && !is_rail
             && !is_orifice
-            && !truth
-                .faults
-                .iter()
-                .any(|fault| fault.words.iter().any(|word| name.contains(word.as_str())))
+            && !truth.faults.iter().any(|fault| is_of(name, fault))
     };
     if json["verdict"] == "named" && named.iter().any(is_foreign) {
         return Worth::False;
