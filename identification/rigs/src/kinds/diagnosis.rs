@@ -379,7 +379,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         let Some(cause) = Cause::of(value.clone(), measured.stated(i)) else {
             continue;
         };
-        if !believed(i, &cause) {
+        if !believed(i, &cause) || cause.makes_up(&confirmed.parameters) {
             continue;
         }
         let without = measured.without_cause(i);
