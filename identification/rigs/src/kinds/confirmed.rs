@@ -371,7 +371,7 @@ fn refused_by<M: InParts>(measured: &M, fits: &Fits) -> (Vec<Refused>, Vec<Strin
     (out, silent)
 }
 
-/// Whether an effect's size differs from zero: one of its parameters that are no shape does, by its interval.
+/// Whether an effect's size differs from zero: the interval of one of its parameters, shapes apart, excludes zero.
 fn differs_from_zero(effect: &Candidate, values: &[NamedValue]) -> bool {
     let pairs = effect.parameters.iter().zip(values);
     let mut sizes = pairs.filter(|(parameter, _)| !matches!(parameter.role, Role::Shape { .. }));
