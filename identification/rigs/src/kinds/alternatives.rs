@@ -2,11 +2,11 @@
 //! another of its class, and without what is not needed.
 
 use super::PartReport;
-use super::confirmed::{unfit, without_effect};
+use super::confirmed::{clearly_better, lengths, unfit, without_effect};
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts};
 use super::readings::{Crossed, NEEDED};
-use diagnosis::{Observer, Point, looked, refit, settled};
+use diagnosis::{Observer, Point, all_errors, looked, refit, settled};
 use rayon::prelude::*;
 
 /// Logarithm of how much less likely a model is that does nearly as well.
@@ -157,6 +157,12 @@ pub(super) fn simplest<M: InParts>(
     (error < most && !crossed.needs(&errors)).then_some((best, errors))
 }
 
+/// Whether all data are explained worse `without` something than by the model at `point`, by more than chance.
+fn is_missed<M: InParts>(measured: &M, without: &Point, point: &Point) -> bool {
+    let [bare, own] = [without, point].map(|one| all_errors(measured, one, EVERYTHING));
+    clearly_better(&bare, &own, &lengths(measured, EVERYTHING))
+}
+
 /// What a model may go without.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Item {
@@ -190,8 +196,10 @@ pub(super) fn least_needed<M: InParts>(
             let errors = errors.settled(measured)?;
             // Where a part does not tell a parameter that the rig has, it may predict worse with it.
             let fits = || {
-                settled(measured, &left, EVERYTHING)
-                    .is_some_and(|found| measured.normalised_error(&found, EVERYTHING) < most)
+                settled(measured, &left, EVERYTHING).is_some_and(|found| {
+                    measured.normalised_error(&found, EVERYTHING) < most
+                        && !is_missed(measured, &found, point)
+                })
             };
             let is_idle = !crossed.needs(&errors) && (matches!(item, Item::Effect(_)) || fits());
             is_idle.then_some((item, left, errors))

@@ -43,6 +43,17 @@ impl Cause {
         (is_short && parameters.iter().any(gives_way)).then_some(spring)
     }
 
+    /// Whether it makes up for others of these `parameters`: no command arrives early, but in a model with a lag that is
+    /// too long. Without one the record's channels are shifted.
+    pub fn makes_up(&self, parameters: &[NamedValue]) -> bool {
+        const LAGS: [&str; 3] = ["command_lag", "loop_lag", "resonance"];
+        let is_early = self.found.name == "command_delay" && self.found.value < self.stated;
+        let mut lags = parameters
+            .iter()
+            .filter(|p| LAGS.contains(&p.name.as_str()));
+        is_early && lags.any(|p| p.value > 0.0)
+    }
+
     /// The cause in words, with value, unit and 95 % interval.
     pub fn words(&self) -> String {
         let NamedValue {
@@ -244,6 +255,23 @@ mod tests {
         assert_eq!(or(0.95, &with(0.5)), None);
         assert_eq!(or(1.05, &with(0.0)), None);
         assert_eq!(or(0.95, &[]), None);
+    }
+
+    #[test]
+    fn an_early_command_is_a_cause_only_where_no_lag_is_too_long() {
+        let with = |lag: f64| {
+            [
+                found("integral", 0.5, 0.0, "1/s"),
+                found("resonance", lag, 1e-4, "s"),
+            ]
+        };
+        let cause = |delay: f64| {
+            let own = found("command_delay", delay, 1e-4, "s");
+            Cause::of(own, (0.0, 1e-3)).unwrap()
+        };
+        assert!(cause(-3e-3).makes_up(&with(2e-3)));
+        assert!(!cause(-3e-3).makes_up(&with(0.0)));
+        assert!(!cause(3e-3).makes_up(&with(2e-3)));
     }
 
     #[test]

@@ -10,8 +10,8 @@ use super::readings::NEEDED;
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
 use diagnosis::{
-    AGAIN, Free, Point, Role, all_errors, completed, estimates, least_squares, looked, refit,
-    settled, squares,
+    AGAIN, Candidate, Free, Point, Role, all_errors, completed, estimates, least_squares, looked,
+    refit, settled, squares,
 };
 use recordings::mean_and_deviation;
 
@@ -26,6 +26,12 @@ const CLEAR: f64 = 1.96;
 const LEAST: f64 = 0.5;
 /// Factor by which the squared error on all data grows without an effect that one part of them need not show.
 const VITAL: f64 = 4.0;
+/// Why an effect is not named of which the parts tell different sizes.
+const SCATTERED: &str =
+    "its size differs so much between parts of the data that the 95 % interval contains zero";
+/// Why an effect is not named of which models that do as well have none.
+const UNKNOWN: &str = "its size differs so much between models that explain the data as well that the 95 % \
+                       interval contains zero";
 /// Samples that a file must bring to be fitted by itself.
 const FEWEST: usize = 500;
 
@@ -56,6 +62,9 @@ pub struct Confirmed {
     /// Whether the effects gain on either part, from a fit to the other.
     #[serde(skip)]
     pub(super) pays: bool,
+    /// The effects that differ from zero by the intervals of the fit.
+    #[serde(skip)]
+    clear: Vec<usize>,
     /// Where it is.
     #[serde(skip)]
     pub(super) point: Point,
@@ -73,6 +82,17 @@ impl Confirmed {
             let same = other.effects.iter().find(|(known, _)| known == name);
             widen(own, same.map_or(&[], |(_, values)| values));
         }
+    }
+
+    /// The effects of which the widened intervals hold zero, and those of the fit did not.
+    pub(super) fn vanished(&self, candidates: &[Candidate]) -> Vec<Refused> {
+        let own = self.effects.iter().zip(&self.point.effects);
+        let vanished = own.filter(|((_, values), (index, _))| {
+            self.clear.contains(index) && !differs_from_zero(&candidates[*index], values)
+        });
+        vanished
+            .map(|(_, (index, _))| (*index, UNKNOWN.to_owned()))
+            .collect()
     }
 
     /// As [`Self::widen_to`], the nominal parameters alone.
@@ -351,6 +371,41 @@ fn refused_by<M: InParts>(measured: &M, fits: &Fits) -> (Vec<Refused>, Vec<Strin
     (out, silent)
 }
 
+/// Whether an effect's size differs from zero: the interval of one of its parameters, shapes apart, excludes zero.
+fn differs_from_zero(effect: &Candidate, values: &[NamedValue]) -> bool {
+    let pairs = effect.parameters.iter().zip(values);
+    let mut sizes = pairs.filter(|(parameter, _)| !matches!(parameter.role, Role::Shape { .. }));
+    sizes.any(|(_, own)| own.value.abs() > CLEAR * own.standard_error)
+}
+
+/// The effects that all data tell from none, but of which the sizes in parts and files differ so much that `all`
+/// parameters, with standard errors that hold that scatter, do not. Of what `silent` parts do not reach they tell no
+/// size.
+fn vague<M: InParts>(
+    measured: &M,
+    fits: &Fits,
+    all: &[NamedValue],
+    silent: &[String],
+) -> Vec<Refused> {
+    let candidates = measured.candidates();
+    let (point, deviations) = &fits.everything;
+    let mut place = all.len();
+    let own = effects(measured, point, deviations).into_iter();
+    let own: Vec<_> = own.zip(&point.effects).collect();
+    let mut out = Vec::new();
+    for ((name, values), (index, _)) in own.iter().rev() {
+        place -= values.len();
+        let scattered = &all[place..place + values.len()];
+        if !silent.contains(name)
+            && differs_from_zero(&candidates[*index], values)
+            && !differs_from_zero(&candidates[*index], scattered)
+        {
+            out.push((*index, SCATTERED.to_owned()));
+        }
+    }
+    out
+}
+
 /// What is found beside the effects, and the model; none where it cannot be fitted. Effects of
 /// `start` that turn out to be unfit leave it, each with its reason.
 pub(super) fn confirm<M: InParts>(
@@ -361,11 +416,18 @@ pub(super) fn confirm<M: InParts>(
     findings: &mut Vec<String>,
 ) -> Option<Confirmed> {
     let mut start = start.clone();
-    let (fits, on_one_part) = loop {
+    let (fits, on_one_part, all, differing) = loop {
         let fits = fits(measured, &start)?;
-        let (out, silent) = refused_by(measured, &fits);
+        let (mut out, silent) = refused_by(measured, &fits);
+        let mut differing = Vec::new();
+        let (point, deviations) = &fits.everything;
+        let mut all = listed(measured, point, deviations);
+        differences(measured, &fits, &mut all, &mut differing);
         if out.is_empty() {
-            break (fits, silent);
+            out = vague(measured, &fits, &all, &silent);
+        }
+        if out.is_empty() {
+            break (fits, silent, all, differing);
         }
         start
             .effects
@@ -380,8 +442,7 @@ pub(super) fn confirm<M: InParts>(
     let (refitted, refitted_deviations) = &nominal.everything;
     let own = measured.parameters(point, deviations);
     let count = own.len();
-    let mut all = listed(measured, point, deviations);
-    differences(measured, &fits, &mut all, findings);
+    findings.extend(differing);
     surprises(measured, &all, count, findings);
     let scattered: Vec<f64> = all.iter().map(|value| value.standard_error).collect();
     let with_errors = |values: Vec<NamedValue>, from: usize| -> Vec<NamedValue> {
@@ -394,7 +455,7 @@ pub(super) fn confirm<M: InParts>(
             .collect()
     };
     let mut from = count;
-    let effects = effects(measured, point, deviations)
+    let effects: Vec<(String, Vec<NamedValue>)> = effects(measured, point, deviations)
         .into_iter()
         .map(|(name, values)| {
             let first = from;
@@ -402,6 +463,12 @@ pub(super) fn confirm<M: InParts>(
             (name, with_errors(values, first))
         })
         .collect();
+    let pairs = point.effects.iter().zip(&effects);
+    let clear = pairs.filter(|((i, _), (_, values))| {
+        let own = &measured.candidates()[*i];
+        differs_from_zero(own, values)
+    });
+    let clear = clear.map(|((i, _), _)| *i).collect();
     let on = |part: Part| {
         let (own, other) = (part as usize, part.other() as usize);
         completed(measured, &fits.parts[own].0, Some(own), other)
@@ -426,6 +493,7 @@ pub(super) fn confirm<M: InParts>(
         parameters: with_errors(own, 0),
         effects,
         on_one_part,
+        clear,
         point: point.clone(),
         refitted_point: refitted.clone(),
     })
@@ -522,6 +590,7 @@ fn surprises<M: InParts>(
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
@@ -546,6 +615,69 @@ mod tests {
         let drift: Vec<f64> = (0..2000).map(|k| (2e-3 * f64::from(k)).sin()).collect();
         let shifted: Vec<f64> = drift.iter().map(|e| e + 0.05).collect();
         assert!(!clearly_better(&shifted, &drift));
+    }
+
+    #[test]
+    fn an_effect_of_which_another_model_leaves_nothing_vanishes() {
+        let rig = super::super::of_kind("closed_loop_actuator").unwrap();
+        let candidates: Vec<Candidate> = rig.effects().into_iter().map(|e| e.candidate).collect();
+        let value = |name: &str, value: f64, standard_error: f64| NamedValue {
+            name: name.into(),
+            value,
+            unit: "1".into(),
+            standard_error,
+        };
+        let own = |values: [f64; 3]| {
+            let [compression, error, sliding] = values;
+            let effects = vec![
+                (
+                    "flow_saturation".to_owned(),
+                    vec![value("compression", compression, 5e-3)],
+                ),
+                (
+                    "friction".to_owned(),
+                    vec![
+                        value("breakaway_error", error, 1e-6),
+                        value("sliding_speed", sliding, 1e-5),
+                    ],
+                ),
+            ];
+            let places: Vec<usize> = effects
+                .iter()
+                .map(|(name, _)| candidates.iter().position(|c| c.effect == *name).unwrap())
+                .collect();
+            let point = Point {
+                nuisance: Vec::new(),
+                effects: places.iter().map(|i| (*i, Vec::new())).collect(),
+            };
+            Confirmed {
+                error: 0.0,
+                swapped_error: 0.0,
+                gain_interval: (0.0, 0.0),
+                refitted_error: 0.0,
+                fitted_error: 0.0,
+                refitted: Vec::new(),
+                parameters: Vec::new(),
+                effects,
+                on_one_part: Vec::new(),
+                pays: true,
+                clear: places,
+                refitted_point: point.clone(),
+                point,
+            }
+        };
+        let first = own([0.127, 2e-5, 1e-3]);
+        let gone = |other: [f64; 3]| {
+            let mut first = first.clone();
+            first.widen_to(&own(other));
+            let vanished = first.vanished(&candidates);
+            let names = vanished.into_iter().map(|(i, _)| candidates[i].effect);
+            names.collect::<Vec<_>>()
+        };
+        assert!(gone([0.2, 2.2e-5, 1e-3]).is_empty());
+        // A sliding speed is no size.
+        assert!(gone([0.2, 2.2e-5, 0.1]).is_empty());
+        assert_eq!(gone([0.43, 2.2e-5, 1e-3]), ["flow_saturation"]);
     }
 
     #[test]

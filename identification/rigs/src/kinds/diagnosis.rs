@@ -313,6 +313,17 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     // What the model may lack or not changes the others by as much as is not known.
     confirmed.widen_to(&with_all);
+    let vanished = confirmed.vanished(measured.candidates());
+    if !vanished.is_empty() {
+        let mut left = confirmed.point.clone();
+        let is_gone = |i: usize| vanished.iter().any(|(gone, _)| *gone == i);
+        left.effects.retain(|(i, _)| !is_gone(*i));
+        refused.extend(vanished);
+        findings.clear();
+        confirmed = confirm(measured, &nominal, &left, &mut refused, &mut findings)?;
+        crossed = Crossed::of(measured, &confirmed.point)?;
+        confirmed.widen_to(&with_all);
+    }
     for (i, reason) in refused {
         let effect = measured.name(i);
         if set_aside.iter().all(|known| known.effect != effect) {
@@ -368,7 +379,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         let Some(cause) = Cause::of(value.clone(), measured.stated(i)) else {
             continue;
         };
-        if !believed(i, &cause) {
+        if !believed(i, &cause) || cause.makes_up(&confirmed.parameters) {
             continue;
         }
         let without = measured.without_cause(i);
@@ -397,7 +408,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     causes.extend(measured.contradictions().into_iter().filter(|cause| {
         // Of records that no model explains, sensors tell less too.
-        holds || cause.deviations() > FAR
+        holds || explains || cause.deviations() > FAR
     }));
     let readings = readings(measured, weighed, &causes, &doubted, (&confirmed, crossed));
     let verdict = match (named.is_empty() || !confirmed.pays, rivalled) {

@@ -59,6 +59,9 @@ pub struct Truth {
     pub is_railed: bool,
     /// Whether a spring holds the table, and no integral makes up for that.
     pub gives_way: bool,
+    /// By what share a valve's flow falls per speed, s/m.
+    #[serde(default)]
+    pub flow_falls: f64,
 }
 
 /// A laboratory's folder.
@@ -96,12 +99,11 @@ impl Faults {
             }
             1 => {
                 self.scale = sign * dice.between(0.03, 0.1);
-                let sizes = [(self.scale, "1"), (1.0 + self.scale, "1")];
-                fault(
-                    "the table moves by another scale",
-                    &["scale", "gain"],
-                    &sizes,
-                )
+                // A spring takes its share of what the table moves.
+                let moves = (1.0 + self.scale) * table.reaches();
+                let alone = [(self.scale, "1"), (1.0 + self.scale, "1")];
+                let sizes = [alone, [(moves - 1.0, "1"), (moves, "1")]].concat();
+                fault("the table moves by another scale", &["scale"], &sizes)
             }
             2 => {
                 self.zero = sign * dice.between(0.02, 0.1) * reach;
@@ -122,19 +124,13 @@ impl Faults {
             4 => {
                 self.accelerometer = sign * dice.between(0.04, 0.15);
                 let sizes = [(self.accelerometer, "1"), (1.0 + self.accelerometer, "1")];
-                fault(
-                    "the accelerometer's scale is off",
-                    &["accel", "scale"],
-                    &sizes,
-                )
+                fault("the accelerometer's scale is off", &["accel"], &sizes)
             }
             5 => {
-                let force = table.rub(dice.between(2.0, 5.0));
-                fault(
-                    "friction is larger than usual",
-                    &["friction"],
-                    &[(force, "N")],
-                )
+                let [slides, breaks] = table.rub(dice.between(2.0, 5.0));
+                let of = |(force, error): (f64, f64)| [(force, "N"), (error, "m")];
+                let sizes = [of(slides), of(breaks)].concat();
+                fault("friction is larger than usual", &["friction"], &sizes)
             }
             6 => {
                 let overlap = table.overlap(dice.between(0.05, 0.2));
@@ -226,6 +222,7 @@ impl Laboratory {
                 faults: faults.said,
                 is_railed,
                 gives_way: table.gives_way(),
+                flow_falls: table.flow_falls(),
             },
             recordings,
         }

@@ -20,10 +20,17 @@ pub enum Worth {
     Refused,
 }
 
+/// Whether an effect of that name is `fault`. A sensor's scale is not the table's.
+fn is_of(name: &str, fault: &Fault) -> bool {
+    let is_sensor = name.contains("accel");
+    let mut words = fault.words.iter();
+    words.any(|word| name.contains(word.as_str()) && (!is_sensor || word == "accel"))
+}
+
 /// Whether `effect` says `fault` with its size: within its interval or a tenth.
 fn says(effect: &Value, fault: &Fault) -> bool {
     let name = effect["effect"].as_str().unwrap_or_default();
-    if !fault.words.iter().any(|word| name.contains(word.as_str())) {
+    if !is_of(name, fault) {
         return false;
     }
     let Some(parameters) = effect["parameters"].as_object() else {
@@ -43,6 +50,15 @@ fn says(effect: &Value, fault: &Fault) -> bool {
     })
 }
 
+/// Whether `effect` has the size of an orifice's flow that falls with speed, and is told from none.
+fn says_orifice(effect: &Value, flow_falls: f64) -> bool {
+    let own = &effect["parameters"]["compression"];
+    let value = own["value"].as_f64().unwrap_or(f64::NAN);
+    let half = 1.96 * own["standard_error"].as_f64().unwrap_or(0.0);
+    let is_size = (value - flow_falls).abs() <= half.max(0.1 * flow_falls);
+    flow_falls > 0.0 && is_size && value > half
+}
+
 /// What the answer is worth.
 pub fn worth(truth: &Truth, answer: &Answer) -> Worth {
     let Some(json) = &answer.json else {
@@ -54,21 +70,20 @@ pub fn worth(truth: &Truth, answer: &Answer) -> Worth {
         .faults
         .iter()
         .all(|fault| named.iter().any(|effect| says(effect, fault)));
-    // Every table has some friction, and may be at its rail or on a spring; what records cannot tell from these is
-    // said with them.
+    // Every table has some friction, a valve's flow falls with speed, and a table may be at its rail or on a spring;
+    // what records cannot tell from these is said with them.
     let alternatives = json["alternatives"].to_string();
     let is_foreign = |effect: &Value| {
         let name = effect["effect"].as_str().unwrap_or_default();
         let is_hedged = name == "reduced_null_gain" && alternatives.contains("friction")
             || name == "scale" && truth.gives_way && alternatives.contains("spring");
         let is_rail = name == "speed_limit" && truth.is_railed;
+        let is_orifice = name == "flow_saturation" && says_orifice(effect, truth.flow_falls);
         name != "friction"
             && !is_hedged
             && !is_rail
-            && !truth
-                .faults
-                .iter()
-                .any(|fault| fault.words.iter().any(|word| name.contains(word.as_str())))
+            && !is_orifice
+            && !truth.faults.iter().any(|fault| is_of(name, fault))
     };
     if json["verdict"] == "named" && named.iter().any(is_foreign) {
         return Worth::False;

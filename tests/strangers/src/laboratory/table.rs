@@ -164,18 +164,35 @@ impl Table {
         }
     }
 
-    /// Friction times a factor; returns it in N.
-    pub fn rub(&mut self, factor: f64) -> f64 {
-        match &mut self.body {
+    /// Friction times a factor; returns it in N while it slides and where it breaks away, and the position error (m)
+    /// that either holds: what a coil's or a motor's resistance needs of the voltage at rest, or what the leak takes
+    /// of the valve's flow.
+    pub fn rub(&mut self, factor: f64) -> [(f64, f64); 2] {
+        let held = match &mut self.body {
             Body::Hydraulic(rig) => {
                 rig.coulomb *= factor;
                 rig.breakaway *= factor;
-                rig.coulomb
+                [rig.coulomb, rig.breakaway].map(|force| {
+                    let load = force / rig.area;
+                    let flow = rig.flow_coefficient * ((rig.supply - load) / 2.0).sqrt();
+                    (force, rig.leakage * load / flow)
+                })
             }
             Body::Electric(electric) => {
                 electric.coulomb *= factor;
-                electric.coulomb
+                let current = electric.coulomb / electric.constant;
+                [(electric.coulomb, electric.resistance * current); 2]
             }
+        };
+        held.map(|(force, voltage)| (force, voltage / self.control.gain))
+    }
+
+    /// By what share an orifice's flow falls per speed, s/m: `v = w sqrt(1 - p / P)` at the load pressure
+    /// `p = c v / A` of viscous seals, to first order; 0 without a valve.
+    pub fn flow_falls(&self) -> f64 {
+        match &self.body {
+            Body::Hydraulic(rig) => rig.viscous / (2.0 * rig.area * rig.supply),
+            Body::Electric(_) => 0.0,
         }
     }
 
@@ -218,6 +235,17 @@ impl Table {
     pub fn gives_way(&self) -> bool {
         let is_sprung = matches!(&self.body, Body::Electric(electric) if electric.stiffness > 0.0);
         is_sprung && self.control.integral == 0.0
+    }
+
+    /// Steady displacement over the command: below one where a spring holds the table and no integral makes up for it.
+    pub fn reaches(&self) -> f64 {
+        match &self.body {
+            Body::Electric(electric) if self.gives_way() => {
+                let push = self.control.gain * electric.constant / electric.resistance;
+                push / (push + electric.stiffness)
+            }
+            _ => 1.0,
+        }
     }
 
     /// Displacement, acceleration and force at every sample of a reference that reaches the loop late and by
@@ -333,6 +361,90 @@ impl Electric {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn friction_holds_the_table_back_by_its_position_error() {
+        for seed in 0..12 {
+            let drive = [Drive::Hydraulic, Drive::Motor][seed as usize % 2];
+            let mut table = Table::draw(drive, &mut Dice::new(seed, 0));
+            let [(force, expected), _] = table.rub(3.0);
+            let control = &mut table.control;
+            (control.kind, control.integral, control.derivative) = (Kind::Gain, 0.0, 0.0);
+            (control.feedforward, control.acceleration) = (0.0, 0.0);
+            if let Body::Hydraulic(rig) = &mut table.body {
+                rig.disturbance = 0.0;
+            }
+            // There and back at one speed: what differs is friction and the error of following.
+            let (rate, speed) = (100.0, 0.02);
+            let motion: Vec<f64> = (0..800)
+                .map(|k| speed * (4.0 - (f64::from(k) / rate - 4.0).abs()))
+                .collect();
+            let held = |table: &Table| {
+                let (readings, _) = table.play(&motion, rate, 0.0, 0.0);
+                let mean = |from: usize| {
+                    let own = (from..from + 100).map(|k| motion[k] - readings[k][0]);
+                    own.sum::<f64>() / 100.0
+                };
+                0.5 * (mean(280) - mean(680))
+            };
+            let with = held(&table);
+            // The load's pressure also takes a share of an orifice's flow, at any speed.
+            let share = match &mut table.body {
+                Body::Hydraulic(rig) => {
+                    (rig.coulomb, rig.breakaway) = (1e-3, 1e-3);
+                    0.5 * force / (rig.area * rig.supply)
+                }
+                Body::Electric(electric) => {
+                    electric.coulomb = 0.0;
+                    0.0
+                }
+            };
+            let found = with - (1.0 + share) * held(&table);
+            assert!(
+                (found / expected - 1.0).abs() < 0.05,
+                "{seed}: {found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_table_on_a_spring_comes_to_rest_where_it_holds() {
+        for seed in 0..6 {
+            let mut table = Table::draw(Drive::Shaker, &mut Dice::new(seed, 0));
+            table.control.integral = 0.0;
+            let Body::Electric(electric) = &mut table.body else {
+                unreachable!("it is a shaker");
+            };
+            electric.coulomb = 0.0;
+            let (readings, _) = table.play(&[1e-3; 1000], 100.0, 0.0, 0.0);
+            let (found, expected) = (readings[999][0] / 1e-3, table.reaches());
+            assert!(
+                (found / expected - 1.0).abs() < 1e-3,
+                "{seed}: {found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_orifice_s_flow_falls_with_speed_by_the_seals_drag() {
+        let table = Table::draw(Drive::Hydraulic, &mut Dice::new(3, 0));
+        let expected = table.flow_falls();
+        let Body::Hydraulic(mut rig) = table.body else {
+            unreachable!("it is hydraulic");
+        };
+        (rig.coulomb, rig.breakaway, rig.disturbance) = (1e-3, 1e-3, 0.0);
+        // Long enough to settle, short enough for the stroke.
+        let speed = |voltage: f64| {
+            let mut state = rig.rest();
+            for k in 0..300 {
+                rig.advance(&mut state, 1e-3 * f64::from(k), 1e-3, voltage, 0.0);
+            }
+            state.values[5]
+        };
+        let (slow, fast) = (speed(0.2), speed(2.0));
+        let found = (10.0 * slow / fast - 1.0) / (10.0 * slow - slow);
+        assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+    }
 
     #[test]
     fn every_loop_follows_a_slow_motion() {
