@@ -1,7 +1,9 @@
 //! What an effect is worth: against the model without it, refitted, under the noises that then fit best.
 
 use super::fit::{Fit, evaluate, residuals};
-use super::likelihood::{Hypothesis, PenalisedLikelihood, named, pays, special_case};
+use super::likelihood::{
+    FORM_IS_KNOWN_TO, Hypothesis, PenalisedLikelihood, named, pays, special_case,
+};
 use super::model::{ExtensibleModel, Point};
 use super::progress::{Observer, Progress};
 
@@ -113,22 +115,48 @@ pub(super) fn ablated<M: ExtensibleModel + Clone>(
         let candidates = current.model.candidates();
         let point = &current.hypothesis.fit.point;
         let places = 0..point.effects.len();
-        let simpler = places.clone().map(|place| without(point, place));
-        let special = places.filter_map(|place| special_case(candidates, point, place));
+        let refitted = |smaller: Point| {
+            if observer.is_over() {
+                return None;
+            }
+            observer.tell(|| Progress::Trying(format!("only {}", named(candidates, &smaller))));
+            settled_from(assumed, &current.model, &smaller, records, observer)
+        };
+        let special = places
+            .clone()
+            .filter_map(|place| refitted(special_case(candidates, point, place)?))
+            .collect::<Vec<_>>();
+        let simpler: Vec<_> = places
+            .map(|place| refitted(without(point, place)))
+            .collect();
+        let gain = |own: &Settled<M>| own.hypothesis.score - current.hypothesis.score;
+        let gains: Vec<(&str, f64)> = point
+            .effects
+            .iter()
+            .zip(&simpler)
+            .map(|((i, _), own)| (candidates[*i].law, own.as_ref().map_or(0.0, gain)))
+            .collect();
+        let is_worth = |own: &Settled<M>| pays(candidates, &current.hypothesis, &own.hypothesis);
+        let simpler = simpler
+            .into_iter()
+            .enumerate()
+            .filter_map(|(place, own)| own.filter(|own| !is_worth(own) || is_form(&gains, place)));
         let smaller = simpler
-            .chain(special)
-            .filter(|_| !observer.is_over())
-            .filter_map(|smaller| {
-                observer.tell(|| Progress::Trying(format!("only {}", named(candidates, &smaller))));
-                settled_from(assumed, &current.model, &smaller, records, observer)
-            })
-            .filter(|smaller| !pays(candidates, &current.hypothesis, &smaller.hypothesis))
+            .chain(special.into_iter().filter(|own| !is_worth(own)))
             .min_by(|a, b| a.hypothesis.score.total_cmp(&b.hypothesis.score));
         match smaller {
             Some(smaller) => current = smaller,
             None => return current,
         }
     }
+}
+
+/// Whether the effect at `place`, of laws and what each gains, gains so little beside another one of its law that it
+/// makes up for that one's form.
+fn is_form(gains: &[(&str, f64)], place: usize) -> bool {
+    let (law, own) = gains[place];
+    let mut same = gains.iter().filter(|(other, _)| *other == law);
+    !law.is_empty() && same.any(|(_, gain)| own < FORM_IS_KNOWN_TO * gain)
 }
 
 /// Normal deviate of what `with` predicts better than `without` on `records` that neither was fitted to:

@@ -38,6 +38,8 @@ pub struct Test {
     pub deviate: f64,
     /// Where, if it is a channel's error in a band or a part of the record.
     pub place: Option<Place>,
+    /// True of what was stated of the nominal model, which no effect's form excuses.
+    pub is_stated: bool,
 }
 
 /// Where a model leaves more than noise.
@@ -68,7 +70,14 @@ impl Test {
             what,
             deviate,
             place: None,
+            is_stated: false,
         }
+    }
+
+    /// Whether it shows more than noise where traces of an effect may be `tolerance` times larger than usual.
+    pub(crate) fn fails(&self, tolerance: f64) -> bool {
+        let tolerance = if self.is_stated { 1.0 } else { tolerance };
+        self.deviate >= tolerance * LARGEST_DEVIATE
     }
 
     fn at(self, channel: Option<&str>, part: Part, mean_square: f64) -> Self {
@@ -294,6 +303,8 @@ pub struct Motion<'a> {
     own: &'a [f64],
     /// In those of all records.
     all: &'a [f64],
+    /// Whether effects explain nearly all that the nominal model leaves.
+    is_explained: bool,
 }
 
 /// How much the rig moves in every part of every record. That is the median, over the record's regressors, of their
@@ -360,7 +371,7 @@ fn without_bursts(
 impl Motion<'_> {
     /// Whether `loud` parts of a record are bursts of a noise: few, and no more where there is more motion, as
     /// those of a wrong model are. A single burst may be where a record of low level moves most, as long as other
-    /// records are quiet where they move as much.
+    /// records are quiet where they move as much; and anywhere beside effects that explain all but a burst.
     fn are_bursts(&self, loud: &[usize]) -> bool {
         let count = loud.len() as f64;
         // Ranks of parts that have nothing to do with the motion are even between 0 and 1.
@@ -376,7 +387,8 @@ impl Motion<'_> {
             mean < 0.5 + WITH_THE_MOTION * deviation
         };
         (1..=BURSTS).contains(&loud.len())
-            && (is_even(self.own) || loud.len() <= ONE_BURST && is_even(self.all))
+            && (is_even(self.own)
+                || loud.len() <= ONE_BURST && (self.is_explained || is_even(self.all)))
     }
 }
 
@@ -395,10 +407,20 @@ fn of_parameters(nuisance: &[f64]) -> [Test; 2] {
             farthest / KNOWN_SPREAD,
         ),
     ]
+    .map(|test| Test {
+        is_stated: true,
+        ..test
+    })
 }
 
-/// Tests of whether what `fit` leaves over on `records` is noise, and its parameters plausible.
-pub(crate) fn left_over<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usize]) -> Vec<Test> {
+/// Tests of whether what `fit` leaves over on `records` is noise, and its parameters plausible; `is_explained` says
+/// whether its effects explain nearly all that the nominal model leaves.
+pub(crate) fn left_over<M: ExtensibleModel>(
+    model: &M,
+    fit: &Fit,
+    records: &[usize],
+    is_explained: bool,
+) -> Vec<Test> {
     let mut all = Vec::new();
     let mut rest = fit.residuals.as_slice();
     let regressors: Vec<_> = records.iter().map(|r| model.regressors(*r)).collect();
@@ -414,7 +436,11 @@ pub(crate) fn left_over<M: ExtensibleModel>(model: &M, fit: &Fit, records: &[usi
             model.channels(),
             regressors,
             model.drifts_below(),
-            &Motion { own, all: &of_all },
+            &Motion {
+                own,
+                all: &of_all,
+                is_explained,
+            },
         ));
     }
     all.extend(of_parameters(&fit.point.nuisance));
@@ -457,7 +483,11 @@ mod tests {
         assert_eq!(chi_square_deviate(7.0, 0.0), 0.0);
     }
 
-    const STILL: Motion<'_> = Motion { own: &[], all: &[] };
+    const STILL: Motion<'_> = Motion {
+        own: &[],
+        all: &[],
+        is_explained: false,
+    };
 
     /// Normal values by the sum of twelve uniform ones.
     fn white(samples: usize) -> Vec<f64> {
@@ -509,14 +539,22 @@ mod tests {
         let motion = Motion {
             own: &own,
             all: &own,
+            is_explained: false,
         };
         assert!(motion.are_bursts(&[3, 12, 30]));
         assert!(!motion.are_bursts(&[35, 37, 38]) && !motion.are_bursts(&[39]));
+        // Unless effects explain all else.
+        let explained = Motion {
+            is_explained: true,
+            ..motion
+        };
+        assert!(explained.are_bursts(&[39]) && !explained.are_bursts(&[35, 37, 38]));
         // Unless other records move more and are quiet there.
         let all: Vec<f64> = (0..120).map(f64::from).collect();
         let motion = Motion {
             own: &own,
             all: &all,
+            is_explained: false,
         };
         assert!(motion.are_bursts(&[39]) && motion.are_bursts(&[38, 39]));
         assert!(!motion.are_bursts(&[35, 37, 38]));

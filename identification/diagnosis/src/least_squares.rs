@@ -563,6 +563,7 @@ mod tests {
                     look_alikes: &[],
                     tolerance: 1.0,
                     contains: None,
+                    law: "",
                     is_linear: false,
                 }],
                 measured,

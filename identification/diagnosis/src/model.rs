@@ -205,6 +205,8 @@ pub struct Candidate {
     pub tolerance: f64,
     /// Effect that this one holds as a special case.
     pub contains: Option<&'static str>,
+    /// Law whose form it changes, empty where that is its own: effects of one law make up for each other's form.
+    pub law: &'static str,
     /// Whether it changes the linear part of the rig, through which the noises pass as well: a noise of
     /// another form than was learned looks like a little of it.
     pub is_linear: bool,
@@ -354,6 +356,7 @@ mod tests {
             look_alikes: &[],
             tolerance: 1.0,
             contains: None,
+            law: "",
             is_linear: false,
         }
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::ablation::{self, Settled, ablated, settled, settled_from};
-use super::adequacy::{LARGEST_DEVIATE, Test, left_over};
+use super::adequacy::{Test, left_over};
 use super::fit::{Fit, Jacobian, evaluate, fit as refit, polish};
 use super::likelihood::{
     FLOOR, Hypothesis, MOST_EFFECTS, NEAR_NOISE, NEARLY_NOISE, PenalisedLikelihood, RIVAL_WITHIN,
@@ -24,10 +24,14 @@ const NEAR: f64 = 0.5;
 const STEADY: f64 = 0.5;
 /// Rounds of the fit that asks for it.
 const ROUNDS_OF_DOUBT: usize = 4;
+/// Standard deviations by which an effect predicts unseen records worse than the model without it, and goes.
+const REFUTED: f64 = 3.0;
 /// Share of the residuals' power beyond which an effect is not doubted for that.
 const BEYOND_DOUBT: f64 = 0.02;
 /// Share of the excess error that a single effect explains to lead what is ranked.
 const MOST_OF_IT: f64 = 0.9;
+/// Share beyond which a single burst that is left says nothing of the model.
+const NEARLY_ALL: f64 = 0.99;
 /// Models that are reported with their weights at most.
 const CANDIDATES: usize = 5;
 
@@ -202,6 +206,14 @@ pub fn judge<M: ExtensibleModel + Clone>(
     let (best, others) = rounds.search(nominal, FLOOR);
     let mut best = rounds.steady(best);
     let mut judgement = weigh(&best, &others, fitted, held_out, observer)?;
+    while let Some(place) = refuted(&judgement.unseen_gains) {
+        let smaller = ablation::without(&best.hypothesis.fit.point, place);
+        let Some(smaller) = rounds.settled(&best.model, &smaller) else {
+            break;
+        };
+        best = smaller;
+        judgement = weigh(&best, &others, fitted, held_out, observer)?;
+    }
     let is_near = best.model.is_usual() && best.hypothesis.mean_square() < NEAR_NOISE;
     if judgement.verdict == Verdict::Unexplained && is_near && !observer.is_over() {
         // Too weak to matter, but perhaps all that is left.
@@ -251,6 +263,14 @@ fn has_shrunk(candidate: &Candidate, own: &[f64], again: &[f64]) -> bool {
         .map(|((_, own), again)| again * own.signum() < STEADY * own.abs())
         .peekable();
     sizes.peek().is_some() && sizes.all(|shrunk| shrunk)
+}
+
+/// The place of the effect with which unseen records are predicted worst, where that is worse than without it.
+fn refuted(unseen_gains: &[Option<f64>]) -> Option<usize> {
+    let gains = unseen_gains.iter().enumerate();
+    let known = gains.filter_map(|(place, gain)| Some((place, (*gain)?)));
+    let worst = known.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (worst.1 < -REFUTED).then_some(worst.0)
 }
 
 /// A search in rounds.
@@ -429,7 +449,7 @@ fn learned_at_rest<M: ExtensibleModel + Clone>(model: &M, quiet: &[usize]) -> Op
         effects: Vec::new(),
     };
     let found = settled(model, &origin, quiet, Observer::none())?;
-    let tests = left_over(&found.model, &found.hypothesis.fit, quiet);
+    let tests = left_over(&found.model, &found.hypothesis.fit, quiet, false);
     let is_nearly_noise = tests.iter().all(|test| test.deviate < NEARLY_NOISE);
     (is_nearly_noise && found.model.is_usual()).then_some(found.model)
 }
@@ -473,15 +493,20 @@ fn weigh<M: ExtensibleModel>(
         Some((fit, jacobian)) => (fit, Some(jacobian)),
         None => (best.fit.clone(), None),
     };
-    let mut tests = left_over(model, &joint_fit, &everything);
+    let excess = |square: f64| (square - 1.0).max(0.0);
+    let share_explained = if excess(nominal_square) > 0.0 {
+        1.0 - excess(best.mean_square()) / excess(nominal_square)
+    } else {
+        1.0
+    };
+    let is_explained = named && share_explained > NEARLY_ALL;
+    let mut tests = left_over(model, &joint_fit, &everything, is_explained);
     tests.sort_by(|a, b| b.deviate.total_cmp(&a.deviate));
     let effects = best.fit.point.effects.iter();
     let tolerance = effects.fold(1.0f64, |most, (i, _)| {
         most.max(model.candidates()[*i].tolerance)
     });
-    let adequate = tests
-        .first()
-        .is_none_or(|worst| worst.deviate < tolerance * LARGEST_DEVIATE);
+    let adequate = !tests.iter().any(|test| test.fails(tolerance));
 
     let best_names = names(model, &best);
     let nested = |set: &[&'static str]| {
@@ -515,12 +540,6 @@ fn weigh<M: ExtensibleModel>(
         (true, false, _) => Verdict::Adequate,
         (true, true, true) => Verdict::Named,
         (true, true, false) => Verdict::Ambiguous,
-    };
-    let excess = |square: f64| (square - 1.0).max(0.0);
-    let share_explained = if excess(nominal_square) > 0.0 {
-        1.0 - excess(best.mean_square()) / excess(nominal_square)
-    } else {
-        1.0
     };
     // What is told of the effects rests on all records, as long as the model holds on them.
     let (all, jacobian) = match joint_jacobian.filter(|_| adequate) {
@@ -588,6 +607,16 @@ fn weigh<M: ExtensibleModel>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_effect_that_predicts_unseen_records_worse_is_refuted() {
+        assert_eq!(
+            refuted(&[Some(13.6), Some(-6.7), None, Some(-3.1)]),
+            Some(1)
+        );
+        assert_eq!(refuted(&[Some(-1.9), Some(5.3)]), None);
+        assert_eq!(refuted(&[]), None);
+    }
 
     #[test]
     fn a_further_effect_that_does_not_pay_is_not_a_rival_and_another_one_is() {

@@ -9,6 +9,7 @@ pub mod interpolation;
 pub mod least_squares;
 pub mod prediction;
 pub mod residuals;
+pub mod rounding;
 pub mod spectra;
 pub mod state_variable_filter;
 pub mod subspace;

@@ -42,6 +42,7 @@ impl Waves {
             look_alikes: &[],
             tolerance: 1.0,
             contains: None,
+            law: "",
             is_linear: false,
         }];
         let other = |k: usize| (1.7 * k as f64).sin() + 0.3 * (0.9 * k as f64).cos();

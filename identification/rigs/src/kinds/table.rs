@@ -181,6 +181,7 @@ pub fn effect<const N: usize>(
             look_alikes,
             tolerance: 1.0,
             contains: None,
+            law: "",
             is_linear: false,
         },
         off: parameters.iter().map(|(_, entry)| entry.off).collect(),

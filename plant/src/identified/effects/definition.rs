@@ -371,6 +371,8 @@ pub struct Effect {
     pub confounded_with: &'static [&'static str],
     /// Effect that this one holds as a special case.
     pub contains: Option<&'static str>,
+    /// Law whose form it changes; empty where that is its own.
+    pub law: &'static str,
     /// True where it is linear about rest, offsets aside.
     pub is_linear: bool,
     /// True where it needs finer steps than the rig without it.
@@ -397,6 +399,7 @@ impl Effect {
             starts: &[],
             confounded_with: &[],
             contains: None,
+            law: "",
             is_linear: false,
             is_fast: false,
             needs_co_simulation: false,

@@ -1,6 +1,6 @@
 //! Dry friction that is larger one way than the other, as of a seal that points one way.
 
-use super::friction::{COULOMB_FORCE, STICKS, TRANSITION_VELOCITY, tanh};
+use super::friction::{COULOMB_FORCE, FRICTION_LAW, STICKS, TRANSITION_VELOCITY, tanh};
 use super::quantity::FORCE;
 use super::{Component, Effect, Family, Parameter, TableMotion};
 use crate::ModelError;
@@ -59,6 +59,7 @@ impl Family for DirectionalFriction {
         contains: Some(vocabulary::COULOMB_FRICTION),
         is_fast: true,
         tolerance: STICKS,
+        law: FRICTION_LAW,
         ..Effect::new("directional_friction", Component::ShakeTable)
     }];
 

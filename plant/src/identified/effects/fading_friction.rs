@@ -1,6 +1,6 @@
 //! Dry friction that fades as the table is first moved farther, as of a guide that runs in.
 
-use super::friction::{COULOMB_FORCE, STICKS, TRANSITION_VELOCITY, tanh};
+use super::friction::{COULOMB_FORCE, FRICTION_LAW, STICKS, TRANSITION_VELOCITY, tanh};
 use super::quantity::{LENGTH, RATIO};
 use super::{Component, Effect, Family, Parameter, Scale, TableMotion};
 use crate::ModelError;
@@ -75,6 +75,7 @@ impl Family for FadingFriction {
         is_fast: true,
         needs_co_simulation: true,
         tolerance: STICKS,
+        law: FRICTION_LAW,
         ..Effect::new("fading_friction", Component::ShakeTable)
     }];
 

@@ -79,6 +79,8 @@ pub(super) const TRANSITION_VELOCITY: Parameter = Parameter::new(
 )
 .min(1e-6);
 
+/// The law that friction of all kinds changes the form of.
+pub(super) const FRICTION_LAW: &str = "friction";
 /// Tolerance of friction: where the table sticks the constant gain is not the best one and leaves
 /// traces.
 pub(super) const STICKS: f64 = 1.6;
@@ -98,6 +100,7 @@ impl Family for FrictionEffects {
             confounded_with: &["stribeck_friction"],
             is_fast: true,
             tolerance: STICKS,
+            law: FRICTION_LAW,
             ..Effect::new(vocabulary::COULOMB_FRICTION, Component::ShakeTable)
         },
         Effect {
@@ -129,6 +132,7 @@ impl Family for FrictionEffects {
             contains: Some(vocabulary::COULOMB_FRICTION),
             is_fast: true,
             tolerance: STICKS,
+            law: FRICTION_LAW,
             ..Effect::new("stribeck_friction", Component::ShakeTable)
         },
     ];

@@ -1,6 +1,7 @@
 //! Effects between the valve's opening and the force: supply and oil.
 
 use super::quantity::{FLOW_PER_FORCE, FLOW_PER_FORCE_RATE, FORCE, PER_VOLT, RATIO, TIME_CONSTANT};
+use super::valve::VALVE_FLOW;
 use super::{AtStart, Component, Effect, Family, Parameter, Scale};
 use crate::ModelError;
 use units::constants::LBF;
@@ -56,6 +57,7 @@ impl Family for HydraulicEffects {
             .on_table(|e| &mut e.hydraulics.stall_force)
             .min(0.0)],
             starts: &[&[60.0 * LBF]],
+            law: VALVE_FLOW,
             ..Effect::new("valve_flow_saturation", Component::ShakeTable)
         },
         Effect {

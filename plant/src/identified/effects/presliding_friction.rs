@@ -1,6 +1,6 @@
 //! Dry friction whose contact gives way elastically before it slides.
 
-use super::friction::{COULOMB_FORCE, STICKS, STRIBECK_FORCE, STRIBECK_VELOCITY};
+use super::friction::{COULOMB_FORCE, FRICTION_LAW, STICKS, STRIBECK_FORCE, STRIBECK_VELOCITY};
 use super::quantity::LENGTH;
 use super::{Component, Effect, Family, Parameter, Scale, TableMotion};
 use crate::ModelError;
@@ -84,6 +84,7 @@ impl Family for PreslidingFriction {
         is_fast: true,
         needs_co_simulation: true,
         tolerance: STICKS,
+        law: FRICTION_LAW,
         ..Effect::new("presliding_friction", Component::ShakeTable)
     }];
 

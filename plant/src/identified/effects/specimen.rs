@@ -67,6 +67,9 @@ impl Default for SpecimenEffects {
     }
 }
 
+/// The law of the columns' force over the drift.
+const RESTORING_FORCE: &str = "restoring force of the specimen";
+
 impl Family for SpecimenEffects {
     type Memory = ();
 
@@ -88,7 +91,7 @@ impl Family for SpecimenEffects {
                     RATIO,
                     "Stiffness after yielding over elastic stiffness",
                 )
-                .shape(Scale::Linear(0.01), 0.05, 4.0, (-0.1, 0.5))
+                .shape(Scale::Linear(0.01), 0.05, 10.0, (-0.1, 0.5))
                 .on_specimen(|s| &mut s.yield_post_ratio),
                 Parameter::new("exponent", RATIO, "Sharpness of yielding")
                     .shape(Scale::Logarithmic, 3.0, 0.35, (0.8, 12.0))
@@ -101,6 +104,7 @@ impl Family for SpecimenEffects {
                 &[1.05 * INCH, 0.05, 3.0],
             ],
             needs_co_simulation: true,
+            law: RESTORING_FORCE,
             ..Effect::new("specimen_yielding", Component::Specimen)
         },
         Effect {
@@ -215,6 +219,7 @@ impl Family for SpecimenEffects {
                     *form = 0.0;
                 }
             },
+            law: RESTORING_FORCE,
             ..Effect::new("specimen_degradation", Component::Specimen)
         },
         Effect {
@@ -238,6 +243,7 @@ impl Family for SpecimenEffects {
                 .on_specimen(|s| &mut s.uplift_post_ratio),
             ],
             starts: &[&[0.3 * INCH, 0.3], &[0.55 * INCH, 0.3], &[0.9 * INCH, 0.3]],
+            law: RESTORING_FORCE,
             ..Effect::new("specimen_uplift", Component::Specimen)
         },
         Effect {

@@ -8,6 +8,9 @@ use super::{AtStart, Component, Effect, Family, Parameter, Scale};
 use crate::ModelError;
 use crate::delay_line::{DelayLine, MAX_DELAY_SAMPLES, require_delay};
 
+/// The law of the flow over the spool's travel.
+pub(super) const VALVE_FLOW: &str = "flow of the valve";
+
 /// The valve: `command -> delay -> play -> spool lag -> offset -> travel limit -> overlap -> gain`.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -107,6 +110,7 @@ impl Family for ValveEffects {
             .min(0.0)
             .at_start(AtStart::ActuatorRates)],
             starts: &[&[0.04], &[0.15]],
+            law: VALVE_FLOW,
             ..Effect::new("valve_dead_band", Component::ShakeTable)
         },
         Effect {
@@ -137,6 +141,7 @@ impl Family for ValveEffects {
             .on_table(|e| &mut e.valve.asymmetry)
             .at_start(AtStart::ActuatorRates)],
             starts: &[&[0.0]],
+            law: VALVE_FLOW,
             ..Effect::new("valve_asymmetric_gain", Component::ShakeTable)
         },
         Effect {
@@ -200,6 +205,7 @@ impl Family for ValveEffects {
                 &[0.28],
                 &[0.2],
             ],
+            law: VALVE_FLOW,
             ..Effect::new("valve_spool_saturation", Component::ShakeTable)
         },
         Effect {
@@ -216,6 +222,7 @@ impl Family for ValveEffects {
             .at_start(AtStart::ActuatorRates)],
             starts: &[&[0.04], &[0.15]],
             needs_co_simulation: true,
+            law: VALVE_FLOW,
             ..Effect::new("valve_hysteresis", Component::ShakeTable)
         },
     ];

@@ -191,6 +191,7 @@ fn candidate(
         look_alikes: &[],
         tolerance: 1.0,
         contains: None,
+        law: "",
         is_linear: false,
     }
 }

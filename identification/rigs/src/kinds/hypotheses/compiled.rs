@@ -303,6 +303,7 @@ impl Compiled {
                 look_alikes: self.look_alikes,
                 tolerance: 1.0,
                 contains: None,
+                law: "",
                 is_linear: false,
             },
             off: self.off.clone(),

@@ -7,6 +7,7 @@ use plant::identified::shake_table::ShakeTable;
 use plant::sensors::instrumentation::Instrumentation;
 use plant::specimens::linear::LinearSpecimen;
 
+use super::command;
 use super::course::{Course, courses};
 use super::experiment::{self, SeparatingExperiment};
 use super::friction::{by_cause, cause, note};
@@ -24,10 +25,6 @@ use crate::kinds::shake_table::predictor::{Disturbance, Predictor, Samples, tota
 use diagnosis::{ExtensibleModel, Judgement, NamedEffect, ParameterEstimate};
 use diagnosis::{FLOOR, Observer, Point, Role, SUREST, Test, Verdict, WeighedModel, judge};
 use recordings::{Channel, OUTPUT_NAMES, Recording};
-
-/// R5 fires, and the recorded command is used, where it misses the law by more than this many
-/// standard deviations of its noise.
-const LAW_HOLDS_WITHIN: f64 = 4.0;
 
 /// Standard deviations to either side of an estimate that hold the truth in 95 of 100 cases.
 const INTERVAL_95: f64 = 1.96;
@@ -167,47 +164,6 @@ pub struct Validation {
     pub after: Vec<f64>,
 }
 
-/// The command that the stated law made, where it explains the recorded one.
-fn command_by_law(
-    recording: &Recording,
-    nominal: &Nominal,
-    notes: &mut Vec<String>,
-) -> Option<Vec<f64>> {
-    let [recorded, reference, x, a] = [
-        Channel::ValveCommand,
-        Channel::Reference,
-        Channel::Displacement,
-        Channel::Acceleration,
-    ]
-    .map(|channel| recording.samples(channel));
-    let law = nominal.controller?;
-    let mut commands = law.commands(reference, x, a, 1.0 / nominal.sample_rate);
-    if commands.len() != recorded.len() || commands.len() < 3 {
-        return None;
-    }
-    let last = commands.len() - 1;
-    // The record's ends lack a neighbour of the reference.
-    commands[0] = recorded[0];
-    commands[last] = recorded[last];
-    let square: f64 = commands
-        .iter()
-        .zip(recorded)
-        .map(|(a, b)| (a - b).powi(2))
-        .sum();
-    let miss = (square / recorded.len() as f64).sqrt();
-    if miss > LAW_HOLDS_WITHIN * nominal.command_noise {
-        notes.push(format!(
-            "{}: the stated controller's law does not reproduce the recorded command (R5, {:.1} \
-             times \
-             its noise); the recorded one is used",
-            recording.name,
-            miss / nominal.command_noise
-        ));
-        return None;
-    }
-    Some(commands)
-}
-
 /// Model and recordings of a case, after its checks; sentences on what is missing go to `notes`.
 fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, CaseError> {
     let nominal = &case.nominal;
@@ -267,13 +223,18 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
         Some((&case.validation, true)),
     ];
     for (recording, with_effects) in ordered.into_iter().flatten() {
-        let by_law = command_by_law(recording, nominal, notes);
-        let recorded = || recording.samples(Channel::ValveCommand).to_vec();
+        let by_law = command::by_stated_law(recording, nominal, notes);
         records.push(Prepared {
             name: recording.name.clone(),
             with_effects,
             by_law: by_law.is_some(),
-            samples: Samples::of(recording, by_law.unwrap_or_else(recorded)),
+            samples: match by_law {
+                Some(command) => Samples::of(recording, command),
+                None => Samples::of(
+                    recording,
+                    command::shown(recording, 1.0 / nominal.sample_rate),
+                ),
+            },
         });
     }
     Ok(ShakeTableModel::new(nominal, noise, records))

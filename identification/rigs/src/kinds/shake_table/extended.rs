@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use plant::identified::rig::IdentifiedRig;
 use serde::{Deserialize, Serialize};
 
+use super::command;
 use super::predictor::{Disturbance, Noise, Predictor, Samples};
 use crate::case::{CaseError, Nominal, problems};
 use recordings::{Called, Channel, OUTPUT_NAMES, Recording, mean_and_deviation};
@@ -153,7 +154,7 @@ impl ExtendedTable {
         }
         let samples = Samples::of(
             &recording,
-            recording.samples(Channel::ValveCommand).to_vec(),
+            command::shown(&recording, 1.0 / self.extended.sample_rate),
         );
         let there = Channel::OUTPUTS.map(|channel| recording.channel(channel).is_some());
         let before = self.one_step(&self.described, &samples, there, file)?;

@@ -1,6 +1,7 @@
 //! The shake table of the thesis with its records.
 
 pub mod catalogue;
+mod command;
 mod course;
 mod diagnosis;
 pub mod experiment;

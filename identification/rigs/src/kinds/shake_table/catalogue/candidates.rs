@@ -41,6 +41,7 @@ fn candidate(effect: &'static Effect, peak_command: f64, period: f64) -> Candida
         look_alikes: effect.confounded_with,
         tolerance: effect.tolerance,
         contains: effect.contains,
+        law: effect.law,
         is_linear: effect.is_linear,
     }
 }
