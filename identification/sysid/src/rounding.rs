@@ -46,7 +46,7 @@ impl Coarse {
 /// The best linear estimate of the signal of which `values`, a sample every `period` s, are readings of a `coarse`
 /// converter (Wiener's filter, without delay).
 ///
-/// An input that is read with an error seems to do less than it does, the more so the weaker it is: a fit to the
+/// An input that is read with an error seems to do less than it does, the more so the weaker it is. A fit to the
 /// readings finds less gain where the signal has little power, which looks like a lag. The error of the estimate does
 /// not go with the estimate, so that a fit to it is right (regression calibration; Carroll et al., Measurement Error
 /// in Nonlinear Models, 2006, ch. 4). Rounding adds white noise.
