@@ -26,9 +26,6 @@ const CLEAR: f64 = 1.96;
 const LEAST: f64 = 0.5;
 /// Factor by which the squared error on all data grows without an effect that one part of them need not show.
 const VITAL: f64 = 4.0;
-/// Why an effect is not named of which the parts tell different sizes.
-const SCATTERED: &str =
-    "its size differs so much between parts of the data that the 95 % interval contains zero";
 /// Why an effect is not named of which models that do as well have none.
 const UNKNOWN: &str = "its size differs so much between models that explain the data as well that the 95 % \
                        interval contains zero";
@@ -378,34 +375,6 @@ fn differs_from_zero(effect: &Candidate, values: &[NamedValue]) -> bool {
     sizes.any(|(_, own)| own.value.abs() > CLEAR * own.standard_error)
 }
 
-/// The effects that all data tell from none, but of which the sizes in parts and files differ so much that `all`
-/// parameters, with standard errors that hold that scatter, do not. Of what `silent` parts do not reach they tell no
-/// size.
-fn vague<M: InParts>(
-    measured: &M,
-    fits: &Fits,
-    all: &[NamedValue],
-    silent: &[String],
-) -> Vec<Refused> {
-    let candidates = measured.candidates();
-    let (point, deviations) = &fits.everything;
-    let mut place = all.len();
-    let own = effects(measured, point, deviations).into_iter();
-    let own: Vec<_> = own.zip(&point.effects).collect();
-    let mut out = Vec::new();
-    for ((name, values), (index, _)) in own.iter().rev() {
-        place -= values.len();
-        let scattered = &all[place..place + values.len()];
-        if !silent.contains(name)
-            && differs_from_zero(&candidates[*index], values)
-            && !differs_from_zero(&candidates[*index], scattered)
-        {
-            out.push((*index, SCATTERED.to_owned()));
-        }
-    }
-    out
-}
-
 /// What is found beside the effects, and the model; none where it cannot be fitted. Effects of
 /// `start` that turn out to be unfit leave it, each with its reason.
 pub(super) fn confirm<M: InParts>(
@@ -416,18 +385,11 @@ pub(super) fn confirm<M: InParts>(
     findings: &mut Vec<String>,
 ) -> Option<Confirmed> {
     let mut start = start.clone();
-    let (fits, on_one_part, all, differing) = loop {
+    let (fits, on_one_part) = loop {
         let fits = fits(measured, &start)?;
-        let (mut out, silent) = refused_by(measured, &fits);
-        let mut differing = Vec::new();
-        let (point, deviations) = &fits.everything;
-        let mut all = listed(measured, point, deviations);
-        differences(measured, &fits, &mut all, &mut differing);
+        let (out, silent) = refused_by(measured, &fits);
         if out.is_empty() {
-            out = vague(measured, &fits, &all, &silent);
-        }
-        if out.is_empty() {
-            break (fits, silent, all, differing);
+            break (fits, silent);
         }
         start
             .effects
@@ -442,7 +404,8 @@ pub(super) fn confirm<M: InParts>(
     let (refitted, refitted_deviations) = &nominal.everything;
     let own = measured.parameters(point, deviations);
     let count = own.len();
-    findings.extend(differing);
+    let mut all = listed(measured, point, deviations);
+    differences(measured, &fits, &mut all, findings);
     surprises(measured, &all, count, findings);
     let scattered: Vec<f64> = all.iter().map(|value| value.standard_error).collect();
     let with_errors = |values: Vec<NamedValue>, from: usize| -> Vec<NamedValue> {
