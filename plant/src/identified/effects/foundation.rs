@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::quantity::{FREQUENCY, RATIO};
-use units::vocabulary;
 use super::{Component, Effect, Family, Parameter, Scale};
 use crate::ModelError;
+use units::vocabulary;
 
 /// Reaction mass on a spring: `M (x_f'' + 2 zeta w x_f' + w² x_f) = -(force on the table from the
 /// wall)`. Piston, springs and displacement sensor move relative to it.

@@ -157,10 +157,14 @@ impl Family for ValveEffects {
                 .on_table(|e| &mut e.valve.spool_frequency)
                 .min(0.0)
                 .at_start(AtStart::ActuatorRates),
-                Parameter::new(vocabulary::DAMPING_RATIO, RATIO, "Damping ratio of the spool")
-                    .shape(Scale::Logarithmic, 0.7, 0.15, (0.3, 1.5))
-                    .on_table(|e| &mut e.valve.spool_damping)
-                    .min(1e-3),
+                Parameter::new(
+                    vocabulary::DAMPING_RATIO,
+                    RATIO,
+                    "Damping ratio of the spool",
+                )
+                .shape(Scale::Logarithmic, 0.7, 0.15, (0.3, 1.5))
+                .on_table(|e| &mut e.valve.spool_damping)
+                .min(1e-3),
             ],
             starts: &[&[40.0, 0.7], &[18.0, 0.7]],
             is_linear: true,
