@@ -1,9 +1,7 @@
 //! What an effect is worth: against the model without it, refitted, under the noises that then fit best.
 
 use super::fit::{Fit, evaluate, residuals};
-use super::likelihood::{
-    FORM_IS_KNOWN_TO, Hypothesis, PenalisedLikelihood, named, pays, special_case,
-};
+use super::likelihood::{Hypothesis, PenalisedLikelihood, named, pays, special_case};
 use super::model::{ExtensibleModel, Point};
 use super::progress::{Observer, Progress};
 
@@ -15,6 +13,10 @@ const ROUNDS_OF_A_FIT: usize = 4;
 const NOTHING_NEW: f64 = 20.0;
 /// Samples in a block over which unseen likelihoods are summed, as a share of a record.
 const BLOCKS: usize = 40;
+
+/// Share of what an effect gains that another one of the same law must gain: the form of a law is not known better.
+/// Lifting off gained 0.35 % of what yielding did where a specimen of many sliders yields one after the other.
+const FORM_IS_KNOWN_TO: f64 = 0.01;
 
 /// A fitted model with the noises that fit it. Scores of models under different noises compare.
 #[derive(Clone)]

@@ -20,9 +20,6 @@ pub const FLOOR: f64 = 0.6;
 /// form of a noise, of a coarse converter's for one, is not known better: where nothing was hidden, oil that is
 /// not there took away 0.35 %.
 pub(super) const NOISE_IS_KNOWN_TO: f64 = 0.004;
-/// Share of what an effect gains that another one of the same law must gain: the form of a law is not known better.
-/// A specimen of many sliders that yield one after the other took 0.35 % of lifting off to a Bouc-Wen spring.
-pub(super) const FORM_IS_KNOWN_TO: f64 = 0.01;
 /// Least share of an effect's gain that the records must contribute; the rest comes from the stated parameters.
 /// Without the error of a scale, for one, the parameters would be far off and the records would look the same.
 const BY_THE_RECORDS: f64 = 0.3;

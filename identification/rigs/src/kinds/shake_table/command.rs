@@ -1,7 +1,7 @@
 //! The command that acted, from a record of it.
 
-use nalgebra::{DMatrix, DVector};
 use recordings::{Channel, Recording};
+use sysid::least_squares;
 use sysid::rounding::{self, Coarse};
 
 use crate::case::{ControlLaw, Nominal};
@@ -163,19 +163,17 @@ fn fitted_law(recording: &Recording, period: f64, velocity_filter: f64) -> Optio
         return None;
     }
     // The ends hold what was recorded.
-    let inner = 1..n - 1;
-    let sizes = columns.each_ref().map(|own| {
-        let square: f64 = own[inner.clone()].iter().map(|v| v * v).sum();
-        square.sqrt().max(f64::MIN_POSITIVE)
+    let found = least_squares::reduce(n - 2, columns.len(), 1, |k, row| {
+        let all = columns.iter().map(|own| own[k + 1]);
+        let all = all.chain([recorded[k + 1]]);
+        row.iter_mut().zip(all).for_each(|(cell, own)| *cell = own);
     });
-    let matrix = DMatrix::from_fn(n - 2, columns.len(), |i, j| columns[j][i + 1] / sizes[j]);
-    let right = DVector::from_column_slice(&recorded[inner]);
-    let gains = (matrix.transpose() * &matrix)
-        .cholesky()
-        .map(|factor| factor.solve(&(matrix.transpose() * &right)))?;
-    let mut commands: Vec<f64> = recorded.to_vec();
-    let made = matrix * gains;
-    commands[1..n - 1].copy_from_slice(made.as_slice());
+    let gains = found.solve_directly()?;
+    let mut commands = recorded.to_vec();
+    for (k, command) in commands.iter_mut().enumerate().take(n - 1).skip(1) {
+        let parts = columns.iter().zip(gains.iter());
+        *command = parts.map(|(own, gain)| gain * own[k]).sum();
+    }
     Some(commands)
 }
 
