@@ -98,7 +98,8 @@ impl Equations for PositioningDrive {
         }
         let sample = recording.period();
         // The record may begin in motion: where and how fast is measured.
-        let first = (position[0], start_speed(&position[..BEGIN], sample));
+        let start = position[0] - effects.position_zero.zero;
+        let first = (start, start_speed(&position[..BEGIN], sample));
         let mechanics = Mechanics {
             mass,
             viscous,
@@ -242,6 +243,31 @@ mod tests {
         let session = Session::default();
         PositioningDrive.simulate(recording, &NOMINAL, &off, &session, &mut out);
         out
+    }
+
+    #[test]
+    fn a_loop_at_rest_needs_no_voltage_whatever_zero_the_record_of_its_position_has() {
+        let (reference, shift) = (0.05, 0.012);
+        let channels = vec![
+            (Channel::Reference, vec![reference; SAMPLES]),
+            (POSITION, vec![reference + shift; SAMPLES]),
+            (MOTOR_VOLTAGE, vec![0.0; SAMPLES]),
+        ];
+        let recording = recording(channels);
+        let first = |zero: f64| {
+            let effects = Effects {
+                position_zero: super::super::carriage::PositionZero { zero },
+                ..Effects::off().unwrap()
+            };
+            let mut out = vec![0.0; SAMPLES];
+            let session = Session::default();
+            PositioningDrive.simulate(&recording, &NOMINAL, &effects, &session, &mut out);
+            out[0]
+        };
+        assert!(first(shift).abs() < 1e-9);
+        // The position gain times the velocity gain times the distance, limited.
+        assert!((first(0.0) + 10.0).abs() < 1e-9);
+        assert!((first(shift - 1e-4) + 160.0 * 240.0 * 1e-4).abs() < 1e-6);
     }
 
     #[test]
