@@ -78,7 +78,7 @@ effects! {
     /// Compression yields at (1 + a) of tension.
     strength_differential: StrengthDifferential {
         asymmetry: size("1", 0.01, (-0.5, 0.5)),
-    } from [[0.02], [-0.02]];
+    } from [[0.02], [-0.02]], like ["load_cell_zero"];
     /// A frame of compliance C between grips and drive: it is ε + C σ that runs evenly between
     /// two readings, not the strain (Lemaitre and Chaboche, Mechanics of Solid Materials,
     /// 1990, section 3.2). It tells where interpolated samples of the strain were.
@@ -92,7 +92,7 @@ effects! {
     /// The load cell reads that much without a stress.
     load_cell_zero: LoadCellZero {
         zero: size("Pa", 2e6, (-2e8, 2e8)),
-    } from [[1e7], [-1e7]];
+    } from [[1e7], [-1e7]], like ["strength_differential"];
 }
 
 impl Equations for CyclicMaterial {
