@@ -57,10 +57,6 @@ effects! {
         share: size("1", 0.02, (0.0, 0.9)),
         frequency: shape("rad/s", 300.0, 0.7),
     } from [[0.1, 150.0], [0.1, 400.0]];
-    /// The recorded position is that much larger than the one that the controller reads.
-    position_zero: PositionZero {
-        zero: size("m", 1e-5, (-0.1, 0.1)),
-    } from [[1e-3], [-1e-3], [1e-2], [-1e-2]];
 }
 
 /// Nominal parameters of the mechanics, SI.
@@ -167,8 +163,6 @@ impl<'a> Carriage<'a> {
             position_dependent_friction: PositionDependentFriction { slope },
             quadratic_drag: QuadraticDrag { drag },
             flexibility: Flexibility { share, frequency },
-            // Of the record alone.
-            position_zero: _,
         } = *self.effects;
         let h = self.sample / STEPS as f64;
         let load = share * mass;

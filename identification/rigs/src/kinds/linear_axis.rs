@@ -52,9 +52,6 @@ impl Equations for LinearAxis {
     type Effects = Effects;
     type Session = Session;
     const INPUTS: &'static [Channel] = &[MOTOR_VOLTAGE];
-    // Without a controller nothing tells the position's zero.
-    const OPTIONAL: &'static [(Channel, &'static [&'static str])] =
-        &[(Channel::Reference, &["position_zero"])];
     const OUTPUT: Channel = POSITION;
     const BEGINS_ANEW: bool = true;
     const SCREENED: usize = 8192;
