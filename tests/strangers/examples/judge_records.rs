@@ -17,20 +17,35 @@ use strangers::judge::{Judge, share};
 use strangers::options::Options;
 use strangers::records::{Added, changed};
 
+/// What may be added.
+#[derive(Clone, Copy)]
+enum Kind {
+    Delay,
+    Gain,
+    Zero,
+    Play,
+    Asymmetry,
+    DeadBand,
+}
+
 /// A rig with its files, the column that is changed, its unit, the largest value there, and the sampling step.
 struct Measured {
     rig: &'static str,
+    folder: &'static str,
     files: &'static [&'static str],
     column: &'static str,
     unit: &'static str,
     largest: f64,
     step: f64,
-    has_time: bool,
+    /// Those that its description leaves to be told: a gain of the force is none where its friction is known to a
+    /// quarter, and a law of friction has its own asymmetry.
+    may_be: &'static [Kind],
 }
 
 const MEASURED: [Measured; 5] = [
     Measured {
         rig: "friction_damper",
+        folder: "measured/friction_damper",
         files: &[
             "ds2_0.5Hz_36lb_1in.csv",
             "ds2_1Hz_36lb_0.5in.csv",
@@ -40,70 +55,67 @@ const MEASURED: [Measured; 5] = [
         unit: "N",
         largest: 18e3,
         step: 1.0 / 1024.0,
-        has_time: true,
+        may_be: &[Kind::Delay, Kind::Zero],
     },
     Measured {
         rig: "steel_coupon",
+        folder: "measured/steel_coupon",
         files: &["example_1.csv"],
         column: "Sigma_true",
         unit: "MPa",
         largest: 500.0,
         step: 1.0,
-        has_time: false,
+        may_be: &[Kind::Zero],
     },
     Measured {
-        rig: "emps",
-        files: &["DATA_EMPS.csv"],
-        column: "q_meas_m",
-        unit: "m",
-        largest: 0.24,
-        step: 1e-3,
-        has_time: true,
+        rig: "mr_damper",
+        folder: "benchmarks/mr_damper",
+        files: &["train_random.csv"],
+        column: "force_N",
+        unit: "N",
+        largest: 1.5e3,
+        step: 0.332_800_85e-3,
+        may_be: &[Kind::Delay, Kind::Zero],
     },
     Measured {
         rig: "positioning_drive",
+        folder: "measured/positioning_drive",
         files: &["DATA_EMPS.csv"],
         column: "q_meas_m",
         unit: "m",
         largest: 0.24,
         step: 1e-3,
-        has_time: true,
+        may_be: &[Kind::Zero],
     },
     Measured {
         rig: "servohydraulic_press",
+        folder: "measured/servohydraulic_press",
         files: &["chirp_0A.csv"],
         column: "x_meas_mm",
         unit: "mm",
         largest: 2.0,
         step: 1e-3,
-        has_time: true,
+        may_be: &[
+            Kind::Delay,
+            Kind::Gain,
+            Kind::Zero,
+            Kind::Play,
+            Kind::Asymmetry,
+            Kind::DeadBand,
+        ],
     },
 ];
 
 impl Measured {
-    /// Folder of the files.
-    fn folder(&self) -> &str {
-        if self.rig == "emps" {
-            "positioning_drive"
-        } else {
-            self.rig
-        }
-    }
-
     fn draw(&self, dice: &mut Dice) -> Added {
         let (sign, size) = (dice.sign(), self.largest);
-        loop {
-            let added = match dice.pick(&[0, 1, 2, 3, 4, 5]) {
-                0 => Added::Delay(dice.between(4.0, 16.0) * self.step.max(1e-3)),
-                1 => Added::Gain(sign * dice.between(0.04, 0.15)),
-                2 => Added::Zero(sign * dice.between(0.02, 0.08) * size),
-                3 => Added::Play(dice.between(0.01, 0.05) * size),
-                4 => Added::Asymmetry(sign * dice.between(0.04, 0.15)),
-                _ => Added::DeadBand(dice.between(0.02, 0.08) * size),
-            };
-            if self.has_time || !matches!(added, Added::Delay(_)) {
-                return added;
-            }
+        match dice.pick(self.may_be) {
+            Kind::Delay => Added::Delay(dice.between(4.0, 16.0) * 1e-3),
+            Kind::Gain => Added::Gain(sign * dice.between(0.04, 0.15)),
+            Kind::Zero => Added::Zero(sign * dice.between(0.02, 0.08) * size),
+            Kind::Play => Added::Play(dice.between(0.01, 0.05) * size),
+            Kind::Asymmetry => Added::Asymmetry(sign * dice.between(0.04, 0.15)),
+            Kind::DeadBand => Added::DeadBand(dice.between(0.02, 0.08) * size),
         }
     }
 }
@@ -140,7 +152,7 @@ fn ask(
         description.to_string_lossy().into_owned(),
     ];
     for file in rig.files {
-        let path = shared.join("measured").join(rig.folder()).join(file);
+        let path = shared.join(rig.folder).join(file);
         let text = fs::read_to_string(&path).map_err(failed(&path))?;
         let text = changed(&text, rig.column, |y| {
             added.map_or_else(|| y.to_vec(), |added| added.to(y, rig.step))

@@ -12,7 +12,6 @@ use identification::diagnosis::rigs::{
 
 /// Description and data of a rig.
 fn rig(name: &str) -> (Description, Measurement) {
-    let measured = shared::folder().join("measured");
     let file = format!("../identification/rigs/{name}.toml");
     let description = Description::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap();
     let files: Vec<PathBuf> = description
@@ -21,10 +20,10 @@ fn rig(name: &str) -> (Description, Measurement) {
         .map(|file| {
             let inside: PathBuf = file
                 .iter()
-                .skip_while(|part| *part != "measured")
+                .skip_while(|part| *part != "shared")
                 .skip(1)
                 .collect();
-            measured.join(inside)
+            shared::folder().join(inside)
         })
         .collect();
     let measurement = description.measurement(&files).unwrap();
@@ -230,6 +229,51 @@ fn the_coupon_hardens() {
     names(&report, &["second_backstress"]);
     let hardens = |name: &String| name.contains("isotropic_hardening");
     assert!(report.named.iter().any(hardens), "{:?}", report.named);
+}
+
+#[needs::shared("measured")]
+#[test]
+fn a_zero_put_on_the_coupon_s_load_cell_is_found() {
+    let (description, measurement) = rig("steel_coupon");
+    let shifted = changed(&measurement, |s, k| s.output()[k] + 15e6);
+    let after = diagnose(&description, &shifted, Observer::none()).unwrap();
+    print(&after);
+    // Nothing that was named before is lost.
+    names(
+        &after,
+        &["second_backstress", "isotropic_hardening", "load_cell_zero"],
+    );
+    let mut effects = after.confirmed.effects.iter();
+    let own = effects.find(|(name, _)| name == "load_cell_zero");
+    let zero = &own.unwrap().1[0];
+    let off = (zero.value - 15e6).abs();
+    assert!(
+        off < 5e6 && zero.standard_error < 3e6,
+        "{} {}",
+        zero.value,
+        zero.standard_error
+    );
+}
+
+#[needs::shared("benchmarks")]
+#[test]
+fn the_magnetorheological_damper_keeps_what_its_predictions_need() {
+    let report = report("mr_damper");
+    assert_eq!(report.verdict, Verdict::Named);
+    // Two of these have sizes that other models of the data leave little of.
+    names(
+        &report,
+        &[
+            "hysteretic_friction",
+            "friction_by_command",
+            "command_lag",
+            "damping_by_command",
+            "shear_thinning",
+            "inertia",
+        ],
+    );
+    let error = report.confirmed.error;
+    assert!(error < 0.126, "{error}");
 }
 
 #[needs::shared("measured")]

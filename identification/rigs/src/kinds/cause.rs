@@ -79,6 +79,10 @@ impl Cause {
                 let way = if by > 0.0 { "high" } else { "low" };
                 format!("the displacement reads {} too {way}", size(unit))
             }
+            "position_zero" => {
+                let way = if by > 0.0 { "high" } else { "low" };
+                format!("the recorded position is {} too {way}", size(unit))
+            }
             "accelerometer_scale" => format!(
                 "the accelerometer reads {} {more} than the displacement says",
                 share()

@@ -214,7 +214,7 @@ fn is_silent<M: InParts>(measured: &M, fits: &Fits, effect: usize, part: Part) -
         let held = least_squares(measured, &held, record, &Free::Chosen(&is_free), AGAIN)?;
         let [bare, _] = without_and_with(measured, own, effect, record)?;
         let lengths = lengths(measured, record);
-        Some(!clearly_better(&held.errors, &bare, &lengths))
+        Some(!needed(&held.errors, &bare, &lengths))
     };
     is_vital() == Some(true) && is_as_good() == Some(true)
 }

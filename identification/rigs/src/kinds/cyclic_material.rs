@@ -78,7 +78,7 @@ effects! {
     /// Compression yields at (1 + a) of tension.
     strength_differential: StrengthDifferential {
         asymmetry: size("1", 0.01, (-0.5, 0.5)),
-    } from [[0.02], [-0.02]];
+    } from [[0.02], [-0.02]], like ["load_cell_zero"];
     /// A frame of compliance C between grips and drive: it is ε + C σ that runs evenly between
     /// two readings, not the strain (Lemaitre and Chaboche, Mechanics of Solid Materials,
     /// 1990, section 3.2). It tells where interpolated samples of the strain were.
@@ -89,6 +89,10 @@ effects! {
     stress_late: StressLate {
         samples: size("1", 0.05, (-2.0, 2.0)),
     } from [[0.3], [-0.3]];
+    /// The load cell reads that much without a stress.
+    load_cell_zero: LoadCellZero {
+        zero: size("Pa", 2e6, (-2e8, 2e8)),
+    } from [[1e7], [-1e7]], like ["strength_differential"];
 }
 
 impl Equations for CyclicMaterial {
@@ -138,6 +142,7 @@ impl Equations for CyclicMaterial {
                 },
             frame_compliance: FrameCompliance { compliance },
             stress_late: StressLate { samples: late },
+            load_cell_zero: LoadCellZero { zero },
         } = *effects;
         let strain = recording.input(STRAIN);
         let Some(&first) = strain.first() else { return };
@@ -216,6 +221,9 @@ impl Equations for CyclicMaterial {
                 let share = place - before as f64;
                 *stress = shown[before] * (1.0 - share) + shown[(before + 1).min(last)] * share;
             }
+        }
+        for stress in out.iter_mut() {
+            *stress += zero;
         }
     }
 }
@@ -315,13 +323,17 @@ mod tests {
     use recordings::Recording;
 
     fn stress(strain: &[f64], amplitude: f64, compliance: f64) -> Vec<f64> {
-        let channels = vec![(STRAIN, strain.to_vec()), (STRESS, vec![0.0; strain.len()])];
-        let recording = Recording::new("path", 1.0, channels).unwrap();
-        let recording = RigRecording::new(recording, CyclicMaterial::INPUTS, STRESS);
         let effects = Effects {
             frame_compliance: FrameCompliance { compliance },
             ..Effects::off().unwrap()
         };
+        stress_with(strain, amplitude, effects)
+    }
+
+    fn stress_with(strain: &[f64], amplitude: f64, effects: Effects) -> Vec<f64> {
+        let channels = vec![(STRAIN, strain.to_vec()), (STRESS, vec![0.0; strain.len()])];
+        let recording = Recording::new("path", 1.0, channels).unwrap();
+        let recording = RigRecording::new(recording, CyclicMaterial::INPUTS, STRESS);
         // Perfectly plastic at 400 MPa.
         let nominal = Nominal {
             modulus: 2e11,
@@ -347,6 +359,19 @@ mod tests {
         // Without a known amplitude the readings are all there is.
         let plain = stress(&strain, 0.0, 0.0);
         assert!((plain[3] - 1e8).abs() < 1e6, "{}", plain[3]);
+    }
+
+    #[test]
+    fn a_load_cell_s_zero_is_in_every_reading_and_yields_nothing() {
+        let effects = Effects {
+            load_cell_zero: LoadCellZero { zero: -3e7 },
+            ..Effects::off().unwrap()
+        };
+        // Elastic, at yield, and back without a strain.
+        let out = stress_with(&[0.0, 0.001, 0.01, 0.0], 0.0, effects);
+        for (found, expected) in out.into_iter().zip([-3e7, 1.7e8, 3.7e8, -4.3e8]) {
+            assert!((found - expected).abs() < 1.0, "{found} {expected}");
+        }
     }
 
     #[test]

@@ -318,11 +318,14 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         let mut left = confirmed.point.clone();
         let is_gone = |i: usize| vanished.iter().any(|(gone, _)| *gone == i);
         left.effects.retain(|(i, _)| !is_gone(*i));
-        refused.extend(vanished);
-        findings.clear();
-        confirmed = confirm(measured, &nominal, &left, &mut refused, &mut findings)?;
-        crossed = Crossed::of(measured, &confirmed.point)?;
-        confirmed.widen_to(&with_all);
+        let (mut reasons, mut own) = ([refused.clone(), vanished].concat(), Vec::new());
+        let mut without = confirm(measured, &nominal, &left, &mut reasons, &mut own)?;
+        let errors = Crossed::of(measured, &without.point)?;
+        // Of an effect that predictions need, the size alone is not known.
+        if !crossed.needs(&errors) {
+            without.widen_to(&with_all);
+            (confirmed, crossed, refused, findings) = (without, errors, reasons, own);
+        }
     }
     for (i, reason) in refused {
         let effect = measured.name(i);

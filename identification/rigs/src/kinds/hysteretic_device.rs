@@ -54,7 +54,7 @@ effects! {
     /// F± = F (1 ± a).
     asymmetric_coulomb_friction: AsymmetricCoulombFriction {
         asymmetry: size("1", 0.03, (-0.9, 0.9)),
-    } from [[0.1], [-0.1]];
+    } from [[0.1], [-0.1]], like ["load_cell_zero"];
     /// After the force has gone to zero, the device moves through a gap before it takes
     /// hold on the other side.
     free_play: FreePlay {
@@ -121,6 +121,10 @@ effects! {
     delay: Delay {
         delay: size("s", 6e-3, (0.0, 1.2)),
     } from [[0.03], [0.12]];
+    /// The load cell reads that much without a force.
+    load_cell_zero: LoadCellZero {
+        zero: size("N", 0.01, (-1.0, 1.0)),
+    } from [[0.05], [-0.05]], like ["asymmetric_coulomb_friction"];
 }
 
 impl Equations for HystereticDevice {
@@ -188,6 +192,7 @@ impl Equations for HystereticDevice {
                 lever: second_lever,
             },
             delay: Delay { delay },
+            load_cell_zero: LoadCellZero { zero },
         } = *effects;
         let inner = [
             (first_lever, recording.input(FIRST_INNER_FORCE)),
@@ -198,7 +203,7 @@ impl Equations for HystereticDevice {
             recording.input(Channel::Velocity),
         );
         // The device begins as it was left: under the first measured force, or somewhere in the gap.
-        let first = recording.output().first().copied().unwrap_or(f64::NAN);
+        let first = recording.output().first().copied().unwrap_or(f64::NAN) - zero;
         let is_held = first.abs() > HELD * coulomb;
         let mut force = if is_held {
             first.max(-coulomb).min(coulomb)
@@ -302,9 +307,9 @@ impl Equations for HystereticDevice {
                     shown_rate += h * resonance * pull;
                     shown += h * shown_rate;
                 }
-                *y = shown;
+                *y = shown + zero;
             } else {
-                *y = total;
+                *y = total + zero;
             }
         }
     }
@@ -362,6 +367,35 @@ mod tests {
     use super::super::EffectTable;
     use super::*;
     use recordings::Recording;
+
+    #[test]
+    fn a_device_in_its_gap_shows_the_load_cell_s_zero() {
+        // Through 4 mm of a gap of 10, from its middle; then it takes hold and slides.
+        let displacement: Vec<f64> = (0..1000).map(|k| 1e-5 * f64::from(k)).collect();
+        let n = displacement.len();
+        let channels = vec![
+            (Channel::Displacement, displacement),
+            (Channel::Velocity, vec![0.01; n]),
+            // Not the force of a device that is held: without a force the cell reads as much.
+            (FORCE, vec![800.0; n]),
+        ];
+        let recording = Recording::new("crosses", 1e-3, channels).unwrap();
+        let recording = RigRecording::new(recording, HystereticDevice::INPUTS, FORCE);
+        let effects = Effects {
+            free_play: FreePlay { gap: 0.010 },
+            load_cell_zero: LoadCellZero { zero: 800.0 },
+            ..Effects::off().unwrap()
+        };
+        let nominal = Nominal {
+            coulomb_force: 1e4,
+            stiffness: 1e8,
+        };
+        let mut out = vec![0.0; n];
+        let session = Session::default();
+        HystereticDevice.simulate(&recording, &nominal, &effects, &session, &mut out);
+        assert!((out[400] - 800.0).abs() < 1e-9, "{}", out[400]);
+        assert!((out[n - 1] - 10_800.0).abs() < 1e-6, "{}", out[n - 1]);
+    }
 
     #[test]
     fn asymmetry_fades_with_the_greatest_excursion() {

@@ -7,8 +7,11 @@
 
 use super::carriage::{Carriage, Effects, Mechanics, ripple_starts, start_speed};
 use super::table::{nominal_parameters, session_parameters};
-use super::{Equations, RigRecording};
-use recordings::Channel;
+use super::{Cause, Equations, NamedValue, RigRecording};
+use diagnosis::resampling::correlation_time;
+use diagnosis::squares;
+use nalgebra::{Matrix3, Vector3};
+use recordings::{Channel, mean_and_deviation};
 
 /// The rig.
 pub struct PositioningDrive;
@@ -35,6 +38,12 @@ const BEGIN: usize = 8;
 const CLEAR: f64 = 8.0;
 const WORTH: f64 = 0.1;
 const SHORTEST: usize = 10;
+/// Samples from which the controller's law is found at least, passes in which what it does not explain is left out,
+/// deviations from which on that is, and the zero over the travel that is worth no word.
+const FEWEST: usize = 200;
+const PASSES: usize = 30;
+const OUTSIDE: f64 = 4.0;
+const SMALL: f64 = 5e-3;
 /// Lower quartile of the size of a normal deviate.
 const QUARTILE: f64 = 0.318_6;
 
@@ -98,7 +107,8 @@ impl Equations for PositioningDrive {
         }
         let sample = recording.period();
         // The record may begin in motion: where and how fast is measured.
-        let first = (position[0], start_speed(&position[..BEGIN], sample));
+        let start = position[0] - zero_at_begin(recording, nominal);
+        let first = (start, start_speed(&position[..BEGIN], sample));
         let mechanics = Mechanics {
             mass,
             viscous,
@@ -129,6 +139,11 @@ impl Equations for PositioningDrive {
         errors: &[f64],
     ) -> Vec<(&'static str, Vec<f64>)> {
         ripple_starts(nominal.coulomb_friction, recording.input(POSITION), errors)
+    }
+
+    fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause> {
+        let first = recordings.iter().find_map(zero_by_the_law);
+        first.into_iter().collect()
     }
 
     fn notes(&self, recording: &RigRecording, nominal: &Nominal) -> Vec<String> {
@@ -213,6 +228,81 @@ fn added_voltage(recording: &RigRecording, nominal: &Nominal) -> Vec<f64> {
     added
 }
 
+/// Means over the first samples of how far the recorded position lies above the one that the controller's law needs for
+/// its voltages, m; 0 where the voltage is limited, or more is added.
+fn zero_at_begin(recording: &RigRecording, nominal: &Nominal) -> f64 {
+    let (reference, position) = (
+        recording.input(Channel::Reference),
+        recording.input(POSITION),
+    );
+    let voltage = recording.output();
+    let (gain, sample) = (nominal.velocity_gain, recording.period());
+    let is_free = |u: &f64| u.abs() < nominal.voltage_limit;
+    if voltage.len() < BEGIN || !recording.input(ADDED_VOLTAGE).is_empty() {
+        return 0.0;
+    }
+    if !voltage[..BEGIN].iter().all(is_free) {
+        return 0.0;
+    }
+    let speed = start_speed(&position[..BEGIN], sample);
+    let above = |k: usize| {
+        let needed = (voltage[k] + gain * speed) / (gain * nominal.position_gain);
+        position[k] - reference[k] + needed
+    };
+    (0..BEGIN).map(above).sum::<f64>() / BEGIN as f64
+}
+
+/// The zero of the recorded position against the one that the controller reads, from its law: the voltage is linear in
+/// error and speed, and what stays is the zero. Samples that the law does not explain, as those at a limit, are left
+/// out by and by. None where it is small.
+fn zero_by_the_law(recording: &RigRecording) -> Option<Cause> {
+    let (reference, position) = (
+        recording.input(Channel::Reference),
+        recording.input(POSITION),
+    );
+    let voltage = recording.output();
+    let count = voltage.len().min(position.len()).min(reference.len());
+    if count < FEWEST || !recording.input(ADDED_VOLTAGE).is_empty() {
+        return None;
+    }
+    let row = |k: usize| {
+        let speed = (position[k] - position[k - 1]) / recording.period();
+        Vector3::new(reference[k] - position[k], speed, 1.0)
+    };
+    let mut used: Vec<usize> = (1..count).filter(|&k| voltage[k].is_finite()).collect();
+    for _ in 0..PASSES {
+        let sums = used.iter().map(|&k| (row(k), voltage[k]));
+        let (normal, right) = sums.fold(
+            (Matrix3::zeros(), Vector3::zeros()),
+            |(normal, right), (row, u)| (normal + row * row.transpose(), right + row * u),
+        );
+        let inverse = normal.try_inverse()?;
+        let law = inverse * right;
+        let left: Vec<f64> = used
+            .iter()
+            .map(|&k| voltage[k] - law.dot(&row(k)))
+            .collect();
+        let variance = squares(&left) / left.len() as f64;
+        let zero = law[2] / law[0];
+        let independent = correlation_time(&left);
+        let found = NamedValue {
+            name: "position_zero".into(),
+            value: zero,
+            unit: "m".into(),
+            standard_error: (inverse[(2, 2)] * variance * independent).sqrt() / law[0].abs(),
+        };
+        let (_, travel) = mean_and_deviation(position);
+        let kept = used.iter().zip(&left);
+        let kept = kept.filter(|(_, own)| own.abs() <= OUTSIDE * variance.sqrt());
+        let kept: Vec<usize> = kept.map(|(k, _)| *k).collect();
+        if kept.len() == used.len() || kept.len() < FEWEST {
+            return Cause::of(found, (0.0, SMALL * travel));
+        }
+        used = kept;
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::EffectTable;
@@ -242,6 +332,50 @@ mod tests {
         let session = Session::default();
         PositioningDrive.simulate(recording, &NOMINAL, &off, &session, &mut out);
         out
+    }
+
+    #[test]
+    fn the_zero_of_the_recorded_position_is_read_from_the_controllers_law() {
+        let reference: Vec<f64> = (0..SAMPLES)
+            .map(|k| 0.09 - 0.04 * (4.0 * k as f64 * 1e-3).cos())
+            .collect();
+        // A loop of its own: by steps of a tenth of a sample, with friction that has no law here.
+        let (mut q, mut v) = (0.05, 0.0);
+        let (mut positions, mut voltages) = (Vec::new(), Vec::new());
+        let mut before = q - v * 1e-3;
+        for r in &reference {
+            let u = 160.0 * 240.0 * (r - q) - 240.0 * (q - before) / 1e-3;
+            positions.push(q);
+            voltages.push(u);
+            before = q;
+            for _ in 0..10 {
+                let force = 35.0 * u - 200.0 * v - 30.0 * (v / 0.01).tanh() * (1.0 + 3.0 * q);
+                v += 1e-4 * force / 90.0;
+                q += 1e-4 * v;
+            }
+        }
+        let found = |shift: f64| {
+            let shown = positions.iter().map(|q| q + shift).collect();
+            let recording = recording(vec![
+                (Channel::Reference, reference.clone()),
+                (POSITION, shown),
+                (MOTOR_VOLTAGE, voltages.clone()),
+            ]);
+            let first = simulated(&recording)[0];
+            assert!(
+                (first - voltages[0]).abs() < 0.05,
+                "{first} {}",
+                voltages[0]
+            );
+            Equations::contradictions(&PositioningDrive, &[recording])
+        };
+        assert_eq!(found(1e-4), []);
+        let [cause] = &found(-0.008)[..] else {
+            panic!("there is one cause");
+        };
+        let zero = &cause.found;
+        assert!((zero.value + 0.008).abs() < 2e-5, "{zero:?}");
+        assert!(zero.standard_error < 1e-4, "{zero:?}");
     }
 
     #[test]

@@ -249,7 +249,9 @@ impl Table {
     }
 
     /// Displacement, acceleration and force at every sample of a reference that reaches the loop late and by
-    /// another scale, and the share of the time at the voltage's rail.
+    /// another scale, and the share of the time at the voltage's rail. The acceleration is the mean since the sample
+    /// before, as of a converter with a filter: the reference turns at each sample, so that the acceleration at that
+    /// instant would be as much as a quarter off.
     pub fn play(
         &self,
         reference: &[f64],
@@ -276,11 +278,14 @@ impl Table {
         let (mut sum, mut before, mut command) = (0.0, 0.0, 0.0);
         let mut readings = Vec::with_capacity(reference.len());
         let mut railed = 0.0;
+        let (mut total, mut count) = (0.0, 0.0);
         for k in 0..reference.len() * ticks {
             let t = k as f64 * period;
             let [x, a, f] = self.reading(&state, command);
+            (total, count) = (total + a, count + 1.0);
             if k % ticks == 0 {
-                readings.push([x, a, f]);
+                readings.push([x, total / count, f]);
+                (total, count) = (0.0, 0.0);
             }
             let r = at(t);
             let rate_of = |t: f64| (at(t + period) - at(t - period)) / (2.0 * period);
@@ -444,6 +449,34 @@ mod tests {
         let (slow, fast) = (speed(0.2), speed(2.0));
         let found = (10.0 * slow / fast - 1.0) / (10.0 * slow - slow);
         assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+    }
+
+    #[test]
+    fn both_sensors_show_one_motion() {
+        for seed in 0..24 {
+            let drive = [Drive::Hydraulic, Drive::Shaker, Drive::Motor][seed as usize % 3];
+            let table = Table::draw(drive, &mut Dice::new(seed, 0));
+            let rate = 200.0;
+            let motion: Vec<f64> = (0..1200)
+                .map(|k| 0.003 * (TAU * 2.0 * f64::from(k) / rate).sin())
+                .collect();
+            let (readings, _) = table.play(&motion, rate, 0.0, 0.0);
+            // What is in step with a sine, of both.
+            let size = |own: &dyn Fn(usize) -> f64| {
+                let part = |phase: f64| {
+                    let all = 400..1200;
+                    let all = all.map(|k| own(k) * (TAU * 2.0 * k as f64 / rate + phase).sin());
+                    all.sum::<f64>() / 400.0
+                };
+                part(0.0).hypot(part(TAU / 4.0))
+            };
+            let expected = (TAU * 2.0).powi(2) * size(&|k| readings[k][0]);
+            let found = size(&|k| readings[k][1]);
+            assert!(
+                (found / expected - 1.0).abs() < 0.02,
+                "{seed} {table:?}: {found} {expected}"
+            );
+        }
     }
 
     #[test]
