@@ -38,6 +38,7 @@ use controllers::preview;
 use controllers::preview::feedback::Uncertainty;
 use controllers::preview::model::{Hydraulics, RigModel};
 use controllers::tuning::acceleration_tracking::{AccelerationTuning, Shaping};
+use controllers::tuning::preview::Known;
 use controllers::tuning::suite::{Member, Suite};
 use identification::IdentificationError;
 use identification::closed_loop::equations::HydraulicRig;
@@ -466,12 +467,10 @@ impl Rules {
         let mut own = preview_control(&self.model);
         own.load.specimen = specimen.copied();
         let identified = self.model.specimen.map(YieldingSpecimen::from);
-        let tuned = if specimen.is_some() && specimen == identified.as_ref() {
-            own.tuned_as_identified()
-        } else {
-            own.tuned()
-        };
-        let tuned = tuned?;
+        let tuned = own.tuned_for(Known {
+            identified_specimen: specimen.is_some() && specimen == identified.as_ref(),
+            compensated_valve: self.model.curve.is_some(),
+        })?;
         let noise = &self.model.noise;
         self.model(component);
         if let Some(own) = self.model.whole_samples() {
