@@ -21,9 +21,6 @@ pub struct HydraulicIdentification {
     pub found: Found,
     /// How the rest obeys it.
     pub check: Check,
-    /// Largest error with which it replays the acceleration of the rest, over that acceleration; none where it does not
-    /// replay.
-    replayed: Option<f64>,
     /// The model file.
     pub file: ModelFile,
 }
@@ -70,22 +67,7 @@ impl HydraulicIdentification {
         }
         let check = closed_loop::check(&found, &rest, settings)?;
         let file = found.model_file()?;
-        let errors = rest.iter().map(|own| Some(found.replication(own)?.relative_error));
-        let replayed = errors.collect::<Option<Vec<_>>>();
-        let replayed = replayed.and_then(|own| own.into_iter().reduce(f64::max));
-        Ok(Self {
-            found,
-            check,
-            file,
-            replayed,
-        })
-    }
-
-    /// Whether it predicts what was not fitted so well that no rig of another form is looked for where a hydraulic one is
-    /// expected.
-    pub fn predicts(&self) -> bool {
-        const MOST: f64 = 0.15;
-        self.replayed.is_some_and(|own| own < MOST)
+        Ok(Self { found, check, file })
     }
 
     /// Whether both parts obey the equations.

@@ -199,8 +199,7 @@ fn form(
 ) -> Result<Form, IdentificationError> {
     let hydraulic = || HydraulicIdentification::new(recordings, options.fit_part);
     let mut first = hydraulic_first.then(hydraulic);
-    let suffices = |own: &HydraulicIdentification| own.holds() || own.predicts();
-    if let Some(Ok(own)) = first.take_if(|own| own.as_ref().is_ok_and(suffices)) {
+    if let Some(Ok(own)) = first.take_if(|own| own.as_ref().is_ok_and(|own| own.holds())) {
         return Ok(Form::Hydraulic(Box::new(own)));
     }
     let general = match rig::identify(recordings, options) {
