@@ -530,3 +530,30 @@ fn preview_control(model: &ControlModel) -> preview::Parameters {
         ..usual
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::identified::valve_curve::ValveCurve;
+
+    #[test]
+    fn preview_estimates_quicker_behind_the_valve_that_is_compensated() {
+        let step = |curve: Option<ValveCurve>| {
+            let mut model = ControlModel::commissioned().unwrap();
+            model.curve = curve;
+            let mut component = ComponentFile::default();
+            Rules::unprinted(model)
+                .linear_quadratic_gaussian(&mut component, None)
+                .unwrap();
+            match component.parameters.get("force_step") {
+                Some(fmi_system::Setting::Number(step)) => *step,
+                other => panic!("{other:?}"),
+            }
+        };
+        let lapped = ValveCurve {
+            overlap: 0.03,
+            ..ValveCurve::default()
+        };
+        assert!(step(Some(lapped)) >= 4.0 * step(None));
+    }
+}
