@@ -18,6 +18,9 @@ const FORCE_STEP: f64 = 0.1 * LBF;
 const FRICTION_SHARE: f64 = 1.0 / 30.0;
 /// How often it may be halved.
 const HALVINGS: usize = 8;
+/// How often it may be doubled behind a compensated valve: what the inverse of a curve leaves at the valve is a force that
+/// changes quickly.
+const DOUBLINGS: usize = 3;
 
 /// Gain margin that is kept, and the least one under an identified specimen.
 const MARGIN: f64 = 2.0;
@@ -25,6 +28,15 @@ const LEAST_MARGIN: f64 = 1.41;
 
 /// Stiffness that a specimen may have, over that which is known: a fifth either way.
 const STIFFNESSES: [f64; 3] = [0.8, 1.0, 1.25];
+
+/// What is known of a rig beside its model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Known {
+    /// Its specimen was identified together with it.
+    pub identified_specimen: bool,
+    /// Its valve is not an ideal one, and the inverse of its curve is applied to the command.
+    pub compensated_valve: bool,
+}
 
 impl Parameters {
     /// What its feedback has to hold: the rig bare and, where a specimen is known, under it before it
@@ -52,31 +64,42 @@ impl Parameters {
     /// # Errors
     /// What [`Parameters::validate`] and [`Feedback::new`] refuse; a model that no such feedback holds.
     pub fn tuned(self) -> Result<Self, ModelError> {
-        self.holding(MARGIN)
+        self.tuned_for(Known::default())
     }
 
-    /// As [`Self::tuned`] for a specimen that was identified together with the rig: where no feedback keeps 6 dB, one
-    /// that keeps 3 dB will do, as for the other controllers on an identified rig. The gain is known to some percent.
+    /// As [`Self::tuned`] for a rig of which more is known. Of an identified specimen: where no feedback keeps 6 dB, one
+    /// that keeps 3 dB will do, as for the other controllers on an identified rig, whose gain is known to some percent.
+    /// Behind a compensated valve: the step of the unknown force is up to eight times as large if a weight of 6 1/V
+    /// keeps the margin with it.
     ///
     /// # Errors
     /// As [`Self::tuned`].
-    pub fn tuned_as_identified(self) -> Result<Self, ModelError> {
-        self.tuned().or_else(|_| self.holding(LEAST_MARGIN))
+    pub fn tuned_for(self, known: Known) -> Result<Self, ModelError> {
+        let tuned = self.holding(MARGIN, known.compensated_valve);
+        if known.identified_specimen {
+            return tuned.or_else(|_| self.holding(LEAST_MARGIN, known.compensated_valve));
+        }
+        tuned
     }
 
     /// The same with a feedback that keeps a gain margin, as a factor.
-    fn holding(self, margin: f64) -> Result<Self, ModelError> {
+    fn holding(self, margin: f64, quick: bool) -> Result<Self, ModelError> {
         self.validate()?;
         let rig = self.rig.sample(self.period);
         let plants = self.plants(&rig);
         let weights = self.feedback_weights.into();
+        let usual = FORCE_STEP.max(FRICTION_SHARE * self.load.friction);
+        let doublings = if quick { DOUBLINGS } else { 0 };
+        let quicker = (1..=doublings).rev();
+        let quicker = quicker.map(|n| (2f64.powi(n as i32), &COMMAND_WEIGHTS[..1]));
+        let slower = (0..=HALVINGS).map(|n| (0.5f64.powi(n as i32), &COMMAND_WEIGHTS[..]));
         let mut tried = self;
-        tried.uncertainty.force_step = FORCE_STEP.max(FRICTION_SHARE * self.load.friction);
-        for _ in 0..=HALVINGS {
-            for weight in COMMAND_WEIGHTS {
-                tried.command_weight = weight;
+        for (factor, lightest) in quicker.chain(slower) {
+            tried.uncertainty.force_step = factor * usual;
+            for weight in lightest {
+                tried.command_weight = *weight;
                 let feedback =
-                    Feedback::new(&rig, &weights, weight, &tried.uncertainty, tried.delay)?;
+                    Feedback::new(&rig, &weights, *weight, &tried.uncertainty, tried.delay)?;
                 if plants
                     .iter()
                     .all(|plant| feedback.is_robust(&rig, plant, margin))
@@ -84,7 +107,6 @@ impl Parameters {
                     return Ok(tried);
                 }
             }
-            tried.uncertainty.force_step *= 0.5;
         }
         Err(ModelError::NoSolution {
             equation: "the rule for preview control's feedback",
@@ -151,11 +173,15 @@ mod tests {
         };
         known.rig.hydraulics = Some(Hydraulics::default());
         known.load.specimen = Some(heavy(21.0, 5.0).into());
-        assert!(known.tuned_as_identified().is_err());
+        let identified = Known {
+            identified_specimen: true,
+            ..Known::default()
+        };
+        assert!(known.tuned_for(identified).is_err());
         let specimen = heavy(14.0, 5.8);
         known.load.specimen = Some(specimen.into());
         assert!(known.tuned().is_err());
-        let own = known.tuned_as_identified().unwrap();
+        let own = known.tuned_for(identified).unwrap();
         // The monolithic equations of table, valve and specimen, not those of the rule.
         let control = PreviewControl::new(own).unwrap();
         let (a, b) = monolithic(&own, &specimen);
@@ -237,6 +263,36 @@ mod tests {
         };
         assert_eq!(step(13.0), FORCE_STEP);
         assert!((step(40.0) - 40.0 / 30.0).abs() < 1e-12);
+    }
+
+    /// Behind a compensated valve the estimate is quicker, and the margins are those of the rule.
+    #[test]
+    fn the_unknown_force_is_quicker_behind_a_compensated_valve() {
+        let mut own = Parameters {
+            delay: 2,
+            ..Parameters::default()
+        };
+        own.load.friction = 13.0;
+        own.rig.hydraulics = Some(Hydraulics::default());
+        let known = Known {
+            compensated_valve: true,
+            ..Known::default()
+        };
+        let quick = own.tuned_for(known).unwrap();
+        assert!(quick.uncertainty.force_step >= 2.0 * FORCE_STEP);
+        assert_eq!(quick.command_weight, COMMAND_WEIGHTS[0]);
+        let control = PreviewControl::new(quick).unwrap();
+        let plant = control.rig().driven(quick.period);
+        for (gain, late) in [(0.5, 2), (1.0, 2), (2.0, 2), (1.0, 3)] {
+            let feedback = control.feedback();
+            let slowest = feedback.slowest_pole(control.rig(), &plant, gain, late);
+            assert!(slowest < 1.0, "{gain} {late}: {slowest}");
+        }
+        // Under a specimen that leaves no room the rule is that of the ideal valve.
+        let specimen = LinearSpecimen::appendix_a();
+        own.load.specimen = Some(specimen.into());
+        let (held, quick) = (own.tuned().unwrap(), own.tuned_for(known).unwrap());
+        assert!(quick.uncertainty.force_step >= held.uncertainty.force_step);
     }
 
     #[test]

@@ -143,21 +143,33 @@ impl Rig {
         past * (1.0 - lost) * (1.0 + self.asymmetry * past.signum())
     }
 
-    /// Unseen voltage at a time: sines of a resonance, and slow ones of a 1/f spectrum.
-    fn unseen(&self, time: f64) -> f64 {
+    /// Unseen voltage at times `step` apart, the first at `time`: sines of a resonance, and slow ones of a 1/f spectrum.
+    fn unseen(&self, time: f64, step: f64) -> Unseen {
         if self.disturbance == 0.0 {
-            return 0.0;
+            return Unseen::default();
         }
         let golden = |k: f64| (k * 0.618_033_988_749_895).fract();
-        let sine = |f: f64, k: f64| (std::f64::consts::TAU * (f * time + golden(k + 7.0))).sin();
-        let (mut near, mut slow) = (0.0, 0.0);
-        for k in 0..8 {
-            let k = f64::from(k);
-            near += sine(self.disturbance_frequency * (0.96 + 0.08 * golden(k)), k);
-            slow += sine(0.03 * 2000f64.powf((k + golden(k)) / 8.0), k + 20.0);
-        }
         // Eight sines of amplitude 1 have an rms of 2.
-        self.disturbance / 2.0 * (0.3f64.sqrt() * near + 0.7f64.sqrt() * slow)
+        let size = self.disturbance / 2.0;
+        let mut own = Unseen::default();
+        for k in 0..8 {
+            let n = f64::from(k);
+            let near = self.disturbance_frequency * (0.96 + 0.08 * golden(n));
+            let slow = 0.03 * 2000f64.powf((n + golden(n)) / 8.0);
+            for (place, frequency, phase, part) in [
+                (0, near, n, 0.3f64.sqrt()),
+                (8, slow, n + 20.0, 0.7f64.sqrt()),
+            ] {
+                let place = place + k as usize;
+                let omega = std::f64::consts::TAU * frequency;
+                let (sine, cosine) =
+                    (std::f64::consts::TAU * (frequency * time + golden(phase + 7.0))).sin_cos();
+                own.sines[place] = [size * part * sine, size * part * cosine];
+                let (sine, cosine) = (omega * step).sin_cos();
+                own.turns[place] = [sine, cosine];
+            }
+        }
+        own
     }
 
     /// Quantities at `s` with `command` volts arriving and `push` newtons on the table.
@@ -250,15 +262,38 @@ impl Rig {
             let u = arrived.map_or(0.0, |(_, u)| *u);
             let steps = ((to - from) / 20e-6).ceil();
             let h = (to - from) / steps;
-            for i in 0..steps as usize {
-                let t = time + from + h * i as f64;
-                let noise = [t, t + h / 2.0, t + h].map(|t| u + self.unseen(t));
+            let mut unseen = self.unseen(time + from, h / 2.0);
+            for _ in 0..steps as usize {
+                let noise = [u + unseen.value(), u + unseen.next(), u + unseen.next()];
                 step(&mut state.values, h, |s, i| {
                     self.now(s, noise[i], push).derivative
                 });
             }
             from = to;
         }
+    }
+}
+
+/// Sixteen sines (V) that turn by a constant angle from one time to the next.
+#[derive(Default)]
+struct Unseen {
+    /// Sine and cosine, V.
+    sines: [[f64; 2]; 16],
+    /// Sine and cosine of the angle.
+    turns: [[f64; 2]; 16],
+}
+
+impl Unseen {
+    fn value(&self) -> f64 {
+        self.sines.iter().map(|own| own[0]).sum()
+    }
+
+    /// The value at the next time.
+    fn next(&mut self) -> f64 {
+        for ([sine, cosine], [up, on]) in self.sines.iter_mut().zip(&self.turns) {
+            (*sine, *cosine) = (*sine * on + *cosine * up, *cosine * on - *sine * up);
+        }
+        self.value()
     }
 }
 
@@ -332,6 +367,24 @@ mod tests {
                 "{bristles:?} {last:?}"
             );
         }
+    }
+
+    /// The turned sines against sines, their sum's size against that which is asked for.
+    #[test]
+    fn the_unseen_voltage_is_a_sum_of_sines() {
+        let rig = Rig {
+            disturbance: 3e-3,
+            ..Rig::default()
+        };
+        let mut own = rig.unseen(7.0, 1e-5);
+        for k in 1..=2000 {
+            let turned = own.next();
+            let fresh = rig.unseen(7.0 + 1e-5 * f64::from(k), 1e-5).value();
+            assert!((turned - fresh).abs() < 1e-12, "{k}: {turned} {fresh}");
+        }
+        let values = (0..40_000).map(|k| rig.unseen(0.025 * f64::from(k), 1e-5).value());
+        let square = values.map(|v| v * v).sum::<f64>() / 40_000.0;
+        assert!((square.sqrt() / 3e-3 - 1.0).abs() < 0.03, "{square}");
     }
 
     #[test]

@@ -36,6 +36,9 @@ const FAINT: f64 = 0.1;
 const EDGE: f64 = 0.25;
 /// Error of the delay, s, that the form of the spool leaves beside its scatter: a quarter of a sample.
 const DELAY_MISTAKEN: f64 = 5e-4;
+/// Part of the delay, s, that the spool's lag takes where friction and flow are of another form: half a sample, and at
+/// most a third of the lag.
+const EXCHANGED: f64 = 1e-3;
 /// Share of oil stiffness and force rate that is as uncertain: flow goes with the root of the pressure.
 const OIL_MISTAKEN: f64 = 0.01;
 /// Share of the overlap that is as uncertain: its edges leak.
@@ -533,6 +536,13 @@ impl Found {
             0.0
         };
         self.covariance[(delay, delay)] += DELAY_MISTAKEN.powi(2) + exchanged.powi(2);
+        let places = [delay, slopes[5].1, slopes[6].1];
+        let together = exchange(&moved.rig);
+        for (row, by_row) in places.into_iter().zip(together) {
+            for (column, by_column) in places.into_iter().zip(together) {
+                self.covariance[(row, column)] += by_row * by_column;
+            }
+        }
         let mut edge = EDGE_MISTAKEN * moved.curve.overlap;
         if let Some(other) = doubted {
             edge = edge.hypot(0.5 * (other.curve.overlap - moved.curve.overlap));
@@ -560,6 +570,13 @@ impl Found {
         valve.improvement = (best.left() / plain.left()).sqrt();
         Some(())
     }
+}
+
+/// What delay (s), spool's lag (s) and its inertia (s²) take from each other. Phase and gain of the spool at low frequencies
+/// are `T + l` and `j - l²/2`: recordings show those, and less of how they are divided.
+fn exchange(rig: &HydraulicRig) -> [f64; 3] {
+    let part = EXCHANGED.min(rig.spool_lag / 3.0);
+    [-part, part, rig.spool_lag * part]
 }
 
 /// Fits the rig with an ideal valve. None where it cannot be replayed.
@@ -608,6 +625,41 @@ mod tests {
     use super::super::simulation::Simulation;
     use super::*;
     use recordings::Channel;
+
+    /// The spool with its delay, at frequencies of a table's motion.
+    #[test]
+    fn what_delay_and_spool_exchange_hardly_shows() {
+        let rig = HydraulicRig {
+            spool_lag: 4.8e-3,
+            spool_inertia: 7e-6,
+            command_delay: 4.4e-3,
+            ..super::super::start::empty()
+        };
+        let [delay, lag, inertia] = exchange(&rig);
+        assert!(delay.abs() >= 0.9e-3);
+        let other = HydraulicRig {
+            spool_lag: rig.spool_lag + lag,
+            spool_inertia: rig.spool_inertia + inertia,
+            command_delay: rig.command_delay + delay,
+            ..rig
+        };
+        let late = HydraulicRig {
+            command_delay: other.command_delay,
+            ..rig
+        };
+        let shown = |rig: &HydraulicRig, hertz: f64| {
+            let s = nalgebra::Complex::new(0.0, std::f64::consts::TAU * hertz);
+            let spool = s * s * rig.spool_inertia + s * rig.spool_lag + 1.0;
+            (-s * rig.command_delay).exp() / spool
+        };
+        for hertz in [2.0, 5.0, 10.0] {
+            let away = (shown(&other, hertz) - shown(&rig, hertz)).norm();
+            let alone = (shown(&late, hertz) - shown(&rig, hertz)).norm();
+            assert!(away < 0.1 * alone, "{hertz} Hz: {away} {alone}");
+        }
+        // A spool without lag has none to exchange.
+        assert_eq!(exchange(&super::super::start::empty()), [0.0; 3]);
+    }
 
     /// A search that begins again where a fit ended may also lower the share that is lost at null.
     #[test]

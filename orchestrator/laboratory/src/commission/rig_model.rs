@@ -141,7 +141,7 @@ pub(super) fn predicted(
         let wanted = &prepared.motion.acceleration;
         let (rms, peak) = rms_and_peak(&wanted[..a.len().min(wanted.len())]);
         let missed = if peak > 0.0 {
-            missed.at(rms) / peak
+            missed.tracked(rms) / peak
         } else {
             0.0
         };

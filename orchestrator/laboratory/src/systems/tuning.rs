@@ -38,6 +38,7 @@ use controllers::preview;
 use controllers::preview::feedback::Uncertainty;
 use controllers::preview::model::{Hydraulics, RigModel};
 use controllers::tuning::acceleration_tracking::{AccelerationTuning, Shaping};
+use controllers::tuning::preview::Known;
 use controllers::tuning::suite::{Member, Suite};
 use identification::IdentificationError;
 use identification::closed_loop::equations::HydraulicRig;
@@ -466,12 +467,10 @@ impl Rules {
         let mut own = preview_control(&self.model);
         own.load.specimen = specimen.copied();
         let identified = self.model.specimen.map(YieldingSpecimen::from);
-        let tuned = if specimen.is_some() && specimen == identified.as_ref() {
-            own.tuned_as_identified()
-        } else {
-            own.tuned()
-        };
-        let tuned = tuned?;
+        let tuned = own.tuned_for(Known {
+            identified_specimen: specimen.is_some() && specimen == identified.as_ref(),
+            compensated_valve: self.model.curve.is_some(),
+        })?;
         let noise = &self.model.noise;
         self.model(component);
         if let Some(own) = self.model.whole_samples() {
@@ -529,5 +528,32 @@ fn preview_control(model: &ControlModel) -> preview::Parameters {
             ..usual.uncertainty
         },
         ..usual
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::identified::valve_curve::ValveCurve;
+
+    #[test]
+    fn preview_estimates_quicker_behind_the_valve_that_is_compensated() {
+        let step = |curve: Option<ValveCurve>| {
+            let mut model = ControlModel::commissioned().unwrap();
+            model.curve = curve;
+            let mut component = ComponentFile::default();
+            Rules::unprinted(model)
+                .linear_quadratic_gaussian(&mut component, None)
+                .unwrap();
+            match component.parameters.get("force_step") {
+                Some(fmi_system::Setting::Number(step)) => *step,
+                other => panic!("{other:?}"),
+            }
+        };
+        let lapped = ValveCurve {
+            overlap: 0.03,
+            ..ValveCurve::default()
+        };
+        assert!(step(Some(lapped)) >= 4.0 * step(None));
     }
 }
