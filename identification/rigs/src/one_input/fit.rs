@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::Response;
 use super::structure::{Coefficients, DelayedTransferFunction, Structure};
 use crate::closed_loop::bands::{Band, Bands};
-use crate::closed_loop::least_squares::{Coordinate, Optimum, Residuals, minimise};
+use sysid::nonlinear::{Coordinate, Optimum, Residuals, minimise};
 use sysid::state_variable_filter::Between;
 
 /// Delays from which the search starts, s.
