@@ -15,6 +15,12 @@ pub trait Residuals: Sync {
     fn priors(&self, _values: &[f64]) -> Vec<f64> {
         Vec::new()
     }
+
+    /// Whether a step is computed as if there were no bounds and ends at them. If not, parameters that a bound holds
+    /// are left out of it, and the others go to their best values beside them.
+    fn ignores_bounds(&self) -> bool {
+        false
+    }
 }
 
 /// One parameter of a fit.
@@ -193,7 +199,8 @@ impl<M: Residuals> Problem for Fit<'_, M> {
         let downhill = &quadratic.downhill;
         quadratic.active.retain(|&row| {
             let i = self.free[row];
-            !is_held(place.values[i], self.coordinates[i].bounds, downhill[row])
+            let bounds = self.coordinates[i].bounds;
+            self.model.ignores_bounds() || !is_held(place.values[i], bounds, downhill[row])
         });
         Ok(quadratic)
     }

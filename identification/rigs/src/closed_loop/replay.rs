@@ -374,6 +374,10 @@ impl Residuals for Replay<'_> {
     fn priors(&self, values: &[f64]) -> Vec<f64> {
         self.surprise(values)
     }
+
+    fn ignores_bounds(&self) -> bool {
+        true
+    }
 }
 
 /// Looks for the friction with which `start`, whose Coulomb force is known to `known` of it (one standard

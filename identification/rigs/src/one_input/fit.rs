@@ -121,6 +121,10 @@ impl Residuals for Fit<'_> {
         }
         all.iter().all(|value| value.is_finite()).then_some(all)
     }
+
+    fn ignores_bounds(&self) -> bool {
+        true
+    }
 }
 
 /// What a fit of one structure found.
