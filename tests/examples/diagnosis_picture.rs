@@ -10,6 +10,7 @@ use std::process::Command;
 use hidden_effects::case::{Case, Kind, Settings};
 use identification::diagnosis::engine::Observer;
 use laboratory::diagnosis::diagnose;
+use laboratory::results::Out;
 use pages::report::FILE;
 
 /// Seed of the case.
@@ -25,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::env::set_current_dir(&folder)?;
     let case = Path::new("cases").join(format!("case-{SEED:05}"));
     Case::draw(SEED, &Settings::new(Kind::This("valve_dead_band"))).write(&case)?;
-    let report = diagnose(&case, &[], None, Path::new("results"), Observer::none())?;
+    let report = diagnose(&case, &[], None, &Out::new("results"), Observer::none())?;
     println!("{}", report.sentence);
     let page = folder.join("results").join(FILE);
     let picture = root.join("docs/diagnosis-report.png");

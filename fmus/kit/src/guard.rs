@@ -130,4 +130,16 @@ mod tests {
         assert!(catch(|| panic!("plain")).unwrap_err().ends_with("plain"));
         assert_eq!(catch(|| 5), Ok(5));
     }
+
+    #[test]
+    fn the_place_of_a_panic_is_that_of_its_own_thread() {
+        let other = thread::spawn(|| thread::current().id()).join().unwrap();
+        let own = thread::current().id();
+        let places = [(own, " at here:1"), (other, " at elsewhere:2")];
+        let places = places.map(|(id, place)| (id, place.to_string()));
+        PANICS.lock().unwrap().extend(places);
+        assert_eq!(describe(Box::new("why")), "panic at here:1: why");
+        // It was told; that of the other thread is not ours.
+        assert_eq!(describe(Box::new("again")), "panic: again");
+    }
 }

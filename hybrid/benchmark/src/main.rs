@@ -5,7 +5,6 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use hybrid_benchmark::{console, marths, vrths};
 use laboratory::error;
-use laboratory::results;
 use pages::report::UnitSystem;
 
 /// Run a published benchmark and score controllers by its rules
@@ -41,12 +40,9 @@ fn main() -> ExitCode {
     if let Some(units) = cli.units {
         units.choose();
     }
-    if cli.force {
-        results::allow_overwriting();
-    }
     let done = match cli.benchmark {
-        Benchmark::Vrths(arguments) => vrths::command::execute(&arguments),
-        Benchmark::Marths(arguments) => marths::command::execute(&arguments),
+        Benchmark::Vrths(arguments) => vrths::command::execute(&arguments, cli.force),
+        Benchmark::Marths(arguments) => marths::command::execute(&arguments, cli.force),
     };
     done.unwrap_or_else(|error| {
         console::complain(&format!("error: {}", error::clipped(&error.to_string())));

@@ -1,6 +1,7 @@
 //! Maximum-likelihood fits by Levenberg-Marquardt, with the nuisance estimated along.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use sysid::levenberg_marquardt::{Problem, Quadratic, Search, Taken, minimise};
 
 use super::model::{ExtensibleModel, Point};
 
@@ -371,103 +372,106 @@ pub fn fit<M: ExtensibleModel>(
     iterations: usize,
 ) -> Option<Fit> {
     let (first, predictor) = evaluated(model, start, records)?;
-    let mut held = Held::of(model, &first);
-    let known = frozen.columns.len();
-    let count = start.nuisance.len() + start.effect_coordinates();
-    for _ in 0..iterations {
-        let fresh = columns(model, &predictor, &held.fit, records, known..count)?;
-        let jacobian = frozen.with(&fresh);
-        let Stepped { gained, expected } =
-            held.step(model, &predictor, records, &jacobian, |_, _| ())?;
-        if gained < STILL || expected < STILL {
-            break;
-        }
-    }
-    let next = evaluate(model, &held.fit.point, records);
+    let held = Held {
+        model,
+        predictor: &predictor,
+        records,
+        derivatives: Derivatives::Frozen(frozen),
+    };
+    let found = held.minimise(&first, iterations)?;
+    let next = evaluate(model, &found.point, records);
     Some(next.filter(|next| next.cost < first.cost).unwrap_or(first))
 }
 
-/// A fit whose cost is that with the gain held, which is what the derivatives are of.
-struct Held {
-    fit: Fit,
-    damping: f64,
+/// Where the derivatives of a fit come from.
+enum Derivatives<'a> {
+    /// The first ones stay as they are, those of the others are computed in each iteration.
+    Frozen(&'a Jacobian),
+    /// They learn from every step that is tried.
+    Learned(&'a mut Jacobian),
 }
 
-struct Stepped {
-    gained: f64,
-    expected: f64,
+/// A fit with the gain of a predictor held, which is what the derivatives are of.
+struct Held<'a, M: ExtensibleModel> {
+    model: &'a M,
+    predictor: &'a M::Predictor,
+    records: &'a [usize],
+    derivatives: Derivatives<'a>,
 }
 
-impl Held {
-    fn of<M: ExtensibleModel>(model: &M, fit: &Fit) -> Self {
-        let cost = squares(&fit.residuals) + fit.point.prior_cost(model.candidates());
-        Self {
-            fit: Fit {
-                cost,
-                ..fit.clone()
-            },
-            // Directions that only the priors hold are a million times flatter than others: any damping
-            // to begin with would stop them.
-            damping: 0.0,
-        }
+impl<M: ExtensibleModel> Held<'_, M> {
+    fn held_cost(&self, point: &Point, residuals: &[f64]) -> f64 {
+        squares(residuals) + point.prior_cost(self.model.candidates())
     }
 
-    /// One damped step of Gauss and Newton. `tried` receives every step that was looked at with the change
-    /// of the residuals.
-    fn step<M: ExtensibleModel>(
-        &mut self,
-        model: &M,
-        predictor: &M::Predictor,
-        records: &[usize],
-        jacobian: &Jacobian,
-        mut tried: impl FnMut(&DVector<f64>, &[f64]),
-    ) -> Option<Stepped> {
-        let (hessian, gradient) = jacobian.normal_equations(model, &self.fit);
-        let mut stepped = Stepped {
-            gained: 0.0,
-            expected: 0.0,
+    /// The fit after at most `iterations` steps; its cost is that with the gain held.
+    fn minimise(mut self, start: &Fit, iterations: usize) -> Option<Fit> {
+        let start = Fit {
+            cost: self.held_cost(&start.point, &start.residuals),
+            ..start.clone()
         };
-        for _ in 0..5 {
-            let mut damped = hessian.clone();
-            for i in 0..gradient.len() {
-                damped[(i, i)] *= 1.0 + self.damping;
+        let search = Search {
+            // Directions that only the priors hold are a million times flatter than others: any damping
+            // to begin with would stop them.
+            first: 0.0,
+            lowered: |damping| if damping < 1e-5 { 0.0 } else { 0.03 * damping },
+            raised: |damping| (30.0 * damping).max(1e-5),
+            tries: [5, 0],
+            pointless: 0.05,
+            iterations,
+            ..Search::default()
+        };
+        Some(minimise(&mut self, start, &search).ok()?.place)
+    }
+}
+
+impl<M: ExtensibleModel> Problem for Held<'_, M> {
+    type Place = Fit;
+    type Error = ();
+
+    fn cost(&self, place: &Fit) -> f64 {
+        place.cost
+    }
+
+    fn expand(&mut self, place: &Fit, _: bool) -> Result<Quadratic, ()> {
+        let (information, downhill) = match &self.derivatives {
+            Derivatives::Learned(own) => own.normal_equations(self.model, place),
+            Derivatives::Frozen(own) => {
+                let count = place.point.nuisance.len() + place.point.effect_coordinates();
+                let rest = own.columns.len()..count;
+                let fresh = columns(self.model, self.predictor, place, self.records, rest);
+                own.with(&fresh.ok_or(())?)
+                    .normal_equations(self.model, place)
             }
-            let nuisance = self.fit.point.nuisance.len();
-            let Some(step) = bounded_step(damped, &gradient, nuisance) else {
-                self.damping = (self.damping * 20.0).max(1e-6);
-                continue;
-            };
-            stepped.expected = gradient.dot(&step);
-            let moved = self.fit.point.moved(step.as_slice(), model.candidates());
-            if let Some(residuals) = residuals(model, predictor, &moved, records) {
-                let cost = squares(&residuals) + moved.prior_cost(model.candidates());
-                let change: Vec<f64> = residuals
-                    .iter()
-                    .zip(&self.fit.residuals)
-                    .map(|(after, before)| after - before)
-                    .collect();
-                tried(&self.fit.point.step_to(&moved), &change);
-                stepped.gained = self.fit.cost - cost;
-                if stepped.gained > 0.0 {
-                    self.fit = Fit {
-                        point: moved,
-                        cost,
-                        residuals,
-                    };
-                    self.damping = if self.damping < 1e-5 {
-                        0.0
-                    } else {
-                        self.damping * 0.03
-                    };
-                    break;
-                }
-            }
-            self.damping = (self.damping * 30.0).max(1e-5);
-            if stepped.expected < 0.05 {
-                break;
-            }
+        };
+        Ok(Quadratic::new(information, downhill))
+    }
+
+    fn step(&self, quadratic: &Quadratic, damping: f64) -> Option<DVector<f64>> {
+        let mut damped = quadratic.information.clone();
+        for i in 0..damped.nrows() {
+            damped[(i, i)] *= 1.0 + damping;
         }
-        Some(stepped)
+        bounded_step(damped, &quadratic.downhill, self.model.nuisance())
+    }
+
+    fn moved(&mut self, place: &Fit, step: &DVector<f64>) -> Option<Fit> {
+        let point = place.point.moved(step.as_slice(), self.model.candidates());
+        let residuals = residuals(self.model, self.predictor, &point, self.records)?;
+        if let Derivatives::Learned(own) = &mut self.derivatives {
+            let ends = residuals.iter().zip(&place.residuals);
+            let change: Vec<f64> = ends.map(|(after, before)| after - before).collect();
+            own.learn(&place.point.step_to(&point), &change);
+        }
+        Some(Fit {
+            cost: self.held_cost(&point, &residuals),
+            point,
+            residuals,
+        })
+    }
+
+    fn has_settled(&self, taken: &Taken<'_, Fit>) -> bool {
+        taken.gain < STILL || taken.promise < STILL
     }
 }
 
@@ -522,24 +526,18 @@ pub(crate) fn polish<M: ExtensibleModel>(
     };
     let mut is_fresh = false;
     for _ in 0..rounds {
-        let mut held = Held::of(model, &best);
-        let mut expected = 0.0;
-        for _ in 0..STEPS {
-            let mut learned = Vec::new();
-            let stepped = held.step(model, &predictor, records, &jacobian, |step, change| {
-                learned.push((step.clone(), change.to_vec()));
-            })?;
-            for (step, change) in &learned {
-                jacobian.learn(step, change);
-            }
-            expected += stepped.gained.max(0.0);
-            if stepped.gained < STILL || stepped.expected < STILL {
-                break;
-            }
-        }
+        let held = Held {
+            model,
+            predictor: &predictor,
+            records,
+            derivatives: Derivatives::Learned(&mut jacobian),
+        };
+        let before = held.held_cost(&best.point, &best.residuals);
+        let found = held.minimise(&best, STEPS)?;
+        let expected = before - found.cost;
         let excess = (squares(&best.residuals) - best.residuals.len() as f64).max(0.0);
         let enough = 0.1 + share * excess;
-        let next = evaluated(model, &held.fit.point, records);
+        let next = evaluated(model, &found.point, records);
         // Near the optimum the gain's own dependence on the point can outweigh the step: what was
         // gained with the gain held counts.
         let better =

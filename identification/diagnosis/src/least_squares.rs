@@ -7,6 +7,7 @@
 //! from running away; it does not hold back what they do see.
 
 use nalgebra::{DMatrix, DVector};
+use sysid::levenberg_marquardt::{Problem, Quadratic, Search, Taken, minimise};
 
 use super::model::{Candidate, Point, Scale};
 use super::resampling::correlation_time;
@@ -284,86 +285,118 @@ pub fn least_squares<M: SimulatedModel>(
     free: &Free<'_>,
     iterations: usize,
 ) -> Option<Solution> {
-    let mut best = solution(model, start, record)?;
-    let count = coordinates(start);
-    let n = best.errors.len() as f64;
-    let is_free = |i: usize| match free {
-        Free::All | Free::Frozen(_) => true,
-        Free::Chosen(chosen) => chosen(i),
+    let start = solution(model, start, record)?;
+    let mut fit = Fit {
+        model,
+        record,
+        free,
+        own: Vec::new(),
     };
-    let held = match free {
-        Free::Frozen(columns) => columns.columns.as_slice(),
-        _ => &[],
+    let search = Search {
+        first: 1e-4,
+        tries: [8, 2],
+        carried_counts: 0.5,
+        iterations,
+        ..Search::default()
     };
-    let mut damping = 1e-4;
-    let mut learned: Option<Vec<Vec<f64>>> = None;
-    // In halves of a step.
-    let mut left = 2 * iterations;
-    while left > 0 {
-        let variance = squares(&best.errors) / n;
-        if variance <= f64::MIN_POSITIVE {
-            break;
-        }
-        let (mut own, is_fresh) = match learned.take() {
-            Some(learned) => (learned, false),
-            None => {
-                let fresh = (held.len()..count).map(|i| {
-                    if is_free(i) {
-                        column(model, &best, record, i, false)
-                    } else {
-                        Some(vec![0.0; best.errors.len()])
-                    }
-                });
-                (fresh.collect::<Option<_>>()?, true)
-            }
-        };
-        left = left.saturating_sub(if is_fresh { 2 } else { 1 });
-        let columns: Vec<&Vec<f64>> = held.iter().chain(&own).collect();
-        let (hessian, gradient) = normal(model, &best.point, &columns, &best.errors, variance);
-        let before = best.cost;
-        let mut active: Vec<bool> = (0..count).map(|i| hessian[(i, i)] > 0.0).collect();
-        let (mut has_learned, damped) = (false, damping);
-        for _ in 0..if is_fresh { 8 } else { 2 } {
-            let Some(step) = step(&hessian, &gradient, &active, damping) else {
-                damping = (damping * 10.0).max(1e-6);
-                continue;
-            };
-            let step = shortened(step, start.nuisance.len());
-            let moved = model.moved(&best.point, &step);
-            // What stands at a bound and wants beyond leaves the step.
-            let stuck: Vec<usize> = stuck(&best.point, &moved, &step);
-            if !stuck.is_empty() && stuck.iter().any(|&i| active[i]) {
-                stuck.iter().for_each(|&i| active[i] = false);
-                continue;
-            }
-            if let Some(next) = solution(model, &moved, record)
-                && next.cost < best.cost
-            {
-                damping = (damping * 0.1).max(1e-9);
-                // Beside derivatives that are held, those that are not are few.
-                has_learned = held.is_empty() && learn(&mut own, &hessian, &best, &next);
-                best = next;
-                break;
-            }
-            damping = (damping * 10.0).max(1e-6);
-        }
-        let gained = before - best.cost;
-        let still = match gained < STILL * LARGEST_TIME {
-            true => STILL * correlation_time(&best.errors).clamp(1.0, LARGEST_TIME),
-            false => STILL,
-        };
-        if gained < still && is_fresh {
-            break;
-        }
-        if gained <= 0.0 {
-            // Learned derivatives that lead nowhere say nothing of the damping.
-            damping = damped;
-        }
-        if has_learned && gained >= still {
-            learned = Some(own);
+    let found = minimise(&mut fit, start, &search).ok()?;
+    Some(found.place)
+}
+
+/// A fit to a record.
+struct Fit<'a, M> {
+    model: &'a M,
+    record: usize,
+    free: &'a Free<'a>,
+    /// Derivatives that are not held.
+    own: Vec<Vec<f64>>,
+}
+
+impl<M: SimulatedModel> Fit<'_, M> {
+    fn held(&self) -> &[Vec<f64>] {
+        match self.free {
+            Free::Frozen(columns) => &columns.columns,
+            Free::All | Free::Chosen(_) => &[],
         }
     }
-    Some(best)
+
+    fn fresh(&self, at: &Solution) -> Option<Vec<Vec<f64>>> {
+        let own = (self.held().len()..coordinates(&at.point)).map(|i| match self.free {
+            Free::Chosen(chosen) if !chosen(i) => Some(vec![0.0; at.errors.len()]),
+            _ => column(self.model, at, self.record, i, false),
+        });
+        own.collect()
+    }
+}
+
+impl<M: SimulatedModel> Problem for Fit<'_, M> {
+    type Place = Solution;
+    type Error = ();
+
+    fn cost(&self, place: &Solution) -> f64 {
+        place.cost
+    }
+
+    fn expand(&mut self, place: &Solution, is_carried: bool) -> Result<Quadratic, ()> {
+        if !is_carried {
+            self.own = self.fresh(place).ok_or(())?;
+        }
+        let columns: Vec<&Vec<f64>> = self.held().iter().chain(&self.own).collect();
+        let variance = squares(&place.errors) / place.errors.len() as f64;
+        let variance = variance.max(f64::MIN_POSITIVE);
+        let (information, downhill) =
+            normal(self.model, &place.point, &columns, &place.errors, variance);
+        let mut quadratic = Quadratic::new(information, downhill);
+        let information = &quadratic.information;
+        quadratic.active.retain(|&i| information[(i, i)] > 0.0);
+        Ok(quadratic)
+    }
+
+    fn step(&self, quadratic: &Quadratic, damping: f64) -> Option<DVector<f64>> {
+        let step = quadratic.step(damping, 0.0)?;
+        let nuisance = self.model.nuisance();
+        let longest = step
+            .rows(0, nuisance)
+            .iter()
+            .fold(0.0f64, |m, s| m.max(s.abs()));
+        Some(if longest > LONGEST_STEP {
+            step * (LONGEST_STEP / longest)
+        } else {
+            step
+        })
+    }
+
+    fn stuck(&self, place: &Solution, step: &DVector<f64>) -> Vec<usize> {
+        let moved = self.model.moved(&place.point, step.as_slice());
+        let (before, after) = (flat(&place.point), flat(&moved));
+        (0..step.len())
+            .filter(|&i| step[i] != 0.0 && before[i] == after[i])
+            .collect()
+    }
+
+    fn moved(&mut self, place: &Solution, step: &DVector<f64>) -> Option<Solution> {
+        let moved = self.model.moved(&place.point, step.as_slice());
+        solution(self.model, &moved, self.record)
+    }
+
+    fn has_settled(&self, taken: &Taken<'_, Solution>) -> bool {
+        let still = match taken.gain < STILL * LARGEST_TIME {
+            true => STILL * correlation_time(&taken.place.errors).clamp(1.0, LARGEST_TIME),
+            false => STILL,
+        };
+        taken.gain < still
+    }
+
+    fn carry(
+        &mut self,
+        quadratic: &Quadratic,
+        from: &Solution,
+        taken: &Taken<'_, Solution>,
+    ) -> bool {
+        // Beside derivatives that are held, those that are not are few.
+        let learns = self.held().is_empty();
+        learns && learn(&mut self.own, &quadratic.information, from, taken.place)
+    }
 }
 
 /// Changes derivatives of the errors so that they give the change from `before` to `after`, along that step and not
@@ -441,46 +474,6 @@ fn normal<M: SimulatedModel>(
         gradient[i] -= off * spread.powi(-2);
     }
     (hessian, gradient)
-}
-
-fn step(
-    hessian: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    active: &[bool],
-    damping: f64,
-) -> Option<Vec<f64>> {
-    let places: Vec<usize> = (0..active.len()).filter(|&i| active[i]).collect();
-    let reduced = DMatrix::from_fn(places.len(), places.len(), |i, j| {
-        let value = hessian[(places[i], places[j])];
-        if i == j {
-            value * (1.0 + damping)
-        } else {
-            value
-        }
-    });
-    let right = DVector::from_fn(places.len(), |i, _| gradient[places[i]]);
-    let solved = reduced.cholesky()?.solve(&right);
-    let mut step = vec![0.0; active.len()];
-    for (place, value) in places.iter().zip(solved.iter()) {
-        step[*place] = *value;
-    }
-    step.iter().all(|s| s.is_finite()).then_some(step)
-}
-
-fn shortened(mut step: Vec<f64>, nuisance: usize) -> Vec<f64> {
-    let longest = step[..nuisance].iter().fold(0.0f64, |m, s| m.max(s.abs()));
-    if longest > LONGEST_STEP {
-        step.iter_mut().for_each(|s| *s *= LONGEST_STEP / longest);
-    }
-    step
-}
-
-/// Coordinates that a step would move and a bound keeps in place.
-fn stuck(before: &Point, after: &Point, step: &[f64]) -> Vec<usize> {
-    let (before, after) = (flat(before), flat(after));
-    (0..step.len())
-        .filter(|&i| step[i] != 0.0 && before[i] == after[i])
-        .collect()
 }
 
 /// One standard deviation of each coordinate at `at`: the larger of what correlated errors leave

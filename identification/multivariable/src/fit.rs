@@ -1,6 +1,7 @@
 //! Poles and delays by Gauss and Newton's method; residues, free motion and offsets follow by least squares.
 
 use nalgebra::{Complex, DMatrix, DVector};
+use sysid::levenberg_marquardt::{Problem, Quadratic, Search, Taken, minimise};
 
 use crate::Recording;
 use crate::model::{delayed, filtered};
@@ -173,16 +174,27 @@ fn cost(square: &[f64]) -> f64 {
     square.iter().map(|square| square.max(1e-60).ln()).sum()
 }
 
-type Linearized = (DMatrix<f64>, Vec<Vec<f64>>, Vec<f64>);
-
-/// What `recording` leaves of a shape: coefficients, residuals, mean squares.
-fn evaluate(recording: &Recording, shape: &Shape) -> Option<Linearized> {
-    let (linear, residuals) = regress(&columns(recording, shape), &recording.strokes)?;
+/// What `recording` leaves of a shape: coefficients and residuals.
+fn evaluate(recording: &Recording, shape: Shape) -> Option<Evaluated> {
+    let (linear, residuals) = regress(&columns(recording, &shape), &recording.strokes)?;
     let square: Vec<f64> = residuals.iter().map(|own| mean_square(own)).collect();
     square
         .iter()
         .all(|value| value.is_finite())
-        .then_some((linear, residuals, square))
+        .then_some(Evaluated {
+            shape,
+            linear,
+            residuals,
+            square,
+        })
+}
+
+/// A shape with its coefficients, residuals and their mean squares.
+struct Evaluated {
+    shape: Shape,
+    linear: DMatrix<f64>,
+    residuals: Vec<Vec<f64>>,
+    square: Vec<f64>,
 }
 
 /// Changes of the residuals by each number, with the coefficients as they are.
@@ -233,59 +245,22 @@ fn without(columns: &[Vec<f64>], values: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
 
 /// Improves a shape by at most `iterations` steps.
 pub(crate) fn improve(recording: &Recording, start: &Shape, iterations: usize) -> Option<Fitted> {
-    let mut shape = start.with(&start.numbers(), recording.period);
-    let (mut linear, mut residuals, mut square) = evaluate(recording, &shape)?;
-    let mut damping = 1e-3;
-    for _ in 0..iterations {
-        let slopes = slopes(recording, &shape, &linear, &residuals);
-        let own = columns(recording, &shape);
-        let count = slopes.len();
-        let mut normal = DMatrix::<f64>::zeros(count, count);
-        let mut right = DVector::<f64>::zeros(count);
-        for (stroke, square) in square.iter().enumerate() {
-            let of: Vec<Vec<f64>> = slopes.iter().map(|by| by[stroke].clone()).collect();
-            let of = without(&own, &of)?;
-            for i in 0..count {
-                right[i] -= dot(&of[i], &residuals[stroke]) / square;
-                for j in 0..count {
-                    normal[(i, j)] += dot(&of[i], &of[j]) / square;
-                }
-            }
-        }
-        let before = cost(&square);
-        let mut better = false;
-        while damping < 1e6 {
-            let mut damped = normal.clone();
-            for i in 0..count {
-                damped[(i, i)] +=
-                    damping * normal[(i, i)] + 1e-12 * normal[(0, 0)].abs() + f64::MIN_POSITIVE;
-            }
-            let Some(factor) = damped.cholesky() else {
-                damping *= 10.0;
-                continue;
-            };
-            let step = factor.solve(&right).map(|value| value.clamp(-1.0, 1.0));
-            let numbers: Vec<f64> = shape
-                .numbers()
-                .iter()
-                .zip(step.iter())
-                .map(|(a, b)| a + b)
-                .collect();
-            let moved = shape.with(&numbers, recording.period);
-            if let Some(found) = evaluate(recording, &moved).filter(|found| cost(&found.2) < before)
-            {
-                (linear, residuals, square) = found;
-                shape = moved;
-                damping = (0.1 * damping).max(1e-9);
-                better = true;
-                break;
-            }
-            damping *= 10.0;
-        }
-        if !better || before - cost(&square) < 1e-7 {
-            break;
-        }
-    }
+    let start = start.with(&start.numbers(), recording.period);
+    let start = evaluate(recording, start)?;
+    let search = Search {
+        raised: |damping| 10.0 * damping,
+        most: 1e6,
+        tries: [16, 0],
+        iterations,
+        ..Search::default()
+    };
+    let found = minimise(&mut Improved { recording }, start, &search).ok()?;
+    let Evaluated {
+        shape,
+        linear,
+        square,
+        ..
+    } = found.place;
     Some(Fitted {
         shape,
         linear,
@@ -294,11 +269,66 @@ pub(crate) fn improve(recording: &Recording, start: &Shape, iterations: usize) -
     })
 }
 
+struct Improved<'a> {
+    recording: &'a Recording,
+}
+
+impl Problem for Improved<'_> {
+    type Place = Evaluated;
+    type Error = ();
+
+    fn cost(&self, place: &Evaluated) -> f64 {
+        cost(&place.square)
+    }
+
+    fn expand(&mut self, at: &Evaluated, _: bool) -> Result<Quadratic, ()> {
+        let slopes = slopes(self.recording, &at.shape, &at.linear, &at.residuals);
+        let own = columns(self.recording, &at.shape);
+        let count = slopes.len();
+        let mut normal = DMatrix::<f64>::zeros(count, count);
+        let mut right = DVector::<f64>::zeros(count);
+        for (stroke, square) in at.square.iter().enumerate() {
+            let of: Vec<Vec<f64>> = slopes.iter().map(|by| by[stroke].clone()).collect();
+            let of = without(&own, &of).ok_or(())?;
+            for i in 0..count {
+                right[i] -= dot(&of[i], &at.residuals[stroke]) / square;
+                for j in 0..count {
+                    normal[(i, j)] += dot(&of[i], &of[j]) / square;
+                }
+            }
+        }
+        Ok(Quadratic::new(normal, right))
+    }
+
+    fn step(&self, quadratic: &Quadratic, damping: f64) -> Option<DVector<f64>> {
+        let ridge = 1e-12 * quadratic.information[(0, 0)].abs() + f64::MIN_POSITIVE;
+        let step = quadratic.step(damping, ridge)?;
+        Some(step.map(|value| value.clamp(-1.0, 1.0)))
+    }
+
+    fn moved(&mut self, at: &Evaluated, step: &DVector<f64>) -> Option<Evaluated> {
+        let numbers = at.shape.numbers();
+        let numbers: Vec<f64> = numbers
+            .iter()
+            .zip(step.iter())
+            .map(|(a, b)| a + b)
+            .collect();
+        evaluate(
+            self.recording,
+            at.shape.with(&numbers, self.recording.period),
+        )
+    }
+
+    fn has_settled(&self, taken: &Taken<'_, Evaluated>) -> bool {
+        taken.gain < 1e-7
+    }
+}
+
 /// The same with covariances: residuals that are correlated in time count as fewer samples.
 pub(crate) fn with_covariance(recording: &Recording, mut fitted: Fitted) -> Option<Fitted> {
     let shape = &fitted.shape;
     let own = columns(recording, shape);
-    let (_, residuals, _) = evaluate(recording, shape)?;
+    let residuals = evaluate(recording, shape.clone())?.residuals;
     let slopes = slopes(recording, shape, &fitted.linear, &residuals);
     let (count, width, strokes) = (slopes.len(), own.len(), residuals.len());
     let mut information = DMatrix::<f64>::zeros(count + strokes * width, count + strokes * width);

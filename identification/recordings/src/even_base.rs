@@ -322,6 +322,21 @@ mod tests {
     }
 
     #[test]
+    fn a_part_has_its_number_in_its_name_where_there_are_several() {
+        let mut values = wave(500);
+        assert_eq!(read(&even(500), values.clone()).0[0].name, "a.csv");
+        // A sample by itself is not a part.
+        values[100..150].fill(f64::NAN);
+        values[151..200].fill(f64::NAN);
+        let (recordings, _) = read(&even(500), values);
+        let parts: Vec<_> = recordings
+            .iter()
+            .map(|own| (&*own.name, own.len()))
+            .collect();
+        assert_eq!(parts, [("a.csv (part 1)", 100), ("a.csv (part 2)", 300)]);
+    }
+
+    #[test]
     fn uneven_stamps_are_put_on_an_even_base() {
         let time: Vec<f64> = (0..500)
             .map(|k| (k as f64 + 0.3 * (k as f64).sin()) * 0.002)

@@ -196,6 +196,23 @@ fn columns_of_any_name_are_picked_with_their_units() {
 }
 
 #[test]
+fn names_that_nobody_knows_keep_the_units_in_the_row_below() {
+    let wanted = || Wanted {
+        is_column: &|_| false,
+        header: "`a,b`",
+    };
+    let file = Path::new("rig.csv");
+    for preamble in ["", "A rig of ours\n", "A rig of ours\nmeasured by us\n"] {
+        let text = format!("{preamble}when,what\n[s],[mm]\n0,1\n0.1,2\n");
+        let text = decode(file, text.as_bytes()).unwrap();
+        let sheet = Sheet::parse(file, text, wanted()).unwrap();
+        assert_eq!(sheet.heads(), ["when", "what"], "{preamble:?}");
+        assert_eq!(sheet.unit_below(1).unwrap().1, "mm");
+        assert_eq!(sheet.column(1, "what").unwrap(), [1.0, 2.0]);
+    }
+}
+
+#[test]
 fn the_page_on_data_files_lists_every_channel() {
     let page = include_str!("../../../docs/data-files.md");
     for channel in Channel::KNOWN {

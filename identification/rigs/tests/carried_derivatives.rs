@@ -4,10 +4,8 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use rigs::closed_loop::least_squares::{
-    Coordinate, Derivatives, Effort, Residuals, WHOLE, minimise_with,
-};
 use strangers::dice::Dice;
+use sysid::nonlinear::{Coordinate, Derivatives, Effort, Residuals, WHOLE, minimise_with};
 
 /// Sums of exponentials and a constant over time, their errors against a record, and how often they were computed.
 struct Decays {

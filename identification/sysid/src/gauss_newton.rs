@@ -10,6 +10,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::levenberg_marquardt::{self, Problem, Quadratic, Taken, is_held};
 use crate::prediction::{Parameter, PredictionModel, cost, scoring};
 use recordings::IdentificationError;
 
@@ -136,61 +137,115 @@ pub fn fit_within<const P: usize>(
     parameters: &[Parameter],
     search: Search,
 ) -> Result<(GaussNewtonEstimate, bool), IdentificationError> {
-    let mut values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
-    let mut least = cost(model, &values).ok_or(IdentificationError::NotConverged {
+    let values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
+    let cost = cost(model, &values).ok_or(IdentificationError::NotConverged {
         method: "the Gauss-Newton refinement",
         reason: "the start value gives no model".into(),
     })?;
     let small = search.tolerance * search.tolerance;
-    let mut damping = search.damping;
-    let mut iteration = 0;
-    loop {
-        iteration += 1;
-        let (information, gradient) = scoring(model, parameters, &values)?;
-        let active: Vec<usize> = (0..parameters.len())
-            .filter(|&i| parameters[i].free && !pushes_out(&parameters[i], values[i], gradient[i]))
-            .collect();
-        let mut settled = true;
-        for _ in 0..12 {
-            let step = damped_step(&information, &gradient, &active, damping);
-            let mut trial = values.clone();
-            for &i in &active {
-                let parameter = &parameters[i];
-                let (low, high) = parameter.bounds;
-                let most = parameter.largest_step;
-                trial[i] = (values[i] + step[i].clamp(-most, most)).clamp(low, high);
-            }
-            let decrement = -active.iter().map(|&i| gradient[i] * step[i]).sum::<f64>();
-            let next = cost(model, &trial).unwrap_or(f64::INFINITY);
-            if next <= least {
-                settled = decrement.abs() < small && least - next < small;
-                values = trial;
-                least = next;
-                damping = (damping * 0.1).max(LEAST_DAMPING);
-                break;
-            }
-            if decrement.abs() < small {
-                break;
-            }
-            damping *= if damping < 1e-4 { 100.0 } else { 10.0 };
-        }
-        if settled || iteration >= search.iterations {
-            let mut estimate = GaussNewtonEstimate {
-                parameters: values,
-                covariance: DMatrix::zeros(0, 0),
-                flat_directions: Vec::new(),
-                cost: least,
-                iterations: iteration,
-            };
-            estimate.judge(parameters, &information);
-            return Ok((estimate, settled));
-        }
-    }
+    let mut scoring = Scoring::<P, _> {
+        model,
+        parameters,
+        small,
+    };
+    let damped = levenberg_marquardt::Search {
+        first: search.damping,
+        lowered: |damping| (0.1 * damping).max(LEAST_DAMPING),
+        raised: |damping| damping * if damping < 1e-4 { 100.0 } else { 10.0 },
+        tries: [12, 0],
+        pointless: small,
+        iterations: search.iterations,
+        ..levenberg_marquardt::Search::default()
+    };
+    let start = Place { values, cost };
+    let found = levenberg_marquardt::minimise(&mut scoring, start, &damped)?;
+    let mut estimate = GaussNewtonEstimate {
+        parameters: found.place.values,
+        covariance: DMatrix::zeros(0, 0),
+        flat_directions: Vec::new(),
+        cost: found.place.cost,
+        iterations: found.iterations,
+    };
+    let count = parameters.len();
+    let none = || DMatrix::zeros(count, count);
+    estimate.judge(parameters, &found.information.unwrap_or_else(none));
+    Ok((estimate, found.has_converged))
 }
 
-fn pushes_out(parameter: &Parameter, value: f64, gradient: f64) -> bool {
-    let (low, high) = parameter.bounds;
-    (value <= low && gradient > 0.0) || (value >= high && gradient < 0.0)
+struct Place {
+    values: Vec<f64>,
+    cost: f64,
+}
+
+struct Scoring<'a, const P: usize, M> {
+    model: &'a M,
+    parameters: &'a [Parameter],
+    /// Gain that does not matter.
+    small: f64,
+}
+
+impl<const P: usize, M: PredictionModel<P>> Problem for Scoring<'_, P, M> {
+    type Place = Place;
+    type Error = IdentificationError;
+
+    fn cost(&self, place: &Place) -> f64 {
+        place.cost
+    }
+
+    fn expand(&mut self, place: &Place, _: bool) -> Result<Quadratic, IdentificationError> {
+        let (information, gradient) = scoring(self.model, self.parameters, &place.values)?;
+        let is_active = |&i: &usize| {
+            let own = &self.parameters[i];
+            own.free && !is_held(place.values[i], own.bounds, -gradient[i])
+        };
+        Ok(Quadratic {
+            active: (0..self.parameters.len()).filter(is_active).collect(),
+            information,
+            downhill: -gradient,
+        })
+    }
+
+    fn step(&self, quadratic: &Quadratic, damping: f64) -> Option<DVector<f64>> {
+        let active = &quadratic.active;
+        let (mut h, scale) = scaled(&quadratic.information, active);
+        for i in 0..active.len() {
+            h[(i, i)] += damping;
+        }
+        let g = DVector::from_fn(active.len(), |i, _| {
+            quadratic.downhill[active[i]] * scale[i]
+        });
+        let eigen = h.symmetric_eigen();
+        let mut coordinates = eigen.eigenvectors.tr_mul(&g);
+        for (value, eigenvalue) in coordinates.iter_mut().zip(eigen.eigenvalues.iter()) {
+            *value /= eigenvalue.max(damping.max(FLAT));
+        }
+        let solution = eigen.eigenvectors * coordinates;
+        let mut step = DVector::zeros(quadratic.downhill.len());
+        for (k, &i) in active.iter().enumerate() {
+            step[i] = solution[k] * scale[k];
+        }
+        Some(step)
+    }
+
+    fn moved(&mut self, place: &Place, step: &DVector<f64>) -> Option<Place> {
+        let moved = self.parameters.iter().zip(&place.values).zip(step.iter());
+        let values = moved.map(|((own, value), by)| {
+            let by = by.clamp(-own.largest_step, own.largest_step);
+            let (low, high) = own.bounds;
+            if own.free {
+                (value + by).clamp(low, high)
+            } else {
+                *value
+            }
+        });
+        let values: Vec<f64> = values.collect();
+        let cost = cost(self.model, &values)?;
+        Some(Place { values, cost })
+    }
+
+    fn has_settled(&self, taken: &Taken<'_, Place>) -> bool {
+        taken.promise.abs() < self.small && taken.gain < self.small
+    }
 }
 
 /// The information of the active parameters, scaled to a unit diagonal, and the scales.
@@ -204,30 +259,6 @@ fn scaled(information: &DMatrix<f64>, active: &[usize]) -> (DMatrix<f64>, Vec<f6
         information[(active[i], active[j])] * scale[i] * scale[j]
     });
     (h, scale)
-}
-
-fn damped_step(
-    information: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    active: &[usize],
-    damping: f64,
-) -> DVector<f64> {
-    let (mut h, scale) = scaled(information, active);
-    for i in 0..active.len() {
-        h[(i, i)] += damping;
-    }
-    let g = DVector::from_fn(active.len(), |i, _| -gradient[active[i]] * scale[i]);
-    let eigen = h.symmetric_eigen();
-    let mut coordinates = eigen.eigenvectors.tr_mul(&g);
-    for (value, eigenvalue) in coordinates.iter_mut().zip(eigen.eigenvalues.iter()) {
-        *value /= eigenvalue.max(damping.max(FLAT));
-    }
-    let solution = eigen.eigenvectors * coordinates;
-    let mut step = DVector::zeros(gradient.len());
-    for (k, &i) in active.iter().enumerate() {
-        step[i] = solution[k] * scale[k];
-    }
-    step
 }
 
 #[cfg(test)]

@@ -7,6 +7,8 @@ pub mod input_matrices;
 pub mod instrumental_variables;
 pub mod interpolation;
 pub mod least_squares;
+pub mod levenberg_marquardt;
+pub mod nonlinear;
 pub mod prediction;
 pub mod residuals;
 pub mod rounding;

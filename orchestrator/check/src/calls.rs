@@ -50,9 +50,11 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, guest: Option<&Path
 
 /// Step size and, where it is known, the end, s.
 pub(super) fn plan(fmu: &Fmu) -> (f64, f64) {
-    let description = &fmu.description;
-    let stop = description.default_stop;
-    let step = description.preferred_step;
+    steps(fmu.description.preferred_step, fmu.description.default_stop)
+}
+
+/// Step size and end of a run whose description names them or not, s.
+fn steps(step: Option<f64>, stop: Option<f64>) -> (f64, f64) {
     match (step, stop) {
         (Some(step), Some(stop)) => (step, stop),
         (Some(step), None) => (step, step * STEPS as f64),
@@ -375,4 +377,18 @@ fn out_of_order(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) {
         }
     }
     findings.check(format!("library: {} calls out of order", tries.len()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::steps;
+
+    #[test]
+    fn a_run_has_the_steps_that_are_named_or_a_few_usual_ones() {
+        assert_eq!(steps(Some(0.5), Some(3.0)), (0.5, 3.0));
+        // Twenty steps, a hundredth of the end, twenty of a millisecond.
+        assert_eq!(steps(Some(0.5), None), (0.5, 10.0));
+        assert_eq!(steps(None, Some(3.0)), (0.03, 3.0));
+        assert_eq!(steps(None, None), (1e-3, 0.02));
+    }
 }

@@ -23,43 +23,19 @@ const LARGEST: u64 = 64 << 20;
 
 /// Compares the results that the archive holds, if it holds some.
 pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path, guest: Option<&Path>) {
-    let Some((name, text)) = table(path) else {
+    let Some((name, text)) = table_in(path) else {
         findings.note("archive", "there is no reference result for comparison");
         return;
     };
-    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
-    let clean = |cell: &str| cell.trim().trim_matches('"').to_string();
-    let Some(head) = lines.next() else {
-        findings.warning(&name, "is empty");
-        return;
+    let table = match Table::read(&text) {
+        Ok(table) => table,
+        Err(what) => {
+            findings.warning(&name, what);
+            return;
+        }
     };
-    let columns: Vec<String> = head.split(',').map(clean).collect();
-    if columns.first().map(String::as_str) != Some("time") {
-        findings.warning(&name, "the first column is not `time`");
-        return;
-    }
-    let rows: Vec<Vec<String>> = lines
-        .map(|line| line.split(',').map(clean).collect())
-        .collect();
-    let time = |row: &Vec<String>| row.first().and_then(|cell| cell.parse::<f64>().ok());
-    let (Some(first), Some(last)) = (rows.first().and_then(time), rows.last().and_then(time))
-    else {
-        findings.warning(&name, "the times cannot be read");
-        return;
-    };
-    let times: Vec<f64> = rows.iter().filter_map(time).collect();
-    let spans = times.windows(2).map(|pair| pair[1] - pair[0]);
-    let usual = spans
-        .filter(|span| *span > 0.0)
-        .fold(f64::INFINITY, f64::min);
-    // Without the rounding of differences.
-    let usual = (usual * 1e12).round() / 1e12;
-    let step = fmu.description.preferred_step.unwrap_or(usual);
-    if !(last > first && step.is_finite()) {
-        findings.warning(&name, "holds no run");
-        return;
-    }
-    let outcome = match run(path, step, last - first, guest) {
+    let step = fmu.description.preferred_step.unwrap_or(table.step);
+    let outcome = match run(path, step, table.duration, guest) {
         Ok(outcome) => outcome,
         Err(reason) => {
             findings.error(
@@ -79,7 +55,7 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path, guest:
     let record = &outcome.record;
     let ours = record.column("time").unwrap_or_default();
     let mut compared = 0;
-    for (place, column) in columns.iter().enumerate().skip(1) {
+    for (place, column) in table.columns.iter().enumerate().skip(1) {
         if fmu.description.array(column).is_some() {
             continue;
         }
@@ -99,24 +75,7 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path, guest:
             continue;
         };
         let values: Vec<f64> = record.rows().map(|row| row[found]).collect();
-        let (mut worst, mut at, mut size): (f64, f64, f64) = (0.0, 0.0, 0.0);
-        for row in &rows {
-            let cells = (
-                time(row),
-                row.get(place).and_then(|cell| cell.parse::<f64>().ok()),
-            );
-            let (Some(time), Some(theirs)) = cells else {
-                continue;
-            };
-            size = size.max(theirs.abs());
-            let near = ours.iter().position(|own| (own - time).abs() < 1e-6 * step);
-            if let Some(near) = near {
-                let difference = (values[near] - theirs).abs();
-                if difference > worst {
-                    (worst, at) = (difference, time);
-                }
-            }
-        }
+        let Difference { worst, at, size } = table.difference(place, &ours, &values, 1e-6 * step);
         compared += 1;
         if worst > ALLOWED * size.max(1e-9) {
             findings.error(
@@ -130,6 +89,87 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, path: &Path, guest:
     findings.check(format!(
         "{name}: {compared} columns compared with a run of {step} s steps"
     ));
+}
+
+/// Results over time.
+struct Table {
+    /// Headings, the time first.
+    columns: Vec<String>,
+    rows: Vec<Vec<String>>,
+    /// From the first row to the last, s.
+    duration: f64,
+    /// Shortest time between two rows, s.
+    step: f64,
+}
+
+/// How far a column is from another.
+#[derive(Debug, PartialEq)]
+struct Difference {
+    worst: f64,
+    /// Time of it, s.
+    at: f64,
+    /// Largest value of the table's column.
+    size: f64,
+}
+
+fn number(row: &[String], place: usize) -> Option<f64> {
+    row.get(place)?.parse().ok()
+}
+
+impl Table {
+    /// A table as text.
+    ///
+    /// # Errors
+    /// What it lacks.
+    fn read(text: &str) -> Result<Self, &'static str> {
+        let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+        let clean = |cell: &str| cell.trim().trim_matches('"').to_string();
+        let head = lines.next().ok_or("is empty")?;
+        let columns: Vec<String> = head.split(',').map(clean).collect();
+        if columns.first().map(String::as_str) != Some("time") {
+            return Err("the first column is not `time`");
+        }
+        let rows = lines.map(|line| line.split(',').map(clean).collect());
+        let rows: Vec<Vec<String>> = rows.collect();
+        let time = |row: Option<&Vec<String>>| row.and_then(|row| number(row, 0));
+        let (Some(first), Some(last)) = (time(rows.first()), time(rows.last())) else {
+            return Err("the times cannot be read");
+        };
+        let times: Vec<f64> = rows.iter().filter_map(|row| number(row, 0)).collect();
+        let spans = times.windows(2).map(|pair| pair[1] - pair[0]);
+        let step = spans
+            .filter(|span| *span > 0.0)
+            .fold(f64::INFINITY, f64::min);
+        let duration = last - first;
+        if duration.is_nan() || duration <= 0.0 || step.is_infinite() {
+            return Err("holds no run");
+        }
+        Ok(Self {
+            columns,
+            rows,
+            duration,
+            // Without the rounding of differences.
+            step: (step * 1e12).round() / 1e12,
+        })
+    }
+
+    /// The largest difference of column `place` from `values` at `times`, where one of these is at most `near` away.
+    fn difference(&self, place: usize, times: &[f64], values: &[f64], near: f64) -> Difference {
+        let (mut worst, mut at, mut size): (f64, f64, f64) = (0.0, 0.0, 0.0);
+        for row in &self.rows {
+            let (Some(time), Some(theirs)) = (number(row, 0), number(row, place)) else {
+                continue;
+            };
+            size = size.max(theirs.abs());
+            if let Some(own) = times.iter().position(|own| (own - time).abs() < near) {
+                let difference = (values[own] - theirs).abs();
+                if difference > worst {
+                    (worst, at) = (difference, time);
+                }
+            }
+        }
+        Difference { worst, at, size }
+    }
 }
 
 /// Runs the FMU alone for `duration` seconds in steps of `step` seconds.
@@ -162,7 +202,7 @@ fn run(path: &Path, step: f64, duration: f64, guest: Option<&Path>) -> Result<Ou
 }
 
 /// The table with results, by its name.
-fn table(path: &Path) -> Option<(String, String)> {
+fn table_in(path: &Path) -> Option<(String, String)> {
     let mut archive = ZipArchive::new(File::open(path).ok()?).ok()?;
     let names: Vec<String> = archive
         .file_names()
@@ -178,4 +218,46 @@ fn table(path: &Path) -> Option<(String, String)> {
     let entry = archive.by_name(&name).ok()?;
     entry.take(LARGEST).read_to_string(&mut text).ok()?;
     Some((name, text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_without_a_run_says_what_it_lacks() {
+        for (text, lack) in [
+            ("", "is empty"),
+            ("\n  \n", "is empty"),
+            ("t,x\n0,1\n1,2\n", "the first column is not `time`"),
+            ("time,x\n", "the times cannot be read"),
+            ("time,x\n0,1\nend,2\n", "the times cannot be read"),
+            ("time,x\n0,1\n", "holds no run"),
+            ("time,x\n1,1\n0,1\n", "holds no run"),
+            ("time,x\n0,1\nNaN,1\n", "holds no run"),
+        ] {
+            assert_eq!(Table::read(text).err(), Some(lack), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn step_and_duration_are_those_of_the_rows() {
+        // An event's time is there twice; the first row is at 2 s.
+        let text = "\"time\", \"x\"\n\n2,1\n 2.1 ,1\n2.1,4\n2.4,4\n";
+        let table = Table::read(text).unwrap();
+        assert_eq!(table.columns, ["time", "x"]);
+        assert_eq!(table.rows.len(), 4);
+        assert_eq!(table.step, 0.1);
+        assert!((table.duration - 0.4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_column_differs_by_its_worst_row_where_both_have_a_time() {
+        let table = Table::read("time,a,x\n0,9,1\n0.1,9,2.5\n0.2,9,-4\n0.3,9,?\n0.35,9,3\n");
+        let (times, values) = ([0.0, 0.1, 0.2, 0.3], [1.0, 2.0, -3.75, 100.0]);
+        let found = table.unwrap().difference(2, &times, &values, 1e-6);
+        // At 0.1 s; a cell that is no number and a time that the run lacks are left out.
+        let (worst, at, size) = (0.5, 0.1, 4.0);
+        assert_eq!(found, Difference { worst, at, size });
+    }
 }

@@ -11,7 +11,7 @@ use motion::Motion;
 use pack::StartValue;
 
 use crate::error::Error;
-use crate::results;
+use crate::results::Out;
 use crate::systems::opensees;
 
 /// The component that plays the motion.
@@ -86,14 +86,14 @@ impl Supply for Experiment<'_> {
 ///
 /// # Errors
 /// A model that cannot be read, or a file that exists.
-pub fn write_model(model: &Path, version: FmiVersion, out: &Path) -> Result<(), Error> {
+pub fn write_model(model: &Path, version: FmiVersion, out: &Out) -> Result<(), Error> {
     let fault = |path: &Path, reason: String| Error::File {
         path: path.to_path_buf(),
         reason,
     };
     let bytes = opensees::fmu_of(model, version);
     let bytes = bytes.map_err(|error| fault(model, error.to_string()))?;
-    if out.exists() && !results::may_overwrite() {
+    if out.exists() && !out.replaces() {
         let reason = "exists already; name another file, or add --force".to_string();
         return Err(fault(out, reason));
     }

@@ -4,32 +4,78 @@ pub mod parquet_file;
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use pages::report::{self, Report};
 use serde::Serialize;
 
 use crate::error::Error;
 
-static MAY_OVERWRITE: AtomicBool = AtomicBool::new(false);
-
-/// Lets this process replace files that differ (`--force`).
-pub fn allow_overwriting() {
-    MAY_OVERWRITE.store(true, Ordering::Relaxed);
+/// A folder or file that results go to. What is there already stays if it differs, unless [`Out::replacing`] says
+/// otherwise.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Out {
+    path: PathBuf,
+    replaces: bool,
 }
 
-/// Whether this process may replace files that differ.
-pub fn may_overwrite() -> bool {
-    MAY_OVERWRITE.load(Ordering::Relaxed)
+impl Out {
+    /// The folder or file at `path`, of which nothing is lost.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self {
+            path: path.into(),
+            replaces: false,
+        }
+    }
+
+    /// The same, with files that differ replaced if `replaces` (`--force`).
+    #[must_use]
+    pub fn replacing(self, replaces: bool) -> Self {
+        Self { replaces, ..self }
+    }
+
+    /// Whether files that differ are replaced.
+    #[must_use]
+    pub fn replaces(&self) -> bool {
+        self.replaces
+    }
+
+    /// Another place, where the same is allowed.
+    #[must_use]
+    pub fn at(&self, path: &Path) -> Self {
+        Self::new(path).replacing(self.replaces)
+    }
+
+    /// The folder of this file.
+    #[must_use]
+    pub fn folder(&self) -> Self {
+        let parent = self.path.parent();
+        let parent = parent.filter(|parent| !parent.as_os_str().is_empty());
+        self.at(parent.unwrap_or(Path::new(".")))
+    }
+}
+
+impl Deref for Out {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl AsRef<Path> for Out {
+    fn as_ref(&self) -> &Path {
+        &self.path
+    }
 }
 
 /// A folder for results without a given name: the first of `folder`, `folder-2`, `folder-3` and so
 /// on that does not exist yet or, by `is_same`, holds the results of the same command.
-pub fn unused(folder: &Path, is_same: impl Fn(&Path) -> bool) -> PathBuf {
-    let is_free = |place: &Path| may_overwrite() || !place.exists() || is_same(place);
+pub fn unused(folder: &Out, is_same: impl Fn(&Path) -> bool) -> Out {
+    let is_free = |place: &Path| folder.replaces || !place.exists() || is_same(place);
     if is_free(folder) {
-        return folder.to_path_buf();
+        return folder.clone();
     }
     let numbered = (2..).map(|number| {
         let mut name = folder.as_os_str().to_os_string();
@@ -38,7 +84,8 @@ pub fn unused(folder: &Path, is_same: impl Fn(&Path) -> bool) -> PathBuf {
     });
     let mut free = numbered.filter(|place| is_free(place));
     // The numbers do not end.
-    free.next().unwrap_or_else(|| folder.to_path_buf())
+    free.next()
+        .map_or_else(|| folder.clone(), |place| folder.at(&place))
 }
 
 /// Why results cannot be written.
@@ -152,7 +199,7 @@ fn is_full(error: &io::Error) -> bool {
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write_report(report: &Report, folder: &Path) -> Result<PathBuf, Error> {
+pub fn write_report(report: &Report, folder: &Out) -> Result<PathBuf, Error> {
     let path = folder.join(report::FILE);
     let page = report::render(report, &path)?;
     let mut results = Results::begin(folder)?;
@@ -167,7 +214,7 @@ const VOLATILE: [&str; 4] = ["html", "json", "svg", "fmu"];
 
 /// Files on their way into a folder: they appear there together, when all of them are complete.
 pub struct Results {
-    folder: PathBuf,
+    folder: Out,
     staging: tempfile::TempDir,
     names: Vec<String>,
     /// Files of an earlier run that do not stay.
@@ -181,7 +228,7 @@ impl Results {
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn begin(folder: &Path) -> Result<Self, ResultsError> {
+    pub fn begin(folder: &Out) -> Result<Self, ResultsError> {
         let failed = |source| ResultsError::Folder {
             folder: folder.to_path_buf(),
             source,
@@ -198,7 +245,7 @@ impl Results {
             // Without the name of the temporary folder.
             .map_err(|error| failed(error.kind().into()))?;
         Ok(Self {
-            folder: folder.to_path_buf(),
+            folder: folder.clone(),
             staging,
             names: Vec::new(),
             replaced: Vec::new(),
@@ -211,7 +258,7 @@ impl Results {
     /// # Errors
     /// A folder that cannot be written.
     pub fn check(folder: &Path) -> Result<(), ResultsError> {
-        Self::begin(folder).map(drop)
+        Self::begin(&Out::new(folder)).map(drop)
     }
 
     /// Writes a file; `name` may have folders in it.
@@ -270,7 +317,7 @@ impl Results {
         }
         for name in std::mem::take(&mut self.names) {
             let to = self.folder.join(&name);
-            let is_new = may_overwrite() || self.supersedes || !to.exists();
+            let is_new = self.folder.replaces || self.supersedes || !to.exists();
             if is_new && fs::rename(self.staging.path().join(&name), &to).is_ok() {
                 saved.push(to);
             }
@@ -325,9 +372,9 @@ impl Results {
     /// and summaries follow the data. To be asked before what takes long.
     ///
     /// # Errors
-    /// Such a file, unless [`allow_overwriting`] was called.
+    /// Such a file, unless [`Out::replaces`].
     pub fn check_existing(&self) -> Result<(), ResultsError> {
-        if self.supersedes || may_overwrite() {
+        if self.supersedes || self.folder.replaces {
             return Ok(());
         }
         let is_volatile = |name: &&String| {
@@ -355,11 +402,11 @@ impl Results {
     ///
     /// # Errors
     /// A folder that cannot be made; a file of data that is there and would change, unless
-    /// [`allow_overwriting`] was called.
+    /// [`Out::replaces`].
     pub fn finish(self) -> Result<Vec<PathBuf>, ResultsError> {
         self.check_existing()?;
         fs::create_dir_all(&self.folder).map_err(|source| ResultsError::Folder {
-            folder: self.folder.clone(),
+            folder: self.folder.to_path_buf(),
             source,
         })?;
         // Where folders cannot be locked, nothing waits.
@@ -403,7 +450,7 @@ mod tests {
         let out = folder.path().join("out");
         fs::create_dir_all(out.join("checkpoint")).unwrap();
         fs::write(out.join("checkpoint/state"), "").unwrap();
-        let mut results = Results::begin(&out).unwrap();
+        let mut results = Results::begin(&Out::new(&out)).unwrap();
         results.write_text("first.csv", "time\n0\n").unwrap();
         let error = results
             .write("second.csv", |file| {
@@ -427,5 +474,62 @@ mod tests {
         assert_eq!(read("first.csv"), "time\n0\n");
         assert_eq!(read("second.csv.part"), "time\n0\n1\n");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    /// Writes `table.csv` and `page.html` with this content.
+    fn written(out: &Out, content: &str) -> Result<Vec<PathBuf>, ResultsError> {
+        let mut results = Results::begin(out)?;
+        results.write_text("table.csv", content)?;
+        results.write_text("page.html", content)?;
+        results.finish()
+    }
+
+    #[test]
+    fn data_that_differ_stay_where_they_are_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Out::new(folder.path().join("out"));
+        let read = |name: &str| fs::read_to_string(out.join(name)).unwrap();
+        written(&out, "1\n").unwrap();
+        // The same again is no loss.
+        written(&out, "1\n").unwrap();
+        let error = written(&out, "2\n").unwrap_err();
+        assert!(matches!(error, ResultsError::Exists { file } if file == out.join("table.csv")));
+        assert_eq!(
+            (read("table.csv"), read("page.html")),
+            ("1\n".into(), "1\n".into())
+        );
+        written(&out.clone().replacing(true), "2\n").unwrap();
+        assert_eq!(
+            (read("table.csv"), read("page.html")),
+            ("2\n".into(), "2\n".into())
+        );
+        // Nothing is left of what was on its way.
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_that_is_taken_gets_a_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Out::new(folder.path().join("run"));
+        let never = |_: &Path| false;
+        assert_eq!(unused(&out, never), out);
+        for name in ["run", "run-2"] {
+            fs::create_dir(folder.path().join(name)).unwrap();
+        }
+        assert_eq!(*unused(&out, never), *folder.path().join("run-3"));
+        let is_second = |place: &Path| place.ends_with("run-2");
+        assert_eq!(*unused(&out, is_second), *folder.path().join("run-2"));
+        let forced = out.clone().replacing(true);
+        assert_eq!(unused(&forced, never), forced);
+    }
+
+    #[test]
+    fn a_file_belongs_to_its_folder() {
+        let out = Out::new("models/rig.toml").replacing(true);
+        assert_eq!(
+            (&*out.folder(), out.folder().replaces()),
+            (Path::new("models"), true)
+        );
+        assert_eq!(&*Out::new("rig.toml").folder(), Path::new("."));
     }
 }

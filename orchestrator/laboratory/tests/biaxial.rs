@@ -106,7 +106,7 @@ fn the_page_has_both_axes_and_can_be_made_again() {
         duration_s: Some(3.0),
         ..request("biaxial", &[])
     };
-    laboratory::run::perform(&request, place.path()).unwrap();
+    laboratory::run::perform(&request, &laboratory::results::Out::new(place.path())).unwrap();
     let page = page::page_again(place.path()).unwrap();
     let headings: Vec<&str> = page
         .sections

@@ -388,6 +388,24 @@ mod tests {
     /// A late table: the delay is found, also between samples, and shows in time but hardly in
     /// Fourier amplitudes.
     #[test]
+    fn a_delay_beyond_the_longest_is_the_longest() {
+        // Half a slow wave, a second late: the correlation still rises where the search ends.
+        let (dt, late) = (0.01, 100);
+        let wave = |k: i32| {
+            let t = f64::from(k) * dt;
+            if (0.0..10.0).contains(&t) {
+                (0.1 * std::f64::consts::PI * t).sin()
+            } else {
+                0.0
+            }
+        };
+        let reference: Vec<f64> = (0..1500).map(wave).collect();
+        let history: Vec<f64> = (0..1500).map(|k| wave(k - late)).collect();
+        assert_eq!(delay(&reference, &history, dt), LONGEST_DELAY);
+        assert_eq!(delay(&history, &reference, dt), -LONGEST_DELAY);
+    }
+
+    #[test]
     fn a_late_table_has_a_delay() {
         let burst = |t: f64| (-(t - 3.0).powi(2)).exp() * (TAU * 2.0 * t).sin();
         let reference = motion(3000, 0.002, burst);

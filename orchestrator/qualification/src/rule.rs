@@ -376,6 +376,16 @@ mod tests {
     }
 
     #[test]
+    fn a_grid_that_meets_the_upper_end_has_it_once() {
+        let half_octaves = grid([1.0, 8.0], 2, 0.0);
+        assert_eq!(half_octaves.len(), 7);
+        for (n, frequency) in half_octaves.iter().enumerate() {
+            close(*frequency, 2f64.powf(0.5 * n as f64));
+        }
+        assert_eq!(grid([1.0, 8.0], 1, 0.5).len(), 3);
+    }
+
+    #[test]
     fn a_grid_spans_the_band() {
         let all = grid([1.3, 33.3], 12, 0.0);
         assert_eq!((all[0], all[all.len() - 1]), (1.3, 33.3));

@@ -5,9 +5,10 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::out::{given, unused};
 use super::{interrupt, progress};
 use laboratory::error::Error;
-use laboratory::results::{Results, unused};
+use laboratory::results::{Out, Results};
 use pages::report::columns::aligned;
 use study::campaign::{self, Bench, Left, Plan, Progress, Runs, Shard, Study, carry_out};
 
@@ -59,7 +60,11 @@ fn range(text: &str) -> Result<std::ops::Range<u64>, String> {
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let study = Study::read(&arguments.study)?;
     if arguments.plan {
-        return plan(&study, arguments.out.as_deref(), arguments.json);
+        return plan(
+            &study,
+            arguments.out.clone().map(given).as_ref(),
+            arguments.json,
+        );
     }
     if let Some(rows) = &arguments.rows {
         if rows.end > study.runs() {
@@ -72,7 +77,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         campaign::rows(&study, rows.clone(), &mut output)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
         let name = arguments.study.file_stem().unwrap_or_default();
         let is_same = |place: &Path| {
             let before = std::fs::read_to_string(place.join(campaign::STUDY));
@@ -158,7 +163,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn plan(study: &Study, folder: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+fn plan(study: &Study, folder: Option<&Out>, json: bool) -> Result<ExitCode, Error> {
     let bench = Bench::new(study);
     bench.check()?;
     if let Some(folder) = folder {

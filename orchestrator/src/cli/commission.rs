@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::OneVersion;
+use super::out::given;
 use super::quantity::whole;
 use laboratory::commission::{self, Request, Verdict};
 use laboratory::error::Error;
@@ -106,7 +107,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
     };
     let mut done = commission::commission(&request, &tell)?;
-    done.write(&arguments.out)?;
+    done.write(&given(&arguments.out))?;
     let status = match done.verdict {
         Verdict::Robust => ExitCode::from(1),
         Verdict::Used | Verdict::Extended => ExitCode::SUCCESS,

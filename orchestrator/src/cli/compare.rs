@@ -5,12 +5,13 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::out::{given, unused};
 use super::quantity::{if_given, whole};
 use super::rig::RigArguments;
 use super::{figures, print_files, progress};
 use laboratory::comparison::{self, Plan, Played, Progress};
 use laboratory::error::Error;
-use laboratory::results::unused;
+use laboratory::results::Out;
 use laboratory::run::experiment::{Request, is_file};
 use laboratory::run::{manifest, perform};
 use laboratory::run_comparison::{self, RunComparison};
@@ -74,11 +75,10 @@ pub struct Arguments {
 
 impl Arguments {
     /// The folder of the results.
-    fn out(&self, usual: &str) -> PathBuf {
+    fn out(&self, usual: &str) -> Out {
         let usual = Path::new("shakebench-results").join(usual);
-        self.out
-            .clone()
-            .unwrap_or_else(|| unused(&usual, |_| false))
+        let own = self.out.clone().map(given);
+        own.unwrap_or_else(|| unused(&usual, |_| false))
     }
 
     /// The first option that describes new runs.
@@ -307,7 +307,7 @@ fn with_new_runs(
                 1 => folder.join(&name),
                 _ => folder.join(format!("{name}-{}", n + 1)),
             };
-            perform(&request, &place)?;
+            perform(&request, &folder.at(&place))?;
             all.push(place);
         }
     }
@@ -319,7 +319,7 @@ fn with_new_runs(
 fn report_runs(
     arguments: &Arguments,
     comparison: &RunComparison,
-    folder: &Path,
+    folder: &Out,
 ) -> Result<ExitCode, Error> {
     let files = comparison.write(folder)?;
     if arguments.json {

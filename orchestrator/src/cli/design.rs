@@ -6,11 +6,11 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::out::{given, unused};
 use super::quantity::whole;
 use super::{figures, multivariable};
 use laboratory::design::{self, LoopName, NoLinearModel, Options, Synthesis, UnknownLoop, model};
 use laboratory::error::Error;
-use laboratory::results::unused;
 use pages::report::columns::aligned;
 use pages::report::number::significant;
 use units::INCH;
@@ -93,8 +93,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     };
     let design = design::design(&options).map_err(|error| fault("--crossover", &error))?;
     let folder = arguments.out.clone();
-    let folder =
-        folder.unwrap_or_else(|| unused(Path::new("shakebench-results/design"), |_| false));
+    let folder = folder
+        .map(given)
+        .unwrap_or_else(|| unused(Path::new("shakebench-results/design"), |_| false));
     let report = design::write(&design, &folder)?;
     if arguments.json {
         let mut json = serde_json::json!(design);
@@ -136,7 +137,7 @@ fn on_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
         });
     }
     let folder = arguments.out.clone();
-    let folder = folder.unwrap_or_else(|| "shakebench-results/design".into());
+    let folder = given(folder.unwrap_or_else(|| "shakebench-results/design".into()));
     let report = design.write(&folder)?;
     if arguments.json {
         let mut json = serde_json::json!(design);

@@ -10,12 +10,13 @@ use clap::Args;
 use identification::diagnosis::DiagnosisReport;
 use identification::diagnosis::engine::{Deadline, Observer, Progress};
 
+use super::out::{given, unused};
 use super::{multivariable, progress};
 use fmi_import::Isolation;
 use identification::diagnosis::rigs::guess::Guess;
 use laboratory::diagnosis::{diagnose_files, diagnose_with, files, foreign, model, template, text};
 use laboratory::error::Error;
-use laboratory::results::unused;
+use laboratory::results::Out;
 
 /// What `diagnose` takes.
 #[derive(Debug, Args)]
@@ -193,7 +194,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             option: "--time-limit",
             reason,
         })?;
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
         let place = std::path::absolute(case).unwrap_or_else(|_| case.clone());
         let name = if place.is_dir() {
             place.file_name()
@@ -267,7 +268,7 @@ fn short(event: &Progress) -> String {
 fn of_fmu(
     arguments: &Arguments,
     fmu: &Path,
-    folder: &Path,
+    folder: &Out,
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
     let Some(map) = &arguments.map else {
@@ -302,7 +303,7 @@ fn with_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
     if let Some(file) = &arguments.predict {
         let out = arguments.out.clone();
         let out = out.unwrap_or_else(|| PathBuf::from("prediction.csv"));
-        let found = model::predict(&asked, file, arguments.periodic, &out)?;
+        let found = model::predict(&asked, file, arguments.periodic, &super::out::given(out))?;
         if arguments.json {
             println!("{}", serde_json::json!(found));
         } else {

@@ -7,6 +7,7 @@ use bridges::opensees;
 use clap::{Args, ValueEnum};
 
 use super::motion::MotionArguments;
+use super::out::is_forced;
 use super::quantity::if_given;
 use super::rig::RigArguments;
 use super::run;
@@ -14,7 +15,7 @@ use fmi_import::FmiVersion;
 use fmi_master::Algorithm;
 use laboratory::error::Error;
 use laboratory::export::{Experiment, write, write_model};
-use laboratory::results::{self, Results};
+use laboratory::results::Results;
 use laboratory::run::experiment::{Request, prepare};
 
 /// Options of `shakebench export`.
@@ -86,7 +87,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 ),
             });
         };
-        write_model(model, fmi, out)?;
+        write_model(model, fmi, &super::out::given(out))?;
         let note = "files that the model reads are not included, and it needs openseespy";
         return Ok(exported(arguments, out, &[note.to_string()]));
     }
@@ -141,7 +142,7 @@ fn check_archive(ssp: &Path, system: &Path) -> Result<(), Error> {
     if matches!((ssp.canonicalize(), system.canonicalize()), (Ok(a), Ok(b)) if a == b) {
         return fault(" is the system to export; expected another file for the archive");
     }
-    if !results::may_overwrite() && !run::may_be_replaced(ssp, |begin| begin.starts_with(b"PK")) {
+    if !is_forced() && !run::may_be_replaced(ssp, |begin| begin.starts_with(b"PK")) {
         return fault(" exists and is not an archive; name another file, or add --force");
     }
     Ok(())

@@ -5,10 +5,10 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::out::unused;
 use super::{print_files, progress};
 use laboratory::error::Error;
 use laboratory::figures;
-use laboratory::results::unused;
 
 /// Options of `shakebench figures`, the former name.
 #[derive(Debug, Args)]
@@ -72,7 +72,7 @@ pub fn draw(
     let drawn = figures::figures(&numbers, record, &tell);
     bar.finish_and_clear();
     let drawn = drawn?;
-    let folder = out.map(Path::to_path_buf);
+    let folder = out.map(super::out::given);
     let folder =
         folder.unwrap_or_else(|| unused(Path::new("shakebench-results/figures"), |_| false));
     let motion = record.map_or_else(

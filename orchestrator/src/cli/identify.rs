@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 use identification::identify::identified::RigIdentification;
 
+use super::out::is_forced;
 use super::{multivariable, progress};
 use laboratory::error::Error;
 use laboratory::identify::{
@@ -85,7 +86,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     });
     bar.finish_and_clear();
     let identified = identified?;
-    identified.write()?;
+    identified.write(is_forced())?;
     if arguments.json {
         println!(
             "{}",

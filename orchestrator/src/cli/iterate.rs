@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::motion::MotionArguments;
+use super::out::{given, unused};
 use super::quantity::{band, if_given};
 use super::rig::RigArguments;
 use super::{print_files, progress, run};
@@ -17,7 +18,7 @@ use laboratory::iteration::on_model::Search;
 use laboratory::iteration::on_rig;
 use laboratory::iteration::replay::{self, Replay};
 use laboratory::iteration::{self, Iteration, Plan};
-use laboratory::results::{Results, unused};
+use laboratory::results::Results;
 use pages::report::columns::aligned;
 
 /// Options of `shakebench iterate`.
@@ -136,7 +137,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let found = iteration::iterate(&plan, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
     let found = found?;
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
         let name = format!("iteration-{}-{}", found.system, found.motion);
         let name = name.replace(['/', '\\', ' '], "-");
         unused(&Path::new("shakebench-results").join(name), |_| false)
@@ -187,7 +188,7 @@ fn replayed(arguments: &Arguments) -> Result<ExitCode, Error> {
         gain,
         limit: if_given("--command-limit", &arguments.command_limit, "V")?,
     })?;
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
         let name = arguments.replay.first().and_then(|path| path.file_stem());
         let name = format!("replay-{}", name.unwrap_or_default().to_string_lossy());
         unused(&Path::new("shakebench-results").join(name), |_| false)
@@ -236,7 +237,7 @@ fn on_model(arguments: &Arguments, case: &str, model: &Path) -> Result<ExitCode,
         },
     };
     let found = circle::close(&plan)?;
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
         let name = format!("drive-{}-{}", found.case, found.motion);
         let name = name.replace(['/', '\\', ' '], "-");
         unused(&Path::new("shakebench-results").join(name), |_| false)
@@ -280,7 +281,7 @@ fn on_rig(arguments: &Arguments, model: &Path) -> Result<ExitCode, Error> {
         },
     };
     let found = on_rig::drive(&plan)?;
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
         let name = wanted.file_stem().unwrap_or_default().to_string_lossy();
         let name = format!("drive-{}-{name}", found.rig).replace(['/', '\\', ' '], "-");
         unused(&Path::new("shakebench-results").join(name), |_| false)

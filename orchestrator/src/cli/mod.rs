@@ -38,6 +38,7 @@ pub mod iterate;
 mod motion;
 mod multivariable;
 mod negative;
+mod out;
 mod progress;
 pub mod qualify;
 mod quantity;
@@ -59,7 +60,6 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use fmi_import::{FmiVersion, isolation};
 use laboratory::error;
-use laboratory::results;
 use pack::supply;
 use pages::report::UnitSystem;
 use progress::Detail;
@@ -261,7 +261,7 @@ pub fn main() -> ExitCode {
         None => (None, None),
     };
     if cli.force {
-        results::allow_overwriting();
+        out::force();
     }
     if let Some(folder) = &cli.fmus {
         supply::take_from(folder);

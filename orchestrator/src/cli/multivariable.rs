@@ -10,6 +10,7 @@ use multivariable::diagnose::{Found, diagnose};
 use multivariable::interaction::{Interaction, interaction};
 use multivariable::{Description, KIND, Model, Names, Recording, TEMPLATE, is_multivariable};
 
+use super::out::given;
 use laboratory::error::Error;
 use laboratory::results::Results;
 use pages::report::columns::aligned;
@@ -100,7 +101,7 @@ pub fn identified(
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
-    let mut results = Results::begin(folder)?;
+    let mut results = Results::begin(&given(folder))?;
     results.write_text(
         &out.file_name().unwrap_or_default().to_string_lossy(),
         &text,
@@ -217,7 +218,7 @@ pub fn diagnosed(
         "wall_s": started.elapsed().as_secs_f64(),
     });
     if let Some(folder) = out {
-        let mut results = Results::begin(folder)?;
+        let mut results = Results::begin(&given(folder))?;
         results.write_json("diagnosis.json", &summary)?;
         results.finish()?;
     }

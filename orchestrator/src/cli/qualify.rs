@@ -6,12 +6,13 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 
 use super::motion::MotionArguments;
+use super::out::{given, unused};
 use super::quantity::whole;
 use super::rig::RigArguments;
 use super::{progress, run};
 use laboratory::error::Error;
 use laboratory::qualify::{self, Plan, Qualification};
-use laboratory::results::{Results, unused};
+use laboratory::results::Results;
 use pages::report::columns::aligned;
 use qualification::load;
 use qualification::resonance::Excitation;
@@ -93,7 +94,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let found = qualify::qualify(&plan, &mut |what| progress::say(&bar, what.to_string()));
     bar.finish_and_clear();
     let mut found = found?;
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
         let stem = Path::new(&arguments.rule).file_stem().unwrap_or_default();
         let name = format!("qualification-{}", stem.to_string_lossy());
         unused(&Path::new("shakebench-results").join(name), |_| false)

@@ -1,5 +1,6 @@
 //! `shakebench report`
 
+use super::out::given;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -58,7 +59,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
              comparison.json of a comparison, or diagnosis.json of a diagnosis",
         ));
     };
-    let report = write_report(&page, folder)?;
+    let report = write_report(&page, &given(folder))?;
     if arguments.json {
         println!("{}", serde_json::json!({"of": kind, "report": report}));
     } else {

@@ -10,6 +10,7 @@ use clap::Args;
 use super::OneVersion;
 use super::interrupt;
 use super::motion::MotionArguments;
+use super::out::{given, is_forced, unused};
 use super::quantity::{at_least_one, if_given, percent, positive};
 use super::rig::RigArguments;
 use super::watch::watch;
@@ -18,7 +19,7 @@ use fmi_import::{Isolation, Options, Trace};
 use fmi_master::{Algorithm, Ended, Ending, KeepCheckpoint, Pace, Simulation};
 use identification::data::why;
 use laboratory::error::Error;
-use laboratory::results::{Results, allow_overwriting, may_overwrite, unused};
+use laboratory::results::{Out, Results};
 use laboratory::run::checkpoint::{self, Checkpoints, Unfinished};
 use laboratory::run::experiment::{Prepared, Request, is_file, prepare};
 use laboratory::run::manifest::Manifest;
@@ -210,7 +211,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         })
     };
     let folder = arguments.resume.as_ref().or(arguments.out.as_ref());
-    let folder = folder.cloned().unwrap_or_else(|| {
+    let mut folder = folder.cloned().map(given).unwrap_or_else(|| {
         let name = match motion.is_empty() {
             true => system.name.clone(),
             false => format!("{}-{}", system.name, motion.name),
@@ -225,7 +226,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     simulation.heed(interrupt::heed());
     let has_checkpoints = unfinished.is_some() || arguments.checkpoint_every.is_some();
     match unfinished {
-        Some(unfinished) => go_on(&mut simulation, &folder, &manifest, unfinished)?,
+        Some(unfinished) => go_on(&mut simulation, &mut folder, &manifest, unfinished)?,
         None => {
             checkpoint::refuse_unfinished(&folder)?;
             simulation.keep_every(arguments.record_every);
@@ -330,7 +331,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 /// A checkpoint of a run that has changed, or that cannot be continued.
 fn go_on(
     simulation: &mut Simulation,
-    folder: &Path,
+    folder: &mut Out,
     manifest: &Manifest,
     unfinished: Unfinished,
 ) -> Result<(), Error> {
@@ -352,7 +353,7 @@ fn go_on(
     // What the run saved when it was interrupted is a part of what it saves now.
     let before = Manifest::read(&folder.join("manifest.json"));
     if before.is_ok_and(|before| before.request == manifest.request) {
-        allow_overwriting();
+        *folder = folder.clone().replacing(true);
     }
     Ok(())
 }
@@ -397,7 +398,7 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
             path: path.to_path_buf(),
             reason,
         };
-        if !may_overwrite() && !may_be_replaced(path, |begin| holds(begin, "Instantiate")) {
+        if !is_forced() && !may_be_replaced(path, |begin| holds(begin, "Instantiate")) {
             let reason = "exists and is not a trace; name another file for --trace, or add --force";
             return Err(fault(reason.to_string()));
         }

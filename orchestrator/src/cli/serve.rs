@@ -9,12 +9,13 @@ use bridges::element::{Interval, Moves, Shape};
 use bridges::{Admission, Event};
 use clap::{Args, ValueEnum};
 
+use super::out::{given, unused};
 use super::quantity::{at_least_one, if_given, positive};
 use super::rig::RigArguments;
 use super::{OneVersion, interrupt, run};
 use fmi_system::ElementFile;
 use laboratory::error::Error;
-use laboratory::results::{Results, unused};
+use laboratory::results::Results;
 use laboratory::run::manifest::Manifest;
 use laboratory::run::page;
 use laboratory::run::summary::Summary;
@@ -149,7 +150,7 @@ pub fn execute(arguments: &Arguments, units: Option<&str>) -> Result<ExitCode, E
     let request = wanted.request.clone();
     let service = serve::prepare(wanted)?;
     let server = service.listen()?;
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
         let stem = std::path::Path::new(&arguments.system).file_stem();
         let name = stem.map_or("system".into(), |stem| stem.to_string_lossy());
         unused(&serve::usual_folder(&name), |_| false)

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+use super::out::given;
 use laboratory::error::Error;
 use laboratory::qualify::{spectrum_panel, trs_page};
 use laboratory::results::Results;
@@ -53,7 +54,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             &trs_page(&rule, &record, &verdict),
             &folder.join(report::FILE),
         )?;
-        let mut results = Results::begin(folder)?;
+        let mut results = Results::begin(&given(folder))?;
         results.write_text(report::FILE, &page)?;
         let panel = spectrum_panel(&rule, &record.acceleration, record.dt);
         results.write_text("spectra.svg", &svg(&panel))?;

@@ -6,9 +6,10 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 
+use super::out::{given, unused};
 use super::{interrupt, progress};
 use laboratory::error::Error;
-use laboratory::results::{Results, unused};
+use laboratory::results::Results;
 use pages::report::columns::aligned;
 use study::campaign::Study;
 use study::tune::tune;
@@ -35,7 +36,7 @@ pub struct Arguments {
 /// Input at fault; nothing is written then.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let study = Study::read(&arguments.study)?;
-    let folder = arguments.out.clone().unwrap_or_else(|| {
+    let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
         let stem = arguments.study.file_stem().unwrap_or_default();
         let name = format!("{}-tuned", stem.to_string_lossy());
         unused(&Path::new("shakebench-results").join(name), |_| false)

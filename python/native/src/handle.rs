@@ -4,6 +4,7 @@ use std::ffi::c_int;
 use std::time::{Duration, Instant};
 
 use fmi_master::{Outcome, Stepwise};
+use laboratory::results::Out;
 use laboratory::run::experiment::{Prepared, Request};
 use laboratory::run::manifest::Manifest;
 use laboratory::run::page;
@@ -186,7 +187,14 @@ impl Handle {
             summary,
             manifest,
         } = finished.as_mut();
-        let written = page::write(folder.as_ref(), prepared, outcome, summary, manifest, false);
+        let written = page::write(
+            &Out::new(folder),
+            prepared,
+            outcome,
+            summary,
+            manifest,
+            false,
+        );
         written.map_err(|error| Fault::input(&error.to_string()))?;
         Ok(Status::Done)
     }

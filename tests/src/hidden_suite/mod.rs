@@ -288,7 +288,7 @@ pub fn run_all(
     tell: &(dyn Fn(Progress) + Sync),
 ) -> Result<Vec<Scored>, Error> {
     let how = campaign::Plan {
-        folder: folder.to_path_buf(),
+        folder: laboratory::results::Out::new(folder),
         shard,
         jobs: None,
     };

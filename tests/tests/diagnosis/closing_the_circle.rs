@@ -6,6 +6,7 @@ use hidden_effects::case::{Case, Kind, Settings};
 use identification::diagnosis::case::Nominal;
 use laboratory::iteration::circle::{Plan, close, write};
 use laboratory::iteration::on_model::{ModelledRig, Search};
+use laboratory::results::Out;
 use motion::{self, Motion, Options};
 use plant::identified::rig::IdentifiedRig;
 use units::constants::{G, INCH};
@@ -103,7 +104,7 @@ fn what_makes_no_drive_is_said_and_nothing_is_written() {
     let [itself, .., extended] = found.expected().map(|(_, e)| e.time_domain_percent);
     assert!(extended < itself && found.effects == ["valve_dead_band"]);
     let out = folder.path().join("out");
-    write(&found, &out).unwrap();
+    write(&found, &Out::new(&out)).unwrap();
     let drive = motion::load_reference(&out.join("drive.csv"), &Options::default()).unwrap();
     assert_eq!(drive.len(), found.drive.unwrap().len());
 }

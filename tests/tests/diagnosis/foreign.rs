@@ -12,6 +12,7 @@ use identification::diagnosis::DiagnosisReport;
 use identification::diagnosis::engine::{Observer, Verdict};
 use laboratory::diagnosis::foreign::{diagnose, template};
 use laboratory::diagnosis::model::{self, Asked};
+use laboratory::results::Out;
 use laboratory::run::experiment::{Request, prepare};
 use pack::library;
 use rand::SeedableRng;
@@ -48,7 +49,7 @@ fn names(report: &DiagnosisReport) -> Vec<(&str, f64)> {
 fn found(folder: &Path, fmu: &Path, map: &str) -> DiagnosisReport {
     let place = folder.join("map.toml");
     fs::write(&place, map).unwrap();
-    let out = folder.join("out");
+    let out = Out::new(folder.join("out"));
     diagnose(
         fmu,
         &place,
@@ -284,7 +285,7 @@ fn our_own_specimen_and_the_system_around_it() {
         .collect();
     let input = folder.path().join("input.csv");
     fs::write(&input, unknown).unwrap();
-    let out = folder.path().join("prediction.csv");
+    let out = Out::new(folder.path().join("prediction.csv"));
     let told = model::predict(&asked, &input, false, &out).unwrap();
     assert_eq!((told.unit.as_str(), told.rows, told.given), ("kN", 5000, 0));
     let predicted: Vec<f64> = fs::read_to_string(&out)
@@ -359,7 +360,7 @@ fn bad_maps_are_refused_by_place_and_cure() {
     ] {
         let place = folder.path().join("map.toml");
         fs::write(&place, map).unwrap();
-        let out = folder.path().join("out");
+        let out = Out::new(folder.path().join("out"));
         let data = [folder.path().join("data.csv")];
         let error = diagnose(
             fmu,

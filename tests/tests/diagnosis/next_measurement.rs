@@ -11,6 +11,7 @@ use identification::diagnosis::rigs::shake_table::predictor::{
     Disturbance, Noise, Predictor, Samples,
 };
 use laboratory::diagnosis::diagnose;
+use laboratory::results::Out;
 use laboratory::run::experiment::{Request, prepare};
 use plant::identified::rig::IdentifiedRig;
 use plant::specimens::linear::LinearSpecimen;
@@ -123,7 +124,7 @@ fn an_unexplained_case_leaves_a_motion_that_run_plays() {
     let (case, out) = (folder.path().join("case"), folder.path().join("out"));
     let kind = Kind::ThisOutside(Outside::QuadraticDrag);
     Case::draw(32, &Settings::new(kind)).write(&case).unwrap();
-    let report = diagnose(&case, &[], None, &out, Observer::none()).unwrap();
+    let report = diagnose(&case, &[], None, &Out::new(&out), Observer::none()).unwrap();
     assert_eq!(report.verdict, Verdict::Unexplained, "{}", report.sentence);
     let told = report.separating_experiment.unwrap();
     assert!(told.contains("the residual is largest at speeds"), "{told}");

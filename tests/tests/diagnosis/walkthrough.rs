@@ -6,6 +6,7 @@ use hidden_effects::case::{Case, Kind, Settings};
 use identification::diagnosis::Evidence;
 use identification::diagnosis::engine::Observer;
 use laboratory::diagnosis::diagnose;
+use laboratory::results::Out;
 
 /// `value` with three significant digits, as the report shows ratios.
 fn three(value: f64) -> String {
@@ -28,7 +29,7 @@ fn figures_of_the_walkthrough_are_those_of_its_command() {
         &place,
         &[],
         None,
-        &folder.path().join("out"),
+        &Out::new(folder.path().join("out")),
         Observer::none(),
     )
     .unwrap();

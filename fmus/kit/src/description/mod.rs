@@ -341,6 +341,22 @@ mod tests {
     }
 
     #[test]
+    fn a_type_that_several_variables_have_is_there_once() {
+        let of = |name| Type::Choice(Enumeration { name, items: &[] });
+        let own = model().variables[0].row(&mut Oscillator::default());
+        let rows: Vec<Row> = ["Mode", "Shape", "Mode"]
+            .into_iter()
+            .map(|name| Row {
+                declaration: own.declaration,
+                kind: of(name),
+                start: own.start.clone(),
+            })
+            .collect();
+        let names: Vec<&str> = enumerations(&rows).iter().map(|own| own.name).collect();
+        assert_eq!(names, ["Mode", "Shape"]);
+    }
+
+    #[test]
     fn token_changes_with_the_interface() {
         let token = super::token(model());
         assert_eq!(token, super::token(&Model::<Oscillator>::new().unwrap()));

@@ -1,6 +1,6 @@
 //! `shakebench benchmark marths`
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -8,7 +8,7 @@ use hybrid::marths::criteria::COLUMNS;
 use hybrid::marths::run::ground;
 use indicatif::{ProgressBar, ProgressStyle};
 use laboratory::error::Error;
-use laboratory::results::Results;
+use laboratory::results::{Out, Results};
 use pages::report;
 
 use super::outcome::Outcome;
@@ -57,7 +57,7 @@ pub struct Marths {
 ///
 /// # Errors
 /// Unknown names: nothing is run then; a folder that cannot be written.
-pub fn execute(arguments: &Marths) -> Result<ExitCode, Error> {
+pub fn execute(arguments: &Marths, replaces: bool) -> Result<ExitCode, Error> {
     let folder = data_folder("marths", arguments.data.as_deref());
     if let (Some(given), None) = (&arguments.data, &folder) {
         return Err(Error::File {
@@ -81,7 +81,9 @@ pub fn execute(arguments: &Marths) -> Result<ExitCode, Error> {
         },
         seed: arguments.seed,
     };
-    if let Some(out) = &arguments.out {
+    let given = arguments.out.as_deref();
+    let out = given.map(|path| Out::new(path).replacing(replaces));
+    if let Some(out) = &out {
         Results::check(out)?;
     }
     let bar = ProgressBar::new(study.jobs() as u64);
@@ -101,7 +103,7 @@ pub fn execute(arguments: &Marths) -> Result<ExitCode, Error> {
                 .into(),
         );
     }
-    let files = match &arguments.out {
+    let files = match &out {
         Some(out) => write(out, &outcome)?,
         None => Vec::new(),
     };
@@ -137,7 +139,7 @@ fn controllers(names: &[String]) -> Result<Vec<roster::Entry>, Error> {
 }
 
 /// Writes report, scores and one row per run.
-fn write(folder: &Path, outcome: &Outcome) -> Result<Vec<PathBuf>, Error> {
+fn write(folder: &Out, outcome: &Outcome) -> Result<Vec<PathBuf>, Error> {
     let page = report::render(&page::report(outcome), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
     results.write_text(report::FILE, &page)?;

@@ -15,7 +15,7 @@ use super::study::{Plants, Study};
 use super::{page, published, roster};
 use laboratory::diagnosis::EXTENDED_MODEL;
 use laboratory::error::Error;
-use laboratory::results::Results;
+use laboratory::results::{Out, Results};
 use pages::report;
 use units::nearest;
 
@@ -100,7 +100,7 @@ const STIFFNESSES: u32 = 10;
 ///
 /// # Errors
 /// Unknown names and numbers out of range: nothing is run then; a folder that cannot be written.
-pub fn execute(arguments: &Vrths) -> Result<ExitCode, Error> {
+pub fn execute(arguments: &Vrths, replaces: bool) -> Result<ExitCode, Error> {
     let folder = motions::data_folder("vrths", arguments.data.as_deref());
     if let (Some(given), None) = (&arguments.data, &folder) {
         return Err(Error::File {
@@ -110,11 +110,13 @@ pub fn execute(arguments: &Vrths) -> Result<ExitCode, Error> {
         });
     }
     let study = study(arguments, folder.as_deref())?;
-    if let Some(out) = &arguments.out {
+    let given = arguments.out.as_deref();
+    let out = given.map(|path| Out::new(path).replacing(replaces));
+    if let Some(out) = &out {
         Results::check(out)?;
     }
     if !arguments.hidden.is_empty() {
-        return hidden(arguments, study);
+        return hidden(arguments, study, out.as_ref());
     }
     let published = folder
         .as_deref()
@@ -147,7 +149,7 @@ pub fn execute(arguments: &Vrths) -> Result<ExitCode, Error> {
     }
 
     let mut files = Vec::new();
-    if let Some(out) = &arguments.out {
+    if let Some(out) = &out {
         let pictures = page::pictures(&study).map_err(simulation)?;
         files = write(out, &outcome, &page::report(&outcome, &pictures))?;
     }
@@ -162,7 +164,7 @@ pub fn execute(arguments: &Vrths) -> Result<ExitCode, Error> {
 }
 
 /// Adds effects to the plant, diagnoses it and scores the laws.
-fn hidden(arguments: &Vrths, study: Study) -> Result<ExitCode, Error> {
+fn hidden(arguments: &Vrths, study: Study, out: Option<&Out>) -> Result<ExitCode, Error> {
     let refused = |reason: String| Error::Option {
         option: "--hidden",
         reason,
@@ -177,7 +179,7 @@ fn hidden(arguments: &Vrths, study: Study) -> Result<ExitCode, Error> {
     };
     let fault = |error: HiddenError| refused(error.to_string());
     let record = hidden.record().map_err(fault)?;
-    let results = match &arguments.out {
+    let results = match out {
         Some(out) => {
             let mut results = Results::begin(out)?;
             results.write("record.csv", |file| record.write(file))?;
@@ -189,7 +191,7 @@ fn hidden(arguments: &Vrths, study: Study) -> Result<ExitCode, Error> {
     };
     let outcome = hidden.run(&record, Observer::none()).map_err(fault)?;
     let mut files = Vec::new();
-    if let (Some(out), Some(mut results)) = (&arguments.out, results) {
+    if let (Some(out), Some(mut results)) = (out, results) {
         let model = outcome.extended_model().map_err(|error| Error::File {
             path: out.join(EXTENDED_MODEL),
             reason: error.to_string(),
@@ -283,11 +285,7 @@ fn controllers(names: &[String]) -> Result<Vec<roster::Entry>, Error> {
 }
 
 /// Writes report, scores and one row per run.
-fn write(
-    folder: &std::path::Path,
-    outcome: &Outcome,
-    page: &report::Report,
-) -> Result<Vec<PathBuf>, Error> {
+fn write(folder: &Out, outcome: &Outcome, page: &report::Report) -> Result<Vec<PathBuf>, Error> {
     let page = report::render(page, &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
     results.write_text(report::FILE, &page)?;

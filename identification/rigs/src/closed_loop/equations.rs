@@ -19,7 +19,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::bands::{Band, Bands};
 use super::friction::{SHAPE, SealShape, Searched};
-use super::least_squares::Residuals;
+use sysid::nonlinear::Residuals;
 
 /// Channels of an experiment, in the order of [`Bands::new`].
 pub const CHANNELS: usize = 7 + SHAPE;
@@ -447,14 +447,16 @@ impl Whitener {
 impl Residuals for Equations {
     fn residuals(&self, values: &[f64]) -> Option<Vec<f64>> {
         let all = self.whitened(values)?;
-        let mut residuals: Vec<f64> = all.iter().flatten().flat_map(|v| [v.re, v.im]).collect();
-        if let Some(shape) = &self.shape {
-            residuals.extend(
-                shape
-                    .changed(&values[PARAMETERS..PARAMETERS + SHAPE])
-                    .surprise(),
-            );
-        }
-        Some(residuals)
+        Some(all.iter().flatten().flat_map(|v| [v.re, v.im]).collect())
+    }
+
+    fn priors(&self, values: &[f64]) -> Vec<f64> {
+        let own = |shape: &SealShape| shape.changed(&values[PARAMETERS..PARAMETERS + SHAPE]);
+        let own = self.shape.as_ref().map(own);
+        own.map_or_else(Vec::new, |shape| shape.surprise().to_vec())
+    }
+
+    fn ignores_bounds(&self) -> bool {
+        true
     }
 }

@@ -8,11 +8,11 @@ use recordings::{Channel, IdentificationError, Recording, mean_and_deviation};
 
 use super::equations::{EQUATIONS, Equations, HydraulicRig, PARAMETERS};
 use super::friction::{SHAPE, SealShape, Searched};
-use super::least_squares::{Coordinate, Derivatives, Effort, Optimum, WHOLE, minimise_with};
 use super::specimen::{self, SpecimenFit};
 use super::{
     Channels, Found, Histories, LEAST_INERTIA, Settings, lateness, start, valve, velocity,
 };
+use sysid::nonlinear::{Coordinate, Derivatives, Effort, Optimum, WHOLE, minimise_with};
 
 /// Overlaps over the command (rms) from which the search for one starts.
 const OVERLAPS: [f64; 4] = [0.2, 0.4, 0.6, 0.9];

@@ -2,7 +2,7 @@
 //!
 //! 1. [`bands`]: every channel is projected on the reference, band by band.
 //! 2. [`start`]: linear regressions over a grid of spools, leakages and delays.
-//! 3. [`equations`], [`least_squares`]: maximum likelihood with errors in all channels, from
+//! 3. [`equations`], [`sysid::nonlinear`]: maximum likelihood with errors in all channels, from
 //!    several starts (Pintelon and Schoukens 2012, Chapters 9 and 12).
 //! 4. [`replay`], [`valve`]: the recorded command on the simulated rig, for the friction and for what the valve lacks
 //!    to an ideal one.
@@ -12,7 +12,6 @@ pub mod equations;
 mod fitting;
 pub mod friction;
 mod lateness;
-pub mod least_squares;
 mod model_section;
 pub mod replay;
 mod seals;

@@ -13,13 +13,13 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::{EQUATIONS, HydraulicRig, PARAMETERS};
 use super::fitting::Fitting;
 use super::friction::{SHAPE, SealShape, Searched};
-use super::least_squares::{Coordinate, Derivatives, Effort, Residuals, minimise_with};
 use super::simulation::Simulation;
 use super::specimen::SpecimenOverMass;
 use super::velocity::velocity;
 use super::{Found, Histories, LEAST_INERTIA};
 use plant::identified::valve_curve::ValveCurve;
 use recordings::{Channel, Recording};
+use sysid::nonlinear::{Coordinate, Derivatives, Effort, Residuals, minimise_with};
 
 /// Rate at which the replayed displacement is led back to the measured one, rad/s.
 pub(super) const CORRECTION: f64 = 1.0;
@@ -368,9 +368,15 @@ impl Replay<'_> {
 impl Residuals for Replay<'_> {
     fn residuals(&self, values: &[f64]) -> Option<Vec<f64>> {
         let errors = self.errors(values)?;
-        let mut all: Vec<f64> = errors.iter().flatten().flatten().copied().collect();
-        all.extend(self.surprise(values));
-        Some(all)
+        Some(errors.iter().flatten().flatten().copied().collect())
+    }
+
+    fn priors(&self, values: &[f64]) -> Vec<f64> {
+        self.surprise(values)
+    }
+
+    fn ignores_bounds(&self) -> bool {
+        true
     }
 }
 

@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 use plant::integration::runge_kutta_4;
 
-use super::least_squares::{Coordinate, Residuals, minimise};
 use super::velocity::noise_floor;
+use sysid::nonlinear::{Coordinate, Residuals, minimise};
 
 /// A specimen over its mass: `d'' = -a - f/m`, `f/m = c d' + k (r d + (1 - r) z)`,
 /// `z' = d' (1 - |z/d_y|^n (1 + sign(z d'))/2)` (Bouc and Wen), elastic for an infinite `d_y`.

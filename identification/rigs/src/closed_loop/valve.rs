@@ -17,12 +17,12 @@ use recordings::{Recording, mean_and_deviation};
 use super::equations::{HydraulicRig, PARAMETERS};
 use super::fitting::Fitting;
 use super::friction::SealShape;
-use super::least_squares::{Coordinate, Derivatives, Effort, Optimum, minimise_with};
 use super::replay::{
     Actuator, CORRECTION, Errors, FITTED, MISTAKEN, OF_CURVE, PART, Replay, coordinates, speed,
 };
 use super::simulation::spool_transition;
 use super::{Found, LEAST_INERTIA};
+use sysid::nonlinear::{Coordinate, Derivatives, Effort, Optimum, minimise_with};
 
 /// Least part of the squared error that a member of the curve has to take away.
 const LEAST: f64 = 0.03;

@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::Response;
 use super::structure::{Coefficients, DelayedTransferFunction, Structure};
 use crate::closed_loop::bands::{Band, Bands};
-use crate::closed_loop::least_squares::{Coordinate, Optimum, Residuals, minimise};
+use sysid::nonlinear::{Coordinate, Optimum, Residuals, minimise};
 use sysid::state_variable_filter::Between;
 
 /// Delays from which the search starts, s.
@@ -120,6 +120,10 @@ impl Residuals for Fit<'_> {
             all.extend([whitened.re, whitened.im]);
         }
         all.iter().all(|value| value.is_finite()).then_some(all)
+    }
+
+    fn ignores_bounds(&self) -> bool {
+        true
     }
 }
 

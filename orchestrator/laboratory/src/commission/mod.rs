@@ -27,7 +27,7 @@ use self::motions::{Sines, motion, triangle};
 use crate::design::model::{self, ModelDesign};
 use crate::error::Error;
 use crate::identify::{Form, Identified, from_recordings};
-use crate::results::Results;
+use crate::results::{Out, Results};
 use crate::systems::built_in;
 use crate::systems::control_model::ControlModel;
 use crate::systems::tuning::Rules;
@@ -568,7 +568,7 @@ impl Commissioned {
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write(&mut self, folder: &Path) -> Result<(), Error> {
+    pub fn write(&mut self, folder: &Out) -> Result<(), Error> {
         let mut results = Results::begin(folder)?;
         for recording in &self.recordings {
             let name = format!("{RECORDINGS}/{}.csv", recording.name);

@@ -7,7 +7,7 @@ use super::result::{Comparison, History, Measure, Row};
 use super::tables::{ErrorTable, tables};
 use crate::error::Error;
 use crate::json;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use pages::report::{
     self, Axis, Bar, BarGroup, Bars, Panel, Report, Section, Series, Units, identity,
 };
@@ -19,7 +19,7 @@ pub const COMPARISON: &str = "comparison.json";
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write(comparison: &Comparison, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn write(comparison: &Comparison, folder: &Out) -> Result<Vec<PathBuf>, Error> {
     let page = report::render(&page(comparison), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
     results.write_text(report::FILE, &page)?;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use controllers::ModelError;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::results;
+use crate::results::{self, Out};
 use crate::systems::control_model::ControlModel;
 use pages::report::number::significant;
 use pages::report::{Abscissa, Axis, Panel, Report, Section, Series, Style, Table, Units};
@@ -365,7 +365,7 @@ impl ModelDesign {
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<PathBuf, Error> {
+    pub fn write(&self, folder: &Out) -> Result<PathBuf, Error> {
         results::write_report(&self.report(), folder)
     }
 

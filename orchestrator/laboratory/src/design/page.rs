@@ -1,7 +1,7 @@
 //! The frequency responses of `shakebench design`: the content of Fig 3-3, 3-4, 3-7, 3-9 and 3-10, and
 //! every loop in continuous time beside the one that is sampled.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use controllers::loop_shaping::LoopShapingCoefficients;
 use controllers::loops::Time;
@@ -16,14 +16,14 @@ use super::table::table;
 use super::{Design, bode};
 use crate::error::Error;
 use crate::figures::Figure;
-use crate::results;
+use crate::results::{self, Out};
 use pages::report::{Report, Section, Style, Table, identity};
 
 /// Writes `report.html` into `folder`; says where.
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write(design: &Design, folder: &Path) -> Result<PathBuf, Error> {
+pub fn write(design: &Design, folder: &Out) -> Result<PathBuf, Error> {
     results::write_report(&report(design), folder)
 }
 

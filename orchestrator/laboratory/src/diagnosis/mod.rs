@@ -26,7 +26,7 @@ use identification::diagnosis::{
 
 use crate::error::Error;
 use crate::json;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use pages::report::{self, Report};
 
 /// File with the extended model, in the folder of `--out`.
@@ -49,7 +49,7 @@ pub fn diagnose(
     subject: &Path,
     data: &[PathBuf],
     columns: Option<&Path>,
-    folder: &Path,
+    folder: &Out,
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
     diagnose_with(subject, data, columns, None, folder, observer)
@@ -64,7 +64,7 @@ pub fn diagnose_with(
     data: &[PathBuf],
     columns: Option<&Path>,
     effects: Option<&Path>,
-    folder: &Path,
+    folder: &Out,
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
     let begun = Instant::now();
@@ -92,7 +92,7 @@ pub fn diagnose_files(
     files: &[PathBuf],
     columns: Option<&Path>,
     effects: Option<&Path>,
-    folder: &Path,
+    folder: &Out,
     tell: &dyn Fn(&Guess),
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
@@ -110,7 +110,7 @@ fn of_subject(
     subject: &Path,
     read: &Subject,
     description: Option<&str>,
-    folder: &Path,
+    folder: &Out,
     observer: Observer<'_>,
     begun: Instant,
 ) -> Result<DiagnosisReport, Error> {

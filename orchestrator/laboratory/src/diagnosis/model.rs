@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::{fault, file_fault, foreign};
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use fmi_import::Isolation;
 use pages::report::columns::aligned;
 
@@ -103,7 +103,7 @@ pub fn predict(
     asked: &Asked<'_>,
     file: &Path,
     is_periodic: bool,
-    out: &Path,
+    out: &Out,
 ) -> Result<Predicted, Error> {
     let model = asked.model;
     let read = match read(asked)? {
@@ -126,7 +126,7 @@ pub fn predict(
     Ok(Predicted {
         model: model.into(),
         file: file.into(),
-        prediction: out.into(),
+        prediction: out.to_path_buf(),
         channel: found.channel.into(),
         unit: found.unit,
         rows: found.rows.len(),
@@ -154,7 +154,7 @@ fn predict_table(
     called: &[Called],
     file: &Path,
     is_periodic: bool,
-    out: &Path,
+    out: &Out,
 ) -> Result<Predicted, Error> {
     if is_periodic {
         return Err(Error::Option {
@@ -186,7 +186,7 @@ fn predict_table(
     Ok(Predicted {
         model: table.path.clone(),
         file: file.into(),
-        prediction: out.into(),
+        prediction: out.to_path_buf(),
         channel: wanted.name().into(),
         unit,
         rows: found.rows.len(),
@@ -200,7 +200,7 @@ fn predict_foreign(
     model: &foreign::Extended,
     file: &Path,
     is_periodic: bool,
-    out: &Path,
+    out: &Out,
 ) -> Result<Predicted, Error> {
     if is_periodic {
         return Err(Error::Option {
@@ -229,7 +229,7 @@ fn predict_foreign(
     Ok(Predicted {
         model: model.path.clone(),
         file: file.into(),
-        prediction: out.into(),
+        prediction: out.to_path_buf(),
         channel: found.outputs[found.wanted].name.clone(),
         unit: unit.clone(),
         rows: found.time.len(),
@@ -238,15 +238,11 @@ fn predict_foreign(
 }
 
 /// Writes the file `out`, all or nothing.
-fn write(
-    out: &Path,
-    text: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> Result<(), Error> {
+fn write(out: &Out, text: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<(), Error> {
     let name = out
         .file_name()
         .ok_or_else(|| file_fault(out, "expected the name of an output file"))?;
-    let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-    let mut results = Results::begin(folder.unwrap_or(Path::new(".")))?;
+    let mut results = Results::begin(&out.folder())?;
     results.write(&name.to_string_lossy(), |file| text(file))?;
     results.finish()?;
     Ok(())

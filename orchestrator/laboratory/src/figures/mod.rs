@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::design;
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use pages::report::{self, Panel, Report, Section, identity};
 
 /// A figure of the thesis, as this program draws it.
@@ -95,7 +95,7 @@ pub fn figures(
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write(figures: &[Figure], motion: &str, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn write(figures: &[Figure], motion: &str, folder: &Out) -> Result<Vec<PathBuf>, Error> {
     let sections = figures.iter().map(|figure| Section {
         heading: format!("Figure {}", figure.number),
         text: vec![figure.text.clone()],

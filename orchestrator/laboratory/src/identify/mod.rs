@@ -10,7 +10,7 @@ mod residuals;
 mod responses;
 mod summary;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use identification::IdentificationError;
@@ -28,7 +28,7 @@ pub use parameters::{PARAMETER_COLUMNS, Parameter, parameter_table, parameters};
 pub use summary::Summary;
 
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use pages::report::{self, Report};
 
 /// What is identified from what.
@@ -93,15 +93,16 @@ impl Outcome {
         }
     }
 
-    /// Writes model and report next to each other, both or none.
+    /// Writes model and report next to each other, both or none; files that differ are replaced if `replaces`.
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write(&self) -> Result<(), Error> {
+    pub fn write(&self, replaces: bool) -> Result<(), Error> {
         match self {
-            Self::Rig(own) => own.write(),
+            Self::Rig(own) => own.write(replaces),
             Self::OneInput(own) => {
-                write(&own.summary, &own.own.text, &own.own.report(&own.summary))
+                let page = own.own.report(&own.summary);
+                write(&own.summary, &own.own.text, &page, replaces)
             }
         }
     }
@@ -258,29 +259,31 @@ impl Identified {
         })
     }
 
-    /// Writes model and report next to each other, both or none.
+    /// Writes model and report next to each other, both or none; files that differ are replaced if `replaces`.
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write(&self) -> Result<(), Error> {
+    pub fn write(&self, replaces: bool) -> Result<(), Error> {
         let page = match &self.form {
             Form::General(found) => page::report(found, &self.recordings, &self.summary),
             Form::Hydraulic(own) => own.report(&self.summary),
         };
-        write(&self.summary, &self.model_file()?.to_toml()?, &page)
+        write(
+            &self.summary,
+            &self.model_file()?.to_toml()?,
+            &page,
+            replaces,
+        )
     }
 }
 
 /// Writes a model and its report next to each other, both or none.
-fn write(summary: &Summary, model: &str, page: &Report) -> Result<(), Error> {
+fn write(summary: &Summary, model: &str, page: &Report, replaces: bool) -> Result<(), Error> {
     let path = &summary.model;
     let beside = path.with_extension("html");
     let page = report::render(page, &beside)?;
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut results = Results::begin(folder)?;
+    let out = Out::new(path).replacing(replaces);
+    let mut results = Results::begin(&out.folder())?;
     for (file, text) in [(path.as_path(), model), (&beside, &page)] {
         let name = file.file_name().unwrap_or_default();
         results.write_text(&name.to_string_lossy(), text)?;

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::drive;
 use super::on_model::{ModelledRig, Search};
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use motion::metrics::Tracking;
 use motion::{self, Motion, Scaling};
 use units::INCH;
@@ -191,7 +191,7 @@ fn name_of(folder: &Path) -> String {
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write(circle: &Circle, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn write(circle: &Circle, folder: &Out) -> Result<Vec<PathBuf>, Error> {
     let mut results = Results::begin(folder)?;
     results.write_text(FIGURES, &(serde_json::json!(circle).to_string() + "\n"))?;
     if let Some(found) = &circle.drive {

@@ -1,13 +1,13 @@
 //! The drive of a described rig, such as an axis on a voltage, computed on its extended model.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use identification::diagnosis::rigs::{DriveSearch, ExtendedRig, RigDrive};
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 
 const DRIVE: &str = "drive.csv";
 const FIGURES: &str = "drive.json";
@@ -79,7 +79,7 @@ pub fn figures(plan: &Plan, found: &RigDrive) -> Figures {
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write(plan: &Plan, found: &RigDrive, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn write(plan: &Plan, found: &RigDrive, folder: &Out) -> Result<Vec<PathBuf>, Error> {
     let mut results = Results::begin(folder)?;
     let figures = serde_json::json!(figures(plan, found)).to_string();
     results.write_text(FIGURES, &(figures + "\n"))?;

@@ -1,10 +1,10 @@
 //! The files of an iteration.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::{Iteration, Plan, drive};
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use crate::run::identity::tuning;
 use pages::report::identity::{entry, version};
 use pages::report::{
@@ -22,7 +22,7 @@ const DRIVE_Y: &str = "drive_y.csv";
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write(plan: &Plan, iteration: &Iteration, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn write(plan: &Plan, iteration: &Iteration, folder: &Out) -> Result<Vec<PathBuf>, Error> {
     let page = report::render(&page(plan, iteration), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
     results.write_text(report::FILE, &page)?;

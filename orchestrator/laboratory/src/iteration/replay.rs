@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::correction::{Inverse, Response, from_spectrum, padded};
 use super::drive;
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 
 /// Files in the folder.
 const DRIVE: &str = "drive.csv";
@@ -518,7 +518,7 @@ fn next(
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write(found: &Replay, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn write(found: &Replay, folder: &Out) -> Result<Vec<PathBuf>, Error> {
     let mut results = Results::begin(folder)?;
     if let Some(next) = &found.drive {
         results.write_text(DRIVE, &drive::text(next))?;

@@ -1,6 +1,6 @@
 //! The report of a qualification and its files.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use motion::{Motion, Record};
 use pages::report::identity::{entry, version};
@@ -14,7 +14,7 @@ use units::STANDARD_GRAVITY;
 use super::{Plan, Qualification, Round};
 use crate::error::Error;
 use crate::iteration::drive_text;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use crate::run::identity::tuning;
 
 /// File with everything that was found.
@@ -70,7 +70,7 @@ fn record_text(acceleration: &[f64], dt: f64) -> String {
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write(plan: &Plan, found: &Qualification, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn write(plan: &Plan, found: &Qualification, folder: &Out) -> Result<Vec<PathBuf>, Error> {
     let page = report::render(&page(plan, found), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
     for (n, motion) in found.motions.iter().enumerate() {

@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 
 use super::manifest::Manifest;
 use crate::error::Error;
-use crate::results::may_overwrite;
+use crate::results::Out;
 use fmi_import::Datum;
 use fmi_master::{Checkpoint, Record};
 
@@ -96,12 +96,12 @@ fn fault(path: &Path, reason: impl ToString) -> Error {
 ///
 /// # Errors
 /// There is a checkpoint.
-pub fn refuse_unfinished(folder: &Path) -> Result<(), Error> {
+pub fn refuse_unfinished(folder: &Out) -> Result<(), Error> {
     let place = folder.join(FOLDER);
     if !is_there(folder) {
         return Ok(());
     }
-    if may_overwrite() {
+    if folder.replaces() {
         remove(folder);
         return Ok(());
     }

@@ -16,16 +16,17 @@ pub mod text;
 pub mod tuning;
 mod warned;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::error::Error;
+use crate::results::Out;
 
 /// Runs a system as fast as it goes and writes the files of the run into `folder`; says where.
 ///
 /// # Errors
 /// Whatever is at fault in the request, or a folder that cannot be written. A run that ends early is not an error:
 /// its summary says so.
-pub fn perform(request: &experiment::Request, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn perform(request: &experiment::Request, folder: &Out) -> Result<Vec<PathBuf>, Error> {
     let prepared = experiment::prepare(request)?;
     let outcome = prepared.run(prepared.algorithm)?;
     let plan = (prepared.algorithm, prepared.step, prepared.samples);

@@ -17,7 +17,7 @@ use super::summary::{Summary, asked};
 use super::table::Table;
 use super::text::steps_in_words;
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use fmi_import::hexadecimal;
 use fmi_master::{Outcome, Record};
 use motion::Motion;
@@ -29,7 +29,7 @@ use pages::report::{self, Cell, Component, Report, SpecimenHistory};
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(
-    folder: &Path,
+    folder: &Out,
     prepared: &Prepared,
     outcome: &Outcome,
     summary: &Summary,

@@ -10,7 +10,7 @@ use serde::Serialize;
 pub use differences::Difference;
 
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use crate::run::manifest::Manifest;
 use crate::run::signals::{RESULTS, read_csv};
 use crate::run::summary::Summary;
@@ -161,7 +161,7 @@ impl RunComparison {
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    pub fn write(&self, folder: &Out) -> Result<Vec<PathBuf>, Error> {
         let page = report::render(&page::report(self), &folder.join(report::FILE))?;
         let mut results = Results::begin(folder)?;
         results.write_text(report::FILE, &page)?;

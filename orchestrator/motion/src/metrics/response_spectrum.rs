@@ -350,6 +350,25 @@ fn closed_form(omega: f64, zeta: f64, dt: f64, [x, v, from, to]: [f64; 4]) -> [f
 mod tests {
     use super::*;
 
+    #[test]
+    fn the_extremum_of_a_cubic_is_where_its_rate_is_zero() {
+        // The rate (s - inside) (s - outside).
+        for inside in [0.1, 0.5, 0.9] {
+            for outside in [-3.0, -0.5, 1.5, 4.0] {
+                let rate = |s: f64| (s - inside) * (s - outside);
+                let value = |s: f64| {
+                    s.powi(3) / 3.0 - 0.5 * (inside + outside) * s * s + inside * outside * s
+                };
+                let (found, place) = extremum([value(0.0), value(1.0)], [rate(0.0), rate(1.0)]);
+                assert!(
+                    (place - inside).abs() < 1e-12,
+                    "{inside} {outside}: {place}"
+                );
+                assert!((found - value(inside)).abs() < 1e-12);
+            }
+        }
+    }
+
     /// Resonance of a steady sine: amplification 1/(2 zeta); far above, the ground's own peak.
     #[test]
     fn a_long_sine_is_amplified_as_in_the_closed_form() {

@@ -18,7 +18,7 @@ use super::study::Study;
 use super::table::{Cell, INVALID, Table};
 use fmi_master::Ending;
 use laboratory::error::Error;
-use laboratory::results::may_overwrite;
+use laboratory::results::Out;
 
 /// A part of a study: every `of`-th run from the `part`-th on, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +57,7 @@ impl Shard {
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// The folder for journals and results.
-    pub folder: PathBuf,
+    pub folder: Out,
     /// The part to carry out; none: all.
     pub shard: Option<Shard>,
     /// Runs at a time; none: one a core.
@@ -122,7 +122,7 @@ pub fn carry_out(
     let begun = Instant::now();
     runs.check()?;
     let head = runs.head()?;
-    if may_overwrite() {
+    if plan.folder.replaces() {
         journal::remove(&plan.folder);
     }
     let mut rows = journal::read(&plan.folder, &head)?;
@@ -221,10 +221,10 @@ impl Left {
     ///
     /// # Errors
     /// A study at fault; a journal that is damaged, or was made by another version.
-    pub fn new(runs: &dyn Runs, folder: Option<&Path>) -> Result<Self, Error> {
+    pub fn new(runs: &dyn Runs, folder: Option<&Out>) -> Result<Self, Error> {
         let head = runs.head()?;
         let rows = match folder {
-            Some(folder) if !may_overwrite() => journal::read(folder, &head)?,
+            Some(folder) if !folder.replaces() => journal::read(folder, &head)?,
             _ => HashMap::new(),
         };
         let mut missing: Vec<[u64; 2]> = Vec::new();

@@ -31,7 +31,7 @@ pub use table::Row;
 
 use analysis::Findings;
 use laboratory::error::Error;
-use laboratory::results::Results;
+use laboratory::results::{Out, Results};
 use pages::report::identity::{entry, version};
 use pages::report::{self, Cell};
 
@@ -80,7 +80,7 @@ pub fn write(
     study: &Study,
     carried: &Carried,
     findings: &Findings,
-    folder: &Path,
+    folder: &Out,
 ) -> Result<Vec<PathBuf>, Error> {
     let page = page::report(&carried.table, findings, about(study));
     let page = report::render(&page, &folder.join(report::FILE))?;

@@ -6,7 +6,7 @@ mod margins;
 mod page;
 
 use std::cell::RefCell;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -20,7 +20,7 @@ pub use margins::{Held, held};
 use crate::campaign::analysis::percentile;
 use crate::campaign::{Bench, Key, Runs, Study, Values, identity, with_unit};
 use laboratory::error::Error;
-use laboratory::results::Results;
+use laboratory::results::{Out, Results};
 use pages::report::{self, Cell};
 
 /// A parameter that is searched.
@@ -436,7 +436,7 @@ impl Tuned {
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    pub fn write(&self, folder: &Out) -> Result<Vec<PathBuf>, Error> {
         let page = report::render(&page::page(self), &folder.join(report::FILE))?;
         let mut results = Results::begin(folder)?;
         results.write_text(report::FILE, &page)?;

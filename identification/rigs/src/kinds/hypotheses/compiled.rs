@@ -77,19 +77,9 @@ pub(super) struct Wrong {
     pub what: String,
 }
 
-/// A name that lives as long as the program: every one of a file is kept once.
-pub(super) fn kept(text: &str) -> &'static str {
-    use std::sync::Mutex;
-    static KEPT: Mutex<Vec<&'static str>> = Mutex::new(Vec::new());
-    let mut all = KEPT
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    if let Some(known) = all.iter().find(|own| **own == text) {
-        return known;
-    }
-    let own: &'static str = Box::leak(text.to_owned().into_boxed_str());
-    all.push(own);
-    own
+/// A name that lives as long as the program, as the kind that has it does ([`super::extended`] makes each once).
+fn kept(text: &str) -> &'static str {
+    Box::leak(text.to_owned().into_boxed_str())
 }
 
 fn is_name(name: &str) -> bool {

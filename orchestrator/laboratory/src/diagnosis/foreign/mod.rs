@@ -16,7 +16,7 @@ use identification::diagnosis::rigs::foreign::{self, ForeignDiagnosis, ForeignMo
 
 use super::{DIAGNOSIS, EXTENDED_MODEL, file_fault, page};
 use crate::error::Error;
-use crate::results::Results;
+use crate::results::{Out, Results};
 use fmi_import::Isolation;
 pub(super) use further::{Extended, is_one};
 use map::Map;
@@ -41,7 +41,7 @@ pub fn diagnose(
     model: &Path,
     map: &Path,
     files: &[PathBuf],
-    folder: &Path,
+    folder: &Out,
     isolate: Option<Isolation>,
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
