@@ -38,7 +38,7 @@ struct Measured {
     largest: f64,
     step: f64,
     /// Those that its description leaves to be told: a gain of the force is none where its friction is known to a
-    /// quarter, and a law of friction has its own asymmetry.
+    /// quarter, a law of friction has its own asymmetry, and a zero of 100 N is stated.
     may_be: &'static [Kind],
 }
 
@@ -75,7 +75,7 @@ const MEASURED: [Measured; 5] = [
         unit: "N",
         largest: 1.5e3,
         step: 0.332_800_85e-3,
-        may_be: &[Kind::Delay, Kind::Zero],
+        may_be: &[Kind::Delay],
     },
     Measured {
         rig: "positioning_drive",
