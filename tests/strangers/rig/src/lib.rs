@@ -59,7 +59,8 @@ impl Component for StrangerRig {
                 .nominal(400.0).depends_on(&["specimen_force"], Dependent);
             output("specimen_acceleration", s.specimen_acceleration, "Acceleration of the specimen inside", "m/s2" => "g").nominal(10.0);
             output("supply_pressure", s.rig.supply, "Pressure of the supply", "Pa" => "psi").nominal(2e7);
-            output("supply_flow", s.supply_flow, "Flow that the valve draws", "m3/s" => "in3/s").nominal(2e-4);
+            output("supply_flow", s.supply_flow, "Flow that the valve draws", "m3/s" => "in3/s").nominal(2e-4)
+                .initially_depends_on(&["null_bias", "flow_coefficient"]);
             parameter("overlap", s.rig.overlap, "Half width of the valve's overlap", "V").min(0.0);
             parameter("null_loss", s.rig.null_loss, "Share of the flow gain that is lost at null", "1").min(0.0).max(1.0);
             parameter("null_width", s.rig.null_width, "Opening over which it comes back", "V");
