@@ -229,7 +229,7 @@ fn added_voltage(recording: &RigRecording, nominal: &Nominal) -> Vec<f64> {
 }
 
 /// Means over the first samples of how far the recorded position lies above the one that the controller's law needs for
-/// its voltages, m; 0 where the voltage is limited, or more is added.
+/// its voltages, m; 0 where the voltage is limited, or more is added, or nothing feeds the position back.
 fn zero_at_begin(recording: &RigRecording, nominal: &Nominal) -> f64 {
     let (reference, position) = (
         recording.input(Channel::Reference),
@@ -249,7 +249,8 @@ fn zero_at_begin(recording: &RigRecording, nominal: &Nominal) -> f64 {
         let needed = (voltage[k] + gain * speed) / (gain * nominal.position_gain);
         position[k] - reference[k] + needed
     };
-    (0..BEGIN).map(above).sum::<f64>() / BEGIN as f64
+    let mean = (0..BEGIN).map(above).sum::<f64>() / BEGIN as f64;
+    if mean.is_finite() { mean } else { 0.0 }
 }
 
 /// The zero of the recorded position against the one that the controller reads, from its law: the voltage is linear in
