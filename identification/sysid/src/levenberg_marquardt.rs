@@ -79,7 +79,7 @@ pub trait Problem {
     /// The cost to second order about `place`, with the derivatives that were carried there if `is_carried`.
     ///
     /// # Errors
-    /// There is no model beside `place`.
+    /// A place from which a small change leads to no model, so that there are no derivatives.
     fn expand(&mut self, place: &Self::Place, is_carried: bool) -> Result<Quadratic, Self::Error>;
 
     /// The damped step, within what the problem allows.
@@ -167,7 +167,7 @@ pub struct Minimum<P> {
 /// Goes downhill from `start`.
 ///
 /// # Errors
-/// A cost that cannot be expanded where the search is.
+/// The error of [`Problem::expand`] at a place that the search reaches.
 pub fn minimise<P: Problem>(
     problem: &mut P,
     start: P::Place,
