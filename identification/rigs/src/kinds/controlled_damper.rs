@@ -7,6 +7,7 @@
 //! Effects are counted in natural units: the standard deviations of displacement, velocity, force and
 //! command.
 
+use super::between::between;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Equations, Natural, RigRecording};
 use recordings::Channel;
@@ -173,12 +174,9 @@ impl Equations for ControlledDamper {
         }
         let late = e.force_delay.delay / h;
         if late > 0.0 {
-            for k in (0..out.len()).rev() {
-                let place = (k as f64 - late).max(0.0);
-                let before = place as usize;
-                let share = place - before as f64;
-                let after = (before + 1).min(out.len() - 1);
-                out[k] = out[before] * (1.0 - share) + out[after] * share;
+            let in_time = out.to_vec();
+            for (k, y) in out.iter_mut().enumerate() {
+                *y = between(&in_time, k as f64 - late);
             }
         }
     }

@@ -9,6 +9,7 @@
 //! between two samples what it covers before and behind, there and back. With both at zero the samples
 //! are all there is.
 
+use super::between::between;
 use super::table::{effects, nominal_parameters, shape, size};
 use super::{Equations, RigRecording};
 use recordings::Channel;
@@ -216,10 +217,7 @@ impl Equations for CyclicMaterial {
         if late != 0.0 {
             let shown = out.to_vec();
             for (k, stress) in out.iter_mut().enumerate() {
-                let place = (k as f64 - late).clamp(0.0, last as f64);
-                let before = place as usize;
-                let share = place - before as f64;
-                *stress = shown[before] * (1.0 - share) + shown[(before + 1).min(last)] * share;
+                *stress = between(&shown, k as f64 - late);
             }
         }
         for stress in out.iter_mut() {

@@ -10,6 +10,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use realfft::RealFftPlanner;
 
+use super::between::between;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Equations, Natural, RigRecording};
 use recordings::{Channel, mean_and_deviation};
@@ -221,13 +222,7 @@ impl Equations for HystereticDevice {
         let radians = resonance * recording.period();
         let steps = (12.0 * radians).ceil().clamp(1.0, 64.0);
         let late = delay / recording.period();
-        let at = |values: &[f64], k: usize| {
-            let place = (k as f64 - late).max(0.0);
-            let before = place as usize;
-            let share = place - before as f64;
-            let after = (before + 1).min(values.len() - 1);
-            values[before] * (1.0 - share) + values[after] * share
-        };
+        let at = |values: &[f64], k: usize| between(values, k as f64 - late);
         let rest = x.first().copied().unwrap_or(0.0);
         let mut position = rest;
         let mut greatest = 0.0f64;

@@ -5,6 +5,7 @@
 //! on data not fitted and that is found on each part of the data.
 
 mod alternatives;
+mod between;
 mod carriage;
 mod cause;
 mod closed_loop_actuator;
