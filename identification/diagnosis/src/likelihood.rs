@@ -101,6 +101,11 @@ fn unsure([by_records, all]: [f64; 2], residuals: usize) -> f64 {
 
 /// Whether what `with` has more than `without` earns its price.
 pub(super) fn pays(candidates: &[Candidate], with: &Hypothesis, without: &Hypothesis) -> bool {
+    lacks(candidates, with, without) < 0.0
+}
+
+/// What it lacks to earn that, in units of `2 log` likelihood.
+pub(super) fn lacks(candidates: &[Candidate], with: &Hypothesis, without: &Hypothesis) -> f64 {
     let known = without.effects();
     let added = with.effects().into_iter().filter(|i| !known.contains(i));
     let linear = added.filter(|i| candidates[*i].is_linear).count();
@@ -110,7 +115,7 @@ pub(super) fn pays(candidates: &[Candidate], with: &Hypothesis, without: &Hypoth
         without.fit.cost - with.fit.cost,
     ];
     let unsure = unsure(gained, linear * with.fit.residuals.len());
-    without.score - with.score > unsure
+    unsure - (without.score - with.score)
 }
 
 /// True when every effect of `point` has `floor` times the strength of the catalogue's weakest.

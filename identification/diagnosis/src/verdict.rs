@@ -7,7 +7,7 @@ use super::adequacy::{Test, left_over};
 use super::fit::{Fit, Jacobian, evaluate, fit as refit, polish};
 use super::likelihood::{
     FLOOR, Hypothesis, MOST_EFFECTS, NEAR_NOISE, NEARLY_NOISE, PenalisedLikelihood, RIVAL_WITHIN,
-    ROUNDS, SETTLED, matters, named, pays,
+    ROUNDS, SETTLED, lacks, matters, named, pays,
 };
 use super::model::{Candidate, ExtensibleModel, Point, Role, Scale};
 use super::progress::{Observer, Progress, Step};
@@ -541,6 +541,40 @@ fn weigh<M: ExtensibleModel>(
         (true, true, true) => Verdict::Named,
         (true, true, false) => Verdict::Ambiguous,
     };
+    let explains = |own: &Hypothesis| {
+        let nominal = excess(nominal_square);
+        if nominal > 0.0 {
+            1.0 - excess(own.mean_square()) / nominal
+        } else {
+            0.0
+        }
+    };
+    // What a model has beside the best one did not pay.
+    let weighed = first.iter().chain(&others);
+    let weighed = weighed.filter(|own| !named || !extends(&names(model, own), &best_names));
+    let weighed: Vec<&Hypothesis> = weighed.take(CANDIDATES).collect();
+    let odds = |own: &Hypothesis| {
+        let behind = if named {
+            own.score - best.score
+        } else {
+            lacks(model.candidates(), own, &best)
+        };
+        (-0.5 * behind.max(0.0)).exp()
+    };
+    let of_nominal = if named { 0.0 } else { 1.0 };
+    let all_odds = of_nominal + weighed.iter().map(|own| odds(own)).sum::<f64>();
+    let candidates: Vec<WeighedModel> = weighed
+        .into_iter()
+        .map(|own| {
+            let deviations = own.jacobian.deviations(model, &own.fit).unwrap_or_default();
+            WeighedModel {
+                point: own.fit.point.clone(),
+                effects: estimates(model.candidates(), &own.fit.point, &deviations),
+                weight: odds(own) / all_odds,
+                explains: explains(own),
+            }
+        })
+        .collect();
     // What is told of the effects rests on all records, as long as the model holds on them.
     let (all, jacobian) = match joint_jacobian.filter(|_| adequate) {
         Some(jacobian) => (joint_fit, jacobian),
@@ -559,27 +593,6 @@ fn weigh<M: ExtensibleModel>(
         ablation::unseen_gain(model, own, without, held_out)
     });
     let unseen_gains = unseen_gains.collect();
-    let explains = |own: &Hypothesis| {
-        let nominal = excess(nominal_square);
-        if nominal > 0.0 {
-            1.0 - excess(own.mean_square()) / nominal
-        } else {
-            0.0
-        }
-    };
-    let lowest = first.as_ref().map_or(0.0, |own| own.score);
-    let weighed = first.iter().chain(&others).take(CANDIDATES);
-    let candidates: Vec<WeighedModel> = weighed
-        .map(|own| {
-            let deviations = own.jacobian.deviations(model, &own.fit).unwrap_or_default();
-            WeighedModel {
-                point: own.fit.point.clone(),
-                effects: estimates(model.candidates(), &own.fit.point, &deviations),
-                weight: (-0.5 * (own.score - lowest)).exp() / weight,
-                explains: explains(own),
-            }
-        })
-        .collect();
     let deviations = jacobian.deviations(model, &all).unwrap_or_default();
     let mut effects = estimates(model.candidates(), &all.point, &deviations);
     let mut nuisance_errors = deviations;

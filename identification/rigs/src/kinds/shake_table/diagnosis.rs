@@ -28,6 +28,9 @@ use recordings::{Channel, OUTPUT_NAMES, Recording};
 
 /// Standard deviations to either side of an estimate that hold the truth in 95 of 100 cases.
 const INTERVAL_95: f64 = 1.96;
+/// Standard deviations by which an effect predicts an unseen record better, from which on it is there, even where its
+/// parameters make up for each other.
+const PROVEN: f64 = 3.0;
 
 /// The effect of the mains in the catalogue.
 const MAINS: &str = "mains_hum";
@@ -297,7 +300,9 @@ pub fn diagnose(case: &Case, observer: Observer<'_>) -> Result<Diagnosis, CaseEr
         }
     }
     if judgement.verdict != Verdict::Unexplained {
-        doubts.extend(judgement.effects.iter().filter_map(indistinct));
+        let effects = judgement.effects.iter().zip(&judgement.unseen_gains);
+        let unproven = effects.filter(|(_, gain)| gain.is_none_or(|gain| gain < PROVEN));
+        doubts.extend(unproven.filter_map(|(own, _)| indistinct(own)));
     }
     if !doubts.is_empty() || loudest(&model.noise, &model.stated_noise, model.period) > TOO_LOUD {
         judgement.verdict = Verdict::Unexplained;

@@ -8,6 +8,10 @@ use diagnosis::{Candidate, EffectParameter, Role, Scale};
 /// ridges.
 const DELAYS: [f64; 6] = [0.003, 0.0045, 0.0065, 0.009, 0.013, 0.018];
 
+/// Effects of the linear part that no noise looks like: what one sensor shows of the motion that another one shows as
+/// well, whatever drives it.
+const OF_KINEMATICS: [&str; 1] = ["accelerometer_tilt"];
+
 /// Every candidate with its effect, for records whose largest command is `peak_command` (V),
 /// sampled every `period` s.
 pub fn catalogue(peak_command: f64, period: f64) -> Vec<(Candidate, &'static Effect)> {
@@ -42,7 +46,7 @@ fn candidate(effect: &'static Effect, peak_command: f64, period: f64) -> Candida
         tolerance: effect.tolerance,
         contains: effect.contains,
         law: effect.law,
-        is_linear: effect.is_linear,
+        is_linear: effect.is_linear && !OF_KINEMATICS.contains(&effect.name),
     }
 }
 
