@@ -2,7 +2,7 @@
 
 use identification::diagnosis::engine::Verdict;
 use identification::diagnosis::rigs::foreign::KIND;
-use identification::diagnosis::rigs::shake_table::{laboratory_unit, with_error};
+use identification::diagnosis::rigs::shake_table::{change, laboratory_unit, with_error};
 use identification::diagnosis::rigs::{PartReport, RigDiagnosis, is_undetermined};
 use identification::diagnosis::{
     DiagnosisReport, Evidence, GainReport, ParameterReport, ShakeTableEvidence,
@@ -130,21 +130,6 @@ pub(super) fn share(gain: &GainReport) -> String {
     let (low, high) = gain.interval_95;
     let change = change([100.0 * low, 100.0 * high]);
     format!("The error {change} (95 %, block bootstrap)")
-}
-
-/// How an error changes that falls by so many percent, such as "falls by 3 to 5 %".
-fn change([low, high]: [f64; 2]) -> String {
-    let decimals = usize::from(high - low < 2.0);
-    let unit = 10_f64.powi(-(decimals as i32));
-    // Adding 0 takes the sign from a zero.
-    let [low, high] = [low, high].map(|own| (own / unit).round() * unit + 0.0);
-    let [from, to] = [low.abs(), high.abs()].map(|own| format!("{own:.decimals$}"));
-    match (low < 0.0, high > 0.0) {
-        (false, false) => format!("changes by less than {unit} %"),
-        (true, false) => format!("rises by {to} to {from} %"),
-        (true, true) => format!("may rise by {from} % or fall by {to} %"),
-        (false, true) => format!("falls by {from} to {to} %"),
-    }
 }
 
 /// What else the reader should know, a line each.
@@ -332,7 +317,7 @@ pub fn text(report: &DiagnosisReport) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{ParameterReport, change, in_unit, interval};
+    use super::{ParameterReport, in_unit, interval};
 
     #[test]
     fn a_value_that_is_not_determined_has_no_interval() {
@@ -346,19 +331,5 @@ mod tests {
         assert_eq!(interval(&force, "N"), "not determined");
         assert_eq!(in_unit(&found(0.25, 1e4, "1"), "1"), "about 0.250");
         assert!(interval(&found(50.0, 3.0, "N"), "N").contains("to"));
-    }
-
-    #[test]
-    fn a_change_is_said_by_its_sign() {
-        for (interval, said) in [
-            ([31.2, 52.6], "falls by 31 to 53 %"),
-            ([0.04, 0.61], "falls by 0.0 to 0.6 %"),
-            ([-0.04, 0.03], "changes by less than 0.1 %"),
-            ([-0.3, 0.4], "may rise by 0.3 % or fall by 0.4 %"),
-            ([-12.0, -7.0], "rises by 7 to 12 %"),
-            ([-12.0, -0.2], "rises by 0 to 12 %"),
-        ] {
-            assert_eq!(change(interval), said);
-        }
     }
 }

@@ -86,6 +86,37 @@ fn capitalised(text: &str) -> String {
     })
 }
 
+/// Share by which an error falls at least that is told by its begin and its end.
+const CLEAR_FALL: f64 = 0.03;
+
+fn falls(gain: &Gain) -> String {
+    let (before, after) = (gain.before_ratio, gain.after_ratio);
+    if after < (1.0 - CLEAR_FALL) * before {
+        return format!(
+            "the error on the validation record falls from {before:.2} to {after:.2} times the noise floor"
+        );
+    }
+    let change = change(gain.interval_95.map(|share| 100.0 * share));
+    format!(
+        "the error on the validation record {change} (95 %) and is {after:.2} times the noise floor"
+    )
+}
+
+/// How an error changes that falls by so many percent, such as "falls by 3 to 5 %".
+pub fn change([low, high]: [f64; 2]) -> String {
+    let decimals = usize::from(high - low < 2.0);
+    let unit = 10_f64.powi(-(decimals as i32));
+    // Adding 0 takes the sign from a zero.
+    let [low, high] = [low, high].map(|own| (own / unit).round() * unit + 0.0);
+    let [from, to] = [low.abs(), high.abs()].map(|own| format!("{own:.decimals$}"));
+    match (low < 0.0, high > 0.0) {
+        (false, false) => format!("changes by less than {unit} %"),
+        (true, false) => format!("rises by {to} to {from} %"),
+        (true, true) => format!("may rise by {from} % or fall by {to} %"),
+        (false, true) => format!("falls by {from} to {to} %"),
+    }
+}
+
 /// The sentence.
 pub(super) fn sentence(
     verdict: Verdict,
@@ -98,10 +129,7 @@ pub(super) fn sentence(
     let causes: Vec<String> = effects.iter().map(said).collect();
     let causes = capitalised(&causes.join(" and "));
     let it = if effects.len() > 1 { "them" } else { "it" };
-    let falls = format!(
-        "the error on the validation record falls from {:.2} to {:.2} times the noise floor",
-        gain.before_ratio, gain.after_ratio
-    );
+    let falls = falls(gain);
     match verdict {
         Verdict::Adequate => format!(
             "The nominal model is adequate: with its parameters refitted the error on the validation \
@@ -235,6 +263,47 @@ mod tests {
         ] {
             assert_eq!(amount(&estimate(value, error, si), unit), want);
         }
+    }
+
+    #[test]
+    fn a_change_is_said_by_its_sign() {
+        for (interval, said) in [
+            ([31.2, 52.6], "falls by 31 to 53 %"),
+            ([0.04, 0.61], "falls by 0.0 to 0.6 %"),
+            ([-0.04, 0.03], "changes by less than 0.1 %"),
+            ([-0.3, 0.4], "may rise by 0.3 % or fall by 0.4 %"),
+            ([-12.0, -7.0], "rises by 7 to 12 %"),
+            ([-12.0, -0.2], "rises by 0 to 12 %"),
+        ] {
+            assert_eq!(change(interval), said);
+        }
+    }
+
+    #[test]
+    fn an_error_that_hardly_falls_is_told_by_how_much_it_does() {
+        let told = |before_ratio, after_ratio, interval_95| {
+            falls(&Gain {
+                channels: Vec::new(),
+                before_nrmse: 0.3,
+                after_nrmse: 0.3,
+                noise_floor_nrmse: 0.3,
+                before_ratio,
+                after_ratio,
+                interval_95,
+            })
+        };
+        assert_eq!(
+            told(1.34, 1.01, [0.2, 0.3]),
+            "the error on the validation record falls from 1.34 to 1.01 times the noise floor"
+        );
+        assert_eq!(
+            told(1.004, 0.998, [0.003_2, 0.008_8]),
+            "the error on the validation record falls by 0.3 to 0.9 % (95 %) and is 1.00 times the noise floor"
+        );
+        assert_eq!(
+            told(1.0, 1.0, [-1e-6, 2e-6]),
+            "the error on the validation record changes by less than 0.1 % (95 %) and is 1.00 times the noise floor"
+        );
     }
 
     #[test]
