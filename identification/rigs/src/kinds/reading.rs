@@ -314,10 +314,10 @@ impl Description {
             return match self.windows {
                 None => Ok(()),
                 Some(_) => Err(self.wrong(format!(
-                    "`windows` does not apply to kind {}: expected it only for rigs without a \
-                     restoring force, such as {}",
-                    rig.kind(),
-                    listed(&anew())
+                    "`windows` is for rigs without a restoring force, such as {}; leave it out for \
+                     kind {}",
+                    listed(&anew()),
+                    rig.kind()
                 ))),
             };
         }
