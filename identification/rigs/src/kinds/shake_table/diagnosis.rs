@@ -27,7 +27,7 @@ use diagnosis::{FLOOR, Observer, Point, Role, SUREST, Test, Verdict, WeighedMode
 use recordings::{Channel, OUTPUT_NAMES, Recording};
 
 /// Standard deviations to either side of an estimate that hold the truth in 95 of 100 cases.
-const INTERVAL_95: f64 = 1.96;
+pub(super) const INTERVAL_95: f64 = 1.96;
 /// Standard deviations by which an effect predicts an unseen record better, from which on it is there, even where its
 /// parameters make up for each other.
 const PROVEN: f64 = 3.0;

@@ -1,18 +1,18 @@
 //! A verdict as one sentence for a laboratory engineer.
 
 use super::course::Course;
-use super::diagnosis::Finding;
+use super::diagnosis::{Finding, INTERVAL_95};
 use super::gain::Gain;
 use diagnosis::Test;
 use diagnosis::{NamedEffect, ParameterEstimate, Verdict, WeighedModel};
 use plant::identified::effects::{find, quantity::laboratory_unit};
 use units::convert;
 
-/// Value and standard error of `parameter` in `unit`, as [`with_error`] writes them.
+/// Value and half of the 95 % interval of `parameter` in `unit`, as [`with_error`] writes them.
 pub fn amount(parameter: &ParameterEstimate, unit: &str) -> String {
     with_error(
         parameter.value,
-        parameter.standard_error,
+        INTERVAL_95 * parameter.standard_error,
         parameter.unit,
         unit,
     )
@@ -220,7 +220,7 @@ pub(super) fn of_findings(findings: &[Finding]) -> String {
         format!(
             "`{}` is {}, stated {}",
             own.parameter,
-            with_error(own.found, own.standard_error, &own.unit, unit),
+            with_error(own.found, INTERVAL_95 * own.standard_error, &own.unit, unit),
             with_error(own.stated, 0.0, &own.unit, unit),
         )
     });
@@ -261,8 +261,10 @@ mod tests {
             (2.4e-6, 1e-8, "V s/N", "V s/N", "(2.400 ± 0.010)e-6 V s/N"),
             (4321.0, 250.0, "N", "N", "4321 ± 250 N"),
         ] {
-            assert_eq!(amount(&estimate(value, error, si), unit), want);
+            assert_eq!(with_error(value, error, si, unit), want);
         }
+        let late = estimate(0.01206, 5e-5, "s");
+        assert_eq!(amount(&late, "ms"), "12.06 ± 0.10 ms");
     }
 
     #[test]
@@ -361,7 +363,7 @@ mod tests {
         };
         assert_eq!(
             said(&friction),
-            "the table has dry friction of 1.000 ± 0.010 lbf and 2.00 ± 0.04 lbf more to break away"
+            "the table has dry friction of 1.000 ± 0.019 lbf and 2.00 ± 0.09 lbf more to break away"
         );
     }
 }
