@@ -190,7 +190,7 @@ fn measure_isolated(fmu: &PackedFmu) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let all = all_fmus()?.iter();
+    let all = all_fmus()?.into_iter();
     let third: Vec<_> = all.filter(|fmu| fmu.version == FmiVersion::V3).collect();
     for fmu in &third {
         measure(fmu)?;

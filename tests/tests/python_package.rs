@@ -68,9 +68,9 @@ fn a_study_on_dask_is_that_of_the_program_though_a_worker_is_killed() {
 /// A loop of the importers' pages; what it printed.
 fn example(script: &str, version: FmiVersion) -> String {
     let file = |name: &str| {
-        let mut all = pack::all_fmus().unwrap().iter();
+        let mut all = pack::all_fmus().unwrap().into_iter();
         let found = all.find(|fmu| fmu.version == version && fmu.name == name);
-        found.unwrap().path.clone()
+        found.unwrap().path
     };
     let mut command = python();
     command.arg(importers().join("../../docs/importing").join(script));

@@ -8,7 +8,7 @@ use fmi_import::FmiVersion;
 use fmi_ssp::export::{self, Carrying, Player, Start, Supply};
 use fmi_system::{Component, System};
 use motion::Motion;
-use pack::StartValue;
+use pack::{Installation, StartValue};
 
 use crate::error::Error;
 use crate::results::Out;
@@ -32,6 +32,8 @@ pub struct Experiment<'a> {
     pub algorithm: String,
     /// Version of FMI of the component that plays the motion.
     pub fmi: FmiVersion,
+    /// Where it comes from.
+    pub installation: Installation,
 }
 
 impl Supply for Experiment<'_> {
@@ -39,7 +41,7 @@ impl Supply for Experiment<'_> {
         let Some(motion) = self.motion else {
             return Ok(None);
         };
-        let all = pack::all_fmus()?;
+        let all = self.installation.fmus()?;
         let found = all
             .iter()
             .find(|fmu| fmu.name == PLAYER && fmu.version == self.fmi);
@@ -86,12 +88,17 @@ impl Supply for Experiment<'_> {
 ///
 /// # Errors
 /// A model that cannot be read, or a file that exists.
-pub fn write_model(model: &Path, version: FmiVersion, out: &Out) -> Result<(), Error> {
+pub fn write_model(
+    model: &Path,
+    version: FmiVersion,
+    installation: &Installation,
+    out: &Out,
+) -> Result<(), Error> {
     let fault = |path: &Path, reason: String| Error::File {
         path: path.to_path_buf(),
         reason,
     };
-    let bytes = opensees::fmu_of(model, version);
+    let bytes = opensees::fmu_of(model, version, installation);
     let bytes = bytes.map_err(|error| fault(model, error.to_string()))?;
     if out.exists() && !out.replaces() {
         let reason = "exists already; name another file, or add --force".to_string();

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::PackedFmu;
 use crate::program::{self, VERSION};
-use crate::supply::{self, Origin};
+use crate::supply::{self, Installation, Origin};
 use fmi_import::{FmiVersion, Fmu, Instance, Isolation, Options, Processes};
 
 /// How an examined part is.
@@ -72,11 +72,11 @@ const PACKAGES: [(&str, &str, &str); 4] = [
 ];
 
 /// Examines the installation.
-pub fn examine() -> Examination {
+pub fn examine(installation: &Installation) -> Examination {
     let mut findings = vec![folder_for_results(), temporary_folder()];
-    let folder = supply::folder().ok();
-    findings.extend(components());
-    findings.push(own_process());
+    let folder = installation.folder().ok();
+    findings.extend(components(installation));
+    findings.push(own_process(installation));
     findings.push(cargo());
     findings.extend(packages());
     findings.push(opensees());
@@ -129,7 +129,7 @@ fn temporary_folder() -> Finding {
 }
 
 /// The components: those that are there, whole, of this version, and that can be loaded here.
-fn components() -> Vec<Finding> {
+fn components(installation: &Installation) -> Vec<Finding> {
     let finding = |part, state, found, cure: Option<&str>| Finding {
         part,
         state,
@@ -137,7 +137,7 @@ fn components() -> Vec<Finding> {
         needed_for: "run, compare, diagnose",
         cure: cure.map(String::from),
     };
-    let all = match supply::all_fmus() {
+    let all = match installation.fmus() {
         Ok(all) => all,
         Err(error) => {
             let reason = error.to_string();
@@ -161,7 +161,7 @@ fn components() -> Vec<Finding> {
     let mut platforms: BTreeMap<String, usize> = BTreeMap::new();
     let mut faults = Vec::new();
     for fmu in all {
-        match load(fmu) {
+        match load(fmu, installation) {
             Ok(found) => {
                 for platform in found {
                     *platforms.entry(platform).or_default() += 1;
@@ -188,20 +188,21 @@ fn components() -> Vec<Finding> {
 }
 
 /// The platforms of a component that is whole and can be instantiated here.
-fn load(fmu: &PackedFmu) -> Result<Vec<String>, Box<dyn Error>> {
+fn load(fmu: &PackedFmu, installation: &Installation) -> Result<Vec<String>, Box<dyn Error>> {
     supply::check(fmu)?;
     let opened = Fmu::open_own(&fmu.path)?;
-    Instance::new(&opened, "doctor", &program::options())?;
+    Instance::new(&opened, "doctor", &installation.options())?;
     Ok(opened.platforms.clone())
 }
 
 /// Whether FMUs can be run in a process of their own.
-fn own_process() -> Finding {
+fn own_process(installation: &Installation) -> Finding {
     let options = Options {
         isolation: Isolation::All,
-        ..program::options()
+        ..installation.options()
     };
-    let tried = supply::all_fmus()
+    let tried = installation
+        .fmus()
         .map_err(|error| error.to_string())
         .and_then(|all| all.first().ok_or_else(|| "no FMU for the test".to_string()))
         .and_then(|fmu| Fmu::open_own(&fmu.path).map_err(|error| error.to_string()))

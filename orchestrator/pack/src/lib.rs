@@ -34,7 +34,7 @@ pub use merge::merge;
 use notices::Notices;
 use packing::Form;
 pub use platform::{Platform, UnknownPlatform};
-pub use supply::all_fmus;
+pub use supply::{Installation, all_fmus};
 pub use variant::{StartValue, variant_bytes, with_resource, write_variant};
 use workspace::{Component, Workspace};
 

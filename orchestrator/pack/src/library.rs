@@ -7,13 +7,13 @@ use std::sync::Arc;
 
 use fmi_import::{CURE, Description, FmiVersion, Fmu, FmuError};
 use fmi_system::{Files, Library, SystemFile, Value};
-use units::hint;
 
-use crate::{PackedFmu, parameter_sets, supply};
+use crate::{Installation, parameter_sets};
 
 /// FMUs by the name that a system file gives them, each opened once.
 pub struct FmuLibrary {
     version: FmiVersion,
+    installation: Installation,
     files: Files,
     /// Components of this project.
     own: HashMap<PathBuf, Arc<Fmu>>,
@@ -26,9 +26,19 @@ impl FmuLibrary {
     pub fn new(version: FmiVersion, directory: Option<&Path>) -> Self {
         Self {
             version,
+            installation: Installation::default(),
             files: Files::in_directory(directory),
             own: HashMap::new(),
             given: HashMap::new(),
+        }
+    }
+
+    /// The same with own components of an installation.
+    #[must_use]
+    pub fn from(self, installation: &Installation) -> Self {
+        Self {
+            installation: installation.clone(),
+            ..self
         }
     }
 
@@ -58,7 +68,7 @@ impl Library for FmuLibrary {
         if self.files.is_file(name) {
             return self.files.fmu(name);
         }
-        let path = &component(name, self.version)?.path;
+        let path = &self.installation.component(name, self.version)?.path;
         if let Some(fmu) = self.own.get(path) {
             return Ok(fmu.clone());
         }
@@ -79,27 +89,4 @@ impl Library for FmuLibrary {
     ) -> Result<Vec<(usize, Value)>, Box<dyn Error + Send + Sync>> {
         Ok(parameter_sets::parameters(set, component, directory)?)
     }
-}
-
-/// The packed FMU of a component of this project, checked.
-///
-/// # Errors
-/// An unknown name (with the nearest one), components that cannot be found or built, an FMU that is
-/// damaged or of another version.
-pub fn component(name: &str, version: FmiVersion) -> Result<&'static PackedFmu, Box<dyn Error>> {
-    let packed: Vec<&PackedFmu> = supply::all_fmus()?
-        .iter()
-        .filter(|fmu| fmu.version == version)
-        .collect();
-    let Some(&found) = packed.iter().find(|fmu| fmu.name == name) else {
-        let known = packed.iter().map(|fmu| fmu.name.as_str());
-        let hint = hint(name, known);
-        return Err(format!(
-            "`{name}` is neither a path to an .fmu file nor a component in {}{hint}",
-            supply::folder()?.path.join(version.folder()).display()
-        )
-        .into());
-    };
-    supply::check(found)?;
-    Ok(found)
 }

@@ -3,7 +3,6 @@
 use std::{
     fs::{self, File},
     path::Path,
-    sync::{Mutex, PoisonError},
 };
 
 use rayon::prelude::*;
@@ -34,10 +33,8 @@ pub(super) fn pack(
     out: &Path,
     form: Form,
 ) -> Result<Vec<PackedFmu>, PackError> {
-    // One process at a time builds and packs: the first does the work, the others find it
-    // done. Threads of one process share the lock of the file, so they need one of their own.
-    static THREADS: Mutex<()> = Mutex::new(());
-    let _turn = THREADS.lock().unwrap_or_else(PoisonError::into_inner);
+    // One at a time builds and packs: the first does the work, the others find it done. Each opens the file of the
+    // lock anew, so that it holds between threads too.
     fs::create_dir_all(out).map_err(file_error(out))?;
     let lock_path = out.join(".lock");
     let lock = File::create(&lock_path).map_err(file_error(&lock_path))?;

@@ -135,4 +135,16 @@ mod tests {
         assert!("x86_64-windwos".parse::<Platform>().is_err());
         assert!(Platform::here().is_some());
     }
+
+    #[test]
+    fn cargo_names_libraries_as_each_system_does() {
+        for (platform, file) in [
+            ("x86_64-linux", "libA.so"),
+            ("aarch64-darwin", "libA.dylib"),
+            ("x86_64-windows", "A.dll"),
+        ] {
+            let platform: Platform = platform.parse().unwrap();
+            assert_eq!(platform.library_file("A"), file);
+        }
+    }
 }

@@ -4,9 +4,6 @@ use std::env;
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-
-use fmi_import::Options;
 
 /// Its version, which is that of its components too.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -27,16 +24,8 @@ pub fn file() -> io::Result<PathBuf> {
     Ok(found.canonicalize().unwrap_or(found))
 }
 
-/// Whether this is the program, whatever its file is called.
-static IS_PROGRAM: AtomicBool = AtomicBool::new(false);
-
-/// Notes that this process runs the program, and not a test or another program with its libraries.
-pub fn declare() {
-    IS_PROGRAM.store(true, Ordering::Relaxed);
-}
-
-/// The program that carries out calls of FMUs in processes of their own: the one named in
-/// `SHAKEBENCH_PROGRAM`, this one, or one beside it (a test's program lies in a folder below).
+/// The program that carries out calls of FMUs in processes of their own: the one named in `SHAKEBENCH_PROGRAM`, this one
+/// if it has the name, or one beside it. A test's program lies in a folder below.
 #[must_use]
 pub fn guest() -> Option<PathBuf> {
     if let Some(named) = env::var_os("SHAKEBENCH_PROGRAM") {
@@ -45,7 +34,7 @@ pub fn guest() -> Option<PathBuf> {
     let name = format!("shakebench{}", env::consts::EXE_SUFFIX);
     let own = file().ok()?;
     let is_called = own.file_name().is_some_and(|file| file == name.as_str());
-    if is_called || IS_PROGRAM.load(Ordering::Relaxed) {
+    if is_called {
         return Some(own);
     }
     own.ancestors()
@@ -53,16 +42,6 @@ pub fn guest() -> Option<PathBuf> {
         .take(2)
         .map(|folder| folder.join(&name))
         .find(|path| path.is_file())
-}
-
-/// How FMUs run by default: in this process, and where one must be alone in one of
-/// [`guest`].
-#[must_use]
-pub fn options() -> Options {
-    Options {
-        guest: guest(),
-        ..Options::default()
-    }
 }
 
 /// The file that a shell starts under a name, which may be a path.

@@ -6,7 +6,7 @@ use std::{
     fs::File,
     io::{self, Read},
     path::{Path, PathBuf},
-    sync::OnceLock,
+    sync::{Arc, OnceLock},
 };
 
 use roxmltree::Document;
@@ -18,7 +18,8 @@ use super::error::PackError;
 use super::up_to_date::{self, Sources};
 use super::workspace::Workspace;
 use crate::program::{self, VERSION};
-use fmi_import::FmiVersion;
+use fmi_import::{FmiVersion, Options};
+use units::hint;
 
 /// The environment variable that names a folder of packed FMUs.
 pub const VARIABLE: &str = "SHAKEBENCH_FMUS";
@@ -46,73 +47,145 @@ pub struct Folder {
     pub origin: Origin,
 }
 
-static NAMED: OnceLock<PathBuf> = OnceLock::new();
+/// The project's components as a program has them, and the program that runs FMUs in processes of their own. Copies
+/// share what was found.
+#[derive(Debug, Clone, Default)]
+pub struct Installation(Arc<Parts>);
 
-/// Takes components from a folder for the rest of this process. The first call counts.
-pub fn take_from(folder: &Path) {
-    let _ = NAMED.set(folder.to_path_buf());
+#[derive(Debug, Default)]
+struct Parts {
+    named: Option<PathBuf>,
+    guest: Option<PathBuf>,
+    fmus: OnceLock<Result<Vec<PackedFmu>, String>>,
 }
 
-/// The folder that components come from. In a workspace it may lack some until they are built.
-///
-/// # Errors
-/// When there is none; the message says where it was looked for.
-pub fn folder() -> Result<Folder, PackError> {
-    let chosen = |path: PathBuf, origin| Ok(Folder { path, origin });
-    if let Some(path) = NAMED.get() {
-        return chosen(path.clone(), Origin::Option);
-    }
-    if let Some(path) = env::var_os(VARIABLE).filter(|path| !path.is_empty()) {
-        return chosen(path.into(), Origin::Environment);
-    }
-    let beside = beside_program();
-    if let Some(path) = beside.iter().find(|path| holds_fmus(path)) {
-        return chosen(path.clone(), Origin::BesideProgram);
-    }
-    match Workspace::find() {
-        Ok(workspace) => chosen(workspace.fmus(), Origin::Workspace),
-        Err(_) => Err(PackError::NoFmus { beside }),
+/// Two are equal if they name the same folder and the same program, whatever is found there.
+impl PartialEq for Installation {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.named == other.0.named && self.0.guest == other.0.guest
     }
 }
 
-/// All FMUs of both versions, found or built at most once in a process.
-///
-/// # Errors
-/// No folder, one without FMUs, or components that do not build.
-pub fn all_fmus() -> Result<&'static [PackedFmu], PackError> {
-    static FMUS: OnceLock<Result<Vec<PackedFmu>, String>> = OnceLock::new();
-    let fmus = FMUS.get_or_init(|| find_all().map_err(|error| error.to_string()));
-    fmus.as_deref().map_err(|e| PackError::Earlier(e.clone()))
-}
+impl Installation {
+    /// Components of the folder `named`, FMUs in processes of the program `guest`; none: those that are found.
+    #[must_use]
+    pub fn new(named: Option<PathBuf>, guest: Option<PathBuf>) -> Self {
+        Self(Arc::new(Parts {
+            named,
+            guest,
+            fmus: OnceLock::new(),
+        }))
+    }
 
-fn find_all() -> Result<Vec<PackedFmu>, PackError> {
-    let Folder { path, origin } = folder()?;
-    if origin == Origin::Workspace {
-        let workspace = Workspace::find()?;
-        if let Some(fmus) = up_to_date::packed(&workspace, &path) {
-            return Ok(fmus);
+    /// The folder that components come from. In a workspace it may lack some until they are built.
+    ///
+    /// # Errors
+    /// When there is none; the message says where it was looked for.
+    pub fn folder(&self) -> Result<Folder, PackError> {
+        let chosen = |path: PathBuf, origin| Ok(Folder { path, origin });
+        if let Some(path) = &self.0.named {
+            return chosen(path.clone(), Origin::Option);
         }
-        let sources = Sources::read(&workspace);
-        match super::build_fmus(&path, &FmiVersion::ALL) {
-            // Without cargo those that are there have to do.
-            Err(PackError::NoCargo { .. }) if holds_fmus(&path) => {}
-            Err(error) => return Err(error),
-            Ok(fmus) => {
-                if let Some(sources) = sources {
-                    sources.note(&path, &fmus);
-                }
+        if let Some(path) = env::var_os(VARIABLE).filter(|path| !path.is_empty()) {
+            return chosen(path.into(), Origin::Environment);
+        }
+        let beside = beside_program();
+        if let Some(path) = beside.iter().find(|path| holds_fmus(path)) {
+            return chosen(path.clone(), Origin::BesideProgram);
+        }
+        match Workspace::find() {
+            Ok(workspace) => chosen(workspace.fmus(), Origin::Workspace),
+            Err(_) => Err(PackError::NoFmus { beside }),
+        }
+    }
+
+    /// All FMUs of both versions, found or built at most once.
+    ///
+    /// # Errors
+    /// No folder, one without FMUs, or components that do not build.
+    pub fn fmus(&self) -> Result<&[PackedFmu], PackError> {
+        let find = || self.find_all().map_err(|error| error.to_string());
+        let fmus = self.0.fmus.get_or_init(find);
+        fmus.as_deref().map_err(|e| PackError::Earlier(e.clone()))
+    }
+
+    /// The packed FMU of a component of this project, checked.
+    ///
+    /// # Errors
+    /// An unknown name (with the nearest one), components that cannot be found or built, an FMU that is
+    /// damaged or of another version.
+    pub fn component(
+        &self,
+        name: &str,
+        version: FmiVersion,
+    ) -> Result<&PackedFmu, Box<dyn std::error::Error>> {
+        let own = |fmu: &&PackedFmu| fmu.version == version;
+        let packed: Vec<&PackedFmu> = self.fmus()?.iter().filter(own).collect();
+        let Some(&found) = packed.iter().find(|fmu| fmu.name == name) else {
+            let known = packed.iter().map(|fmu| fmu.name.as_str());
+            let hint = hint(name, known);
+            return Err(format!(
+                "`{name}` is neither a path to an .fmu file nor a component in {}{hint}",
+                self.folder()?.path.join(version.folder()).display()
+            )
+            .into());
+        };
+        check(found)?;
+        Ok(found)
+    }
+
+    /// The program that carries out calls of FMUs in processes of their own.
+    #[must_use]
+    pub fn guest(&self) -> Option<PathBuf> {
+        self.0.guest.clone().or_else(program::guest)
+    }
+
+    /// How FMUs run by default: in this process, and where one must be alone in one of [`Self::guest`].
+    #[must_use]
+    pub fn options(&self) -> Options {
+        Options {
+            guest: self.guest(),
+            ..Options::default()
+        }
+    }
+
+    fn find_all(&self) -> Result<Vec<PackedFmu>, PackError> {
+        let Folder { path, origin } = self.folder()?;
+        if origin == Origin::Workspace {
+            let workspace = Workspace::find()?;
+            if let Some(fmus) = up_to_date::packed(&workspace, &path) {
                 return Ok(fmus);
             }
+            let sources = Sources::read(&workspace);
+            match super::build_fmus(&path, &FmiVersion::ALL) {
+                // Without cargo those that are there have to do.
+                Err(PackError::NoCargo { .. }) if holds_fmus(&path) => {}
+                Err(error) => return Err(error),
+                Ok(fmus) => {
+                    if let Some(sources) = sources {
+                        sources.note(&path, &fmus);
+                    }
+                    return Ok(fmus);
+                }
+            }
         }
+        let found = fmus_in(&path)?;
+        if found.is_empty() {
+            return Err(PackError::EmptyFolder {
+                by: origin.words(),
+                folder: path,
+            });
+        }
+        Ok(found)
     }
-    let found = fmus_in(&path)?;
-    if found.is_empty() {
-        return Err(PackError::EmptyFolder {
-            by: origin.words(),
-            folder: path,
-        });
-    }
-    Ok(found)
+}
+
+/// All FMUs of both versions, as an [`Installation`] by default finds them.
+///
+/// # Errors
+/// As [`Installation::fmus`].
+pub fn all_fmus() -> Result<Vec<PackedFmu>, PackError> {
+    Installation::default().find_all()
 }
 
 /// Checks that an FMU of the project is whole and of this program's version.
@@ -180,5 +253,55 @@ impl Origin {
             Self::BesideProgram => "beside the program",
             Self::Workspace => "of the workspace",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn empty(folder: &Path, file: &str) {
+        fs::create_dir_all(folder.join(file).parent().unwrap()).unwrap();
+        fs::write(folder.join(file), "").unwrap();
+    }
+
+    #[test]
+    fn two_installations_have_components_of_their_own() {
+        let [one, other] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        empty(one.path(), "fmi3/One.fmu");
+        empty(one.path(), "fmi2/One.fmu");
+        empty(one.path(), "fmi3/notes.txt");
+        empty(other.path(), "fmi3/Other.fmu");
+        let [first, second] =
+            [&one, &other].map(|own| Installation::new(Some(own.path().into()), None));
+        let names = |own: &Installation| -> Vec<(String, FmiVersion)> {
+            let fmus = own.fmus().unwrap().iter();
+            fmus.map(|fmu| (fmu.name.clone(), fmu.version)).collect()
+        };
+        let both = FmiVersion::ALL.map(|version| ("One".to_string(), version));
+        assert_eq!(names(&first), both);
+        assert_eq!(names(&second), [("Other".to_string(), FmiVersion::V3)]);
+        assert_eq!(first.folder().unwrap().origin, Origin::Option);
+        // Copies share what was found; what appears later is not looked for.
+        empty(one.path(), "fmi3/Late.fmu");
+        assert_eq!(names(&first.clone()), both);
+        let told = first.component("Ome", FmiVersion::V3).unwrap_err();
+        let told = told.to_string();
+        assert!(told.contains("`Ome`") && told.contains("One"), "{told}");
+        // A file that is not an FMU is refused by its path.
+        let told = first.component("One", FmiVersion::V3).unwrap_err();
+        assert!(told.to_string().contains("One.fmu"), "{told}");
+    }
+
+    #[test]
+    fn an_empty_folder_is_refused_with_who_named_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let own = Installation::new(Some(folder.path().into()), Some("guest".into()));
+        let told = own.fmus().unwrap_err().to_string();
+        assert!(told.contains("named by --fmus"), "{told}");
+        assert_eq!(own.options().guest.as_deref(), Some(Path::new("guest")));
+        assert_eq!(own, own.clone());
+        assert_ne!(own, Installation::default());
     }
 }

@@ -143,3 +143,30 @@ fn change(
     }
     Ok(text)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resource_is_added_to_what_an_archive_holds() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("One.fmu");
+        let before: Entries = [
+            ("modelDescription.xml".to_string(), b"<a/>".to_vec()),
+            ("resources/motion.csv".to_string(), b"old".to_vec()),
+        ]
+        .into();
+        crate::write_archive(&path, &before, None).unwrap();
+        let bytes = with_resource(&path, "motion.csv", b"time\n".to_vec()).unwrap();
+        std::fs::write(&path, bytes).unwrap();
+        let after = with_resource(&path, "more/notes.txt", Vec::new()).unwrap();
+        std::fs::write(&path, after).unwrap();
+        let mut wanted = before;
+        wanted.insert("resources/motion.csv".to_string(), b"time\n".to_vec());
+        wanted.insert("resources/more/notes.txt".to_string(), Vec::new());
+        assert_eq!(read_archive(&path).unwrap(), wanted);
+        let gone = with_resource(&folder.path().join("Gone.fmu"), "a", Vec::new()).unwrap_err();
+        assert!(gone.to_string().contains("Gone.fmu"), "{gone}");
+    }
+}

@@ -256,3 +256,21 @@ fn kinds(target: &serde_json::Value, kind: &str) -> bool {
         .as_array()
         .is_some_and(|kinds| kinds.iter().any(|k| k == kind))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn licences_are_those_of_the_project() {
+        let licences = Workspace::find().unwrap().licences().unwrap();
+        let [apache, mit] = &licences[..] else {
+            panic!("{} licences", licences.len());
+        };
+        let holds = |text: &[u8], words: &str| String::from_utf8_lossy(text).contains(words);
+        assert_eq!(apache.0, "LICENSE-APACHE.txt");
+        assert!(holds(&apache.1, "Apache License"));
+        assert_eq!(mit.0, "LICENSE-MIT.txt");
+        assert!(holds(&mit.1, "WITHOUT WARRANTY OF ANY KIND"));
+    }
+}

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::out::{given, unused};
+use super::out::{given, installation, unused};
 use super::{interrupt, progress};
 use laboratory::error::Error;
 use laboratory::results::{Out, Results};
@@ -74,7 +74,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             });
         }
         let mut output = std::io::stdout().lock();
-        campaign::rows(&study, rows.clone(), &mut output)?;
+        campaign::rows(&study, rows.clone(), installation(), &mut output)?;
         return Ok(ExitCode::SUCCESS);
     }
     let folder = arguments.out.clone().map(given).unwrap_or_else(|| {
@@ -94,7 +94,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         jobs: arguments.jobs.map(usize::from),
     };
     let is_shown = std::sync::Once::new();
-    let bench = Bench::new(&study);
+    let bench = Bench::new(&study, installation());
     let carried = carry_out(&bench, &how, asked, &|Progress { done, of }| {
         is_shown.call_once(|| {
             progress::show(&bar, of as usize);
@@ -164,7 +164,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 }
 
 fn plan(study: &Study, folder: Option<&Out>, json: bool) -> Result<ExitCode, Error> {
-    let bench = Bench::new(study);
+    let bench = Bench::new(study, installation());
     bench.check()?;
     if let Some(folder) = folder {
         Results::check(folder)?;

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::OneVersion;
-use super::out::given;
+use super::out::{given, installation};
 use super::quantity::whole;
 use laboratory::commission::{self, Request, Verdict};
 use laboratory::error::Error;
@@ -99,6 +99,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         reference: arguments.reference.clone(),
         played: quantity("--played", &arguments.played, "s", 1.0, 600.0)?,
         fmi: arguments.fmi.into(),
+        installation: installation().clone(),
     };
     Results::check(&arguments.out)?;
     let tell = |step: &str| {

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::out::{given, unused};
+use super::out::{given, installation, unused};
 use super::quantity::{if_given, whole};
 use super::rig::RigArguments;
 use super::{figures, print_files, progress};
@@ -13,7 +13,7 @@ use laboratory::comparison::{self, Plan, Played, Progress};
 use laboratory::error::Error;
 use laboratory::results::Out;
 use laboratory::run::experiment::{Request, is_file};
-use laboratory::run::{manifest, perform};
+use laboratory::run::perform;
 use laboratory::run_comparison::{self, RunComparison};
 use laboratory::systems::built_in;
 use pages::report::columns::aligned;
@@ -203,7 +203,13 @@ fn systems_on_motions(arguments: &Arguments, systems: Vec<String>) -> Result<Exi
     let plan = Plan {
         systems,
         motions: played(arguments)?,
-        base: base(arguments, Request::built_in(built_in::DEFAULT_SYSTEM))?,
+        base: base(
+            arguments,
+            Request {
+                installation: installation().clone(),
+                ..Request::built_in(built_in::DEFAULT_SYSTEM)
+            },
+        )?,
     };
     let bar = progress::hidden_bar("{bar:40} {pos} of {len} runs, {eta} left");
     let found = comparison::compare(&plan, &|Progress { done, of }| {
@@ -278,7 +284,7 @@ fn with_new_runs(
     let first = finished.first().map(|run| run.join("manifest.json"));
     let first = first.unwrap_or_else(|| PathBuf::from("manifest.json"));
     // The parameters that were set are those of another system, unless the rig has them too.
-    let before = manifest::Manifest::read(&first)?.request;
+    let before = super::run::read_manifest(&first)?.request;
     let is_of_rig = |set: &String| set.starts_with("table.") || set.starts_with("specimen.");
     let request = Request {
         set: before

@@ -10,7 +10,7 @@ use clap::Args;
 use identification::diagnosis::DiagnosisReport;
 use identification::diagnosis::engine::{Deadline, Observer, Progress};
 
-use super::out::{given, unused};
+use super::out::{given, installation, unused};
 use super::{multivariable, progress};
 use fmi_import::Isolation;
 use identification::diagnosis::rigs::guess::Guess;
@@ -103,7 +103,9 @@ pub struct Arguments {
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if let Some(kind) = &arguments.template {
         let text = match &arguments.fmu {
-            Some(fmu) if kind.eq_ignore_ascii_case("map") => foreign::template(fmu)?,
+            Some(fmu) if kind.eq_ignore_ascii_case("map") => {
+                foreign::template(fmu, installation())?
+            }
             Some(_) => {
                 return Err(Error::Option {
                     option: "--template",
@@ -230,7 +232,15 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             };
             diagnose_files(&files, columns, effects, &folder, &tell, observer)
         }
-        None => diagnose_with(case, &arguments.data, columns, effects, &folder, observer),
+        None => diagnose_with(
+            case,
+            &arguments.data,
+            columns,
+            effects,
+            &folder,
+            installation(),
+            observer,
+        ),
     };
     bar.finish_and_clear();
     let report = report?;
@@ -287,7 +297,7 @@ fn of_fmu(
         map,
         &files.cloned().collect::<Vec<_>>(),
         folder,
-        arguments.isolate,
+        (arguments.isolate, installation()),
         observer,
     )
 }
@@ -299,6 +309,7 @@ fn with_model(arguments: &Arguments, path: &Path) -> Result<ExitCode, Error> {
         fmu: arguments.fmu.as_deref(),
         map: arguments.map.as_deref(),
         isolate: arguments.isolate,
+        installation: installation(),
     };
     if let Some(file) = &arguments.predict {
         let out = arguments.out.clone();

@@ -1,5 +1,6 @@
 //! `shakebench doctor`
 
+use super::out::installation;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -23,7 +24,7 @@ pub struct Arguments {
 /// # Errors
 /// None.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
-    let found = examine();
+    let found = examine(installation());
     if arguments.json {
         println!("{}", serde_json::json!(found));
     } else {

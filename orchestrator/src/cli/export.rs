@@ -7,7 +7,7 @@ use bridges::opensees;
 use clap::{Args, ValueEnum};
 
 use super::motion::MotionArguments;
-use super::out::is_forced;
+use super::out::{installation, is_forced};
 use super::quantity::if_given;
 use super::rig::RigArguments;
 use super::run;
@@ -87,7 +87,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 ),
             });
         };
-        write_model(model, fmi, &super::out::given(out))?;
+        write_model(model, fmi, installation(), &super::out::given(out))?;
         let note = "files that the model reads are not included, and it needs openseespy";
         return Ok(exported(arguments, out, &[note.to_string()]));
     }
@@ -120,6 +120,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         duration: prepared.samples as f64 * prepared.motion.dt,
         algorithm: prepared.algorithm.to_string(),
         fmi,
+        installation: installation().clone(),
     };
     let mut notes = write(&prepared.system, &experiment, ssp)?;
     if motion.is_none() {

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::out::unused;
+use super::out::{installation, unused};
 use super::{print_files, progress};
 use laboratory::error::Error;
 use laboratory::figures;
@@ -69,7 +69,7 @@ pub fn draw(
     };
     let bar = progress::spinner("drawing figures");
     let tell = |number: &str| progress::say(&bar, format!("figure {number}"));
-    let drawn = figures::figures(&numbers, record, &tell);
+    let drawn = figures::figures(&numbers, record, installation(), &tell);
     bar.finish_and_clear();
     let drawn = drawn?;
     let folder = out.map(super::out::given);

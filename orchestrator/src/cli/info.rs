@@ -1,5 +1,6 @@
 //! `shakebench info`
 
+use super::out::installation;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -12,7 +13,7 @@ use fmi_system::{Operation, System, SystemFile, assemble};
 use laboratory::error::Error;
 use laboratory::systems::built_in;
 use laboratory::systems::tuning::Wanted;
-use pack::library::{FmuLibrary, component};
+use pack::library::FmuLibrary;
 use pages::report::columns::last_left;
 use pages::report::number::significant;
 use pages::report::{Cell, UnitSystem, Units};
@@ -55,15 +56,22 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             built_in::DEFAULT_SPECIMEN,
             Wanted::default(),
         )?)?,
-        None if pack::all_fmus()?.iter().any(|known| known.name == name) => {
-            let packed = component(&name, FmiVersion::V3).map_err(|error| Error::File {
-                path: path.clone(),
-                reason: error.to_string(),
-            })?;
+        None if installation()
+            .fmus()?
+            .iter()
+            .any(|known| known.name == name) =>
+        {
+            let packed = installation()
+                .component(&name, FmiVersion::V3)
+                .map_err(|error| Error::File {
+                    path: path.clone(),
+                    reason: error.to_string(),
+                })?;
             fmu(&*Fmu::open_own(&packed.path)?)
         }
         _ => {
-            let mut components: Vec<&str> = pack::all_fmus()
+            let mut components: Vec<&str> = installation()
+                .fmus()
                 .unwrap_or_default()
                 .iter()
                 .map(|fmu| fmu.name.as_str())
@@ -193,7 +201,7 @@ fn fmu(fmu: &Fmu) -> Content {
 }
 
 fn system(file: &SystemFile) -> Result<Content, Error> {
-    let mut library = FmuLibrary::of(FmiVersion::V3, file);
+    let mut library = FmuLibrary::of(FmiVersion::V3, file).from(installation());
     let system = assemble(file, &[], &mut library)?;
     let mut text = format!("{}: {}\n\ncomponents\n", system.name, system.description);
     let rows = system.components.iter().map(|component| {

@@ -60,7 +60,6 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use fmi_import::{FmiVersion, isolation};
 use laboratory::error;
-use pack::supply;
 use pages::report::UnitSystem;
 use progress::Detail;
 
@@ -263,9 +262,7 @@ pub fn main() -> ExitCode {
     if cli.force {
         out::force();
     }
-    if let Some(folder) = &cli.fmus {
-        supply::take_from(folder);
-    }
+    out::install(cli.fmus.clone());
     let done = match cli.command {
         None => run::execute(&run::Arguments::default()),
         Some(Command::Benchmark(arguments)) => benchmark::execute(&arguments, units, cli.force),

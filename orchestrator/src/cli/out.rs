@@ -1,10 +1,13 @@
-//! Where a command's results go, and `--force`.
+//! Where a command's results go, `--force`, and where components come from.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use laboratory::results::{self, Out};
+use pack::{Installation, program};
 
+static INSTALLATION: OnceLock<Installation> = OnceLock::new();
 static IS_FORCED: AtomicBool = AtomicBool::new(false);
 
 /// Lets this command replace files that differ.
@@ -25,4 +28,17 @@ pub fn given(path: impl Into<PathBuf>) -> Out {
 /// As [`results::unused`].
 pub fn unused(folder: &Path, is_same: impl Fn(&Path) -> bool) -> Out {
     results::unused(&given(folder), is_same)
+}
+
+/// Takes components from the folder of `--fmus`, and this program for processes of FMUs whatever its file is called.
+pub fn install(named: Option<PathBuf>) {
+    let own = std::env::var_os("SHAKEBENCH_PROGRAM").map(PathBuf::from);
+    let installation = Installation::new(named, own.or(program::file().ok()));
+    // The first holds; there is no second.
+    let _ = INSTALLATION.set(installation);
+}
+
+/// Where this command's components come from.
+pub fn installation() -> &'static Installation {
+    INSTALLATION.get_or_init(Installation::default)
 }

@@ -10,7 +10,7 @@ use clap::Args;
 use super::OneVersion;
 use super::interrupt;
 use super::motion::MotionArguments;
-use super::out::{given, is_forced, unused};
+use super::out::{given, installation, is_forced, unused};
 use super::quantity::{at_least_one, if_given, percent, positive};
 use super::rig::RigArguments;
 use super::watch::watch;
@@ -28,7 +28,6 @@ use laboratory::run::refinement::refine;
 use laboratory::run::summary::Summary;
 use laboratory::run::text::text;
 use laboratory::systems::built_in;
-use pack::program;
 
 /// Options of `shakebench run`.
 #[derive(Debug, Default, Args)]
@@ -169,13 +168,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let written = arguments
         .manifest
         .as_deref()
-        .map(Manifest::read)
+        .map(read_manifest)
         .transpose()?;
-    let unfinished = arguments
-        .resume
-        .as_deref()
-        .map(checkpoint::read)
-        .transpose()?;
+    let unfinished = arguments.resume.as_deref().map(unfinished).transpose()?;
     let known = written.as_ref();
     let known = known.or(unfinished.as_ref().map(|run| &run.manifest));
     let mut request = match known {
@@ -200,7 +195,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         ..
     } = &prepared;
     let is_same = |place: &Path| {
-        let before = Manifest::read(&place.join("manifest.json"));
+        let before = read_manifest(&place.join("manifest.json"));
         before.is_ok_and(|before| {
             // A run whose parameters were changed by hand is not repeated by its request alone.
             let same = match known {
@@ -325,6 +320,22 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::from(1))
 }
 
+/// The manifest in a file, to be repeated with this command's components.
+///
+/// # Errors
+/// A file that is not one.
+pub(super) fn read_manifest(path: &Path) -> Result<Manifest, Error> {
+    let mut manifest = Manifest::read(path)?;
+    manifest.request.installation = installation().clone();
+    Ok(manifest)
+}
+
+fn unfinished(folder: &Path) -> Result<Unfinished, Error> {
+    let mut run = checkpoint::read(folder)?;
+    run.manifest.request.installation = installation().clone();
+    Ok(run)
+}
+
 /// Continues an interrupted run.
 ///
 /// # Errors
@@ -351,7 +362,7 @@ fn go_on(
     simulation.resume(&unfinished.checkpoint, unfinished.record)?;
     keep(simulation, checkpoints, plan.1)?;
     // What the run saved when it was interrupted is a part of what it saves now.
-    let before = Manifest::read(&folder.join("manifest.json"));
+    let before = read_manifest(&folder.join("manifest.json"));
     if before.is_ok_and(|before| before.request == manifest.request) {
         *folder = folder.clone().replacing(true);
     }
@@ -415,7 +426,7 @@ fn fmu_options(arguments: &Arguments) -> Result<Options, Error> {
     });
     Ok(Options {
         isolation: arguments.isolate,
-        guest: program::guest(),
+        guest: installation().guest(),
         call_limit: limit.transpose()?.unwrap_or(Options::CALL_LIMIT),
         trace: trace.transpose()?,
         log_categories: arguments.log.clone(),
@@ -464,6 +475,7 @@ pub(super) fn request(arguments: &Arguments) -> Result<Request, Error> {
         },
         least_step_s: if_given("--least-step", &arguments.least_step, "s")?,
         duration_s: if_given("--duration", &arguments.duration, "s")?,
+        installation: installation().clone(),
         inputs: arguments.input.iter().map(|path| absolute(path)).collect(),
     })
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 
-use super::out::{given, unused};
+use super::out::{given, installation, unused};
 use super::{interrupt, progress};
 use laboratory::error::Error;
 use laboratory::results::Results;
@@ -45,7 +45,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let asked = interrupt::heed();
     let bar = progress::spinner("first set of parameters");
     let count = std::cell::Cell::new(0);
-    let tuned = tune(&study, asked, &|trial| {
+    let tuned = tune(&study, installation(), asked, &|trial| {
         count.set(count.get() + 1);
         let (count, last) = (count.get(), trial.score.quantile);
         progress::say(&bar, format!("{count} sets tried, the last {last:.3}"));

@@ -1,5 +1,6 @@
 //! `shakebench validate`
 
+use super::out::installation;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -7,7 +8,6 @@ use clap::Args;
 
 use fmi_check::{Severity, validate};
 use laboratory::error::Error;
-use pack::program;
 
 /// Options of `shakebench validate`.
 #[derive(Debug, Args)]
@@ -29,7 +29,7 @@ pub struct Arguments {
 /// # Errors
 /// A file that cannot be read, or is neither.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
-    let found = validate(&arguments.file, program::guest().as_deref())?;
+    let found = validate(&arguments.file, installation().guest().as_deref())?;
     let (errors, warnings, notes) = (
         found.count(Severity::Error),
         found.count(Severity::Warning),

@@ -13,11 +13,8 @@ type Entries = Vec<(String, Vec<u8>)>;
 
 /// The entries of a component's FMU.
 fn entries(name: &str, version: pack::FmiVersion) -> Entries {
-    let all = pack::all_fmus().unwrap().iter();
-    let fmu = all
-        .clone()
-        .find(|fmu| fmu.name == name && fmu.version == version)
-        .unwrap();
+    let installation = pack::Installation::default();
+    let fmu = installation.component(name, version).unwrap();
     let mut archive = ZipArchive::new(File::open(&fmu.path).unwrap()).unwrap();
     (0..archive.len())
         .map(|index| {

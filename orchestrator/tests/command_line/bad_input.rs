@@ -217,7 +217,7 @@ fn files(folder: &Path) {
     );
     write("binary.csv", &[0x93, 0, 1, 0xff].repeat(500));
     write("page.fmu", b"<!doctype html><title>404</title>");
-    let sound = pack::all_fmus().unwrap().iter();
+    let sound = pack::all_fmus().unwrap().into_iter();
     let sound = sound.filter(|fmu| fmu.version == pack::FmiVersion::V3);
     let sound = sound.clone().find(|fmu| fmu.name == "ShakeTable").unwrap();
     let bytes = fs::read(&sound.path).unwrap();

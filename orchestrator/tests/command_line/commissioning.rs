@@ -110,6 +110,7 @@ fn a_rig_changed_behind_the_controllers_backs_changes_recordings_only() {
             reference: None,
             played: 10.0,
             fmi: FmiVersion::V3,
+            installation: pack::Installation::default(),
         })
         .unwrap();
         recording.samples(Channel::ActuatorForce).to_vec()

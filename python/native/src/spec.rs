@@ -1,6 +1,6 @@
 //! What is simulated, from its description to a checked system.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
@@ -14,6 +14,7 @@ use laboratory::run::experiment::{
 use laboratory::systems::built_in;
 use laboratory::systems::tuning::Tuning;
 use motion::Scaling;
+use pack::Installation;
 use pack::library::FmuLibrary;
 use serde::{Deserialize, Serialize};
 use units::{STANDARD_GRAVITY, hint};
@@ -89,9 +90,9 @@ pub struct Made {
     pub functions: Vec<FunctionInterface>,
 }
 
-/// The project's components, opened once in a process, and motions.
-static OWN: LazyLock<Mutex<FmuLibrary>> =
-    LazyLock::new(|| Mutex::new(FmuLibrary::new(FmiVersion::V3, None)));
+/// The project's components, opened once in a process, by the folder that they come from.
+type Own = HashMap<Option<PathBuf>, Arc<Mutex<FmuLibrary>>>;
+static OWN: LazyLock<Mutex<Own>> = LazyLock::new(Mutex::default);
 static MOTIONS: LazyLock<Motions> = LazyLock::new(Motions::default);
 
 fn fault(option: &'static str, reason: String) -> Error {
@@ -159,6 +160,7 @@ impl Spec {
             step_s: positive("step", self.step.as_ref(), "s")?,
             duration_s: positive("duration", self.duration.as_ref(), "s")?,
             inputs: self.inputs.iter().map(absolute).collect(),
+            installation: Installation::new(self.fmus.clone(), self.guest.clone()),
             ..built_in
         })
     }
@@ -168,26 +170,28 @@ impl Spec {
     /// # Errors
     /// Whatever is at fault.
     pub fn prepare(&self, callbacks: Callbacks) -> Result<Made, Error> {
-        if let Some(folder) = &self.fmus {
-            pack::supply::take_from(folder);
-        }
         let request = self.request()?;
         let mut file = system_file(&request, None)?;
         let mut functions = Vec::new();
         // A file's FMUs may change between two simulations; those of the project do not.
-        let mut prepared = if is_file(&request.system) || !self.functions.is_empty() {
-            let library = Mutex::new(FmuLibrary::of(FmiVersion::V3, &file));
+        let prepared = if is_file(&request.system) || !self.functions.is_empty() {
+            let library =
+                Mutex::new(FmuLibrary::of(FmiVersion::V3, &file).from(&request.installation));
             for (given, number) in self.functions.iter().zip(0..) {
                 let callback = (number, callbacks);
                 functions.push(given.put_into(&mut file, &library, callback)?);
             }
             prepare_shared(&request, &file, &library, &MOTIONS)?
         } else {
-            prepare_shared(&request, &file, &OWN, &MOTIONS)?
+            let open = || FmuLibrary::new(FmiVersion::V3, None).from(&request.installation);
+            let library = Arc::clone(
+                OWN.lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .entry(self.fmus.clone())
+                    .or_insert_with(|| Arc::new(Mutex::new(open()))),
+            );
+            prepare_shared(&request, &file, &library, &MOTIONS)?
         };
-        if self.guest.is_some() {
-            prepared.options.guest.clone_from(&self.guest);
-        }
         Ok(Made {
             request,
             prepared,

@@ -243,7 +243,7 @@ fn damaged_and_hostile_files_are_read_or_refused_by_name() {
             .map_err(|error| error.to_string())
     };
     for version in FmiVersion::ALL {
-        let all = all_fmus().unwrap().iter();
+        let all = all_fmus().unwrap().into_iter();
         let mut all = all.filter(|fmu| fmu.version == version && fmu.name == "ReferenceMotion");
         let sound = entries(&all.next().unwrap().path);
         let whole = zipped(&sound);
@@ -288,6 +288,7 @@ fn damaged_and_hostile_files_are_read_or_refused_by_name() {
         duration: 0.1,
         algorithm: "jacobi".to_string(),
         fmi: FmiVersion::V2,
+        installation: pack::Installation::default(),
     };
     write(&prepared.system, &experiment, &archive).unwrap();
     let mut sound = entries(&archive);

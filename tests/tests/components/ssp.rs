@@ -53,7 +53,7 @@ fn archive(folder: &Path, description: &str, files: &[(&str, &str)]) -> PathBuf 
     let options = SimpleFileOptions::default();
     let motion = all_fmus()
         .unwrap()
-        .iter()
+        .into_iter()
         .find(|fmu| fmu.name == "ReferenceMotion" && fmu.version == FmiVersion::V2);
     let fmu = fs::read(&motion.unwrap().path).unwrap();
     let mut add = |name: &str, content: &[u8]| {
@@ -292,6 +292,7 @@ fn exported(
         duration: 1.0,
         algorithm: Algorithm::Jacobi.to_string(),
         fmi,
+        installation: pack::Installation::default(),
     };
     write(&prepared.system, &experiment, &archive).unwrap();
     write_csv(&outcome.record, File::create(&csv).unwrap()).unwrap();

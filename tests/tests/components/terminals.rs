@@ -110,7 +110,7 @@ fn fits(own: &Terminal, other: &Terminal) -> bool {
 
 #[test]
 fn descriptions_and_terminals_are_valid_by_the_schemas_of_the_standard() {
-    let paths = all_fmus().unwrap().iter().map(|fmu| &fmu.path);
+    let paths = all_fmus().unwrap().into_iter().map(|fmu| fmu.path);
     let said = run_script("schemas.py", paths);
     let checked = said.lines().filter(|line| line.starts_with("ok ")).count();
     assert_eq!(checked, all_fmus().unwrap().len(), "{said}");

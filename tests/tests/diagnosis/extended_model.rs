@@ -128,7 +128,7 @@ fn file(fmus: &[PackedFmu], name: &str) -> Option<PathBuf> {
 
 #[test]
 fn fmus_with_an_effect_move_in_closed_loop_like_the_engine_that_finds_it() {
-    let originals = pack::all_fmus().unwrap_or_else(|e| panic!("{e}"));
+    let originals = &pack::all_fmus().unwrap_or_else(|e| panic!("{e}"));
     let case = Generated::draw(1, &Settings::new(Kind::Nothing));
     let nominal = Nominal::parse(&case.nominal()).unwrap();
     let law = nominal.controller.unwrap();
@@ -278,7 +278,7 @@ fn fmpy(path: &Path, inputs: &serde_json::Value, outputs: &[&str]) -> Vec<Vec<f6
 
 #[test]
 fn in_fmpy_the_extended_fmus_start_with_the_effects() {
-    let originals = pack::all_fmus().unwrap_or_else(|e| panic!("{e}"));
+    let originals = &pack::all_fmus().unwrap_or_else(|e| panic!("{e}"));
     let (mut rig, dead_band) = with_effect("valve_dead_band");
     let (stiff, stiffness) = with_effect("specimen_stiffness");
     rig.effects.specimen = stiff.effects.specimen;

@@ -14,7 +14,7 @@ use laboratory::diagnosis::foreign::{diagnose, template};
 use laboratory::diagnosis::model::{self, Asked};
 use laboratory::results::Out;
 use laboratory::run::experiment::{Request, prepare};
-use pack::library;
+use pack::Installation;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -55,7 +55,7 @@ fn found(folder: &Path, fmu: &Path, map: &str) -> DiagnosisReport {
         &place,
         &[folder.join("data.csv")],
         &out,
-        Some(Isolation::None),
+        (Some(Isolation::None), &Installation::default()),
         Observer::none(),
     )
     .unwrap()
@@ -157,9 +157,13 @@ fn a_delay_through_an_fmu_that_does_nothing() {
 /// lag. What is written around it is played by `run` and gives the same.
 #[test]
 fn our_own_specimen_and_the_system_around_it() {
-    let fmu = &library::component("Specimen", FmiVersion::V3).unwrap().path;
+    let installation = Installation::default();
+    let fmu = &installation
+        .component("Specimen", FmiVersion::V3)
+        .unwrap()
+        .path;
     let folder = tempfile::tempdir().unwrap();
-    let text = template(fmu).unwrap();
+    let text = template(fmu, &installation).unwrap();
     assert!(
         text.contains("\"table_acceleration\" = \"table_acceleration\""),
         "{text}"
@@ -256,6 +260,7 @@ fn our_own_specimen_and_the_system_around_it() {
         fmu: None,
         map: None,
         isolate: Some(Isolation::None),
+        installation: &Installation::default(),
     };
     let found = model::validate(&asked, std::slice::from_ref(&later)).unwrap();
     let [of_later] = &found.records[..] else {
@@ -316,7 +321,11 @@ fn our_own_specimen_and_the_system_around_it() {
 
 #[test]
 fn bad_maps_are_refused_by_place_and_cure() {
-    let fmu = &library::component("Specimen", FmiVersion::V3).unwrap().path;
+    let installation = Installation::default();
+    let fmu = &installation
+        .component("Specimen", FmiVersion::V3)
+        .unwrap()
+        .path;
     let folder = tempfile::tempdir().unwrap();
     let columns = [
         (0..400).map(|k| 0.01 * k as f64).collect(),
@@ -367,7 +376,7 @@ fn bad_maps_are_refused_by_place_and_cure() {
             &place,
             &data,
             &out,
-            Some(Isolation::None),
+            (Some(Isolation::None), &Installation::default()),
             Observer::none(),
         )
         .unwrap_err();

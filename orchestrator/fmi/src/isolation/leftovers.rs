@@ -1,7 +1,7 @@
 //! Processes that FMUs start and leave behind. They end with the guest: those of its group by the
 //! group, those that left it (daemons) by a mark in the environment that they inherited.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::hash::{BuildHasher, RandomState};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// The variable of the environment that holds the mark.
@@ -14,11 +14,11 @@ pub(super) struct Mark(String);
 impl Mark {
     /// A mark that no other guest has.
     pub(super) fn new() -> Self {
-        static COUNT: AtomicU64 = AtomicU64::new(0);
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        // Two guests may begin at one reading of the clock.
+        let random = RandomState::new().hash_one(());
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
         let now = now.map_or(0, |since| since.as_nanos());
-        Self(format!("{}-{count}-{now}", std::process::id()))
+        Self(format!("{}-{random:x}-{now}", std::process::id()))
     }
 
     pub(super) fn value(&self) -> &str {

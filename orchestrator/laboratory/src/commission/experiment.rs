@@ -51,6 +51,7 @@ impl Bench {
             tuning: Some(Tuning::Printed),
             set: request.set.clone(),
             fmi: request.fmi,
+            installation: request.installation.clone(),
             ..experiment::Request::built_in(CONTROLLER)
         })?;
         Ok(Self {

@@ -9,6 +9,7 @@ mod page;
 mod rig_model;
 mod systems;
 
+use pack::Installation;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -66,6 +67,8 @@ pub struct Request {
     pub played: f64,
     /// Version of FMI of the project's own components.
     pub fmi: FmiVersion,
+    /// Where these come from.
+    pub installation: Installation,
 }
 
 /// A step of the growth of the excitation.
@@ -429,6 +432,7 @@ pub fn rules_on_recordings(
     set: Vec<String>,
     duration: f64,
     seed: u64,
+    installation: &Installation,
 ) -> Result<Rules, Error> {
     let asked = Request {
         plant: plant.to_string(),
@@ -443,6 +447,7 @@ pub fn rules_on_recordings(
         reference: None,
         played: 10.0,
         fmi: FmiVersion::V3,
+        installation: installation.clone(),
     };
     let recording = record_excitation(&asked)?;
     let found = identify(&[recording], Settings::default())?;

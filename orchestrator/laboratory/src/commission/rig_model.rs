@@ -127,6 +127,7 @@ pub(super) fn predicted(
         reference: request.reference.clone(),
         duration_s: Some(request.played),
         fmi: request.fmi,
+        installation: request.installation.clone(),
         ..experiment::Request::built_in(controller)
     };
     let prepared = prepare_file(&asked, &file)?;

@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::results::Results;
 use pack::extended_model::ExtendedModel;
 use pack::parameter_sets::component_of;
-use pack::{self, FmiVersion, PackedFmu};
+use pack::{FmiVersion, Installation, PackedFmu};
 
 /// What a case's diagnosis brings beside its report.
 pub(super) struct Extended {
@@ -34,7 +34,7 @@ pub(super) fn extend(
     found: &Diagnosis,
     report: &mut DiagnosisReport,
     results: &mut Results,
-    folder: &Path,
+    (folder, installation): (&Path, &Installation),
 ) -> Result<Extended, Error> {
     let model = ExtendedModel::new(&found.extended_model, &found.modelled).beside(&case.nominal);
     if found.effects.is_empty() && !found.modelled.is_empty() {
@@ -71,14 +71,14 @@ pub(super) fn extend(
         report.separating_motion = Some(folder.join(SEPARATING_MOTION));
     }
     let mut comparison = None;
-    match fmus(&model, results) {
+    match fmus(&model, installation, results) {
         Ok(built) => {
             let first = found.modelled.first();
             let home = first.map_or("ShakeTable", |named| component_of(named.effect).name());
             let place = |fmu: &PackedFmu| folder.join(name(fmu));
             report.extended_fmu = find(&built, home).map(place);
             report.extended_fmus = built.iter().map(place).collect();
-            match in_closed_loop(case, found, &built) {
+            match in_closed_loop(case, found, &built, installation) {
                 Ok(played) => comparison = Some(played),
                 Err(reason) => report
                     .notes
@@ -106,8 +106,12 @@ fn find<'a>(fmus: &'a [PackedFmu], name: &str) -> Option<&'a PackedFmu> {
 }
 
 /// The FMUs of the extended model, where they lie until the results are complete.
-fn fmus(model: &ExtendedModel, results: &mut Results) -> Result<Vec<PackedFmu>, Error> {
-    let built = model.write_fmus(pack::all_fmus()?, results.staging())?;
+fn fmus(
+    model: &ExtendedModel,
+    installation: &Installation,
+    results: &mut Results,
+) -> Result<Vec<PackedFmu>, Error> {
+    let built = model.write_fmus(installation.fmus()?, results.staging())?;
     for fmu in &built {
         results.adopt(&name(fmu));
     }
@@ -119,6 +123,7 @@ fn in_closed_loop(
     case: &Case,
     found: &Diagnosis,
     extended: &[PackedFmu],
+    installation: &Installation,
 ) -> Result<Comparison, String> {
     let recording = &case.validation;
     let law = case.nominal.controller.ok_or("the case states no law")?;
@@ -136,7 +141,7 @@ fn in_closed_loop(
     if !found.validation.by_law {
         return Err("the stated law did not make the recorded command (R5)".into());
     }
-    let originals = pack::all_fmus().map_err(|error| error.to_string())?;
+    let originals = installation.fmus().map_err(|error| error.to_string())?;
     let original = |name: &str| {
         let found = find(originals, name).map(|fmu| fmu.path.clone());
         found.ok_or_else(|| format!("there is no component `{name}`"))

@@ -27,6 +27,7 @@ use identification::diagnosis::{
 use crate::error::Error;
 use crate::json;
 use crate::results::{Out, Results};
+use pack::Installation;
 use pages::report::{self, Report};
 
 /// File with the extended model, in the folder of `--out`.
@@ -52,10 +53,12 @@ pub fn diagnose(
     folder: &Out,
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
-    diagnose_with(subject, data, columns, None, folder, observer)
+    let installation = &Installation::default();
+    diagnose_with(subject, data, columns, None, folder, installation, observer)
 }
 
-/// As [`diagnose`], with the effects of the file `effects` beside those of the kind.
+/// As [`diagnose`], with the effects of the file `effects` beside those of the kind and the components of an
+/// `installation`.
 ///
 /// # Errors
 /// As [`diagnose`]; effects that do not fit the kind, by line.
@@ -65,13 +68,14 @@ pub fn diagnose_with(
     columns: Option<&Path>,
     effects: Option<&Path>,
     folder: &Out,
+    installation: &Installation,
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
     let begun = Instant::now();
     Results::check(folder)?;
     let read = Subject::read(subject, data, columns).map_err(|error| fault(subject, error))?;
     let read = with_effects(read, effects, subject)?;
-    of_subject(subject, &read, None, folder, observer, begun)
+    of_subject(subject, &read, None, folder, installation, observer, begun)
 }
 
 fn with_effects(subject: Subject, effects: Option<&Path>, path: &Path) -> Result<Subject, Error> {
@@ -103,7 +107,8 @@ pub fn diagnose_files(
     tell(&guess);
     let subject = Subject::Rig(Box::new((guess.description, guess.measurement)));
     let subject = with_effects(subject, effects, first)?;
-    of_subject(first, &subject, Some(&guess.text), folder, observer, begun)
+    let (text, own) = (Some(&*guess.text), Installation::default());
+    of_subject(first, &subject, text, folder, &own, observer, begun)
 }
 
 fn of_subject(
@@ -111,6 +116,7 @@ fn of_subject(
     read: &Subject,
     description: Option<&str>,
     folder: &Out,
+    installation: &Installation,
     observer: Observer<'_>,
     begun: Instant,
 ) -> Result<DiagnosisReport, Error> {
@@ -131,7 +137,13 @@ fn of_subject(
     }
     let page = match &found {
         Diagnosis::Case { case, found } => {
-            let extended = case::extend(case, found, &mut report, &mut results, folder)?;
+            let extended = case::extend(
+                case,
+                found,
+                &mut report,
+                &mut results,
+                (folder, installation),
+            )?;
             report.wall_s = begun.elapsed().as_secs_f64();
             page::of_case(subject, &report, case, found, &extended)
         }

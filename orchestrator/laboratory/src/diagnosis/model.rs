@@ -1,5 +1,6 @@
 //! An extended model on further records, without a fit: what it misses, and what it predicts.
 
+use pack::Installation;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -65,6 +66,8 @@ pub struct Asked<'a> {
     pub map: Option<&'a Path>,
     /// Of an FMU, whether it runs in a process of its own; absent: it does.
     pub isolate: Option<Isolation>,
+    /// Of an FMU, where a component of the project comes from.
+    pub installation: &'a Installation,
 }
 
 /// Errors of the model that is `asked` for on `files`.
@@ -267,7 +270,12 @@ fn read(asked: &Asked<'_>) -> Result<Read, Error> {
                 ),
             });
         }
-        let read = foreign::Extended::read(model, asked.fmu, asked.map, asked.isolate)?;
+        let read = foreign::Extended::read(
+            model,
+            asked.fmu,
+            asked.map,
+            (asked.isolate, asked.installation),
+        )?;
         return Ok(Read::Foreign(Box::new(read)));
     }
     for (option, given) in [("--fmu", asked.fmu), ("--map", asked.map)] {

@@ -317,7 +317,7 @@ pub fn text(report: &DiagnosisReport) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{ParameterReport, in_unit, interval};
+    use super::{GainReport, ParameterReport, in_unit, interval, share};
 
     #[test]
     fn a_value_that_is_not_determined_has_no_interval() {
@@ -331,5 +331,25 @@ mod tests {
         assert_eq!(interval(&force, "N"), "not determined");
         assert_eq!(in_unit(&found(0.25, 1e4, "1"), "1"), "about 0.250");
         assert!(interval(&found(50.0, 3.0, "N"), "N").contains("to"));
+    }
+
+    #[test]
+    fn the_share_of_an_error_is_said_in_percent_with_its_interval() {
+        let mut gain = GainReport {
+            before_nrmse: 0.4,
+            after_nrmse: 0.1,
+            noise_floor_nrmse: None,
+            interval_95: (0.62, 0.91),
+            interval_of: None,
+            record: "validation".to_string(),
+            against_noise: None,
+        };
+        let end = "(95 %, block bootstrap)";
+        assert_eq!(share(&gain), format!("The error falls by 62 to 91 % {end}"));
+        gain.interval_95 = (-0.1, 0.25);
+        assert_eq!(
+            share(&gain),
+            format!("The error may rise by 10 % or fall by 25 % {end}")
+        );
     }
 }

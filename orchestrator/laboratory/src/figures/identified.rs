@@ -1,5 +1,6 @@
 //! Figures of the identification: 2-6, 2-7, 2-9, 2-10.
 
+use pack::Installation;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use units::vocabulary;
@@ -96,8 +97,11 @@ fn excitation(dt: f64) -> Motion {
 }
 
 /// The rig under three-variable control and the excitation.
-fn rig() -> Result<Run, Error> {
-    let request = Request::built_in("three-variable");
+fn rig(installation: &Installation) -> Result<Run, Error> {
+    let request = Request {
+        installation: installation.clone(),
+        ..Request::built_in("three-variable")
+    };
     let mut prepared = prepare(&request)?;
     prepared.motion = excitation(prepared.motion.dt);
     prepared.samples = prepared.motion.len();
@@ -109,8 +113,8 @@ fn rig() -> Result<Run, Error> {
 }
 
 /// Data of the identified rig with noise, and the result of `shakebench identify`.
-pub(super) fn figures() -> Result<Vec<Figure>, Error> {
-    let rig = rig()?;
+pub(super) fn figures(installation: &Installation) -> Result<Vec<Figure>, Error> {
+    let rig = rig(installation)?;
     let velocity = rig.history("velocity", "table.velocity", 2);
     let mut figures = vec![
         Figure {

@@ -3,6 +3,7 @@
 mod identified;
 mod tracking;
 
+use pack::Installation;
 use std::path::{Path, PathBuf};
 
 use crate::design;
@@ -49,6 +50,7 @@ fn is_of_runs(number: &str) -> bool {
 pub fn figures(
     only: &[String],
     record: Option<&Path>,
+    installation: &Installation,
     progress: &dyn Fn(&str),
 ) -> Result<Vec<Figure>, Error> {
     if let Some(wrong) = only.iter().find(|own| !NUMBERS.contains(&own.as_str())) {
@@ -67,7 +69,7 @@ pub fn figures(
     };
     if ["2-6", "2-7", "2-9", "2-10"].into_iter().any(is_wanted) {
         progress("2-6 to 2-10");
-        add(identified::figures()?);
+        add(identified::figures(installation)?);
     }
     if ["3-3", "3-4", "3-7", "3-9", "3-10"]
         .into_iter()
@@ -84,7 +86,7 @@ pub fn figures(
     for (number, draw) in tracking::ALL {
         if is_wanted(number) {
             progress(number);
-            add(vec![draw(record)?]);
+            add(vec![draw(record, installation)?]);
         }
     }
     found.sort_by_key(|figure| NUMBERS.iter().position(|own| *own == figure.number));

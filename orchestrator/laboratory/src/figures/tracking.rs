@@ -1,5 +1,6 @@
 //! Figures of tables under control: 3-6, 4-4, 4-6, 5-5, 5-6.
 
+use pack::Installation;
 use std::path::Path;
 
 use super::Figure;
@@ -11,7 +12,7 @@ use motion::metrics::{HIGHEST_FREQUENCY, fourier_amplitudes};
 use pages::report::{Abscissa, Axis, Panel, Series, Style, Units};
 
 /// How a figure is drawn on a record.
-type Draw = fn(Option<&Path>) -> Result<Figure, Error>;
+type Draw = fn(Option<&Path>, &Installation) -> Result<Figure, Error>;
 
 /// The figures with their numbers.
 pub(super) const ALL: [(&str, Draw); 5] = [
@@ -34,11 +35,13 @@ pub(super) fn run(
     plant: &str,
     specimen: &str,
     record: Option<&Path>,
+    installation: &Installation,
 ) -> Result<Run, Error> {
     let request = Request {
         plant: plant.into(),
         specimen: specimen.into(),
         record: record.map(Path::to_path_buf),
+        installation: installation.clone(),
         ..Request::built_in(system)
     };
     let prepared = prepare(&request)?;
@@ -117,9 +120,15 @@ fn two(runs: [(&str, &Run); 2]) -> Vec<Panel> {
     panels
 }
 
-fn figure_3_6(record: Option<&Path>) -> Result<Figure, Error> {
-    let pid = run("displacement-pid", "identified", "none", record)?;
-    let three = run("three-variable", "identified", "none", record)?;
+fn figure_3_6(record: Option<&Path>, installation: &Installation) -> Result<Figure, Error> {
+    let pid = run(
+        "displacement-pid",
+        "identified",
+        "none",
+        record,
+        installation,
+    )?;
+    let three = run("three-variable", "identified", "none", record, installation)?;
     Ok(Figure {
         number: "3-6",
         text:
@@ -130,9 +139,9 @@ fn figure_3_6(record: Option<&Path>) -> Result<Figure, Error> {
     })
 }
 
-fn figure_4_4(record: Option<&Path>) -> Result<Figure, Error> {
-    let shaping = run("loop-shaping", "identified", "linear", record)?;
-    let sliding = run("sliding-mode", "identified", "linear", record)?;
+fn figure_4_4(record: Option<&Path>, installation: &Installation) -> Result<Figure, Error> {
+    let shaping = run("loop-shaping", "identified", "linear", record, installation)?;
+    let sliding = run("sliding-mode", "identified", "linear", record, installation)?;
     Ok(Figure {
         number: "4-4",
         text: "Displacement, velocity, acceleration and Fourier amplitudes under loop shaping and \
@@ -143,8 +152,14 @@ fn figure_4_4(record: Option<&Path>) -> Result<Figure, Error> {
     })
 }
 
-fn figure_4_6(record: Option<&Path>) -> Result<Figure, Error> {
-    let run = run("sliding-mode", "servohydraulic", "yielding", record)?;
+fn figure_4_6(record: Option<&Path>, installation: &Installation) -> Result<Figure, Error> {
+    let run = run(
+        "sliding-mode",
+        "servohydraulic",
+        "yielding",
+        record,
+        installation,
+    )?;
     let drift = run.column("specimen.drift");
     let force = run.column("specimen.force");
     Ok(Figure {
@@ -166,9 +181,16 @@ fn predictive(
     specimen: &str,
     text: &str,
     record: Option<&Path>,
+    installation: &Installation,
 ) -> Result<Figure, Error> {
-    let three = run("three-variable", "identified", specimen, record)?;
-    let predictive = run("mpc", "identified", specimen, record)?;
+    let three = run(
+        "three-variable",
+        "identified",
+        specimen,
+        record,
+        installation,
+    )?;
+    let predictive = run("mpc", "identified", specimen, record, installation)?;
     Ok(Figure {
         number,
         text: text.into(),
@@ -179,12 +201,12 @@ fn predictive(
     })
 }
 
-fn figure_5_5(record: Option<&Path>) -> Result<Figure, Error> {
+fn figure_5_5(record: Option<&Path>, installation: &Installation) -> Result<Figure, Error> {
     let text = "Three-variable control alone and under model predictive control, bare table.";
-    predictive("5-5", "none", text, record)
+    predictive("5-5", "none", text, record, installation)
 }
 
-fn figure_5_6(record: Option<&Path>) -> Result<Figure, Error> {
+fn figure_5_6(record: Option<&Path>, installation: &Installation) -> Result<Figure, Error> {
     let text = "The same with the linear specimen of Appendix A (100 lbf, 1 s, 5 %).";
-    predictive("5-6", "linear", text, record)
+    predictive("5-6", "linear", text, record, installation)
 }

@@ -479,4 +479,32 @@ mod tests {
         }
         assert_eq!((drive.displacement[0], drive.velocity[0]), (0.0, 0.0));
     }
+
+    #[test]
+    fn a_response_is_linear_between_its_lines_and_nothing_beyond() {
+        let response = Response {
+            step: 0.5,
+            gain: vec![
+                Complex64::new(1.0, 0.0),
+                Complex64::new(3.0, 0.0),
+                Complex64::new(0.0, 5.0),
+            ],
+            coherence: vec![1.0; 3],
+        };
+        for (frequency, re, im) in [
+            (0.0, 1.0, 0.0),
+            (0.25, 2.0, 0.0),
+            (0.5, 3.0, 0.0),
+            (0.75, 1.5, 2.5),
+            (1.0, 0.0, 5.0),
+            (1.2, 0.0, 5.0),
+            (1.6, 0.0, 0.0),
+        ] {
+            let found = response.at(frequency);
+            assert!(
+                (found - Complex64::new(re, im)).norm() < 1e-12,
+                "{frequency} Hz: {found}"
+            );
+        }
+    }
 }

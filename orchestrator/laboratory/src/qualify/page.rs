@@ -621,3 +621,20 @@ fn search_section(plan: &Plan, found: &Qualification) -> Section {
         ..Section::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::percent;
+
+    #[test]
+    fn damping_is_in_percent_to_four_decimals() {
+        for (part, shown) in [
+            (0.05, 5.0),
+            (0.02, 2.0),
+            (0.123_456_78, 12.3457),
+            (0.0, 0.0),
+        ] {
+            assert_eq!(percent(part), shown);
+        }
+    }
+}

@@ -23,7 +23,6 @@ use fmi_system::{
 use motion::Motion;
 use motion::metrics::LONGEST_REST;
 use pack::library::FmuLibrary;
-use pack::program;
 use pages::live::Run as Shown;
 use units::hint;
 
@@ -200,7 +199,7 @@ pub fn prepare(request: &Request) -> Result<Prepared, Error> {
 /// # Errors
 /// Whatever is at fault.
 pub fn prepare_file(request: &Request, file: &SystemFile) -> Result<Prepared, Error> {
-    let library = Mutex::new(FmuLibrary::of(request.fmi, file));
+    let library = Mutex::new(FmuLibrary::of(request.fmi, file).from(&request.installation));
     prepare_shared(request, file, &library, &Motions::default())
 }
 
@@ -298,7 +297,7 @@ pub fn prepare_shared(
         step,
         variable: variable_step(request, &file)?,
         samples,
-        options: program::options(),
+        options: request.installation.options(),
     })
 }
 

@@ -1,5 +1,6 @@
 //! What a run is asked to be.
 
+use pack::Installation;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -62,6 +63,9 @@ pub struct Request {
     /// Input tables, whose columns are named as the inputs that they drive.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<PathBuf>,
+    /// Where the project's own components come from; not part of what is repeated.
+    #[serde(skip)]
+    pub installation: Installation,
 }
 
 impl Request {
@@ -88,6 +92,7 @@ impl Request {
             least_step_s: None,
             duration_s: None,
             inputs: Vec::new(),
+            installation: Installation::default(),
         }
     }
 }

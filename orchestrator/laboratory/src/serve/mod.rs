@@ -181,7 +181,9 @@ pub fn prepare(wanted: Wanted) -> Result<Service, Error> {
             between: Between::Hold,
         });
     }
-    let library = std::sync::Mutex::new(FmuLibrary::of(wanted.request.fmi, &file));
+    let library = std::sync::Mutex::new(
+        FmuLibrary::of(wanted.request.fmi, &file).from(&wanted.request.installation),
+    );
     let request = Request {
         // A system that follows no motion has no end of its own.
         duration_s: Some(wanted.request.duration_s.unwrap_or(1.0)),

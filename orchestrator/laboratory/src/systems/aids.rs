@@ -8,12 +8,11 @@ use plant::specimens::YieldingSpecimen;
 use plant::specimens::linear::LinearSpecimen;
 use units::Parameters as _;
 use units::vocabulary;
-use units::vocabulary::LOOP_DELAY_SAMPLES;
 
 use super::control_model::ControlModel;
-use super::rule::TuningError;
+use super::rule::{Tuned, TuningError};
 use super::tuning::{Rules, hydraulics, set};
-use fmi_system::{ComponentFile, Setting};
+use fmi_system::Setting;
 
 /// A specimen before it yields.
 pub(super) fn unyielding(specimen: &YieldingSpecimen) -> LinearSpecimen {
@@ -86,8 +85,11 @@ impl Rules {
     /// What is known of the rig, friction, corners and gains.
     pub(super) fn operator_aids(
         &self,
-        component: &mut ComponentFile,
-        specimen: Option<&YieldingSpecimen>,
+        Tuned {
+            component,
+            specimen,
+            ..
+        }: &mut Tuned<'_>,
     ) -> Result<(), TuningError> {
         if let Some(curve) = self.model.curve {
             set(component, &curve.named());
@@ -104,12 +106,12 @@ impl Rules {
         if !known.into_iter().any(on) {
             return Ok(());
         }
-        let aids = self.aids(specimen)?;
+        let aids = self.aids(*specimen)?;
         set(component, &aids.rig.named());
         set(component, &aids.friction.named());
         set(component, &aids.specimen.named());
         set(component, &aids.pressure.named());
-        component.set(LOOP_DELAY_SAMPLES, self.model.delay as i64);
+        self.delay(component);
         Ok(())
     }
 }

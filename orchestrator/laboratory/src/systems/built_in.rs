@@ -11,47 +11,10 @@ use plant::specimens::linear::LinearSpecimen;
 use units::hint;
 
 use super::biaxial;
+use super::catalogue::{CONTROLLERS, Part, part};
 use super::tuning::{self, Wanted};
 use fmi_system::{Link, Origin, SystemError, SystemFile, VariableName};
 
-/// A part of a built-in system.
-struct Part {
-    name: &'static str,
-    /// TOML.
-    text: &'static str,
-}
-
-macro_rules! part {
-    ($folder:literal, $name:literal) => {
-        Part {
-            name: $name,
-            text: include_str!(concat!("../../systems/", $folder, $name, ".toml")),
-        }
-    };
-}
-
-/// Controllers: the names of the built-in systems.
-const CONTROLLERS: [Part; 19] = [
-    part!("", "displacement-pid"),
-    part!("", "three-variable"),
-    part!("", "loop-shaping"),
-    part!("", "sliding-mode"),
-    part!("", "mpc"),
-    part!("", "three-variable-compensated"),
-    part!("", "mpc-compensated"),
-    part!("", "lqg"),
-    part!("", "preview"),
-    part!("", "acceleration-tracking"),
-    part!("", "dual-loop"),
-    part!("", "multi-metric"),
-    part!("", "minimal-control-synthesis"),
-    part!("", "multiple-surface"),
-    part!("", "dynamic-surface"),
-    part!("", "receding-horizon"),
-    part!("", "adaptive-inverse"),
-    part!("", "adaptive-preview"),
-    part!("", "adaptive-mpc"),
-];
 /// Tables with their actuators.
 const PLANTS: [Part; 2] = [
     part!("plant/", "identified"),

@@ -315,4 +315,21 @@ mod tests {
             }
         }
     }
+
+    /// `(1 + l s + j s²) exp(τ s)` to the second order is `1 + (l + τ) s + (j + l τ + τ²/2) s²`.
+    #[test]
+    fn a_spool_with_little_damping_keeps_the_series_of_its_delay() {
+        let mut model = ControlModel::commissioned().unwrap();
+        let (own, _) = model.hydraulics.as_mut().unwrap();
+        (own.spool_lag, own.spool_inertia) = (2e-3, 1e-6);
+        model.fraction = 5e-4;
+        let spool = model.whole_samples().unwrap();
+        assert!((spool.spool_lag - 2.5e-3).abs() < 1e-15);
+        assert!((spool.spool_inertia - 2.125e-6).abs() < 1e-18);
+        // One that acts much earlier keeps a lag of half a millisecond.
+        model.fraction = -5e-3;
+        let spool = model.whole_samples().unwrap();
+        assert!((spool.spool_lag - 5e-4).abs() < 1e-15);
+        assert!(spool.spool_inertia > 0.0);
+    }
 }

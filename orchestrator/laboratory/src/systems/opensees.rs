@@ -1,5 +1,6 @@
 //! Structures that OpenSees computes, as components.
 
+use pack::Installation;
 use std::path::Path;
 
 use bridges::opensees::{CARRIED, model_of};
@@ -70,9 +71,10 @@ fn is_empty(value: &Value) -> bool {
 pub fn fmu_of(
     model: &Path,
     version: FmiVersion,
+    installation: &Installation,
 ) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
     let script = identification::data::read_bytes(model)?;
-    let component =
-        pack::library::component(COMPONENT, version).map_err(|error| error.to_string())?;
+    let component = installation.component(COMPONENT, version);
+    let component = component.map_err(|error| error.to_string())?;
     Ok(pack::with_resource(&component.path, CARRIED, script)?)
 }

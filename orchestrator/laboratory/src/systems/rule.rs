@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use identification::IdentificationError;
 use plant::ModelError;
-use serde::Deserialize;
-use serde::de::IntoDeserializer;
+use plant::specimens::YieldingSpecimen;
 use serde::de::value::Error as UnknownRule;
+
+use super::tuning::Rules;
+use fmi_system::{ComponentFile, Link, Origin};
 
 /// Why the controllers of a system cannot be tuned.
 #[derive(Debug, thiserror::Error)]
@@ -42,50 +44,44 @@ pub(super) enum TuningError {
     },
 }
 
-/// How a component is tuned; a built-in system's file says it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Rule {
-    /// Rig and hold of adaptive inverse control.
-    AdaptiveInverse,
-    /// All gains of the dual loop of acceleration and force.
-    DualLoop,
-    /// The gain of displacement PID.
-    DisplacementPid,
-    /// The gain of force PID under sliding mode.
-    ForcePid,
-    /// Model and weights of linear quadratic Gaussian control.
-    LinearQuadraticGaussian,
-    /// All coefficients of loop shaping.
-    LoopShaping,
-    /// Start and rates of adaptation of minimal control synthesis.
-    MinimalControlSynthesis,
-    /// Model and weights of model predictive control.
-    ModelPredictive,
-    /// Model, weights and inverse of multi-metric control.
-    MultiMetric,
-    /// Rig, friction, corners and gains of the aids of operators.
-    OperatorAids,
-    /// Model, friction, specimen and weights of preview control.
-    Preview,
-    /// Model and rates of sliding mode.
-    SlidingMode,
-    /// Model, surfaces and lead of sliding mode down to the valve.
-    SurfaceControl,
-    /// All gains of three-variable control.
-    ThreeVariable,
-    /// Shaping, filter and gain of acceleration trajectory tracking.
-    TrajectoryTracking,
-    /// The gains of three-variable control under model predictive control.
-    UnderPrediction,
+/// A component that a rule tunes.
+pub struct Tuned<'a> {
+    /// Its name in the system.
+    pub name: &'a str,
+    /// Its parameters.
+    pub component: &'a mut ComponentFile,
+    /// All connections of the system.
+    pub connections: &'a mut [Link],
+    /// The specimen as a controller knows it.
+    pub specimen: Option<&'a YieldingSpecimen>,
 }
 
-impl Rule {
-    /// The rule that a system file names.
-    ///
-    /// # Errors
-    /// No such rule, with those that there are.
-    pub fn named(name: &str) -> Result<Self, UnknownRule> {
-        Self::deserialize(name.into_deserializer())
+/// A rule: gives a component its parameters on the model of [`Rules`].
+pub(super) type Rule = fn(&Rules, &mut Tuned<'_>) -> Result<(), TuningError>;
+
+impl Tuned<'_> {
+    /// How many samples ahead the references are that go to this component, with the input that takes them.
+    fn references(&mut self) -> impl Iterator<Item = (&str, &mut isize)> {
+        let name = self.name;
+        self.connections.iter_mut().filter_map(move |link| {
+            let Origin::Reference { ahead, .. } = &mut link.from else {
+                return None;
+            };
+            (link.to.component == name).then_some((link.to.variable.as_str(), ahead))
+        })
+    }
+
+    /// The references that go to `inputs` of the component are those so many `samples` ahead.
+    pub(super) fn place_references(&mut self, inputs: impl Fn(&str) -> bool, samples: isize) {
+        for (_, ahead) in self.references().filter(|(input, _)| inputs(input)) {
+            *ahead = samples;
+        }
+    }
+
+    /// The component compares measurements that are so many samples late with the reference of the same time.
+    pub(super) fn delay_references(&mut self, delay: usize) {
+        for (_, ahead) in self.references() {
+            *ahead -= delay as isize;
+        }
     }
 }

@@ -3,38 +3,39 @@
 use controllers::preview::feedback::Uncertainty;
 use controllers::surface_control::{Parameters, Variant};
 use controllers::three_variable::ThreeVariableGains;
-use plant::specimens::YieldingSpecimen;
 use units::vocabulary;
 
 use units::Parameters as _;
 
 use super::aids::unyielding;
-use super::rule::TuningError;
+use super::rule::{Tuned, TuningError};
 use super::tuning::{Rules, set};
-use fmi_system::ComponentFile;
 use fmi_system::Setting;
 
 impl Rules {
     /// Model and hold.
-    pub(super) fn adaptive_inverse(
-        &self,
-        component: &mut ComponentFile,
-    ) -> Result<(), TuningError> {
+    pub(super) fn adaptive_inverse(&self, own: &mut Tuned<'_>) -> Result<(), TuningError> {
         let rig = self.known_rig()?;
         let measurements = self.model.measurements();
         let (delay, period) = (measurements.delay(), measurements.period);
         let gains = ThreeVariableGains::tuned(&self.model.rig, delay, period)?;
-        set(component, &rig.named());
-        set(component, &[("hold_gain", 0.5 * gains.proportional)]);
-        component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
+        set(own.component, &rig.named());
+        let hold = ("hold_gain", 0.5 * gains.proportional);
+        set(own.component, &[hold]);
+        self.delay(own.component);
+        let compared = |input: &str| input.starts_with("reference_");
+        own.place_references(compared, -(self.model.delay as isize));
         Ok(())
     }
 
     /// Model, noise, surfaces and lead of the variant that the file names.
     pub(super) fn surface_control(
         &self,
-        component: &mut ComponentFile,
-        specimen: Option<&YieldingSpecimen>,
+        Tuned {
+            component,
+            specimen,
+            ..
+        }: &mut Tuned<'_>,
     ) -> Result<(), TuningError> {
         let variant = match component.parameters.get("variant") {
             Some(Setting::Text(name)) if name == "dynamic-surface" => Variant::DynamicSurface,
@@ -71,7 +72,7 @@ impl Rules {
                 (vocabulary::MEASUREMENT_NOISE[2], noise[2]),
             ],
         );
-        component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
+        self.delay(component);
         component.set("reference_lead_samples", tuned.lead as i64);
         Ok(())
     }

@@ -31,7 +31,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 use units::vocabulary;
 
-use controllers::acceleration_tracking::{AccelerationTracking, SHAPES};
+use controllers::acceleration_tracking::SHAPES;
 use controllers::aids::friction::FrictionCompensation;
 use controllers::minimal_control_synthesis::MinimalControlSynthesis;
 use controllers::preview;
@@ -39,18 +39,21 @@ use controllers::preview::feedback::Uncertainty;
 use controllers::preview::model::{Hydraulics, RigModel};
 use controllers::tuning::acceleration_tracking::{AccelerationTuning, Shaping};
 use controllers::tuning::preview::Known;
-use controllers::tuning::suite::{Member, Suite};
+use controllers::tuning::suite::{Measurements, Member, Suite};
 use identification::IdentificationError;
 use identification::closed_loop::equations::HydraulicRig;
 use serde::{Deserialize, Serialize};
 use units::Parameters as _;
 
+use super::catalogue::{self, OPERATOR_AIDS};
 use super::control_model::ControlModel;
-use super::rule::{Rule, TuningError};
+use super::rule::{Tuned, TuningError};
+use fmi_system::Origin;
 use fmi_system::Setting;
 use fmi_system::{ComponentFile, SystemFile};
-use fmi_system::{Link, Origin};
+use plant::ModelError;
 use plant::identified::nominal::shake_table_values;
+use plant::identified::shake_table::ShakeTable;
 use plant::specimens::YieldingSpecimen;
 
 /// The switch of the aids by which the rig is another one to the controllers.
@@ -133,14 +136,8 @@ pub(super) fn apply(
             });
         }
         (_, None, true) => {
-            static RULES: OnceLock<Rules> = OnceLock::new();
-            match RULES.get() {
-                Some(rules) => rules,
-                None => {
-                    let model = ControlModel::commissioned()?;
-                    RULES.get_or_init(|| Rules::new(model))
-                }
-            }
+            own = Rules::new(ControlModel::commissioned()?);
+            &own
         }
     };
     rules.apply(file, specimen, wanted.inside)
@@ -164,34 +161,6 @@ pub(super) fn rigid_mass(
             ControlModel::commissioned().map(|model| of(&model))
         }
         (None, _, None) => Ok(None),
-    }
-}
-
-/// The references that go to `inputs` of the component `name` are those `ahead` samples ahead.
-fn place_references(
-    connections: &mut [Link],
-    name: &str,
-    inputs: impl Fn(&str) -> bool,
-    samples: isize,
-) {
-    for link in connections {
-        if let Origin::Reference { ahead, .. } = &mut link.from
-            && link.to.component == name
-            && inputs(&link.to.variable)
-        {
-            *ahead = samples;
-        }
-    }
-}
-
-/// The component `name` compares late measurements with the reference of the same time.
-fn delay_references(connections: &mut [Link], name: &str, delay: usize) {
-    for link in connections {
-        if let Origin::Reference { ahead, .. } = &mut link.from
-            && link.to.component == name
-        {
-            *ahead -= delay as isize;
-        }
     }
 }
 
@@ -257,19 +226,19 @@ impl Rules {
             specimen.map(known)
         };
         let specimen = own.as_ref();
-        let mut is_stabilised = false;
-        for component in file.components.values_mut() {
-            let rule = component.tuning.as_deref().map(Rule::named).transpose()?;
-            if rule == Some(Rule::OperatorAids) {
-                self.operator_aids(component, specimen)?;
-                let switch = component.parameters.get(PRESSURE_STABILISATION);
-                is_stabilised |= switch == Some(&Setting::Boolean(true));
-            }
-        }
-        match is_stabilised {
-            true => self.behind_stabilisation()?.tune(file, specimen)?,
-            false => self.tune(file, specimen)?,
-        }
+        let is_aids =
+            |component: &ComponentFile| component.tuning.as_deref() == Some(OPERATOR_AIDS);
+        self.tune(file, specimen, is_aids)?;
+        let is_stabilised = file.components.values().any(|component| {
+            let switch = component.parameters.get(PRESSURE_STABILISATION);
+            is_aids(component) && switch == Some(&Setting::Boolean(true))
+        });
+        let rules = if is_stabilised {
+            self.behind_stabilisation()?
+        } else {
+            self
+        };
+        rules.tune(file, specimen, |component| !is_aids(component))?;
         // A valve that acts late is told early: everything that follows the motion gets it so much ahead.
         for link in &mut file.connections {
             if let Origin::Reference { ahead, .. } = &mut link.from {
@@ -279,154 +248,131 @@ impl Rules {
         Ok(())
     }
 
-    /// The same for the controllers, whatever aids are behind them.
+    /// Tunes the components that are `chosen`.
     fn tune(
         &self,
         file: &mut SystemFile,
         specimen: Option<&YieldingSpecimen>,
+        chosen: impl Fn(&ComponentFile) -> bool,
     ) -> Result<(), TuningError> {
-        let identified = self.model.specimen.map(|own| own.mass);
-        let specimen_mass = identified.or(specimen.map(|own| own.mass));
         for (name, component) in &mut file.components {
-            let Some(rule) = &component.tuning else {
+            let Some(rule) = component.tuning.as_deref() else {
                 continue;
             };
-            let rule = Rule::named(rule)?;
-            match rule {
-                Rule::Preview => self.preview(component, specimen)?,
-                Rule::LinearQuadraticGaussian => {
-                    self.linear_quadratic_gaussian(component, specimen)?;
-                }
-                Rule::MultiMetric => self.multi_metric(component, specimen)?,
-                Rule::AdaptiveInverse => {
-                    self.adaptive_inverse(component)?;
-                    let compared = |variable: &str| variable.starts_with("reference_");
-                    place_references(
-                        &mut file.connections,
-                        name,
-                        compared,
-                        -(self.model.delay as isize),
-                    );
-                }
-                Rule::SurfaceControl => self.surface_control(component, specimen)?,
-                Rule::TrajectoryTracking => {
-                    let tuning = AccelerationTracking::trajectory;
-                    let own = tuning(&self.model.rig, &self.model.measurements())?;
-                    self.acceleration_tracking(component, name, &own, &mut file.connections);
-                }
-                Rule::DualLoop => {
-                    let tuning = AccelerationTracking::dual_loop;
-                    let own = tuning(&self.model.rig, &self.model.measurements())?;
-                    self.acceleration_tracking(component, name, &own, &mut file.connections);
-                }
-                Rule::MinimalControlSynthesis => {
-                    let own =
-                        MinimalControlSynthesis::tuned(&self.model.rig, &self.model.measurements());
-                    set(component, &own?.named());
-                    let wanted = |variable: &str| variable == "wanted_displacement";
-                    let delay = self.model.delay as isize;
-                    place_references(&mut file.connections, name, wanted, -delay);
-                }
-                _ => {}
-            }
-            let Some(suite) = &self.suite else {
-                continue;
-            };
-            let member = match rule {
-                Rule::DisplacementPid => Member::DisplacementPid,
-                Rule::LoopShaping => Member::LoopShaping,
-                Rule::ThreeVariable => Member::ThreeVariable,
-                Rule::ModelPredictive => {
-                    self.model(component);
-                    component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
-                    delay_references(&mut file.connections, name, self.model.delay);
-                    Member::ModelPredictive
-                }
-                Rule::SlidingMode => {
-                    self.sliding_mode(component, specimen_mass);
-                    Member::SlidingMode
-                }
-                Rule::ForcePid => {
-                    let found = suite.sliding_mode()?;
-                    let force = &found.force;
-                    let gains = [
-                        (vocabulary::PROPORTIONAL_GAIN, force.proportional),
-                        (vocabulary::INTEGRAL_GAIN, force.integral),
-                    ];
-                    set(component, &gains);
-                    continue;
-                }
-                Rule::UnderPrediction => {
-                    let mpc = suite.mpc()?;
-                    set(component, &mpc.low_level.gains.named());
-                    continue;
-                }
-                Rule::Preview
-                | Rule::LinearQuadraticGaussian
-                | Rule::MultiMetric
-                | Rule::TrajectoryTracking
-                | Rule::DualLoop
-                | Rule::OperatorAids
-                | Rule::SurfaceControl
-                | Rule::AdaptiveInverse
-                | Rule::MinimalControlSynthesis => continue,
-            };
-            let values = suite.named(member)?;
-            for (parameter, value) in values {
-                component.set(&parameter, value);
+            let rule = catalogue::rule(rule)?;
+            if chosen(component) {
+                let own = &mut Tuned {
+                    name,
+                    component,
+                    connections: &mut file.connections,
+                    specimen,
+                };
+                rule(self, own)?;
             }
         }
+        Ok(())
+    }
+
+    /// The parameters of a controller of the thesis; without a suite those stay as printed.
+    pub(super) fn member(&self, own: &mut Tuned<'_>, member: Member) -> Result<(), TuningError> {
+        if let Some(suite) = &self.suite {
+            for (parameter, value) in suite.named(member)? {
+                own.component.set(&parameter, value);
+            }
+        }
+        Ok(())
+    }
+
+    /// Model, delay and weights of model predictive control.
+    pub(super) fn model_predictive(&self, own: &mut Tuned<'_>) -> Result<(), TuningError> {
+        if self.suite.is_some() {
+            self.model(own.component);
+            self.delay(own.component);
+            own.delay_references(self.model.delay);
+        }
+        self.member(own, Member::ModelPredictive)
+    }
+
+    /// The gains of force PID under sliding mode.
+    pub(super) fn force_pid(&self, own: &mut Tuned<'_>) -> Result<(), TuningError> {
+        if let Some(suite) = &self.suite {
+            let force = &suite.sliding_mode()?.force;
+            let gains = [
+                (vocabulary::PROPORTIONAL_GAIN, force.proportional),
+                (vocabulary::INTEGRAL_GAIN, force.integral),
+            ];
+            set(own.component, &gains);
+        }
+        Ok(())
+    }
+
+    /// The gains of three-variable control under model predictive control.
+    pub(super) fn under_prediction(&self, own: &mut Tuned<'_>) -> Result<(), TuningError> {
+        if let Some(suite) = &self.suite {
+            set(own.component, &suite.mpc()?.low_level.gains.named());
+        }
+        Ok(())
+    }
+
+    /// Start and rates of adaptation of minimal control synthesis.
+    pub(super) fn minimal_control_synthesis(&self, own: &mut Tuned<'_>) -> Result<(), TuningError> {
+        let tuned = MinimalControlSynthesis::tuned(&self.model.rig, &self.model.measurements());
+        set(own.component, &tuned?.named());
+        let wanted = |variable: &str| variable == "wanted_displacement";
+        own.place_references(wanted, -(self.model.delay as isize));
         Ok(())
     }
 
     /// Gains, the lead of the shaped motion, and the delay of the compared one.
-    fn acceleration_tracking(
+    pub(super) fn acceleration_tracking(
         &self,
-        component: &mut ComponentFile,
-        name: &str,
-        tuning: &AccelerationTuning,
-        connections: &mut [Link],
-    ) {
-        set(component, &tuning.law.named());
-        let ahead = |variable: &str| variable.starts_with("ahead_");
-        place_references(connections, name, ahead, tuning.lead as isize);
-        let compared = |variable: &str| variable.starts_with("reference_");
-        place_references(connections, name, compared, -(self.model.delay as isize));
-    }
-
-    /// The feedback of preview control, and the rig's inverse.
-    fn multi_metric(
-        &self,
-        component: &mut ComponentFile,
-        specimen: Option<&YieldingSpecimen>,
+        own: &mut Tuned<'_>,
+        tuning: fn(&ShakeTable, &Measurements) -> Result<AccelerationTuning, ModelError>,
     ) -> Result<(), TuningError> {
-        self.linear_quadratic_gaussian(component, specimen)?;
-        let period = self.model.measurements().period;
-        let shaping = Shaping::inverse(&self.model.rig, period)?;
-        for (name, gain) in SHAPES.into_iter().zip(shaping.gains) {
-            component.set(name, gain);
-        }
-        component.set("shaping_lead_samples", shaping.lead as i64);
+        let tuned = tuning(&self.model.rig, &self.model.measurements())?;
+        set(own.component, &tuned.law.named());
+        own.place_references(|input| input.starts_with("ahead_"), tuned.lead as isize);
+        let compared = |input: &str| input.starts_with("reference_");
+        own.place_references(compared, -(self.model.delay as isize));
         Ok(())
     }
 
-    fn sliding_mode(&self, component: &mut ComponentFile, specimen_mass: Option<f64>) {
-        self.model(component);
-        if let Some(mass) = specimen_mass {
-            component.set(vocabulary::SPECIMEN_MASS, mass);
+    /// The feedback of preview control, and the rig's inverse.
+    pub(super) fn multi_metric(&self, own: &mut Tuned<'_>) -> Result<(), TuningError> {
+        self.linear_quadratic_gaussian(own)?;
+        let period = self.model.measurements().period;
+        let shaping = Shaping::inverse(&self.model.rig, period)?;
+        for (name, gain) in SHAPES.into_iter().zip(shaping.gains) {
+            own.component.set(name, gain);
         }
-        component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
-        // The valve moves when the reference is due; only the measurements are late.
-        component.set("reference_ahead", true);
+        own.component
+            .set("shaping_lead_samples", shaping.lead as i64);
+        Ok(())
+    }
+
+    /// Model and rates of sliding mode.
+    pub(super) fn sliding_mode(&self, own: &mut Tuned<'_>) -> Result<(), TuningError> {
+        if self.suite.is_some() {
+            self.model(own.component);
+            let identified = self.model.specimen.map(|own| own.mass);
+            if let Some(mass) = identified.or(own.specimen.map(|own| own.mass)) {
+                own.component.set(vocabulary::SPECIMEN_MASS, mass);
+            }
+            self.delay(own.component);
+            // The valve moves when the reference is due; only the measurements are late.
+            own.component.set("reference_ahead", true);
+        }
+        self.member(own, Member::SlidingMode)
     }
 
     /// Preview control's model, margins, noise, friction and specimen.
-    fn preview(
-        &self,
-        component: &mut ComponentFile,
-        specimen: Option<&YieldingSpecimen>,
-    ) -> Result<(), TuningError> {
-        self.linear_quadratic_gaussian(component, specimen)?;
+    pub(super) fn preview(&self, own: &mut Tuned<'_>) -> Result<(), TuningError> {
+        self.linear_quadratic_gaussian(own)?;
+        let Tuned {
+            component,
+            specimen,
+            ..
+        } = own;
         if let Some((own, shape)) = &self.model.hydraulics {
             set(
                 component,
@@ -439,7 +385,7 @@ impl Rules {
             );
         }
         component.set("specimen_known", specimen.is_some());
-        if let Some(known) = specimen {
+        if let Some(known) = *specimen {
             set(
                 component,
                 &[
@@ -459,11 +405,15 @@ impl Rules {
 
     /// Preview control's model and noise, and margins under the specimen; without friction and
     /// specimen in its model.
-    fn linear_quadratic_gaussian(
+    pub(super) fn linear_quadratic_gaussian(
         &self,
-        component: &mut ComponentFile,
-        specimen: Option<&YieldingSpecimen>,
+        Tuned {
+            component,
+            specimen,
+            ..
+        }: &mut Tuned<'_>,
     ) -> Result<(), TuningError> {
+        let specimen = *specimen;
         let mut own = preview_control(&self.model);
         own.load.specimen = specimen.copied();
         let identified = self.model.specimen.map(YieldingSpecimen::from);
@@ -487,8 +437,12 @@ impl Rules {
                 (vocabulary::MEASUREMENT_NOISE[2], noise.acceleration),
             ],
         );
-        component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
+        self.delay(component);
         Ok(())
+    }
+
+    pub(super) fn delay(&self, component: &mut ComponentFile) {
+        component.set(vocabulary::LOOP_DELAY_SAMPLES, self.model.delay as i64);
     }
 
     fn model(&self, component: &mut ComponentFile) {
@@ -542,9 +496,14 @@ mod tests {
             let mut model = ControlModel::commissioned().unwrap();
             model.curve = curve;
             let mut component = ComponentFile::default();
-            Rules::unprinted(model)
-                .linear_quadratic_gaussian(&mut component, None)
-                .unwrap();
+            let own = &mut Tuned {
+                name: "control",
+                component: &mut component,
+                connections: &mut [],
+                specimen: None,
+            };
+            let rules = Rules::unprinted(model);
+            rules.linear_quadratic_gaussian(own).unwrap();
             match component.parameters.get("force_step") {
                 Some(fmi_system::Setting::Number(step)) => *step,
                 other => panic!("{other:?}"),

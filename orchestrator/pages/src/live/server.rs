@@ -333,6 +333,50 @@ mod tests {
         }
     }
 
+    /// What the server reads of these parts, sent one after another, and how long it took.
+    fn read(parts: &[&[u8]]) -> (io::Result<Asked>, Duration) {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let (stream, _) = listener.accept().unwrap();
+        std::thread::scope(|scope| {
+            let begun = Instant::now();
+            let asked = scope.spawn(move || (Asked::read(&stream), begun.elapsed()));
+            for part in parts {
+                // The server may have closed it.
+                let _ = client.write_all(part);
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            let _ = client.shutdown(std::net::Shutdown::Write);
+            asked.join().unwrap()
+        })
+    }
+
+    #[test]
+    fn a_body_that_comes_after_its_head_is_read_to_its_end() {
+        let head = b"POST /set HTTP/1.1\r\nContent-Length: 5\r\n\r\n";
+        let asked = read(&[head, b"ab", b"cde and more"]).0.unwrap();
+        assert_eq!((&*asked.method, &*asked.body), ("POST", "abcde"));
+        let gone = read(&[head, b"ab"]).0;
+        assert_eq!(gone.err().unwrap().kind(), io::ErrorKind::UnexpectedEof);
+    }
+
+    #[test]
+    fn a_head_without_an_end_is_refused_before_patience_ends() {
+        let head = vec![b'x'; 2 * LONGEST];
+        let (refused, time) = read(&[&head]);
+        assert_eq!(refused.err().unwrap().kind(), io::ErrorKind::TimedOut);
+        assert!(time < PATIENCE / 2, "{time:?}");
+        // One that has the greatest length and comes whole is not too long.
+        let mut whole = b"GET / HTTP/1.1\r\nx: ".to_vec();
+        whole.resize(LONGEST - 4, b'y');
+        whole.extend(b"\r\n\r\n");
+        let asked = read(&[&whole]).0.unwrap();
+        assert_eq!(asked.target, "/");
+        let long = b"POST / HTTP/1.1\r\nContent-Length: 16385\r\n\r\n";
+        let refused = read(&[long]).0.err().unwrap();
+        assert_eq!(refused.kind(), io::ErrorKind::InvalidData);
+    }
+
     #[test]
     fn rows_are_served_to_this_machine_only() {
         let tap = Arc::new(Tap::new(vec![0], 3));

@@ -149,3 +149,46 @@ fn legend(out: &mut String, bars: &Bars, scale: &Scale) {
     }
     out.push_str("</div>");
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scale(values: &[f64], mark: Option<f64>) -> Scale {
+        let bar = |value: &f64| Bar {
+            name: "error".to_string(),
+            value: *value,
+            interval: None,
+            colour: 1,
+        };
+        Scale::of(&Bars {
+            title: String::new(),
+            groups: vec![BarGroup {
+                label: String::new(),
+                bars: values.iter().map(bar).collect(),
+            }],
+            mark: mark.map(|place| (place, "limit".to_string())),
+        })
+    }
+
+    #[test]
+    fn bars_far_beyond_the_mark_are_logarithmic_from_a_tenth_of_it() {
+        let near = |found: f64, wanted: f64| assert!((found - wanted).abs() < 1e-9, "{found}");
+        // 25 times the mark: shares of the largest.
+        let linear = scale(&[10.0, 50.0], Some(2.0));
+        near(linear.share(10.0), 20.0);
+        near(linear.share(2.0), 4.0);
+        // 5000 times: ln(v / 0.2) of ln(10000 / 0.2).
+        let logarithmic = scale(&[10.0, 10_000.0, f64::INFINITY], Some(2.0));
+        near(logarithmic.share(10_000.0), 100.0);
+        near(
+            logarithmic.share(2.0),
+            100.0 * 10_f64.ln() / 50_000_f64.ln(),
+        );
+        near(logarithmic.share(0.1), 0.0);
+        // Without a mark nothing is far.
+        near(scale(&[1.0, 1e6], None).share(1e5), 10.0);
+        // A mark beyond all bars is the end.
+        near(scale(&[1.0], Some(4.0)).share(1.0), 25.0);
+    }
+}

@@ -407,3 +407,28 @@ fn pages_to_look_at() {
     }
     assert!(std::fs::metadata(folder.join("run.html")).unwrap().len() > 100_000);
 }
+
+#[test]
+fn an_error_is_the_reference_less_the_table() {
+    let motion = built_in(1, &Options::default()).unwrap();
+    let (displacement, _, acceleration) = followed(&motion);
+    let report = run_report();
+    let panels: Vec<&Panel> = report.sections.iter().flat_map(|s| &s.panels).collect();
+    for (quantity, reference, table) in [
+        ("Acceleration", &motion.acceleration, &acceleration),
+        ("Displacement", &motion.displacement, &displacement),
+    ] {
+        let title = format!("{quantity} error (reference minus table)");
+        let panel = panels.iter().find(|panel| panel.title == title).unwrap();
+        let shown = &panel.series[0].values;
+        assert_eq!(shown.len(), reference.len());
+        for ((error, wanted), found) in shown.iter().zip(reference).zip(table) {
+            assert_eq!(*error, wanted - found);
+        }
+        // The stroke where the run was stopped is as high as what is drawn, with zero.
+        let stroke = &panel.series[1];
+        let high = shown.iter().copied().fold(0.0, f64::max);
+        let low = shown.iter().copied().fold(0.0, f64::min);
+        assert_eq!(stroke.values, [low, high], "{}", stroke.name);
+    }
+}

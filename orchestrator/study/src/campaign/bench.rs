@@ -21,6 +21,7 @@ use laboratory::commission::rules_on_recordings;
 use laboratory::error::Error;
 use laboratory::run::experiment::{Motions, Prepared, Request, prepare_shared, system_file};
 use laboratory::systems::tuning::Rules;
+use pack::Installation;
 use pack::library::FmuLibrary;
 use units::{hint, value_in};
 
@@ -33,6 +34,7 @@ const MOST_RIGS: usize = 32;
 /// Carries out a study's runs; what they have in common is read once.
 pub struct Bench<'a> {
     study: &'a Study,
+    installation: Installation,
     systems: Mutex<HashMap<String, Arc<Assembled>>>,
     /// FMUs of the built-in systems, by version.
     libraries: Mutex<HashMap<String, Arc<Mutex<FmuLibrary>>>>,
@@ -56,9 +58,10 @@ struct Assembled {
 impl<'a> Bench<'a> {
     /// A bench for a study.
     #[must_use]
-    pub fn new(study: &'a Study) -> Self {
+    pub fn new(study: &'a Study, installation: &Installation) -> Self {
         Self {
             study,
+            installation: installation.clone(),
             systems: Mutex::default(),
             libraries: Mutex::default(),
             motions: Motions::default(),
@@ -286,7 +289,10 @@ impl<'a> Bench<'a> {
     fn request(&self, settings: &[Setting]) -> Result<(Request, Arc<Assembled>, bool), Error> {
         let fault = |reason: String| self.study.fault(&reason);
         let folder = self.study.folder();
-        let mut request = Request::built_in(laboratory::systems::built_in::DEFAULT_SYSTEM);
+        let mut request = Request {
+            installation: self.installation.clone(),
+            ..Request::built_in(laboratory::systems::built_in::DEFAULT_SYSTEM)
+        };
         let mut is_own = false;
         let mut variables = Vec::new();
         for (name, key, value, is_relative) in self.study.all_values(settings) {
@@ -332,7 +338,11 @@ impl<'a> Bench<'a> {
             return Ok(found.clone());
         }
         let file = system_file(request, None)?;
-        let library = || Arc::new(Mutex::new(FmuLibrary::of(*fmi, &file)));
+        let library = || {
+            Arc::new(Mutex::new(
+                FmuLibrary::of(*fmi, &file).from(&self.installation),
+            ))
+        };
         let library = match file.directory.is_none() && file.package.is_none() {
             // Built-in systems have most of their components in common.
             true => {
@@ -380,7 +390,13 @@ impl<'a> Bench<'a> {
         let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
         let set = rig.into_iter().cloned().collect();
         let found = place.get_or_insert_with(|| {
-            let rules = rules_on_recordings(&request.plant, set, RECORDED, self.study.seed);
+            let rules = rules_on_recordings(
+                &request.plant,
+                set,
+                RECORDED,
+                self.study.seed,
+                &self.installation,
+            );
             rules.map(Arc::new).map_err(|error| error.to_string())
         });
         found.clone().map_err(|reason| Error::Option {
@@ -492,7 +508,7 @@ impl Runs for Bench<'_> {
     }
 
     fn head(&self) -> Result<Head, Error> {
-        Head::new(self.columns()?)
+        Head::new(self.columns()?, &self.installation)
     }
 
     fn count(&self) -> u64 {

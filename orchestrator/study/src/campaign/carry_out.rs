@@ -1,5 +1,6 @@
 //! A study from its file to its table: runs that are missing are carried out on all cores.
 
+use pack::Installation;
 use std::collections::{HashMap, HashSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -248,9 +249,10 @@ impl Left {
 pub fn rows(
     study: &Study,
     numbers: std::ops::Range<u64>,
+    installation: &Installation,
     output: &mut dyn Write,
 ) -> Result<(), Error> {
-    let bench = Bench::new(study);
+    let bench = Bench::new(study, installation);
     let mut write = |line: Vec<u8>| {
         output.write_all(&line).map_err(|error| Error::File {
             path: PathBuf::from("standard output"),

@@ -1,6 +1,7 @@
 //! Rows as they come: a file that grows one line per run, so that nothing is lost when a study is
 //! killed, and several processes share a study.
 
+use pack::Installation;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -39,9 +40,9 @@ impl Head {
     ///
     /// # Errors
     /// Components that cannot be found.
-    pub fn new(columns: Vec<Column>) -> Result<Self, Error> {
+    pub fn new(columns: Vec<Column>, installation: &Installation) -> Result<Self, Error> {
         let mut components = BTreeMap::new();
-        for fmu in pack::all_fmus()? {
+        for fmu in installation.fmus()? {
             let bytes = fs::read(&fmu.path).map_err(|error| Error::File {
                 path: fmu.path.clone(),
                 reason: error.to_string(),

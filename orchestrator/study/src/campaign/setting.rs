@@ -393,3 +393,53 @@ pub(super) fn files(key: &Key, value: &Setting, folder: &Path) -> Vec<PathBuf> {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_put_values_into_a_request_or_refuse_them() {
+        let mut request = Request::built_in("mpc");
+        let text = |own: &str| Setting::Text(own.to_string());
+        let mut apply = |key: Key, value: Setting| {
+            let done = key.apply(&value, Path::new("folder"), &mut request);
+            done.map(|()| request.clone())
+                .map_err(|error| error.to_string())
+        };
+        assert_eq!(apply(Key::Seed, Setting::Integer(7)).unwrap().seed, 7);
+        assert_eq!(apply(Key::Seed, Setting::Integer(0)).unwrap().seed, 0);
+        for wrong in [Setting::Integer(-1), Setting::Number(1.5), text("1")] {
+            let told = apply(Key::Seed, wrong).unwrap_err();
+            assert!(told.contains("expected 0, 1, 2"), "{told}");
+        }
+        assert_eq!(
+            apply(Key::Fmi, Setting::Integer(2)).unwrap().fmi,
+            FmiVersion::V2
+        );
+        assert!(apply(Key::Fmi, Setting::Integer(4)).is_err());
+        assert_eq!(
+            apply(Key::Duration, text("250 ms")).unwrap().duration_s,
+            Some(0.25)
+        );
+        assert_eq!(
+            apply(Key::Step, Setting::Number(0.001)).unwrap().step_s,
+            Some(0.001)
+        );
+        assert!(apply(Key::Duration, Setting::Number(0.0)).is_err());
+        let Some(Scaling::PeakAcceleration(peak)) =
+            apply(Key::PeakAcceleration, text("0.3 g")).unwrap().scaling
+        else {
+            panic!("no peak");
+        };
+        assert!((peak - 0.3 * STANDARD_GRAVITY).abs() < 1e-12, "{peak}");
+        let record = apply(Key::Record, text("a.csv")).unwrap().record;
+        assert_eq!(record, Some(Path::new("folder").join("a.csv")));
+        assert_eq!(
+            apply(Key::Plant, text("own.toml")).unwrap().plant,
+            "folder/own.toml"
+        );
+        let told = apply(Key::Specimen, text("yeilding")).unwrap_err();
+        assert!(told.contains("yielding"), "{told}");
+    }
+}

@@ -48,7 +48,7 @@ pub fn held(bench: &Bench, number: u64, set: &[String]) -> Result<Held, Error> {
     request.set.extend_from_slice(set);
     request.duration_s = Some(request.duration_s.map_or(FOLLOWED, |own| own.min(FOLLOWED)));
     let signal = break_at_valve(&mut file)?;
-    let library = Mutex::new(FmuLibrary::of(request.fmi, &file));
+    let library = Mutex::new(FmuLibrary::of(request.fmi, &file).from(&request.installation));
     let motions = Motions::default();
     let mut commands = Vec::new();
     let mut period = 0.0;

@@ -5,6 +5,7 @@ mod asked;
 mod margins;
 mod page;
 
+use pack::Installation;
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -127,9 +128,14 @@ struct Search<'a> {
 ///
 /// # Errors
 /// Whatever is wrong with the study, before its first run.
-pub fn tune(study: &Study, interrupt: &AtomicBool, tell: &dyn Fn(&Trial)) -> Result<Tuned, Error> {
+pub fn tune(
+    study: &Study,
+    installation: &Installation,
+    interrupt: &AtomicBool,
+    tell: &dyn Fn(&Trial),
+) -> Result<Tuned, Error> {
     let begun = Instant::now();
-    let bench = Bench::new(study);
+    let bench = Bench::new(study, installation);
     bench.check()?;
     let asked = Asked::read(study, &bench)?;
     let columns = bench.columns()?;
@@ -349,38 +355,39 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Values at coordinates from 0 to 1: even, or even in the logarithm where the bounds span a factor
-    /// of five.
+    /// Values at coordinates from 0 to 1.
     fn values(&self, at: &[f64]) -> Vec<f64> {
         let parameters = self.asked.parameters.iter().zip(at);
-        parameters
-            .map(|(own, at)| {
-                let at = at.clamp(0.0, 1.0);
-                match own.is_logarithmic() {
-                    true => own.low * (own.high / own.low).powf(at),
-                    false => own.low + (own.high - own.low) * at,
-                }
-            })
-            .collect()
+        parameters.map(|(own, at)| own.value(*at)).collect()
     }
 
     fn coordinates(&self, values: &[f64]) -> Vec<f64> {
         let parameters = self.asked.parameters.iter().zip(values);
-        parameters
-            .map(|(own, value)| {
-                let at = match own.is_logarithmic() {
-                    true => (value / own.low).ln() / (own.high / own.low).ln(),
-                    false => (value - own.low) / (own.high - own.low),
-                };
-                at.clamp(0.0, 1.0)
-            })
-            .collect()
+        parameters.map(|(own, value)| own.place(*value)).collect()
     }
 }
 
 impl Parameter {
     fn is_logarithmic(&self) -> bool {
         self.low > 0.0 && self.high / self.low >= 5.0
+    }
+
+    /// The value at a place from 0 to 1: even, or even in the logarithm where the bounds span a factor of five.
+    fn value(&self, at: f64) -> f64 {
+        let at = at.clamp(0.0, 1.0);
+        match self.is_logarithmic() {
+            true => self.low * (self.high / self.low).powf(at),
+            false => self.low + (self.high - self.low) * at,
+        }
+    }
+
+    /// The place of a value.
+    fn place(&self, value: f64) -> f64 {
+        let at = match self.is_logarithmic() {
+            true => (value / self.low).ln() / (self.high / self.low).ln(),
+            false => (value - self.low) / (self.high - self.low),
+        };
+        at.clamp(0.0, 1.0)
     }
 }
 
@@ -457,6 +464,73 @@ impl Tuned {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn wide_bounds_are_searched_in_the_logarithm() {
+        let parameter = |low, high| Parameter {
+            name: "control.gain".to_string(),
+            unit: String::new(),
+            low,
+            high,
+            before: low,
+            after: low,
+        };
+        // Middle of the bounds: the geometric mean from a factor of five on, otherwise the arithmetic one.
+        for (low, high, middle) in [
+            (0.1, 10.0, 1.0),
+            (2.0, 10.0, 20_f64.sqrt()),
+            (2.0, 9.0, 5.5),
+            (-1.0, 9.0, 4.0),
+            (0.0, 9.0, 4.5),
+        ] {
+            let own = parameter(low, high);
+            assert!((own.value(0.5) - middle).abs() < 1e-12, "{low} to {high}");
+            for (place, value) in [(0.0, low), (0.5, middle), (1.0, high)] {
+                assert!((own.value(place) - value).abs() < 1e-12, "{low} to {high}");
+                assert!((own.place(value) - place).abs() < 1e-12, "{low} to {high}");
+            }
+            // Outside of the bounds are the bounds.
+            assert_eq!(own.value(1.5), own.value(1.0));
+            assert_eq!(own.place(2.0 * high), 1.0);
+        }
+    }
+
+    fn study(factors: &str) -> Study {
+        let text = format!("[study]\ndesign = \"full\"\n[factors]\n{factors}");
+        Study::parse(std::path::Path::new("some.toml"), text).unwrap()
+    }
+
+    #[test]
+    fn motions_are_held_out_whole() {
+        let own = study("controller = [\"mpc\", \"lqg\"]\nseed = [1, 2, 3, 4, 5]\n");
+        assert_eq!(own.runs(), 10);
+        // Two fifths of the seeds: the last two of them, under each controller.
+        let (training, held_out, named) = parts(&own, 0.4);
+        let (factor, values) = named.unwrap();
+        assert_eq!(
+            (&*factor, &values[..]),
+            ("seed", &["4".to_string(), "5".to_string()][..])
+        );
+        let seed = |number: &u64| own.settings(*number)[1].to_string();
+        assert_eq!((training.len(), held_out.len()), (6, 4));
+        assert!(held_out.iter().all(|run| ["4", "5"].contains(&&*seed(run))));
+        assert!(
+            training
+                .iter()
+                .all(|run| !["4", "5"].contains(&&*seed(run)))
+        );
+    }
+
+    #[test]
+    fn without_several_motions_the_last_runs_are_held_out() {
+        let own =
+            study("controller = [\"mpc\", \"lqg\", \"preview\", \"dual-loop\"]\nseed = [7]\n");
+        assert_eq!(parts(&own, 0.25), (vec![0, 1, 2], vec![3], None));
+        // One at least, and not all.
+        assert_eq!(parts(&own, 0.01).1, [3]);
+        assert_eq!(parts(&own, 1.0).0, [0]);
+        assert_eq!(parts(&own, 0.0), (vec![0, 1, 2, 3], vec![], None));
+    }
 
     /// What the optimiser calls a constraint that is kept: one that is not negative.
     #[test]

@@ -311,3 +311,23 @@ fn leave_out(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_between_samples_have_the_mean_of_what_is_between() {
+        let samples = [0.0, 4.0, 2.0];
+        assert_eq!(
+            finer(&samples, 4, Between::Linear),
+            [0.5, 1.5, 2.5, 3.5, 3.75, 3.25, 2.75, 2.25, 2.0]
+        );
+        let held = [0.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 4.0, 2.0];
+        assert_eq!(finer(&samples, 4, Between::Hold), held);
+        for between in [Between::Hold, Between::Linear] {
+            assert_eq!(finer(&samples, 1, between), samples);
+            assert_eq!(finer(&[], 3, between), [0.0]);
+        }
+    }
+}

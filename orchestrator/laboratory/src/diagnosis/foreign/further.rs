@@ -1,5 +1,6 @@
 //! The extended model of an FMU, read back, on further records without a fit.
 
+use pack::Installation;
 use std::path::{Path, PathBuf};
 
 use identification::data::mean_and_deviation;
@@ -59,7 +60,7 @@ impl Extended {
         path: &Path,
         fmu: Option<&Path>,
         map: Option<&Path>,
-        isolate: Option<Isolation>,
+        (isolate, installation): (Option<Isolation>, &Installation),
     ) -> Result<Self, Error> {
         let mut system = SystemFile::read(path)?;
         let map_path = match map {
@@ -113,7 +114,7 @@ impl Extended {
             &place,
             &map,
             &map_path,
-            isolate.unwrap_or(Isolation::Foreign),
+            (isolate.unwrap_or(Isolation::Foreign), installation),
         )?;
         Ok(Self {
             path: path.into(),

@@ -7,6 +7,7 @@ mod pictures;
 mod simulator;
 mod written;
 
+use pack::Installation;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -42,7 +43,7 @@ pub fn diagnose(
     map: &Path,
     files: &[PathBuf],
     folder: &Out,
-    isolate: Option<Isolation>,
+    (isolate, installation): (Option<Isolation>, &Installation),
     observer: Observer<'_>,
 ) -> Result<DiagnosisReport, Error> {
     let begun = Instant::now();
@@ -56,7 +57,12 @@ pub fn diagnose(
         inputs,
         outputs,
         parameters,
-    } = mapped(model, &map, place, isolate.unwrap_or(Isolation::None))?;
+    } = mapped(
+        model,
+        &map,
+        place,
+        (isolate.unwrap_or(Isolation::None), installation),
+    )?;
     let trials = data::trials(&map, place, files, &inputs, &outputs)?;
     let stem = model.file_stem().unwrap_or_default().to_string_lossy();
     let subject = ForeignModel {
@@ -121,8 +127,8 @@ pub fn diagnose(
 ///
 /// # Errors
 /// An FMU that cannot be read.
-pub fn template(model: &Path) -> Result<String, Error> {
-    Ok(map::template(&*open(model)?))
+pub fn template(model: &Path, installation: &Installation) -> Result<String, Error> {
+    Ok(map::template(&*open(model, installation)?))
 }
 
 /// Simulates the nominal model on every record; returns messages of the runs.

@@ -13,8 +13,8 @@ use fmi_master::{Algorithm, Outcome, Pace, Samples, Simulation};
 use fmi_system::{
     Between, InputTable, Library, Origin, System, SystemFile, Value, VariableName, assemble,
 };
+use pack::Installation;
 use pack::library::FmuLibrary;
-use pack::program;
 use units::hint;
 
 /// The table that drives the inputs.
@@ -34,6 +34,8 @@ pub(super) struct Alone {
     pub file: SystemFile,
     /// How the FMU is run.
     options: Options,
+    /// Where components of the project come from.
+    installation: Installation,
 }
 
 /// A model with the signals and parameters that its map names.
@@ -88,11 +90,11 @@ fn real<'a>(fmu: &'a Fmu, name: &str, causality: Causality) -> Result<&'a Variab
 ///
 /// # Errors
 /// No such file or component; an FMU that cannot be read.
-pub(super) fn open(path: &Path) -> Result<Arc<Fmu>, Error> {
+pub(super) fn open(path: &Path, installation: &Installation) -> Result<Arc<Fmu>, Error> {
     if is_file(path) {
         return Ok(Fmu::open(path)?);
     }
-    let mut library = FmuLibrary::new(FmiVersion::V3, None);
+    let mut library = FmuLibrary::new(FmiVersion::V3, None).from(installation);
     library
         .fmu(&path.display().to_string())
         .map_err(|error| Error::Option {
@@ -115,11 +117,11 @@ pub(super) fn mapped(
     path: &Path,
     map: &Map,
     place: &Path,
-    isolation: Isolation,
+    (isolation, installation): (Isolation, &Installation),
 ) -> Result<Mapped, Error> {
     let wrong = |at: String, reason: String| file_fault(place, format!("`{at}`: {reason}"));
     let mut file = SystemFile::of_fmu(path);
-    let fmu = open(path)?;
+    let fmu = open(path, installation)?;
     let signals = |names: &mut dyn Iterator<Item = &String>, causality, table: &str| {
         let own = names.map(|name| {
             let variable = real(&fmu, name, causality);
@@ -182,8 +184,9 @@ pub(super) fn mapped(
             system,
             options: Options {
                 isolation,
-                ..program::options()
+                ..installation.options()
             },
+            installation: installation.clone(),
         },
         inputs,
         outputs,
@@ -232,7 +235,7 @@ impl Alone {
     ) -> Result<Self, Error> {
         file.tables.remove(TABLE);
         file.own_tables.extend(table(inputs));
-        let mut library = FmuLibrary::of(FmiVersion::V3, &file);
+        let mut library = FmuLibrary::of(FmiVersion::V3, &file).from(&self.installation);
         let system = assemble(&file, &[], &mut library)?;
         Ok(Self {
             system,
@@ -241,6 +244,7 @@ impl Alone {
             component: self.component.clone(),
             file,
             options: self.options.clone(),
+            installation: self.installation.clone(),
         })
     }
 

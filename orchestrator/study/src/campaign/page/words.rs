@@ -406,3 +406,23 @@ fn without(own: &Fragility, intensity: &str) -> Option<String> {
         ),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_upper_bound_is_rounded_up() {
+        for (percent, shown) in [
+            (12.0, "12"),
+            (12.3, "13"),
+            (12.9, "13"),
+            (0.0451, "0.046"),
+            (0.0459, "0.046"),
+            (1.23, "1.3"),
+        ] {
+            assert_eq!(at_most(percent), shown);
+        }
+        assert_eq!(at_most(0.0), significant(0.0, 2));
+    }
+}
