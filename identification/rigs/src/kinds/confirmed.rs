@@ -462,32 +462,38 @@ pub(super) fn confirm<M: InParts>(
     })
 }
 
-/// Widens the standard errors of `all` to the scatter between parts and files, and tells which
-/// parameters are not the same there.
+/// Widens the standard errors of `all` to the scatter between parts and files, and tells which parameters are not the
+/// same there. Other files show nothing of the first file's zero: without that file it makes up for a zero of theirs.
 fn differences<M: InParts>(
     measured: &M,
     fits: &Fits,
     all: &mut [NamedValue],
     findings: &mut Vec<String>,
 ) {
-    let lists: Vec<(String, Vec<NamedValue>)> = if fits.files.is_empty() {
-        let of = |part: Part| {
-            let (point, deviations) = &fits.parts[part as usize];
-            let name = measured.record_name(part as usize).to_owned();
-            (name, listed(measured, point, deviations))
-        };
-        vec![of(Part::Fitted), of(Part::LeftOut)]
+    let of = |record: usize, point: &Point, deviations: &[f64]| {
+        let values = listed(measured, point, deviations);
+        (record, measured.record_name(record).to_owned(), values)
+    };
+    let lists: Vec<(usize, String, Vec<NamedValue>)> = if fits.files.is_empty() {
+        let parts = [Part::Fitted, Part::LeftOut].map(|part| part as usize);
+        let own = parts.map(|part| (part, &fits.parts[part]));
+        own.map(|(part, (point, deviations))| of(part, point, deviations))
+            .into()
     } else {
-        let own = fits.files.iter().map(|(s, point, deviations)| {
-            let name = measured.record_name(file(*s)).to_owned();
-            (name, listed(measured, point, deviations))
-        });
-        own.collect()
+        let own = fits.files.iter();
+        own.map(|(s, point, deviations)| of(file(*s), point, deviations))
+            .collect()
+    };
+    let nominal = measured.parameters(&fits.everything.0, &[]).len();
+    let tells = |record: usize, i: usize| {
+        let is_of_first = i < nominal && measured.is_of_first_file(i);
+        !is_of_first || measured.samples(record, 0) > 0
     };
     for (i, parameter) in all.iter_mut().enumerate() {
         let own: Vec<(&str, &NamedValue)> = lists
             .iter()
-            .filter_map(|(name, list)| Some((name.as_str(), list.get(i)?)))
+            .filter(|(record, ..)| tells(*record, i))
+            .filter_map(|(_, name, list)| Some((name.as_str(), list.get(i)?)))
             .filter(|(_, value)| value.value.is_finite() && value.standard_error.is_finite())
             .collect();
         let n = own.len() as f64;
@@ -641,6 +647,61 @@ mod tests {
         // A sliding speed is no size.
         assert!(gone([0.2, 2.2e-5, 0.1]).is_empty());
         assert_eq!(gone([0.43, 2.2e-5, 1e-3]), ["flow_saturation"]);
+    }
+
+    #[test]
+    fn of_the_first_files_zero_no_later_file_tells() {
+        use super::super::measured::Measured;
+        use super::super::{Measurement, RigRecording, of_kind};
+        use recordings::{Channel, Recording};
+        const COMMAND: Channel = Channel::Other {
+            name: "command",
+            unit: "m",
+        };
+        let rig = of_kind("closed_loop_actuator").unwrap();
+        let recordings = [false, true].map(|is_left_out| {
+            let wave: Vec<f64> = (0..600).map(|k| (0.1 * f64::from(k)).sin()).collect();
+            let channels = vec![(COMMAND, wave.clone()), (Channel::Displacement, wave)];
+            let recording = Recording::new("one", 0.01, channels).unwrap();
+            let mut own = RigRecording::new(recording, &[COMMAND], Channel::Displacement);
+            own.left_out.fill(is_left_out);
+            own
+        });
+        let measurement = Measurement {
+            recordings: recordings.into(),
+        };
+        let stated = |name: &str| match name {
+            "loop_gain" => (20.0, 5.0),
+            "scale" => (1.0, 0.01),
+            "offset" => (0.0, 1e-3),
+            _ => (0.0, 0.0),
+        };
+        let nominal = rig.parameters().iter().map(|(name, _)| stated(name));
+        let measured = Measured::new(rig, &measurement, nominal.collect());
+        let all = measured.origin();
+        let mut later = all.clone();
+        later.nuisance.iter_mut().for_each(|p| *p = 2.0);
+        let deviations = vec![0.01; all.nuisance.len()];
+        let fits = Fits {
+            everything: (all.clone(), deviations.clone()),
+            parts: [
+                (all.clone(), deviations.clone()),
+                (later, deviations.clone()),
+            ],
+            files: Vec::new(),
+        };
+        let mut values = listed(&measured, &all, &deviations);
+        let own: Vec<f64> = values.iter().map(|value| value.standard_error).collect();
+        let mut findings = Vec::new();
+        differences(&measured, &fits, &mut values, &mut findings);
+        let widened = values.iter().zip(&own);
+        let widened = widened.filter(|(value, own)| value.standard_error > 10.0 * **own);
+        let names: Vec<&str> = widened.map(|(value, _)| value.name.as_str()).collect();
+        assert_eq!(names, ["loop_gain", "scale"]);
+        assert!(
+            findings.iter().all(|one| !one.contains("offset")),
+            "{findings:?}"
+        );
     }
 
     #[test]
