@@ -134,6 +134,39 @@ pub struct Judgement {
     pub unseen_gains: Vec<Option<f64>>,
 }
 
+impl WeighedModel {
+    /// The fitted model `own`. Unless it is `adequate`, what it leaves may belong to its effects: their sizes are known
+    /// no better than to the root of the share of power that it does not explain.
+    fn of<M: ExtensibleModel>(
+        model: &M,
+        own: &Hypothesis,
+        weight: f64,
+        explains: f64,
+        adequate: bool,
+    ) -> Self {
+        let deviations = own.jacobian.deviations(model, &own.fit).unwrap_or_default();
+        let mut effects = estimates(model.candidates(), &own.fit.point, &deviations);
+        if !adequate {
+            widen(&mut effects, 1.0 - explains);
+        }
+        Self {
+            point: own.fit.point.clone(),
+            effects,
+            weight,
+            explains,
+        }
+    }
+}
+
+/// Widens the standard errors of sizes where a share `left` of the power is not explained.
+fn widen(effects: &mut [NamedEffect], left: f64) {
+    let left = left.clamp(0.0, 1.0).sqrt();
+    let sizes = effects.iter_mut().flat_map(|own| &mut own.parameters);
+    for size in sizes.filter(|own| !own.is_shape) {
+        size.standard_error = size.standard_error.hypot(left * size.value);
+    }
+}
+
 /// Estimates of the effects at `point`, with `deviations` of all coordinates, nuisance first; not a
 /// number where they are unknown.
 pub fn estimates(candidates: &[Candidate], point: &Point, deviations: &[f64]) -> Vec<NamedEffect> {
@@ -377,7 +410,6 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
     /// The one effect of `point` that explains most under the noises of the quiet records, which have no part
     /// of what is missing.
     fn core(&self, point: &Point) -> Option<WeighedModel> {
-        let candidates = self.assumed.candidates();
         let selection = PenalisedLikelihood::of(self.quiet, self.records, self.observer);
         let excess = |own: &Hypothesis| (own.mean_square() - 1.0).max(0.0);
         let fitted = |effects: &[(usize, Vec<f64>)]| {
@@ -390,14 +422,8 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
         let nominal = excess(&fitted(&[])?);
         let alone = point.effects.iter().filter_map(|own| {
             let found = fitted(std::slice::from_ref(own))?;
-            let deviations = found.jacobian.deviations(self.quiet, &found.fit);
-            let deviations = deviations.unwrap_or_default();
-            Some(WeighedModel {
-                point: found.fit.point.clone(),
-                effects: estimates(candidates, &found.fit.point, &deviations),
-                weight: 0.0,
-                explains: 1.0 - excess(&found) / nominal.max(f64::MIN_POSITIVE),
-            })
+            let explains = 1.0 - excess(&found) / nominal.max(f64::MIN_POSITIVE);
+            Some(WeighedModel::of(self.quiet, &found, 0.0, explains, false))
         });
         alone.max_by(|a, b| a.explains.total_cmp(&b.explains))
     }
@@ -566,13 +592,8 @@ fn weigh<M: ExtensibleModel>(
     let candidates: Vec<WeighedModel> = weighed
         .into_iter()
         .map(|own| {
-            let deviations = own.jacobian.deviations(model, &own.fit).unwrap_or_default();
-            WeighedModel {
-                point: own.fit.point.clone(),
-                effects: estimates(model.candidates(), &own.fit.point, &deviations),
-                weight: odds(own) / all_odds,
-                explains: explains(own),
-            }
+            let weight = odds(own) / all_odds;
+            WeighedModel::of(model, own, weight, explains(own), adequate)
         })
         .collect();
     // What is told of the effects rests on all records, as long as the model holds on them.
@@ -620,6 +641,28 @@ fn weigh<M: ExtensibleModel>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_size_is_known_no_better_than_its_model_explains() {
+        let estimate = |value, standard_error, is_shape| ParameterEstimate {
+            name: "size".into(),
+            value,
+            unit: "N",
+            standard_error,
+            is_shape,
+        };
+        let mut effects = [NamedEffect {
+            effect: "friction",
+            parameters: vec![estimate(-4.0, 0.3, false), estimate(0.1, 0.01, true)],
+            confidence: 1.0,
+        }];
+        widen(&mut effects, 0.01);
+        let errors = effects[0].parameters.iter().map(|own| own.standard_error);
+        // A tenth of 4, beside 0.3.
+        assert_eq!(errors.collect::<Vec<_>>(), [0.5, 0.01]);
+        widen(&mut effects, -0.1);
+        assert_eq!(effects[0].parameters[0].standard_error, 0.5);
+    }
 
     #[test]
     fn an_effect_that_predicts_unseen_records_worse_is_refuted() {
