@@ -29,8 +29,6 @@ const LEAST_GAIN: f64 = 0.05;
 const RIVAL: f64 = 0.9;
 /// A candidate whose fit gains less than this share of the best one's is not tested on unseen data.
 const WORTH_TESTING: f64 = 0.7;
-/// And one whose fit has gained less than this share after some steps is not fitted to the end.
-const WORTH_ENDING: f64 = 0.35;
 /// Effects in one model.
 const MOST_EFFECTS: usize = 8;
 /// Candidates that are fitted to the end in a round.
@@ -49,10 +47,6 @@ pub const STARTS_SEED: u64 = 15;
 /// Steps of a first look and of a fit to the end.
 const LOOK: usize = 6;
 const TO_THE_END: usize = 40;
-/// Squared error of a fit after some steps, over the least of others, beyond which more steps do not make it the best.
-const BEHIND: f64 = 4.0;
-/// Squared errors of two fits of one set of effects up to which they come to one end.
-const SAME: f64 = 1.01;
 /// Steps of a fit that begins near its end.
 pub const AGAIN: usize = 12;
 
@@ -384,29 +378,11 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             .collect();
         quick.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
         quick.truncate(FINALISTS);
-        let begun = quick.par_iter().filter_map(|(effect, quick)| {
-            let begun = settle(model, &quick.point, record, AGAIN)?;
-            Some((*effect, begun))
-        });
-        let mut begun: Vec<(usize, Simulated)> = begun.collect();
-        let gained = |one: &Simulated| base.squares - one.squares;
-        let most = begun.iter().map(|(_, one)| gained(one));
-        let most = most.fold(0.0, f64::max);
-        begun.retain(|(_, one)| gained(one) >= WORTH_ENDING * most);
-        let settled = begun.par_iter().filter_map(|(effect, begun)| {
-            let settled = settle(model, &begun.point, record, TO_THE_END)?;
+        let settled = quick.par_iter().filter_map(|(effect, quick)| {
+            let settled = settle(model, &quick.point, record, TO_THE_END)?;
             Some((*effect, settled))
         });
         Some(settled.collect())
-    }
-
-    /// The fit of `point`, which is `current` without an effect; not to its end where it stays far behind.
-    fn without_one(&self, point: &Point, current: &Simulated) -> Option<Simulated> {
-        let begun = settle(self.model, point, self.record, AGAIN)?;
-        if begun.squares > BEHIND * current.squares {
-            return Some(begun);
-        }
-        settle(self.model, &begun.point, self.record, TO_THE_END)
     }
 
     /// Whether an effect of `point` is at a bound other than zero.
@@ -516,8 +492,7 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
                 let mut point = current.point.clone();
                 point.effects.remove(i);
                 // What runs away without an effect is compared with the model that has none.
-                let smaller = self
-                    .without_one(&point, current)
+                let smaller = settle(self.model, &point, self.record, TO_THE_END)
                     .or_else(|| nominal(self.model, self.record))?;
                 Some((compare(&self.crossed(&smaller)?, &after), smaller))
             })
@@ -585,38 +560,6 @@ pub fn select<M: SimulatedModel>(
     })
 }
 
-/// Fits of those of `starts` to `record` that are not far behind after some steps. Of those that have the same effects
-/// and come to the same error, one is enough.
-fn raced<M: SimulatedModel>(
-    model: &M,
-    starts: &[Point],
-    record: usize,
-    observer: Observer<'_>,
-) -> Vec<Simulated> {
-    let mut begun: Vec<Simulated> = starts
-        .iter()
-        .filter_map(|start| {
-            observer.tell(|| Progress::Fitting(model.record_name(record).to_owned()));
-            settle(model, start, record, AGAIN)
-        })
-        .collect();
-    begun.sort_by(|a, b| a.squares.total_cmp(&b.squares));
-    let least = begun.first().map_or(0.0, |best| best.squares);
-    begun.retain(|one| one.squares <= BEHIND * least);
-    let effects = |one: &Simulated| {
-        let mut all: Vec<usize> = one.point.effects.iter().map(|(i, _)| *i).collect();
-        all.sort_unstable();
-        all
-    };
-    begun.dedup_by(|next, kept| {
-        effects(next) == effects(kept) && next.squares <= SAME * kept.squares
-    });
-    let ended = begun.into_iter();
-    ended
-        .filter_map(|one| settle(model, &one.point, record, TO_THE_END))
-        .collect()
-}
-
 /// The best of `proposals`, each a set of effects and a point to begin from. Each is fitted to all of `record`;
 /// the best is the one whose halves predict each other best, without the effects that do not pay there. If none
 /// can be fitted to the halves, it is the nominal model; none if that one cannot be fitted either.
@@ -627,8 +570,9 @@ pub fn select_jointly<M: SimulatedModel>(
     observer: Observer<'_>,
 ) -> Option<Simulated> {
     let mut selection = CrossValidation::new(model, record, observer);
-    let fitted = raced(model, proposals, record, observer).into_iter();
-    let fitted = fitted.filter_map(|fitted| {
+    let fitted = proposals.iter().filter_map(|start| {
+        observer.tell(|| Progress::Fitting(model.record_name(record).to_owned()));
+        let fitted = settle(model, start, record, TO_THE_END)?;
         let crossed = selection.crossed(&fitted)?;
         // Either half counts alike, whatever its size; a model of data without noise may leave nothing.
         let left: f64 = crossed.iter().map(|half| squares(half).ln()).sum();

@@ -5,16 +5,18 @@
 /// samples would smooth most in the middle, so that a delay that is estimated with it leans there.
 pub(super) fn between(values: &[f64], place: f64) -> f64 {
     let last = values.len().saturating_sub(1);
-    let at = |k: usize| values.get(k.min(last)).copied().unwrap_or(f64::NAN);
     let place = place.clamp(0.0, last as f64);
     let before = place as usize;
     let share = place - before as f64;
-    let [far, low, high, beyond] = [
-        at(before.saturating_sub(1)),
-        at(before),
-        at(before + 1),
-        at(before + 2),
-    ];
+    let Some(&low) = values.get(before) else {
+        return f64::NAN;
+    };
+    let high = values.get(before + 1).copied().unwrap_or(low);
+    // At either end it begins and ends straight.
+    let far = before
+        .checked_sub(1)
+        .map_or(2.0 * low - high, |k| values[k]);
+    let beyond = values.get(before + 2).copied().unwrap_or(2.0 * high - low);
     let (begin, end) = (0.5 * (high - far), 0.5 * (beyond - low));
     let rise = high - low;
     low + share
@@ -49,5 +51,10 @@ mod tests {
         assert_eq!([0.0, 1.0, 2.0].map(|k| between(&samples, k)), samples);
         assert_eq!([-5.0, 7.0].map(|k| between(&samples, k)), [3.0, 4.0]);
         assert_eq!(between(&[2.0], 0.4), 2.0);
+        let line = [1.0, 3.0, 5.0];
+        assert_eq!(
+            [0.25, 1.5, 1.75].map(|k| between(&line, k)),
+            [1.5, 4.0, 4.5]
+        );
     }
 }
