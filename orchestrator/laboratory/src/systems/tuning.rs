@@ -13,7 +13,8 @@
 //!   mass and damping of the specimen, and assumes a stiffness 20 % too low and a yield force 20 %
 //!   too high;
 //! - acceleration trajectory tracking, dual loop:
-//!   [`AccelerationTracking::trajectory`], [`AccelerationTracking::dual_loop`]; multi-metric control:
+//!   [`AccelerationTracking::trajectory`](controllers::acceleration_tracking::AccelerationTracking::trajectory),
+//!   [`AccelerationTracking::dual_loop`](controllers::acceleration_tracking::AccelerationTracking::dual_loop); multi-metric control:
 //!   the feedback of preview control and [`Shaping::inverse`];
 //! - minimal control synthesis: [`MinimalControlSynthesis::tuned`];
 //! - multiple surfaces, dynamic surface, receding horizon:
