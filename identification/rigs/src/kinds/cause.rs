@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::named_value::NamedValue;
 
-/// Standard deviations of an interval of 95 %.
-const CLEAR: f64 = 1.96;
+/// Standard deviations to either side of an estimate that hold the truth in 95 of 100 cases.
+pub const INTERVAL_95: f64 = 1.96;
 /// Half of that interval over the value above which the data do not determine the value: an interval so wide is
 /// that of a singular fit, while a value near zero with an ordinary interval is an answer.
 const WIDE: f64 = 100.0;
@@ -116,7 +116,7 @@ pub(super) fn effect_in_words(name: &str, values: &[NamedValue]) -> String {
 
 /// Whether the interval of a value is so wide that the data do not determine it.
 pub fn is_undetermined(value: f64, standard_error: f64) -> bool {
-    value != 0.0 && CLEAR * standard_error > WIDE * value.abs()
+    value != 0.0 && INTERVAL_95 * standard_error > WIDE * value.abs()
 }
 
 /// A sentence on the parameters of `effects` that the data do not determine, and on what to record.
@@ -152,7 +152,7 @@ fn measure(value: f64, standard_error: f64, unit: &str) -> String {
         "1" => ("", 1.0),
         other => (other, 1.0),
     };
-    let (value, half) = (factor * value, CLEAR * factor * standard_error);
+    let (value, half) = (factor * value, INTERVAL_95 * factor * standard_error);
     let power = value.abs().log10().floor();
     if value.is_finite() && value != 0.0 && !(-4.0..5.0).contains(&power) {
         let one = 10f64.powf(power);

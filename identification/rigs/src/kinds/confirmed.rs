@@ -4,6 +4,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::cause::INTERVAL_95;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part, file};
 use super::readings::NEEDED;
@@ -20,8 +21,6 @@ use recordings::mean_and_deviation;
 const DIFFERS: f64 = 3.5;
 /// A refitted nominal parameter is surprising where it lies this many stated deviations off.
 const SURPRISING: f64 = 3.0;
-/// Standard deviations of an interval of 95 %.
-const CLEAR: f64 = 1.96;
 /// Share of the least size worth a name below which an effect has none.
 const LEAST: f64 = 0.5;
 /// Factor by which the squared error on all data grows without an effect that one part of them need not show.
@@ -132,7 +131,7 @@ pub(super) fn unfit<M: InParts>(
             place += 1;
             if !matches!(parameter.role, Role::Shape { .. }) {
                 sizes = true;
-                clear |= q.abs() > CLEAR * error;
+                clear |= q.abs() > INTERVAL_95 * error;
                 matters |= q.abs() > LEAST;
             }
         }
@@ -246,7 +245,7 @@ pub(super) fn clearly_better(before: &[f64], after: &[f64], lengths: &[usize]) -
             deviation * deviation * differences.len() as f64 * correlation_time(&differences);
     }
     let ratio = independent * (squares(before) / squares(after)).ln();
-    ratio > CLEAR * CLEAR || gain > CLEAR * variance.sqrt()
+    ratio > INTERVAL_95 * INTERVAL_95 || gain > INTERVAL_95 * variance.sqrt()
 }
 
 /// Whether the squared errors grow without something, from those `with` to the `bare` ones, by a tenth and by more
@@ -372,7 +371,7 @@ fn refused_by<M: InParts>(measured: &M, fits: &Fits) -> (Vec<Refused>, Vec<Strin
 fn differs_from_zero(effect: &Candidate, values: &[NamedValue]) -> bool {
     let pairs = effect.parameters.iter().zip(values);
     let mut sizes = pairs.filter(|(parameter, _)| !matches!(parameter.role, Role::Shape { .. }));
-    sizes.any(|(_, own)| own.value.abs() > CLEAR * own.standard_error)
+    sizes.any(|(_, own)| own.value.abs() > INTERVAL_95 * own.standard_error)
 }
 
 /// What is found beside the effects, and the model; none where it cannot be fitted. Effects of

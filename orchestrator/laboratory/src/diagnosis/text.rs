@@ -3,7 +3,7 @@
 use identification::diagnosis::engine::Verdict;
 use identification::diagnosis::rigs::foreign::KIND;
 use identification::diagnosis::rigs::shake_table::{change, laboratory_unit, with_error};
-use identification::diagnosis::rigs::{PartReport, RigDiagnosis, is_undetermined};
+use identification::diagnosis::rigs::{INTERVAL_95, PartReport, RigDiagnosis, is_undetermined};
 use identification::diagnosis::{
     DiagnosisReport, Evidence, GainReport, ParameterReport, ShakeTableEvidence,
 };
@@ -40,7 +40,7 @@ fn interval(parameter: &ParameterReport, unit: &str) -> String {
     if is_undetermined(parameter.value, parameter.standard_error) {
         return "not determined".into();
     }
-    let half = 1.96 * parameter.standard_error;
+    let half = INTERVAL_95 * parameter.standard_error;
     if !half.is_finite() {
         return "-".into();
     }

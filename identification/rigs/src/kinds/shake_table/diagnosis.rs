@@ -20,14 +20,13 @@ use super::sentence::{MOST, of_courses, of_findings, said, sentence};
 use crate::case::{
     Case, CaseError, ControlLaw, Nominal, blind_spot, noise_ratios, problems, too_little_excitation,
 };
+use crate::kinds::INTERVAL_95;
 use crate::kinds::shake_table::catalogue::{Prepared, ShakeTableModel, TOO_LOUD, loudest};
 use crate::kinds::shake_table::predictor::{Disturbance, Predictor, Samples, total};
 use diagnosis::{ExtensibleModel, Judgement, NamedEffect, ParameterEstimate};
 use diagnosis::{FLOOR, Observer, Point, Role, SUREST, Test, Verdict, WeighedModel, judge};
 use recordings::{Channel, OUTPUT_NAMES, Recording};
 
-/// Standard deviations to either side of an estimate that hold the truth in 95 of 100 cases.
-pub(super) const INTERVAL_95: f64 = 1.96;
 /// Standard deviations by which an effect predicts an unseen record better, from which on it is there, even where its
 /// parameters make up for each other.
 const PROVEN: f64 = 3.0;

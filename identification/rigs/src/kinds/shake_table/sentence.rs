@@ -1,8 +1,9 @@
 //! A verdict as one sentence for a laboratory engineer.
 
 use super::course::Course;
-use super::diagnosis::{Finding, INTERVAL_95};
+use super::diagnosis::Finding;
 use super::gain::Gain;
+use crate::kinds::INTERVAL_95;
 use diagnosis::Test;
 use diagnosis::{NamedEffect, ParameterEstimate, Verdict, WeighedModel};
 use plant::identified::effects::{find, quantity::laboratory_unit};
