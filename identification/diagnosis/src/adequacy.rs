@@ -26,8 +26,8 @@ const KNOWN_DRIFT: f64 = 4.0;
 /// Deviations of the nominal parameters in those stated, up to which they say nothing of the model: a noise of
 /// another form than was learned bends them a little. Those farther off are findings of the report.
 const KNOWN_SPREAD: f64 = 1.6;
-/// How much farther they may be beside effects that explain nearly all: those are no less there because something was
-/// stated too surely, which the report says as well.
+/// How much farther they may be beside effects that explain nearly all. A nominal value with too small an uncertainty
+/// says nothing against the effects; the report gives it as a finding.
 const STATED_TOO_SURELY: f64 = 2.0;
 /// Correlation with state or command up to which it says nothing of the model: 1/1000 of the residual's power.
 const UNRELATED: f64 = 0.03;
