@@ -1,5 +1,9 @@
 //! Tracking laws as FMUs.
 
+// What the macro names, so that a component depends on this crate for it.
+#[doc(hidden)]
+pub use {controllers, fmu_kit, serde};
+
 /// A component that makes a transfer system follow a displacement by a law:
 ///
 /// ```ignore
@@ -24,7 +28,8 @@ macro_rules! tracking_component {
         $($rows:tt)*
     ) => {
         $(#[$about])*
-        #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+        #[derive(Debug, Clone, $crate::component::serde::Serialize, $crate::component::serde::Deserialize)]
+        #[serde(crate = "hybrid::component::serde")]
         pub struct $name {
             $($field: $type,)*
             law: Option<$law>,
@@ -44,46 +49,46 @@ macro_rules! tracking_component {
         }
 
         impl $name {
-            fn law(&self) -> Result<$law, controllers::ModelError> {
+            fn law(&self) -> Result<$law, $crate::component::controllers::ModelError> {
                 let $s = self;
                 Ok($build)
             }
         }
 
-        impl fmu_kit::Component for $name {
+        impl $crate::component::fmu_kit::Component for $name {
             const NAME: &'static str = stringify!($name);
             const DESCRIPTION: &'static str = $description;
             const DOCUMENTATION: &'static str = include_str!("../README.md");
-            const TERMINALS: &'static [fmu_kit::Terminal] = &[
-                fmu_kit::Terminal::DESIRED_DISPLACEMENT,
-                fmu_kit::Terminal::MEASURED_DISPLACEMENT,
-                fmu_kit::Terminal::ACTUATOR,
+            const TERMINALS: &'static [$crate::component::fmu_kit::Terminal] = &[
+                $crate::component::fmu_kit::Terminal::DESIRED_DISPLACEMENT,
+                $crate::component::fmu_kit::Terminal::MEASURED_DISPLACEMENT,
+                $crate::component::fmu_kit::Terminal::ACTUATOR,
             ];
             const STEP_SIZE: f64 = $crate::vrths::PERIOD;
             const ANY_STEP_SIZE: bool = false;
 
-            fn variables() -> Vec<fmu_kit::Variable<Self>> {
-                let mut variables = fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
-                variables.extend(fmu_kit::table! { Self, $s: $($rows)* });
+            fn variables() -> Vec<$crate::component::fmu_kit::Variable<Self>> {
+                let mut variables = $crate::component::fmu_kit::displacement_tracking!(Self, s: s.input, s.command);
+                variables.extend($crate::component::fmu_kit::table! { Self, $s: $($rows)* });
                 variables
             }
 
-            fn initialize(&mut self) -> fmu_kit::ComponentResult {
+            fn initialize(&mut self) -> $crate::component::fmu_kit::ComponentResult {
                 let law = self.law()?;
-                controllers::Controller::validate(&law)?;
+                $crate::component::controllers::Controller::validate(&law)?;
                 self.law = Some(law);
                 self.command = 0.0;
                 Ok(())
             }
 
-            fn step(&mut self, _time: f64, step_size: f64) -> fmu_kit::ComponentResult {
+            fn step(&mut self, _time: f64, step_size: f64) -> $crate::component::fmu_kit::ComponentResult {
                 if let Some(law) = &mut self.law {
-                    self.command = controllers::Controller::step(law, &self.input, step_size);
+                    self.command = $crate::component::controllers::Controller::step(law, &self.input, step_size);
                 }
                 Ok(())
             }
         }
 
-        fmu_kit::export!($name);
+        $crate::component::fmu_kit::export!($name);
     };
 }

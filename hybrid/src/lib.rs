@@ -4,7 +4,8 @@
 //! A structure under an earthquake is cut in two. One part is computed, the other is a specimen that
 //! hydraulic actuators move as the computed part asks, and whose force goes back.
 
-mod component;
+#[doc(hidden)]
+pub mod component;
 pub mod laws;
 pub mod marths;
 pub mod vrths;
