@@ -436,18 +436,17 @@ impl From<&RigDiagnosis> for DiagnosisReport {
     fn from(found: &RigDiagnosis) -> Self {
         let part = &found.as_described;
         let confirmed = &found.confirmed;
-        let effect = |(name, values): &(String, Vec<NamedValue>)| {
+        let effect = |own: &(String, Vec<NamedValue>)| {
+            let (name, values) = own;
             let parameters = values
                 .iter()
                 .map(|p| (p.name.clone(), ParameterReport::from(p)));
-            // What one part alone proposes is tested on the other.
-            let all = part.effects.iter().chain(&found.swapped.effects);
-            let own = all.into_iter().find(|one| one.effect == *name);
+            let (confidence, share_explained) = found.confidence_and_share(own);
             EffectReport {
                 effect: name.clone(),
                 parameters: parameters.collect(),
-                confidence: own.map_or(f64::NAN, |one| one.confidence),
-                share_explained: own.map(|one| one.share),
+                confidence,
+                share_explained,
                 on_every_part: Some(!confirmed.on_one_part.contains(name)),
                 gain: None,
             }

@@ -529,7 +529,8 @@ fn part_report<M: InParts>(measured: &M, fitted: Part, selected: &Selected) -> P
 /// Probability below `deviate` of Student's distribution with four degrees of freedom: two folds of two
 /// parts tell how far it may be off, so that no confidence is that of a normal tail.
 fn confidence(deviate: f64) -> f64 {
-    let square = deviate * deviate / (1.0 + deviate * deviate / 4.0);
+    // What is not known is as likely as not.
+    let square = (4.0 / (1.0 + 4.0 / (deviate * deviate))).max(0.0);
     0.5 + 0.375 * square.sqrt().copysign(deviate) * (1.0 - square / 12.0)
 }
 
@@ -554,6 +555,29 @@ impl RigDiagnosis {
                 })
         };
         self.named_in_words() + &in_words(&self.readings, &is_named)
+    }
+
+    /// How sure the parts are of `named`, or of an effect that records cannot tell from it. Where neither part
+    /// proposes one, as sure as its first value is of not being zero.
+    pub(crate) fn confidence_and_share(
+        &self,
+        (named, values): &(String, Vec<NamedValue>),
+    ) -> (f64, Option<f64>) {
+        let parts = [&self.as_described, &self.swapped];
+        let of = |name: &str| {
+            let mut all = parts.iter().flat_map(|part| &part.effects);
+            all.find(|one| one.effect == name)
+        };
+        let rivals = &mut self.as_described.rivals.iter();
+        let own = of(named).or_else(|| {
+            rivals.find_map(|(rival, against)| (against == named).then(|| of(rival))?)
+        });
+        if let Some(own) = own {
+            return (own.confidence, Some(own.share));
+        }
+        let first = values.first();
+        let deviate = first.map_or(0.0, |own| (own.value / own.standard_error).abs());
+        (confidence(deviate), None)
     }
 
     /// Effects that records cannot tell from `named`, with their parameters.
@@ -637,7 +661,8 @@ impl RigDiagnosis {
                 let mut all = self.causes_in_words();
                 all.extend(shown);
                 let left = 1.0 - self.unexplained;
-                let share = match (all.len(), left > ALL) {
+                let count = self.causes.len() + self.confirmed.effects.len();
+                let share = match (count, left > ALL) {
                     _ if left <= 0.0 => {
                         return format!(
                             "{name}: {}; the error of {} on the held-out data, {:.1} %, is not theirs.",
@@ -697,6 +722,27 @@ impl RigDiagnosis {
                     100.0 * one.extended_error
                 )
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::confidence;
+
+    /// Quantiles of Student's distribution with four degrees of freedom, from printed tables.
+    #[test]
+    fn a_confidence_is_that_of_four_degrees_of_freedom() {
+        for (deviate, below) in [
+            (-2.1318, 0.05),
+            (0.0, 0.5),
+            (0.7407, 0.75),
+            (2.7764, 0.975),
+            (f64::INFINITY, 1.0),
+            (f64::NAN, 0.5),
+        ] {
+            let found = confidence(deviate);
+            assert!((found - below).abs() < 1e-5, "{found} at {deviate}");
         }
     }
 }

@@ -240,7 +240,7 @@ fn findings(report: &DiagnosisReport) -> Section {
     let mut tables = Vec::new();
     if !report.effects.is_empty() {
         tables.push(Table::headed(
-            "Estimates ± one standard error, with 95 % intervals",
+            "Estimates ± half of their 95 % interval",
             text::parameters(report),
         ));
     }

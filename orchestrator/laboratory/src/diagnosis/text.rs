@@ -2,7 +2,7 @@
 
 use identification::diagnosis::engine::Verdict;
 use identification::diagnosis::rigs::foreign::KIND;
-use identification::diagnosis::rigs::shake_table::{change, laboratory_unit, with_error};
+use identification::diagnosis::rigs::shake_table::{change, laboratory_unit, with_interval};
 use identification::diagnosis::rigs::{INTERVAL_95, PartReport, RigDiagnosis, is_undetermined};
 use identification::diagnosis::{
     DiagnosisReport, Evidence, GainReport, ParameterReport, ShakeTableEvidence,
@@ -20,7 +20,7 @@ fn in_unit(parameter: &ParameterReport, unit: &str) -> String {
         let text = format!("about {} {unit}", significant(factor * value, 3));
         return text.trim_end().to_owned();
     }
-    with_error(value, error, &parameter.unit, unit)
+    with_interval(value, INTERVAL_95 * error, &parameter.unit, unit)
 }
 
 /// A confidence in words: nothing is certain.
@@ -330,7 +330,9 @@ mod tests {
         assert_eq!(in_unit(&force, "N"), "about 50.7 N");
         assert_eq!(interval(&force, "N"), "not determined");
         assert_eq!(in_unit(&found(0.25, 1e4, "1"), "1"), "about 0.250");
-        assert!(interval(&found(50.0, 3.0, "N"), "N").contains("to"));
+        let known = found(50.0, 3.0, "N");
+        assert_eq!(in_unit(&known, "N"), "50 ± 6 N");
+        assert_eq!(interval(&known, "N"), "44.1 to 55.9 N");
     }
 
     #[test]

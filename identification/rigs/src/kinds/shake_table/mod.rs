@@ -20,4 +20,4 @@ pub use diagnosis::*;
 pub use extended::{ChannelErrors, DESCRIBED, ExtendedTable, TableErrors, TablePrediction};
 pub use health::RelationReport;
 pub use plant::identified::effects::quantity::laboratory_unit;
-pub use sentence::{amount, change, said, with_error};
+pub use sentence::{amount, change, said, with_interval};

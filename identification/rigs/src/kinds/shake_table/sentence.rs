@@ -9,9 +9,9 @@ use diagnosis::{NamedEffect, ParameterEstimate, Verdict, WeighedModel};
 use plant::identified::effects::{find, quantity::laboratory_unit};
 use units::convert;
 
-/// Value and half of the 95 % interval of `parameter` in `unit`, as [`with_error`] writes them.
+/// Value and half of the 95 % interval of `parameter` in `unit`, as [`with_interval`] writes them.
 pub fn amount(parameter: &ParameterEstimate, unit: &str) -> String {
-    with_error(
+    with_interval(
         parameter.value,
         INTERVAL_95 * parameter.standard_error,
         parameter.unit,
@@ -19,12 +19,12 @@ pub fn amount(parameter: &ParameterEstimate, unit: &str) -> String {
     )
 }
 
-/// Value and standard error, given in `si`, in `unit`, with as many digits as the error leaves
+/// Value and half of its interval, given in `si`, in `unit`, with as many digits as the interval leaves
 /// meaning: `0.0865 ± 0.0001 V`.
-pub fn with_error(value: f64, standard_error: f64, si: &str, unit: &str) -> String {
+pub fn with_interval(value: f64, half: f64, si: &str, unit: &str) -> String {
     let converted = convert(1.0, si, unit);
     let (factor, unit) = converted.map_or((1.0, si), |factor| (factor, unit));
-    let (value, error) = (factor * value, factor * standard_error);
+    let (value, error) = (factor * value, factor * half);
     let unit = if unit == "1" { "" } else { unit };
     let order = |x: f64| x.abs().log10().floor() as i32;
     if !(error.is_finite() && error > 0.0 && value.is_finite() && value != 0.0) {
@@ -221,8 +221,8 @@ pub(super) fn of_findings(findings: &[Finding]) -> String {
         format!(
             "`{}` is {}, stated {}",
             own.parameter,
-            with_error(own.found, INTERVAL_95 * own.standard_error, &own.unit, unit),
-            with_error(own.stated, 0.0, &own.unit, unit),
+            with_interval(own.found, INTERVAL_95 * own.standard_error, &own.unit, unit),
+            with_interval(own.stated, 0.0, &own.unit, unit),
         )
     });
     let told: Vec<String> = told.collect();
@@ -262,7 +262,7 @@ mod tests {
             (2.4e-6, 1e-8, "V s/N", "V s/N", "(2.400 ± 0.010)e-6 V s/N"),
             (4321.0, 250.0, "N", "N", "4321 ± 250 N"),
         ] {
-            assert_eq!(with_error(value, error, si, unit), want);
+            assert_eq!(with_interval(value, error, si, unit), want);
         }
         let late = estimate(0.01206, 5e-5, "s");
         assert_eq!(amount(&late, "ms"), "12.06 ± 0.10 ms");
