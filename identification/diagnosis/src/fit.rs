@@ -4,6 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use sysid::levenberg_marquardt::{Problem, Quadratic, Search, Taken, minimise};
 
 use super::model::{ExtensibleModel, Point};
+use super::resampling::scattered;
 
 /// Internal coordinates move by this for a difference quotient.
 const DIFFERENCE: f64 = 1e-3;
@@ -306,10 +307,13 @@ impl Jacobian {
         self.normal_equations(model, fit).0.try_inverse()
     }
 
-    /// Standard deviations of all coordinates at `fit`, nuisance first.
+    /// Standard deviations of all coordinates at `fit`, nuisance first: the larger of what white residuals leave and
+    /// of the scatter of the gradient between runs, since a noise has bursts and a law is never quite the rig's.
     pub fn deviations<M: ExtensibleModel>(&self, model: &M, fit: &Fit) -> Option<Vec<f64>> {
         let covariance = self.covariance(model, fit)?;
-        let variance = |i: usize| covariance[(i, i)].max(0.0);
+        let columns: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).collect();
+        let scattered = scattered(&covariance, &columns, &fit.residuals);
+        let variance = |i: usize| covariance[(i, i)].max(scattered[(i, i)]).max(0.0);
         Some(
             (0..covariance.nrows())
                 .map(|i| variance(i).sqrt())

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use sysid::levenberg_marquardt::{Problem, Quadratic, Search, Taken, minimise};
 
 use super::model::{Candidate, Point, Scale};
-use super::resampling::correlation_time;
+use super::resampling::{correlation_time, scattered};
 
 /// A prior counts as if it were this many times as wide as stated.
 pub const WEAK: f64 = 10.0;
@@ -27,8 +27,6 @@ const LARGEST_TIME: f64 = 20.0;
 const MISSED: f64 = 0.25;
 /// Share of what the errors tell of a coordinate that keeps those that compensate each other wholly from rounding.
 const RIDGE: f64 = 1e-10;
-/// Runs of neighbouring samples whose scatter tells standard errors.
-const RUNS: usize = 24;
 
 /// A model that simulates records which consist of blocks (a file each); errors are in the output's
 /// unit.
@@ -477,9 +475,8 @@ fn normal<M: SimulatedModel>(
 }
 
 /// One standard deviation of each coordinate at `at`: the larger of what correlated errors leave
-/// (correlated samples counted once) and of the scatter of the gradient between runs of the record
-/// (Newey and West, Econometrica 55, 1987, with runs for lags). Not a number where the data do not
-/// see a coordinate.
+/// (correlated samples counted once) and of the scatter of the gradient between runs of the record. Not a number
+/// where the data do not see a coordinate.
 pub fn deviations<M: SimulatedModel>(model: &M, at: &Solution, record: usize) -> Option<Vec<f64>> {
     let columns = Columns::of(model, at, record, 0, true)?.columns;
     let all: Vec<&Vec<f64>> = columns.iter().collect();
@@ -495,15 +492,8 @@ pub fn deviations<M: SimulatedModel>(model: &M, at: &Solution, record: usize) ->
     });
     let inverse = reduced.try_inverse()?;
     let inverse = DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] / (size(i) * size(j)));
-    let mut scatter = DMatrix::zeros(count, count);
-    for run in 0..RUNS {
-        let (from, to) = (run * n / RUNS, (run + 1) * n / RUNS);
-        let gradient = DVector::from_fn(count, |i, _| {
-            dot(&all[places[i]][from..to], &at.errors[from..to]) / variance
-        });
-        scatter += &gradient * gradient.transpose();
-    }
-    let scattered = &inverse * scatter * &inverse;
+    let seen: Vec<&[f64]> = places.iter().map(|&i| all[i].as_slice()).collect();
+    let scattered = scattered(&(inverse.clone() / variance), &seen, &at.errors);
     let correlated = correlation_time(&at.errors);
     let mut deviations = vec![f64::NAN; all.len()];
     for (i, place) in places.iter().enumerate() {

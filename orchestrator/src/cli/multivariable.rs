@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use identification::diagnosis::rigs::column_map;
+use identification::diagnosis::rigs::{INTERVAL_95, column_map};
 use multivariable::diagnose::{Found, diagnose};
 use multivariable::interaction::{Interaction, interaction};
 use multivariable::{Description, KIND, Model, Names, Recording, TEMPLATE, is_multivariable};
@@ -256,7 +256,7 @@ fn model_text(model: &Model) -> String {
         format!(
             "{} ± {}",
             significant(value, 5),
-            significant(1.96 * error, 2)
+            significant(INTERVAL_95 * error, 2)
         )
     };
     let mut rows = vec![vec!["static gain".to_string()]];

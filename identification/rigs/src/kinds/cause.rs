@@ -103,7 +103,13 @@ pub(super) fn effect_in_words(name: &str, values: &[NamedValue]) -> String {
     let name = name.replace('_', " ");
     match values {
         [] => name,
-        [one] => format!("{name} ({})", own(one)),
+        [one] => match ends(one.value, one.standard_error, true) {
+            [low, high] if low == 0.0 || high == 0.0 => {
+                let far = measure(low + high, f64::NAN, &one.unit);
+                format!("{name} (0 to {far})")
+            }
+            _ => format!("{name} ({})", own(one)),
+        },
         many => {
             let all: Vec<String> = many
                 .iter()
@@ -111,6 +117,21 @@ pub(super) fn effect_in_words(name: &str, values: &[NamedValue]) -> String {
                 .collect();
             format!("{name} ({})", all.join(", "))
         }
+    }
+}
+
+/// The ends of the 95 % interval of a value. The only size of a named effect is not beyond zero: the effect is there,
+/// whatever size it has.
+pub fn ends(value: f64, standard_error: f64, is_only: bool) -> [f64; 2] {
+    let half = INTERVAL_95 * standard_error;
+    let ends = [value - half, value + half];
+    if !is_only || is_undetermined(value, standard_error) {
+        return ends;
+    }
+    if value > 0.0 {
+        [ends[0].max(0.0), ends[1]]
+    } else {
+        [ends[0], ends[1].min(0.0)]
     }
 }
 
@@ -141,7 +162,7 @@ pub(super) fn undetermined(effects: &[(String, Vec<NamedValue>)]) -> Option<Stri
 }
 
 /// A value with its 95 % interval, in a unit that laboratories use.
-fn measure(value: f64, standard_error: f64, unit: &str) -> String {
+pub(super) fn measure(value: f64, standard_error: f64, unit: &str) -> String {
     if is_undetermined(value, standard_error) {
         let about = measure(value, f64::NAN, unit);
         return format!("about {about}, not determined by these records");
@@ -284,6 +305,15 @@ mod tests {
         assert_eq!(
             effect_in_words("dead_band", std::slice::from_ref(&width)),
             "dead band (0.036 ± 0.002 mm)"
+        );
+        let memory = |value: f64| [found("decay", value, 21.0, "1/m")];
+        assert_eq!(
+            effect_in_words("excursion_memory", &memory(39.65)),
+            "excursion memory (0 to 80.81 1/m)"
+        );
+        assert_eq!(
+            effect_in_words("excursion_memory", &memory(-39.65)),
+            "excursion memory (0 to -80.81 1/m)"
         );
         let stiffness = found("stiffness", 2.9978e7, 1.8e4, "N/m3");
         assert_eq!(

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::cause::INTERVAL_95;
+use super::cause::{INTERVAL_95, measure};
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part, file};
 use super::readings::NEEDED;
@@ -520,14 +520,14 @@ fn differences<M: InParts>(
         let apart = high.1.value - low.1.value;
         if apart > DIFFERS * low.1.standard_error.hypot(high.1.standard_error) {
             let told = |(name, v): (&str, &NamedValue)| {
-                format!("{:.4e} ± {:.1e} ({name})", v.value, v.standard_error)
+                let own = measure(v.value, v.standard_error, &v.unit);
+                format!("{own} ({name})")
             };
             findings.push(format!(
-                "`{}` differs between parts: {} and {} {}; its standard error includes the scatter",
+                "`{}` differs between parts: {} and {}; its interval includes the scatter",
                 parameter.name,
                 told(low),
-                told(high),
-                parameter.unit
+                told(high)
             ));
         }
     }
@@ -546,12 +546,11 @@ fn surprises<M: InParts>(
         let off = (value.value - stated).abs();
         if off > SURPRISING * deviation && off > SURPRISING * value.standard_error {
             findings.push(format!(
-                "`{}` is {:.4e} ± {:.1e} {unit} from these data, stated as {stated:.4e} ± \
-                 {deviation:.1e} {unit}",
+                "`{}` is {} from these data, stated as {} with a deviation of {}",
                 value.name,
-                value.value,
-                value.standard_error,
-                unit = value.unit,
+                measure(value.value, value.standard_error, &value.unit),
+                measure(stated, f64::NAN, &value.unit),
+                measure(deviation, f64::NAN, &value.unit),
             ));
         }
     }

@@ -41,7 +41,7 @@ mod table;
 mod template;
 mod transfer_system;
 
-pub use cause::{Cause, INTERVAL_95, is_undetermined};
+pub use cause::{Cause, INTERVAL_95, ends, is_undetermined};
 pub use confirmed::Confirmed;
 pub use description::{
     Column, Description, DescriptionError, LeftOut, Quantity, Windows, column_map, renamed,

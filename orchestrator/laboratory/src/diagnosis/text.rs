@@ -3,7 +3,9 @@
 use identification::diagnosis::engine::Verdict;
 use identification::diagnosis::rigs::foreign::KIND;
 use identification::diagnosis::rigs::shake_table::{change, laboratory_unit, with_interval};
-use identification::diagnosis::rigs::{INTERVAL_95, PartReport, RigDiagnosis, is_undetermined};
+use identification::diagnosis::rigs::{
+    INTERVAL_95, PartReport, RigDiagnosis, ends, is_undetermined,
+};
 use identification::diagnosis::{
     DiagnosisReport, Evidence, GainReport, ParameterReport, ShakeTableEvidence,
 };
@@ -33,7 +35,7 @@ pub(super) fn confidence(share: f64) -> String {
 }
 
 /// What a parameter is with a confidence of 95 %; a dash where its error is not known.
-fn interval(parameter: &ParameterReport, unit: &str) -> String {
+fn interval(parameter: &ParameterReport, unit: &str, is_only: bool) -> String {
     let Ok(factor) = units::convert(1.0, &parameter.unit, unit) else {
         return "-".into();
     };
@@ -44,11 +46,14 @@ fn interval(parameter: &ParameterReport, unit: &str) -> String {
     if !half.is_finite() {
         return "-".into();
     }
-    let ends = [parameter.value - half, parameter.value + half];
+    let ends = ends(parameter.value, parameter.standard_error, is_only);
     // As many digits as tell the ends apart.
     let size = ends[0].abs().max(ends[1].abs());
     let digits = (size / half.max(1e-300)).log10().ceil().clamp(0.0, 6.0) as usize + 2;
-    let [low, high] = ends.map(|end| significant(factor * end, digits));
+    let [low, high] = ends.map(|end| match end {
+        0.0 => "0".to_owned(),
+        end => significant(factor * end, digits),
+    });
     let unit = if unit == "1" { "" } else { unit };
     format!("{low} to {high} {unit}").trim_end().to_string()
 }
@@ -76,7 +81,8 @@ pub(super) fn parameters(report: &DiagnosisReport) -> Vec<Vec<String>> {
                 true => laboratory_unit(si).to_string(),
                 false => si.to_string(),
             };
-            row.push(of.map_or("-".into(), |p| interval(p, &laboratory(&p.unit))));
+            let is_only = effect.parameters.len() == 1;
+            row.push(of.map_or("-".into(), |p| interval(p, &laboratory(&p.unit), is_only)));
             row.push(confidence(effect.confidence));
             let word = |all| if all { "yes" } else { "no" }.to_string();
             row.extend(effect.on_every_part.map(word));
@@ -328,11 +334,14 @@ mod tests {
         };
         let force = found(50.6981, 1.8e7, "N");
         assert_eq!(in_unit(&force, "N"), "about 50.7 N");
-        assert_eq!(interval(&force, "N"), "not determined");
+        assert_eq!(interval(&force, "N", true), "not determined");
         assert_eq!(in_unit(&found(0.25, 1e4, "1"), "1"), "about 0.250");
         let known = found(50.0, 3.0, "N");
         assert_eq!(in_unit(&known, "N"), "50 ± 6 N");
-        assert_eq!(interval(&known, "N"), "44.1 to 55.9 N");
+        assert_eq!(interval(&known, "N", true), "44.1 to 55.9 N");
+        let there = found(50.0, 30.0, "N");
+        assert_eq!(interval(&there, "N", true), "0 to 109 N");
+        assert_eq!(interval(&there, "N", false), "-8.80 to 109 N");
     }
 
     #[test]

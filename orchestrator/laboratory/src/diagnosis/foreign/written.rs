@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use units::vocabulary;
 
+use identification::diagnosis::rigs::INTERVAL_95;
 use identification::diagnosis::rigs::foreign::{ForeignDiagnosis, ForeignModel, Signal};
 use plant::signal_path::SignalEffects;
 use toml::{Table, Value};
@@ -154,9 +155,9 @@ pub(super) fn system(
     );
     for (effect, values) in &found.found.confirmed.effects {
         for value in values {
-            let (of, amount, error) = (&value.name, value.value, value.standard_error);
+            let (of, amount, half) = (&value.name, value.value, INTERVAL_95 * value.standard_error);
             text += &format!(
-                "#   {effect}: {of} {amount:.6e} ± {error:.1e} {}\n",
+                "#   {effect}: {of} {amount:.6e} ± {half:.1e} {}\n",
                 value.unit
             );
         }
