@@ -308,7 +308,7 @@ impl Jacobian {
     }
 
     /// Standard deviations of all coordinates at `fit`, nuisance first: the larger of what white residuals leave and
-    /// of the scatter of the gradient between runs, since a noise has bursts and a law is never quite the rig's.
+    /// of the scatter of the gradient between runs. A noise has bursts, and a law is never quite the rig's.
     pub fn deviations<M: ExtensibleModel>(&self, model: &M, fit: &Fit) -> Option<Vec<f64>> {
         let covariance = self.covariance(model, fit)?;
         let columns: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).collect();
