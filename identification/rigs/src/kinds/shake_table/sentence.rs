@@ -28,7 +28,7 @@ pub fn with_interval(value: f64, half: f64, si: &str, unit: &str) -> String {
     let unit = if unit == "1" { "" } else { unit };
     let order = |x: f64| x.abs().log10().floor() as i32;
     if !(error.is_finite() && error > 0.0 && value.is_finite() && value != 0.0) {
-        return format!("{value:.4} {unit}").trim_end().to_string();
+        return format!("{} {unit}", plain(value)).trim_end().to_string();
     }
     // One digit of an error of 3 and more, two of a smaller one.
     let place = order(error);
@@ -50,6 +50,24 @@ pub fn with_interval(value: f64, half: f64, si: &str, unit: &str) -> String {
     format!("{value:.decimals$} ± {error:.decimals$} {unit}")
         .trim_end()
         .to_string()
+}
+
+/// `value` alone, with five digits at most.
+fn plain(value: f64) -> String {
+    let order = value.abs().log10().floor();
+    let trimmed = |text: String| match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    };
+    if (-5.0..6.0).contains(&order) {
+        let decimals = (4.0 - order).max(0.0) as usize;
+        return trimmed(format!("{value:.decimals$}"));
+    }
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let scaled = trimmed(format!("{:.4}", value / 10f64.powf(order)));
+    format!("{scaled}e{order}")
 }
 
 /// An effect in words, its sizes in the laboratory's units.
@@ -261,6 +279,16 @@ mod tests {
             (6.928, 0.031, "Hz", "Hz", "6.93 ± 0.03 Hz"),
             (2.4e-6, 1e-8, "V s/N", "V s/N", "(2.400 ± 0.010)e-6 V s/N"),
             (4321.0, 250.0, "N", "N", "4321 ± 250 N"),
+            (98_964.174_6, 0.0, "N/m", "N/m", "98964 N/m"),
+            (
+                5.463_957_26e7,
+                0.0,
+                "N/(m.s2)",
+                "N/(m.s2)",
+                "5.464e7 N/(m.s2)",
+            ),
+            (0.121_2, 0.0, "1", "1", "0.1212"),
+            (0.0, 0.0, "N", "N", "0 N"),
         ] {
             assert_eq!(with_interval(value, error, si, unit), want);
         }
