@@ -216,7 +216,7 @@ fn a_linear_fit_is_the_solution_of_the_normal_equations() {
         // The scatter between runs of a noise without bursts is that of the whole.
         let deviations = jacobian.deviations(&model, &fit).unwrap();
         for (i, own) in deviations.iter().enumerate() {
-            let white = inverse[(i, i)].sqrt();
+            let white = CALIBRATED * inverse[(i, i)].sqrt();
             assert!((0.999..1.5).contains(&(own / white)), "{own} for {white}");
         }
     }
