@@ -12,6 +12,7 @@
 //! deviation X of the drift, the force k_1 X, the time (m_1/k_1)^{1/2}, the deviation of the command.
 
 use super::between::between;
+use super::friction::Friction;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Equations, Natural, RigRecording};
 use recordings::Channel;
@@ -140,6 +141,8 @@ struct Law<'a> {
     nominal: &'a Nominal,
     effects: &'a Effects,
     has_upper: bool,
+    device_friction: Friction,
+    storey_friction: Friction,
 }
 
 impl Law<'_> {
@@ -177,21 +180,9 @@ impl Law<'_> {
 
     /// Friction over `h` at the speeds of `s`.
     fn rub(&self, s: &mut State, h: f64) {
-        let e = self.effects;
-        let v = s.speed[0];
-        let rate = v.abs() / self.nominal.build_up;
-        let grows = s.device * v > 0.0;
-        // Exact for the bracket as it is at the begin of the step.
-        let sharpness = match e.sharp_yield.exponent {
-            p if p > 0.0 && grows => s.device.abs().powf(p),
-            p if p > 0.0 => 0.0,
-            _ => 1.0,
-        };
-        let gone = rate * sharpness + e.device_creep.rate;
-        s.device = relaxed(s.device, rate.copysign(v), gone, h).clamp(-1.0, 1.0);
+        s.device = self.device_friction.after(s.device, h * s.speed[0], h);
         for i in 0..2 {
-            let rate = s.speed[i].abs() / self.nominal.build_up;
-            s.friction[i] = relaxed(s.friction[i], rate.copysign(s.speed[i]), rate, h);
+            s.friction[i] = self.storey_friction.after(s.friction[i], h * s.speed[i], h);
         }
     }
 
@@ -210,16 +201,6 @@ impl Law<'_> {
         }
         ((h * fastest.sqrt() / RADIANS).ceil() as usize).clamp(2, STEPS)
     }
-}
-
-/// `z` after `h` of `z' = drive - gone z`.
-fn relaxed(z: f64, drive: f64, gone: f64, h: f64) -> f64 {
-    let path = gone * h;
-    if path < 1e-9 {
-        return z + drive * h;
-    }
-    let left = (-path).exp();
-    left * z + (1.0 - left) * drive / gone
 }
 
 impl Equations for Frame {
@@ -250,6 +231,16 @@ impl Equations for Frame {
             nominal,
             effects,
             has_upper: nominal.upper_mass > 0.0,
+            device_friction: Friction {
+                build_up: nominal.build_up,
+                creep: effects.device_creep.rate,
+                exponent: effects.sharp_yield.exponent,
+            },
+            storey_friction: Friction {
+                build_up: nominal.build_up,
+                creep: 0.0,
+                exponent: 0.0,
+            },
         };
         let base = recording.input(Channel::Acceleration);
         let (command, given) = (recording.input(COMMAND), recording.input(DEVICE_FORCE));

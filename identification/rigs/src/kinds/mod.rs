@@ -20,6 +20,7 @@ mod extended;
 mod fitted;
 pub mod foreign;
 mod frame;
+mod friction;
 pub mod guess;
 pub mod hypotheses;
 mod hysteretic_device;
