@@ -47,15 +47,12 @@ effects! {
         force: size("N", 0.01, (0.0, 30.0)),
         build_up: shape("m", 0.05, 1.0),
     } from [[0.1, 0.05], [0.5, 0.05], [0.5, 0.2]];
-    /// That friction creeps, z' = ... - r z.
+    /// That friction creeps and yields at once and not little by little: z' = v / d (1 - |z|^p z sgn v) - r z while
+    /// it grows, z' = v / d - r z where it falls.
     friction_creep: FrictionCreep {
         rate: size("1/s", 0.05, (0.0, 300.0)),
-    } from [[2.0], [10.0]];
-    /// That friction yields at once and not little by little, z' = v / d (1 - |z|^p z sgn v) while it grows, and
-    /// otherwise z' = v / d.
-    sharp_yield: SharpYield {
-        exponent: size("1", 0.05, (0.0, 20.0)),
-    } from [[2.0], [6.0]];
+        exponent: shape("1", 4.0, 0.7),
+    } from [[2.0, 4.0], [10.0, 4.0]];
     /// The friction grows with the command, F_h (1 + g (w - 1 V)): F_h is that at one volt.
     friction_by_command: FrictionByCommand {
         growth: size("1/V", 0.02, (-3.0, 3.0)),
@@ -150,7 +147,7 @@ impl Equations for ControlledDamper {
         let shared = Friction {
             build_up: friction.build_up,
             creep: e.friction_creep.rate,
-            exponent: e.sharp_yield.exponent,
+            exponent: e.friction_creep.exponent,
         };
         let mut taken_up = session.taken_up.clamp(-1.0, 1.0);
         let mut acting = command.first().copied().unwrap_or(0.0);

@@ -84,15 +84,12 @@ session_parameters! {
 }
 
 effects! {
-    /// The friction of the device creeps, z' = ... - r z.
+    /// The friction of the device creeps, - r z, and yields at once and not little by little: by |z|^p z |d_1'| / s
+    /// while it grows and by nothing where it falls.
     device_creep: DeviceCreep {
         rate: size("1/s", 0.05, (0.0, 300.0)),
-    } from [[2.0], [10.0]];
-    /// The friction of the device yields at once and not little by little, z' = ... - |z|^p z |d_1'| / s while
-    /// it grows.
-    sharp_yield: SharpYield {
-        exponent: size("1", 0.05, (0.0, 20.0)),
-    } from [[2.0], [6.0]];
+        exponent: shape("1", 4.0, 0.7),
+    } from [[2.0, 4.0], [10.0, 4.0]];
     /// The damping of the device grows with the command.
     damping_by_command: DampingByCommand {
         growth: size("N s/m/V", 0.01, (-30.0, 30.0)),
@@ -234,7 +231,7 @@ impl Equations for Frame {
             device_friction: Friction {
                 build_up: nominal.build_up,
                 creep: effects.device_creep.rate,
-                exponent: effects.sharp_yield.exponent,
+                exponent: effects.device_creep.exponent,
             },
             storey_friction: Friction {
                 build_up: nominal.build_up,
