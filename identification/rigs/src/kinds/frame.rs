@@ -1,6 +1,7 @@
-//! A frame of one or two storeys on a table, with a device such as a damper between table and first floor:
-//! motion of the table and command of the device to the drift of the first storey, and with it, where the data
-//! hold them, to that of the second and to the force of the device.
+//! A frame of one or two storeys on a table, with a device such as a damper between table and first floor.
+//!
+//! Motion of the table and command of the device to the drift of the first storey. The drift of the second and the
+//! force of the device are compared as well where the data hold them.
 //!
 //! Nominal, with drifts d_1, d_2, base acceleration a_g and force F of the device:
 //! `m_1 (d_1'' + a_g) = F_0 - k_1 d_1 - c_1 d_1' - F + k_2 d_2 + c_2 d_2'`,
@@ -8,8 +9,10 @@
 //! `F = c d_1' + (F_d + g w) z`, `z' = d_1' / s - z |d_1'| / s` (Dahl 1968) with the command w. Mechanics are
 //! integrated by the velocity Verlet method, friction exactly over each of its steps.
 //!
-//! A recorded force of another device acts as it is (`device_force`). Effects are counted in natural units: the
-//! deviation X of the drift, the force k_1 X, the time (m_1/k_1)^{1/2}, the deviation of the command.
+//! A recorded force of another device acts as it is (`device_force`) in place of F.
+//!
+//! Effects are counted in natural units: the deviation X of the drift, the force k_1 X, the time (m_1/k_1)^{1/2},
+//! the deviation of the command.
 
 use super::between::between;
 use super::friction::Friction;

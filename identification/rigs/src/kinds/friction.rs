@@ -1,7 +1,6 @@
 //! Friction that builds up over a displacement.
 
-/// Places in the displacement of a full build-up at which the bracket of a sharp yield is taken anew, and most of
-/// them in a step.
+/// Parts of a build-up's displacement over which the bracket of a sharp yield is constant, and most parts of a step.
 const PARTS: f64 = 4.0;
 const MOST: usize = 16;
 
