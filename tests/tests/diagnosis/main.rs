@@ -3,6 +3,7 @@
 mod closing_the_circle;
 mod extended_model;
 mod foreign;
+mod frame_with_damper;
 mod hidden_effects;
 mod measured;
 mod next_measurement;

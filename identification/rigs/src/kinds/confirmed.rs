@@ -444,6 +444,16 @@ pub(super) fn confirm<M: InParts>(
         gain_interval(&errors(&nominal), &errors(own))
     };
     let gains = [gain(Part::Fitted, &here), gain(Part::LeftOut, &there)];
+    let by_output = measured.error_by_output(&here, tested);
+    let swapped_by_output = measured.error_by_output(&there, swapped);
+    let pairs = by_output.into_iter().zip(swapped_by_output);
+    findings.extend(pairs.map(|((name, error), (_, other))| {
+        format!(
+            "error of {name} on the held-out data: {:.1} %; swapped: {:.1} %",
+            100.0 * error,
+            100.0 * other
+        )
+    }));
     Some(Confirmed {
         error: measured.normalised_error(&here, tested),
         swapped_error: measured.normalised_error(&there, swapped),

@@ -8,6 +8,7 @@
 //! command.
 
 use super::between::between;
+use super::friction::Friction;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Equations, Natural, RigRecording};
 use recordings::Channel;
@@ -46,6 +47,12 @@ effects! {
         force: size("N", 0.01, (0.0, 30.0)),
         build_up: shape("m", 0.05, 1.0),
     } from [[0.1, 0.05], [0.5, 0.05], [0.5, 0.2]];
+    /// That friction creeps and yields at once and not little by little: z' = v / d (1 - |z|^p z sgn v) - r z while
+    /// it grows, z' = v / d - r z where it falls.
+    friction_creep: FrictionCreep {
+        rate: size("1/s", 0.05, (0.0, 300.0)),
+        exponent: shape("1", 4.0, 0.7),
+    } from [[2.0, 4.0], [10.0, 4.0]];
     /// The friction grows with the command, F_h (1 + g (w - 1 V)): F_h is that at one volt.
     friction_by_command: FrictionByCommand {
         growth: size("1/V", 0.02, (-3.0, 3.0)),
@@ -137,6 +144,11 @@ impl Equations for ControlledDamper {
             keep(e.force_lag.time_constant),
         );
         let friction = &e.hysteretic_friction;
+        let shared = Friction {
+            build_up: friction.build_up,
+            creep: e.friction_creep.rate,
+            exponent: e.friction_creep.exponent,
+        };
         let mut taken_up = session.taken_up.clamp(-1.0, 1.0);
         let mut acting = command.first().copied().unwrap_or(0.0);
         let mut shown = f64::NAN;
@@ -151,10 +163,8 @@ impl Equations for ControlledDamper {
             damping += e.quadratic_damping.damping * speed.abs();
             let mut force = damping * speed;
             if friction.force > 0.0 {
-                // Exact for a displacement in one direction.
                 let moved = if k == 0 { 0.0 } else { place - x[k - 1] };
-                let left = (-moved.abs() / friction.build_up).exp();
-                taken_up = left * taken_up + (1.0 - left) * moved.signum();
+                taken_up = shared.after(taken_up, moved, h);
                 let growth = 1.0 + e.friction_by_command.growth * (strength - 1.0);
                 force += friction.force * growth.max(0.0) * taken_up;
             }

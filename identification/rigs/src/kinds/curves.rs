@@ -61,10 +61,10 @@ pub fn curves(
             is_timed,
             time: (0..one.len()).map(|k| k as f64 * step(one)).collect(),
             input: input.map_or_else(Vec::new, |input| one.input(input).to_vec()),
-            measured: one.output().to_vec(),
-            nominal: measured.simulate(&origin, s),
-            extended: measured.simulate(&found.confirmed.point, s),
-            left_out: one.left_out.clone(),
+            measured: one.output()[..one.len()].to_vec(),
+            nominal: measured.simulate_to(&origin, s, one.len()),
+            extended: measured.simulate_to(&found.confirmed.point, s, one.len()),
+            left_out: one.left_out[..one.len()].to_vec(),
         });
     Ok(all.collect())
 }

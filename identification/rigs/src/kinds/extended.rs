@@ -13,6 +13,7 @@ use super::hypotheses::Hypotheses;
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts};
+use super::reading::compare_all;
 use super::{Measurement, Rig, SessionParameter, SessionRole};
 use diagnosis::{Free, Point, SimulatedModel, completed, least_squares};
 use units::convert;
@@ -83,14 +84,21 @@ pub struct FileErrors {
 /// What the extended model puts out for a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
+    /// The kind's output, and after it what else the file has a column for.
+    pub columns: Vec<PredictedColumn>,
+    /// Rows whose output was given.
+    pub given: usize,
+}
+
+/// An output of a [`Prediction`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct PredictedColumn {
     /// What is simulated.
     pub channel: &'static str,
     /// Unit of the file's column for it.
     pub unit: String,
     /// A value for each row of the file, in that unit.
     pub rows: Vec<f64>,
-    /// Rows whose output was given.
-    pub given: usize,
 }
 
 fn quantities(values: &[NamedValue]) -> BTreeMap<String, Quantity> {
@@ -376,39 +384,41 @@ impl ExtendedRig {
     pub fn validate(&self, files: &[PathBuf]) -> Result<Vec<FileErrors>, DescriptionError> {
         let description = self.description(&self.nominal);
         let rig = description.rig()?;
-        files
-            .iter()
-            .map(|file| {
-                let recording = description.recording(file, rig, false)?.0;
-                let measurement = Measurement {
-                    recordings: vec![recording],
-                };
-                let error = |nominal, with_effects| {
-                    let (measured, point) = self.measured(&measurement, nominal, with_effects)?;
-                    let point = completed(&measured, &point, None, EVERYTHING);
-                    let session = measured.session_values(&point, 0);
-                    let rms = measured.root_mean_square(&point, EVERYTHING);
-                    let error = measured.normalised_error(&point, EVERYTHING);
-                    let notes = measured.notes(&point);
-                    Ok::<_, DescriptionError>((100.0 * error, rms, session, notes))
-                };
-                let (extended_percent, extended_rms, session, notes) = error(&self.nominal, true)?;
-                let named = rig.session().iter().zip(session);
-                Ok(FileErrors {
-                    file: file.clone(),
-                    channel: rig.output().name().to_owned(),
-                    nominal_percent: error(&self.refitted, false)?.0,
-                    described_percent: error(&self.described, false)?.0,
-                    extended_percent,
-                    extended_rms,
-                    notes,
-                    unit: rig.output().unit().to_owned(),
-                    session: named
-                        .map(|(own, value)| (own.name.to_owned(), value))
-                        .collect(),
-                })
-            })
-            .collect()
+        let mut all = Vec::new();
+        for file in files {
+            let mut measurement = Measurement {
+                recordings: vec![description.recording(file, rig, false)?.0],
+            };
+            compare_all(rig, &mut measurement.recordings);
+            let errors = |nominal, with_effects| {
+                let (measured, point) = self.measured(&measurement, nominal, with_effects)?;
+                let point = completed(&measured, &point, None, EVERYTHING);
+                let session = measured.session_values(&point, 0);
+                let errors = measured.errors_by_output(&point, EVERYTHING);
+                let notes = measured.notes(&point);
+                Ok::<_, DescriptionError>((errors, session, notes))
+            };
+            let (extended, session, notes) = errors(&self.nominal, true)?;
+            let nominal = errors(&self.refitted, false)?.0;
+            let described = errors(&self.described, false)?.0;
+            let named = rig.session().iter().zip(session);
+            let session: BTreeMap<String, f64> = named
+                .map(|(own, value)| (own.name.to_owned(), value))
+                .collect();
+            let models = extended.into_iter().zip(nominal).zip(described);
+            all.extend(models.map(|((extended, nominal), described)| FileErrors {
+                file: file.clone(),
+                channel: extended.0.name().to_owned(),
+                nominal_percent: 100.0 * nominal.1,
+                described_percent: 100.0 * described.1,
+                extended_percent: 100.0 * extended.1,
+                extended_rms: extended.2,
+                notes: notes.clone(),
+                unit: extended.0.unit().to_owned(),
+                session: session.clone(),
+            }));
+        }
+        Ok(all)
     }
 
     /// The output for `file`, in which cells of the output may be empty. Given ones tell how the
@@ -423,9 +433,9 @@ impl ExtendedRig {
         let (mut recording, rows) = description.recording(file, rig, true)?;
         recording.is_periodic = is_periodic;
         let given = recording.output().iter().filter(|y| y.is_finite()).count();
-        let measurement = Measurement {
-            recordings: vec![recording],
-        };
+        let (samples, mut recordings) = (recording.len(), vec![recording]);
+        compare_all(rig, &mut recordings);
+        let measurement = Measurement { recordings };
         let (measured, mut point) = self.measured(&measurement, &self.nominal, true)?;
         let is_told = |own: &SessionParameter| own.role == SessionRole::Start;
         if given > 0 && rig.session().iter().any(is_told) {
@@ -443,15 +453,22 @@ impl ExtendedRig {
                 file.display()
             )));
         }
-        let channel = rig.output();
-        let unit = self.columns.get(channel.name());
-        let unit = unit.map_or(channel.unit(), |column| column.unit.as_str());
-        let factor = convert(1.0, channel.unit(), unit)
-            .map_err(|why| self.wrong(format!("`columns.{}`: {why}", channel.name())))?;
+        let also = measurement.recordings[0].also().iter().copied();
+        let outputs = [(rig.output(), 1.0)].into_iter().chain(also);
+        let columns = outputs.enumerate().map(|(i, (channel, size))| {
+            let unit = self.columns.get(channel.name());
+            let unit = unit.map_or(channel.unit(), |column| column.unit.as_str());
+            let factor = convert(size, channel.unit(), unit)
+                .map_err(|why| self.wrong(format!("`columns.{}`: {why}", channel.name())))?;
+            let rows = rows.iter().map(|&k| factor * simulated[i * samples + k]);
+            Ok(PredictedColumn {
+                channel: channel.name(),
+                unit: unit.to_owned(),
+                rows: rows.collect(),
+            })
+        });
         Ok(Prediction {
-            channel: channel.name(),
-            unit: unit.to_owned(),
-            rows: rows.iter().map(|&k| factor * simulated[k]).collect(),
+            columns: columns.collect::<Result<_, DescriptionError>>()?,
             given,
         })
     }

@@ -2,8 +2,9 @@
 
 use super::named_value::NamedValue;
 use super::parts::{self, EVERYTHING, File, InParts, NAMES, places};
-use super::{Begun, Cause, Effect, Measurement, Natural, Rig, SessionRole, Values};
-use diagnosis::{Candidate, Point, SimulatedModel, WEAK, all_errors};
+use super::{Begun, Cause, Effect, Measurement, Natural, Rig, RigRecording, SessionRole, Values};
+use diagnosis::{Candidate, Point, SimulatedModel, WEAK, squares};
+use recordings::Channel;
 
 /// Samples up to which more may be tried.
 const CHEAP: usize = 40_000;
@@ -259,10 +260,48 @@ impl<'a> Measured<'a> {
         }
     }
 
-    /// Root mean square of the errors on `record`.
-    pub fn root_mean_square(&self, point: &Point, record: usize) -> f64 {
-        let errors = all_errors(self, point, record);
-        (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+    /// As [`InParts::normalised_error`], by output, with each root mean square, SI.
+    pub fn errors_by_output(&self, point: &Point, record: usize) -> Vec<(Channel, f64, f64)> {
+        let first = self.measurement.recordings.first();
+        let also = first.map_or(&[][..], RigRecording::also);
+        let outputs = also.iter().map(|(channel, _)| *channel);
+        let outputs = [self.rig.output()].into_iter().chain(outputs).enumerate();
+        outputs
+            .map(|(i, channel)| {
+                let (errors, size, count) = self.squares_of(point, record, Some(i));
+                let mean = errors / count.max(1) as f64;
+                (channel, (errors / size).sqrt(), mean.sqrt())
+            })
+            .collect()
+    }
+
+    /// Sums on `record` of the squared errors and of the squared output about its mean, and their number; of one
+    /// `output`, SI, or of all as they are fitted.
+    fn squares_of(&self, point: &Point, record: usize, output: Option<usize>) -> (f64, f64, usize) {
+        let (mut errors, mut size, mut count) = (0.0, 0.0, 0);
+        for (s, places) in self.places[record].iter().enumerate() {
+            let one = &self.measurement.recordings[s];
+            let own = self.errors(point, record, s);
+            for i in 0..=one.also().len() {
+                let unit = match output {
+                    Some(wanted) if wanted != i => continue,
+                    Some(_) if i > 0 => one.also()[i - 1].1,
+                    _ => 1.0,
+                };
+                let mine = places
+                    .iter()
+                    .zip(&own)
+                    .filter(|(k, _)| **k / one.len() == i);
+                let (measured, off): (Vec<f64>, Vec<f64>) = mine
+                    .map(|(&k, e)| (unit * one.output()[k], unit * e))
+                    .unzip();
+                let mean = measured.iter().sum::<f64>() / measured.len().max(1) as f64;
+                errors += squares(&off);
+                size += measured.iter().map(|m| (m - mean).powi(2)).sum::<f64>();
+                count += off.len();
+            }
+        }
+        (errors, size, count)
     }
 
     /// Everything that the equations read for `recording`, SI.
@@ -285,11 +324,8 @@ impl<'a> Measured<'a> {
 
     /// Simulated output of one recording.
     pub fn simulate(&self, point: &Point, recording: usize) -> Vec<f64> {
-        self.simulate_to(
-            point,
-            recording,
-            self.measurement.recordings[recording].len(),
-        )
+        let samples = self.measurement.recordings[recording].output().len();
+        self.simulate_to(point, recording, samples)
     }
 
     /// As [`Self::simulate`], the first `samples` only.
@@ -420,7 +456,7 @@ impl SimulatedModel for Measured<'_> {
             return Vec::new();
         };
         let recording = &self.measurement.recordings[block];
-        let mut errors = vec![f64::NAN; recording.len()];
+        let mut errors = vec![f64::NAN; recording.output().len()];
         let own = self.errors(base, record, block);
         for (&place, error) in self.places[record][block].iter().zip(own) {
             errors[place] = error;
@@ -480,18 +516,16 @@ impl InParts for Measured<'_> {
     }
 
     fn normalised_error(&self, point: &Point, record: usize) -> f64 {
-        let errors = all_errors(self, point, record);
-        let mut size = 0.0;
-        for (s, places) in self.places[record].iter().enumerate() {
-            let measured = self.measurement.recordings[s].output();
-            let mean =
-                places.iter().map(|&k| measured[k]).sum::<f64>() / places.len().max(1) as f64;
-            size += places
-                .iter()
-                .map(|&k| (measured[k] - mean).powi(2))
-                .sum::<f64>();
-        }
-        (errors.iter().map(|e| e * e).sum::<f64>() / size).sqrt()
+        let (errors, size, _) = self.squares_of(point, record, None);
+        (errors / size).sqrt()
+    }
+
+    fn error_by_output(&self, point: &Point, record: usize) -> Vec<(&'static str, f64)> {
+        let all = self.errors_by_output(point, record).into_iter();
+        let all: Vec<_> = all
+            .map(|(channel, error, _)| (channel.name(), error))
+            .collect();
+        if all.len() > 1 { all } else { Vec::new() }
     }
 
     fn parameters(&self, point: &Point, deviations: &[f64]) -> Vec<NamedValue> {

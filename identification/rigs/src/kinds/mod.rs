@@ -19,6 +19,8 @@ mod drive;
 mod extended;
 mod fitted;
 pub mod foreign;
+mod frame;
+mod friction;
 pub mod guess;
 pub mod hypotheses;
 mod hysteretic_device;
@@ -48,7 +50,7 @@ pub use description::{
 };
 pub use diagnosis::{PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
 pub use drive::{DriveSearch, RigDrive};
-pub use extended::{ExtendedRig, FileErrors, Prediction};
+pub use extended::{ExtendedRig, FileErrors, PredictedColumn, Prediction};
 pub use fitted::{FittedNominal, fit_nominal};
 pub use named_value::NamedValue;
 
@@ -84,6 +86,8 @@ pub trait Equations: Sync {
     const OPTIONAL: &'static [(Channel, &'static [&'static str])] = &[];
     /// What is simulated and compared.
     const OUTPUT: Channel;
+    /// What is simulated and compared with it where the data hold it.
+    const ALSO: &'static [Channel] = &[];
     /// True where the output depends on the input's path, which a loop shows best.
     const IS_HYSTERETIC: bool = false;
     /// True where a row without a time is a point of a path and no sample.
@@ -104,7 +108,8 @@ pub trait Equations: Sync {
     /// `force` on what moves, `valve` on what the controller sends.
     const PLACES: &'static [&'static str] = &[];
 
-    /// Output for the inputs of `recording` alone.
+    /// Output for the inputs of `recording` alone, and after all its samples those of
+    /// [`RigRecording::also`], divided by their sizes.
     fn simulate(
         &self,
         recording: &RigRecording,
@@ -189,6 +194,9 @@ pub trait Rig: Sync {
 
     /// What is simulated and compared.
     fn output(&self) -> Channel;
+
+    /// As [`Equations::ALSO`].
+    fn also(&self) -> &'static [Channel];
 
     /// Whether the output depends on the input's path.
     fn is_hysteretic(&self) -> bool;
@@ -310,6 +318,10 @@ impl<E: Equations> Rig for E {
 
     fn output(&self) -> Channel {
         E::OUTPUT
+    }
+
+    fn also(&self) -> &'static [Channel] {
+        E::ALSO
     }
 
     fn is_hysteretic(&self) -> bool {
@@ -442,7 +454,7 @@ impl<E: Equations> Rig for E {
 }
 
 /// Every kind of rig.
-pub static KINDS: [&dyn Rig; 8] = [
+pub static KINDS: [&dyn Rig; 9] = [
     &closed_loop_actuator::ClosedLoopActuator,
     &positioning_drive::PositioningDrive,
     &linear_axis::LinearAxis,
@@ -451,6 +463,7 @@ pub static KINDS: [&dyn Rig; 8] = [
     &transfer_system::TransferSystemKind,
     &oscillator::Oscillator,
     &controlled_damper::ControlledDamper,
+    &frame::Frame,
 ];
 
 /// The only rig whose kind holds `word`, such as `actuator` or `hysteretic device`.

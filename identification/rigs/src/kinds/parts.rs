@@ -127,6 +127,11 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
     /// `||y - m|| / ||m - mean||` on the samples of `record`.
     fn normalised_error(&self, point: &Point, record: usize) -> f64;
 
+    /// The same by output, of a model with several.
+    fn error_by_output(&self, _point: &Point, _record: usize) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+
     /// Nominal parameters at `point` with standard errors, in the order of the nuisance.
     fn parameters(&self, point: &Point, deviations: &[f64]) -> Vec<NamedValue>;
 

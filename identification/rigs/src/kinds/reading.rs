@@ -7,6 +7,7 @@ use super::{Begin, KINDS, Rig, RigRecording};
 use recordings::IdentificationError;
 use recordings::{
     Channel, DataError, Pick, Recording, RoundedStamps, Sheet, TimeBase, Wanted, is_called,
+    mean_and_deviation,
 };
 
 /// Samples that a file must have at least.
@@ -41,6 +42,7 @@ impl Description {
             .map(|file| Ok(self.recording(file, rig, false)?.0))
             .collect::<Result<Vec<_>, DescriptionError>>()?;
         self.leave_out(&mut recordings, files)?;
+        compare_all(rig, &mut recordings);
         Ok(Measurement { recordings })
     }
 
@@ -103,6 +105,7 @@ impl Description {
     /// What the file columns of channels are called, each with the channel.
     fn picks(&self, rig: &dyn Rig) -> Result<Vec<Pick<'_>>, DescriptionError> {
         let optional = rig.optional().iter().map(|(channel, _)| *channel);
+        let optional = optional.chain(rig.also().iter().copied());
         let mut wanted = rig.inputs().to_vec();
         wanted.push(rig.output());
         let known: Vec<Channel> = wanted
@@ -125,9 +128,9 @@ impl Description {
         }
         let given = |channel: &Channel| self.columns.contains_key(channel.name());
         wanted.extend(optional.chain([Channel::Time]).filter(given));
-        // A velocity is derived from the displacement.
+        // A velocity or an acceleration is derived from the displacement.
         let is_derived = |channel: &Channel| {
-            *channel == Channel::Velocity && !given(channel) && given(&Channel::Displacement)
+            DERIVED.contains(channel) && !given(channel) && given(&Channel::Displacement)
         };
         wanted
             .into_iter()
@@ -185,7 +188,7 @@ impl Description {
             .iter()
             .map(|(channel, values)| (*channel, &values[..]));
         for (channel, values) in all.chain(read.stamps().map(|t| (Channel::Time, t))) {
-            if may_lack && channel == rig.output() {
+            if may_lack && (channel == rig.output() || rig.also().contains(&channel)) {
                 continue;
             }
             if let Some(row) = values.iter().position(|value| !value.is_finite()) {
@@ -220,11 +223,13 @@ impl Description {
             return Err(DataError::file(path, what).into());
         }
         let period = self.period(path, &sheet, &read)?;
-        if rig.inputs().contains(&Channel::Velocity)
-            && channels.iter().all(|own| own.0 != Channel::Velocity)
-            && let Some((_, way)) = channels.iter().find(|own| own.0 == Channel::Displacement)
-        {
-            channels.push((Channel::Velocity, velocity(way, period)));
+        for (derived, from) in DERIVED.into_iter().zip([velocity, acceleration]) {
+            if rig.inputs().contains(&derived)
+                && channels.iter().all(|own| own.0 != derived)
+                && let Some((_, way)) = channels.iter().find(|own| own.0 == Channel::Displacement)
+            {
+                channels.push((derived, from(way, period)));
+            }
         }
         let (period, channels) = match &self.reduced_to {
             Some(rate) if !may_lack => {
@@ -365,6 +370,45 @@ fn bridged(read: Recording) -> Recording {
     }
 }
 
+/// What a displacement gives where there is no column of it.
+const DERIVED: [Channel; 2] = [Channel::Velocity, Channel::Acceleration];
+
+/// Compares what else a kind puts out wherever every recording has it. One of the output counts as much as the
+/// geometric mean of the deviations in the file and in all: a device that rests in a file shows its friction there.
+pub(super) fn compare_all(rig: &dyn Rig, recordings: &mut [RigRecording]) {
+    let deviation = |channel: Channel, recordings: &[RigRecording]| {
+        let values = recordings.iter().flat_map(|one| one.input(channel));
+        let values: Vec<f64> = values.copied().filter(|value| value.is_finite()).collect();
+        mean_and_deviation(&values).1
+    };
+    let has = |channel: &&Channel| {
+        let mut all = recordings.iter();
+        all.all(|one| !one.input(**channel).is_empty())
+    };
+    let also: Vec<Channel> = rig.also().iter().filter(has).copied().collect();
+    if also.is_empty() {
+        return;
+    }
+    let own = deviation(rig.output(), recordings);
+    let whole: Vec<f64> = also.iter().map(|one| deviation(*one, recordings)).collect();
+    for one in recordings {
+        let sizes = also.iter().zip(&whole).map(|(channel, whole)| {
+            let in_file = deviation(*channel, std::slice::from_ref(one));
+            let size = (in_file * whole).sqrt() / own;
+            (
+                *channel,
+                if size > 0.0 && size.is_finite() {
+                    size
+                } else {
+                    1.0
+                },
+            )
+        });
+        let sizes = sizes.collect();
+        one.compare_also(sizes);
+    }
+}
+
 /// Time over which a velocity is the slope of the displacement, s.
 const SLOPE: f64 = 0.01;
 
@@ -376,6 +420,24 @@ fn velocity(way: &[f64], period: f64) -> Vec<f64> {
         .map(|k| {
             let (from, to) = (k.saturating_sub(reach), (k + reach).min(last));
             (way[to] - way[from]) / ((to - from).max(1) as f64 * period)
+        })
+        .collect()
+}
+
+/// Acceleration from samples of a displacement: second differences over as long.
+fn acceleration(way: &[f64], period: f64) -> Vec<f64> {
+    let reach = ((0.5 * SLOPE / period).round() as usize).max(1);
+    let last = way.len().saturating_sub(1);
+    let step = reach as f64 * period;
+    (0..way.len())
+        .map(|k| {
+            // As it begins and ends.
+            let k = k.clamp(
+                reach.min(last),
+                last.saturating_sub(reach).max(reach.min(last)),
+            );
+            let (from, to) = (k.saturating_sub(reach), (k + reach).min(last));
+            (way[to] - 2.0 * way[k] + way[from]) / (step * step)
         })
         .collect()
 }

@@ -13,6 +13,10 @@ pub struct RigRecording {
     recording: Recording,
     /// What is simulated and compared.
     output: Channel,
+    /// Further outputs that are compared, each with its size for one of the output, SI.
+    also: Vec<(Channel, f64)>,
+    /// The output, and after it those in the output's unit; empty where there are none.
+    together: Vec<f64>,
     /// The first input without what a median of five samples takes out.
     pub cleaned: Vec<f64>,
     /// True where the first input lies half way between its neighbours to rounding: such a sample
@@ -68,6 +72,8 @@ impl RigRecording {
             is_periodic: false,
             between_samples: OnceLock::new(),
             output,
+            also: Vec::new(),
+            together: Vec::new(),
             recording,
         }
     }
@@ -104,9 +110,32 @@ impl RigRecording {
             .get_or_init(|| band_limited(self.input(first), PLACES, self.is_periodic))
     }
 
-    /// The measured output, SI; not a number where a sample is missing.
+    /// The measured output, SI, and after it those of [`Self::compare_also`]; not a number where a sample is
+    /// missing.
     pub fn output(&self) -> &[f64] {
-        self.recording.samples(self.output)
+        if self.together.is_empty() {
+            self.recording.samples(self.output)
+        } else {
+            &self.together
+        }
+    }
+
+    /// Compares further outputs, each with its size for one of the output, SI: they follow it in
+    /// [`Self::output`], divided by that size, and are left out where it is.
+    pub fn compare_also(&mut self, also: Vec<(Channel, f64)>) {
+        let own = also.iter().flat_map(|(channel, size)| {
+            let values = self.recording.samples(*channel).iter();
+            values.map(move |value| value / size)
+        });
+        let first = self.recording.samples(self.output).iter().copied();
+        self.together = first.chain(own).collect();
+        self.left_out = self.left_out.repeat(1 + also.len());
+        self.also = also;
+    }
+
+    /// What [`Self::compare_also`] was given.
+    pub fn also(&self) -> &[(Channel, f64)] {
+        &self.also
     }
 
     /// Restarts every `length` samples, from the `known` ones there, which are not compared.
@@ -153,6 +182,8 @@ impl RigRecording {
         let changed = Self::new(recording, inputs, self.output);
         Some(Self {
             left_out: self.left_out.clone(),
+            also: self.also.clone(),
+            together: self.together.clone(),
             begins: self.begins.clone(),
             is_given: self.is_given.clone(),
             is_periodic: self.is_periodic,
@@ -160,11 +191,14 @@ impl RigRecording {
         })
     }
 
-    /// Puts another output in the place of the measured one.
+    /// Puts another output in the place of the measured one, which is then compared alone.
     ///
     /// # Errors
     /// Samples of another number.
     pub fn replace_output(&mut self, values: Vec<f64>) -> Result<(), IdentificationError> {
+        self.left_out.truncate(self.recording.len());
+        self.also.clear();
+        self.together.clear();
         self.recording.replace(self.output, values)
     }
 }

@@ -45,6 +45,9 @@ pub fn template(rig: &dyn Rig) -> String {
         column(*input, "", "");
     }
     column(rig.output(), "", "  # what is simulated and compared");
+    for also in rig.also() {
+        column(*also, "# ", "  # compared as well, where there is one");
+    }
     for (channel, _) in rig.optional() {
         column(*channel, "# ", "  # where there is one");
     }

@@ -119,20 +119,26 @@ pub fn predict(
     let found = read
         .predict(file, is_periodic)
         .map_err(|error| fault(model, error.into()))?;
+    let Some((first, also)) = found.columns.split_first() else {
+        return Err(file_fault(file, "the model has no output"));
+    };
     write(out, |file| {
-        writeln!(file, "{PREDICTION}")?;
-        found
-            .rows
+        let heads = also
             .iter()
-            .try_for_each(|row| writeln!(file, "{row}"))
+            .map(|own| format!(",{} [{}]", own.channel, own.unit));
+        writeln!(file, "{PREDICTION}{}", heads.collect::<String>())?;
+        first.rows.iter().enumerate().try_for_each(|(k, row)| {
+            let others = also.iter().map(|own| format!(",{}", own.rows[k]));
+            writeln!(file, "{row}{}", others.collect::<String>())
+        })
     })?;
     Ok(Predicted {
         model: model.into(),
         file: file.into(),
         prediction: out.to_path_buf(),
-        channel: found.channel.into(),
-        unit: found.unit,
-        rows: found.rows.len(),
+        channel: first.channel.into(),
+        unit: first.unit.clone(),
+        rows: first.rows.len(),
         given: found.given,
     })
 }

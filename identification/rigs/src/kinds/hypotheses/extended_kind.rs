@@ -119,6 +119,10 @@ impl Rig for ExtendedKind {
         self.base.output()
     }
 
+    fn also(&self) -> &'static [Channel] {
+        self.base.also()
+    }
+
     fn is_hysteretic(&self) -> bool {
         self.base.is_hysteretic()
     }
