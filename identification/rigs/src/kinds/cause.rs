@@ -29,6 +29,15 @@ impl Cause {
         clear.then_some(Self { found, stated })
     }
 
+    /// Widens its interval to what data leave open, from `low` to `high`: the middle may be beside what a fit found.
+    pub(super) fn widen(&mut self, (low, high): (f64, f64)) {
+        let half = 0.5 * (high - low);
+        if half > INTERVAL_95 * self.found.standard_error {
+            self.found.value = low + half;
+            self.found.standard_error = half / INTERVAL_95;
+        }
+    }
+
     /// Standard errors between what was found and what was stated.
     pub(super) fn deviations(&self) -> f64 {
         (self.found.value - self.stated).abs() / self.found.standard_error

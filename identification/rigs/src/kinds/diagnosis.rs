@@ -7,13 +7,14 @@ use serde::{Deserialize, Serialize};
 use super::alternatives::{
     Item, least_needed, nearly_without, of_its_class, proposals, replaced, simplest,
 };
-use super::cause::{Cause, effect_in_words, in_own_words, joined, undetermined};
+use super::cause::{Cause, INTERVAL_95, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
     Confirmed, NominalFits, Refused, confirm, effects as named_values, lengths, needed, unfit,
 };
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, LOST, Part};
+use super::profile::{self, Open};
 use super::readings::{Crossed, Reading, Weighed, in_words, ranked};
 use super::{Description, DescriptionError, Measurement};
 use crate::report::ends_or_not_a_number;
@@ -375,18 +376,32 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let believed = |i: usize, cause: &Cause| {
         holds || ((explains || measured.is_of_first_file(i)) && cause.deviations() > FAR)
     };
-    let values = confirmed.parameters.iter().enumerate();
     let mut causes: Vec<Cause> = Vec::new();
     let mut doubted: Vec<Cause> = Vec::new();
-    for (i, value) in values.filter(|(i, _)| measured.is_cause(*i)) {
-        let Some(cause) = Cause::of(value.clone(), measured.stated(i)) else {
+    for i in (0..confirmed.parameters.len()).filter(|i| measured.is_cause(*i)) {
+        let stated = measured.stated(i);
+        let Some(cause) = Cause::of(confirmed.parameters[i].clone(), stated) else {
             continue;
         };
         if !believed(i, &cause) || cause.makes_up(&confirmed.parameters) {
             continue;
         }
-        let without = measured.without_cause(i);
-        let without = without.and_then(|own| {
+        let mut told = cause.clone();
+        let mut as_stated = None;
+        if !measured.is_of_first_file(i)
+            && !observer.is_over()
+            && let Some(open) = profile::open(measured, &confirmed.point, i, stated.0)
+        {
+            let own = &mut confirmed.parameters[i];
+            let (low, high) = open.ends(own.value, stated.0);
+            told.widen((low, high));
+            let farthest = (own.value - low).max(high - own.value);
+            own.standard_error = own.standard_error.max(farthest / INTERVAL_95);
+            if let Open::Stated(point) = open {
+                as_stated = Some(point);
+            }
+        }
+        let without = measured.pinned(i, stated.0).and_then(|own| {
             // No part tells another one's zero.
             if measured.is_of_first_file(i) {
                 let best = settled(&own, &confirmed.point, EVERYTHING)?;
@@ -396,17 +411,18 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
                 let is_needed = needed(&bare, &with, &lengths(measured, EVERYTHING));
                 return Some((own, best, errors, is_needed));
             }
-            let best = confirmed.point.clone();
+            let is_open = as_stated.is_some();
+            let best = as_stated.unwrap_or_else(|| confirmed.point.clone());
             let errors = Crossed::of(&own, &best)?;
-            let is_needed = crossed.needs(&errors);
+            let is_needed = !is_open && crossed.needs(&errors);
             Some((own, best, errors, is_needed))
         });
         match without {
             Some((own, best, errors, false)) => {
-                doubted.push(cause);
+                doubted.push(told);
                 weighed.extend(Weighed::of(&own, &best, errors));
             }
-            _ => causes.push(cause),
+            _ => causes.push(told),
         }
     }
     causes.extend(measured.contradictions().into_iter().filter(|cause| {
