@@ -1,4 +1,4 @@
-//! What data leave open of a nominal parameter that others can stand in for.
+//! What data leave open of a nominal parameter that others can make up for.
 
 use rayon::prelude::*;
 
@@ -35,11 +35,11 @@ impl Open {
     }
 }
 
-/// What is open of the nominal parameter `i`, which was `stated`, beside the model at `point`: everything else is
-/// fitted again, also what that model goes without, and the error on all data does not grow by more than a tenth and
-/// by chance beyond the least (the profile of the likelihood; Venzon and Moolgavkar, Applied Statistics 37, 1988). A
-/// standard error holds for a model that is exact; where a delay, a lag and a feedforward stand in for each other, an
-/// error of the model's form counts for more than noise. None where nothing can be fitted.
+/// What is open of the nominal parameter `i`, which was `stated`, beside the model at `point`, by the profile of the
+/// likelihood (Venzon and Moolgavkar, Applied Statistics 37, 1988). Everything else is fitted again, also what that model
+/// goes without. Open is where the squared error on all data is at most a tenth above the least, or above it by chance.
+/// A standard error holds for a model that is exact. Where delay, lag and feedforward make up for each other, an error
+/// of the model's form counts for more than noise. None where nothing can be fitted.
 pub(super) fn open<M: InParts>(measured: &M, point: &Point, i: usize, stated: f64) -> Option<Open> {
     let starts = [measured.restored(point), point.clone()];
     let fits = starts.par_iter().filter_map(|start| {
