@@ -9,7 +9,8 @@ use super::alternatives::{
 };
 use super::cause::{Cause, INTERVAL_95, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
-    Confirmed, NominalFits, Refused, confirm, effects as named_values, lengths, needed, unfit,
+    Confirmed, NominalFits, Refused, confirm, effects as named_values, is_vital, lengths, needed,
+    unfit,
 };
 use super::measured::Measured;
 use super::named_value::NamedValue;
@@ -34,6 +35,8 @@ const MOST: f64 = 0.5;
 const FAR: f64 = 5.0;
 /// Why an effect is not named that the data do not need for sure.
 const DOUBTED: &str = "the prediction of either part is hardly worse without it";
+/// Why an effect is not named that does not help to predict the other part.
+const UNUSED: &str = "the prediction of the other part is better without it";
 /// Error on all data over that of a model with more nominal parameters, up to which it does as well.
 const AS_WELL: f64 = 1.02;
 /// Share of the squared error beyond which what is explained is all of it.
@@ -224,6 +227,10 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             continue;
         };
         if both().any(|own| own.effect == effect.effect && own.objection.is_none()) {
+            continue;
+        }
+        // A part without it is predicted by a fit that bends to make up for it, and may be so by chance.
+        if reason == UNUSED && is_vital(measured, &start.point, index) {
             continue;
         }
         start.point.effects.retain(|(known, _)| *known != index);
@@ -514,7 +521,7 @@ fn part_report<M: InParts>(measured: &M, fitted: Part, selected: &Selected) -> P
             .iter()
             .find(|(index, _)| *index == found.effects[i].0)
             .map(|(_, reason)| reason.clone());
-        let negative = || "the prediction of the other part is better without it".to_owned();
+        let negative = || UNUSED.to_owned();
         effects.push(PartEffect {
             effect,
             parameters,
