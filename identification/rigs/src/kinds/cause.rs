@@ -10,6 +10,9 @@ pub const INTERVAL_95: f64 = 1.96;
 /// that of a singular fit, while a value near zero with an ordinary interval is an answer.
 const WIDE: f64 = 100.0;
 
+/// Integral over proportional gain, 1/s, below which it makes up for nothing during a record: it takes minutes.
+const SLOW: f64 = 2e-3;
+
 /// A nominal parameter such as a scale or an offset that is not what was stated, or a sensor that
 /// contradicts another one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,6 +32,15 @@ impl Cause {
         clear.then_some(Self { found, stated })
     }
 
+    /// Widens its interval to what data leave open, from `low` to `high`: the middle may be beside what a fit found.
+    pub(super) fn widen(&mut self, (low, high): (f64, f64)) {
+        let half = 0.5 * (high - low);
+        if half > INTERVAL_95 * self.found.standard_error {
+            self.found.value = low + half;
+            self.found.standard_error = half / INTERVAL_95;
+        }
+    }
+
     /// Standard errors between what was found and what was stated.
     pub(super) fn deviations(&self) -> f64 {
         (self.found.value - self.stated).abs() / self.found.standard_error
@@ -38,7 +50,7 @@ impl Cause {
     /// makes up for it, a table on a spring moves less than commanded.
     pub fn or(&self, parameters: &[NamedValue]) -> Option<(&'static str, &'static str)> {
         let is_short = self.found.name == "scale" && self.found.value < self.stated;
-        let gives_way = |p: &NamedValue| p.name == "integral" && p.value == 0.0;
+        let gives_way = |p: &NamedValue| p.name == "integral" && p.value < SLOW;
         let spring = ("table_spring", "a spring under it holds it back");
         (is_short && parameters.iter().any(gives_way)).then_some(spring)
     }
@@ -277,6 +289,7 @@ mod tests {
             cause.or(all).map(|(name, _)| name)
         };
         assert_eq!(or(0.95, &with(0.0)), Some("table_spring"));
+        assert_eq!(or(0.95, &with(1e-4)), Some("table_spring"));
         assert_eq!(or(0.95, &with(0.5)), None);
         assert_eq!(or(1.05, &with(0.0)), None);
         assert_eq!(or(0.95, &[]), None);

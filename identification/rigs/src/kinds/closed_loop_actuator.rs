@@ -4,8 +4,9 @@
 //! `T/2 q' = K c - q`, `T/2 w' = q - w`, `P² v'' + 2 d P v' + v = w`, `x' = v` (Merritt, Hydraulic Control Systems, 1967: a
 //! valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
 //! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. Two lags in a row
-//! are nearer to a spool, and to a coil before a mass, than one and a delay. The command runs
-//! evenly from sample to sample; the linear equations are solved exactly, and what is not linear by steps.
+//! are nearer to a spool, and to a coil before a mass, than one and a delay. Between samples
+//! the command follows a curve, of which a step takes the chord. The linear equations are solved exactly, and what is
+//! not linear by steps.
 //!
 //! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
 
@@ -13,12 +14,13 @@ use std::cell::Cell;
 
 use units::vocabulary;
 
+use super::between::between;
 use super::hypotheses::Inside;
 use super::linear_loop::LinearLoop;
-use super::loop_step::{Course, Loop, SLOPE, State, rubbing, tanh};
+use super::loop_step::{Course, Loop, State, rubbing, tanh};
 use super::sensors::accelerometer_scale;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
-use super::{Begun, Cause, Equations, Natural, RigRecording};
+use super::{Begun, Cause, Equations, INTERVAL_95, NamedValue, Natural, RigRecording};
 use recordings::Channel;
 
 /// The rig.
@@ -32,8 +34,8 @@ const COMMAND: Channel = Channel::Other {
 /// The loop's gain times a step at most, where it is not linear, and the most steps of a sample.
 const FINE: f64 = 0.25;
 const MOST_STEPS: f64 = 64.0;
-/// The fewest where there is friction, which is even over a step.
-const RUBBED: f64 = 2.0;
+/// The fewest: between samples the command follows a curve, and friction is even over a step.
+const SMOOTH: f64 = 2.0;
 
 nominal_parameters! {
     /// K: speed over position error.
@@ -214,18 +216,21 @@ impl Equations for ClosedLoopActuator {
     }
 
     fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause> {
-        // Calibrations of accelerometer and transducer agree within this, where samples are so many a second.
-        // Without a filter before the converter an accelerometer shows shocks beyond half of a lower rate as
-        // slow motion, at all frequencies alike.
+        // Calibrations of accelerometer and transducer agree within this. Without a filter before the converter an
+        // accelerometer shows shocks beyond half of the rate as slow motion, at all frequencies alike: that may change
+        // its scale by as much where samples are so many a second, in 95 of 100 cases.
         const CALIBRATED: f64 = 0.01;
         const ENOUGH: f64 = 200.0;
         let slowest = recordings
             .iter()
             .map(RigRecording::period)
             .fold(0.0, f64::max);
-        let within = CALIBRATED * (slowest * ENOUGH).max(1.0).powi(3);
-        let scale = accelerometer_scale(recordings, COMMAND);
-        let cause = scale.and_then(|scale| Cause::of(scale, (1.0, within)));
+        let folded = CALIBRATED * (slowest * ENOUGH).max(1.0).powi(3);
+        let scale = accelerometer_scale(recordings, COMMAND).map(|own| NamedValue {
+            standard_error: own.standard_error.hypot(folded / INTERVAL_95),
+            ..own
+        });
+        let cause = scale.and_then(|scale| Cause::of(scale, (1.0, CALIBRATED)));
         cause.into_iter().collect()
     }
 
@@ -314,27 +319,13 @@ impl Equations for ClosedLoopActuator {
         let has_effect = has_effect || !inside.valves.is_empty();
         let is_linear = !has_effect && fastest == f64::INFINITY && !form.rubs;
         let steps = if is_linear {
-            1.0
+            SMOOTH
         } else {
             let most = gain * (1.0 + asymmetry.abs());
-            let least = if form.rubs { RUBBED } else { 1.0 };
-            (sample * most / FINE).ceil().clamp(least, MOST_STEPS)
+            (sample * most / FINE).ceil().clamp(SMOOTH, MOST_STEPS)
         };
-        let mut step = form.step(sample / steps, sample);
-        // A delayed command bends inside a step.
-        let bend = delay - delay.floor();
-        let (bent, before_bend) = ((bend * steps) as usize, (bend * steps).fract());
-        let rest = (1.0 - before_bend) * step.length;
-        step.bend = form.step(rest, sample).columns[SLOPE];
-        let steps = steps as usize;
-        let last = loop_input.len() - 1;
-        let at = |place: f64| {
-            let place = (place - delay).max(0.0);
-            let before = (place as usize).min(last);
-            let share = (place - before as f64).min(1.0);
-            let after = (before + 1).min(last);
-            scale * (loop_input[before] * (1.0 - share) + loop_input[after] * share) + offset
-        };
+        let step = form.step(sample / steps, sample);
+        let at = |place: f64| scale * between(loop_input, place - delay) + offset;
         let now = Cell::new(0.0);
         // What the flow is beyond that of the linear loop.
         let beyond = |sent: f64| {
@@ -364,31 +355,17 @@ impl Equations for ClosedLoopActuator {
             if coupling != 0.0 {
                 *y += coupling * (command[k] - clean[k]);
             }
-            let k = k as f64;
-            let end = at(k + 1.0);
-            let middle = at(k + bend);
-            let slopes = [middle - begin, end - middle];
-            let later = slopes[1] / ((1.0 - bend) * sample);
-            let earlier = if bend > 0.0 {
-                slopes[0] / (bend * sample)
-            } else {
-                later
-            };
-            let mut command = begin;
-            for part in 0..steps {
-                now.set(k * sample + part as f64 * step.length);
-                let slope = if part <= bent { earlier } else { later };
-                let change = if part == bent { later - earlier } else { 0.0 };
-                let reached = command + step.length * slope + rest * change;
+            for part in 0..steps as usize {
+                let place = k as f64 + part as f64 / steps;
+                now.set(place * sample);
+                let end = at(place + 1.0 / steps);
                 let course = Course {
-                    ends: [command, reached],
-                    slope,
-                    change,
+                    ends: [begin, end],
+                    slope: (end - begin) / step.length,
                 };
                 state = step.advance(state, &course, beyond, &rub);
-                command = reached;
+                begin = end;
             }
-            begin = end;
         }
     }
 }

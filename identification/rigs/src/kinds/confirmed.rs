@@ -189,16 +189,20 @@ fn is_felt<M: InParts>(measured: &M, point: &Point, effect: usize, record: usize
         .is_some_and(|[before, after]| squares(&before) > NEEDED * squares(&after))
 }
 
+/// Whether all data cannot do without an effect of `point`, to which they are fitted.
+pub(super) fn is_vital<M: InParts>(measured: &M, point: &Point, effect: usize) -> bool {
+    let without = looked(measured, &without_effect(point, effect), EVERYTHING);
+    without.is_some_and(|without| {
+        let [bare, with] =
+            [&without, point].map(|point| squares(&all_errors(measured, point, EVERYTHING)));
+        bare > VITAL * with
+    })
+}
+
 /// Whether the data of `part` tell nothing of an effect that all data cannot do without: as it is in all of them, it
 /// makes nothing worse there. A rail is silent where no motion reaches it.
 fn is_silent<M: InParts>(measured: &M, fits: &Fits, effect: usize, part: Part) -> bool {
     let all = &fits.everything.0;
-    let is_vital = || {
-        let without = looked(measured, &without_effect(all, effect), EVERYTHING)?;
-        let [bare, with] =
-            [&without, all].map(|point| squares(&all_errors(measured, point, EVERYTHING)));
-        Some(bare > VITAL * with)
-    };
     let is_as_good = || {
         let (own, record) = (&fits.parts[part as usize].0, part as usize);
         // A fit keeps the effects and their order.
@@ -215,7 +219,7 @@ fn is_silent<M: InParts>(measured: &M, fits: &Fits, effect: usize, part: Part) -
         let lengths = lengths(measured, record);
         Some(!needed(&held.errors, &bare, &lengths))
     };
-    is_vital() == Some(true) && is_as_good() == Some(true)
+    is_vital(measured, all, effect) && is_as_good() == Some(true)
 }
 
 /// Samples of each file in `record`, of those that have some.

@@ -7,13 +7,15 @@ use serde::{Deserialize, Serialize};
 use super::alternatives::{
     Item, least_needed, nearly_without, of_its_class, proposals, replaced, simplest,
 };
-use super::cause::{Cause, effect_in_words, in_own_words, joined, undetermined};
+use super::cause::{Cause, INTERVAL_95, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
-    Confirmed, NominalFits, Refused, confirm, effects as named_values, lengths, needed, unfit,
+    Confirmed, NominalFits, Refused, confirm, effects as named_values, is_vital, lengths, needed,
+    unfit,
 };
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, LOST, Part};
+use super::profile::{self, Open};
 use super::readings::{Crossed, Reading, Weighed, in_words, ranked};
 use super::{Description, DescriptionError, Measurement};
 use crate::report::ends_or_not_a_number;
@@ -33,6 +35,8 @@ const MOST: f64 = 0.5;
 const FAR: f64 = 5.0;
 /// Why an effect is not named that the data do not need for sure.
 const DOUBTED: &str = "the prediction of either part is hardly worse without it";
+/// Why an effect is not named that does not help to predict the other part.
+const UNUSED: &str = "the prediction of the other part is better without it";
 /// Error on all data over that of a model with more nominal parameters, up to which it does as well.
 const AS_WELL: f64 = 1.02;
 /// Share of the squared error beyond which what is explained is all of it.
@@ -225,6 +229,10 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         if both().any(|own| own.effect == effect.effect && own.objection.is_none()) {
             continue;
         }
+        // A part without it is predicted by a fit that bends to make up for it, and may be so by chance.
+        if reason == UNUSED && is_vital(measured, &start.point, index) {
+            continue;
+        }
         start.point.effects.retain(|(known, _)| *known != index);
         if refused.iter().all(|(known, _)| *known != index) {
             refused.push((index, reason.clone()));
@@ -375,18 +383,32 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let believed = |i: usize, cause: &Cause| {
         holds || ((explains || measured.is_of_first_file(i)) && cause.deviations() > FAR)
     };
-    let values = confirmed.parameters.iter().enumerate();
     let mut causes: Vec<Cause> = Vec::new();
     let mut doubted: Vec<Cause> = Vec::new();
-    for (i, value) in values.filter(|(i, _)| measured.is_cause(*i)) {
-        let Some(cause) = Cause::of(value.clone(), measured.stated(i)) else {
+    for i in (0..confirmed.parameters.len()).filter(|i| measured.is_cause(*i)) {
+        let stated = measured.stated(i);
+        let Some(cause) = Cause::of(confirmed.parameters[i].clone(), stated) else {
             continue;
         };
         if !believed(i, &cause) || cause.makes_up(&confirmed.parameters) {
             continue;
         }
-        let without = measured.without_cause(i);
-        let without = without.and_then(|own| {
+        let mut told = cause.clone();
+        let mut as_stated = None;
+        if !measured.is_of_first_file(i)
+            && !observer.is_over()
+            && let Some(open) = profile::open(measured, &confirmed.point, i, stated.0)
+        {
+            let own = &mut confirmed.parameters[i];
+            let (low, high) = open.ends(own.value, stated.0);
+            told.widen((low, high));
+            let farthest = (own.value - low).max(high - own.value);
+            own.standard_error = own.standard_error.max(farthest / INTERVAL_95);
+            if let Open::Stated(point) = open {
+                as_stated = Some(point);
+            }
+        }
+        let without = measured.pinned(i, stated.0).and_then(|own| {
             // No part tells another one's zero.
             if measured.is_of_first_file(i) {
                 let best = settled(&own, &confirmed.point, EVERYTHING)?;
@@ -396,17 +418,18 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
                 let is_needed = needed(&bare, &with, &lengths(measured, EVERYTHING));
                 return Some((own, best, errors, is_needed));
             }
-            let best = confirmed.point.clone();
+            let is_open = as_stated.is_some();
+            let best = as_stated.unwrap_or_else(|| confirmed.point.clone());
             let errors = Crossed::of(&own, &best)?;
-            let is_needed = crossed.needs(&errors);
+            let is_needed = !is_open && crossed.needs(&errors);
             Some((own, best, errors, is_needed))
         });
         match without {
             Some((own, best, errors, false)) => {
-                doubted.push(cause);
+                doubted.push(told);
                 weighed.extend(Weighed::of(&own, &best, errors));
             }
-            _ => causes.push(cause),
+            _ => causes.push(told),
         }
     }
     causes.extend(measured.contradictions().into_iter().filter(|cause| {
@@ -498,7 +521,7 @@ fn part_report<M: InParts>(measured: &M, fitted: Part, selected: &Selected) -> P
             .iter()
             .find(|(index, _)| *index == found.effects[i].0)
             .map(|(_, reason)| reason.clone());
-        let negative = || "the prediction of the other part is better without it".to_owned();
+        let negative = || UNUSED.to_owned();
         effects.push(PartEffect {
             effect,
             parameters,

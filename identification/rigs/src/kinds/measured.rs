@@ -47,8 +47,8 @@ pub struct Measured<'a> {
     width: f64,
     /// What the rig is called.
     name: String,
-    /// The uncertain parameter that stays as stated.
-    pinned: Option<usize>,
+    /// The uncertain parameter that does not move, and its value.
+    pinned: Option<(usize, f64)>,
 }
 
 impl<'a> Measured<'a> {
@@ -136,7 +136,8 @@ impl<'a> Measured<'a> {
         let mut values: Vec<f64> = self.nominal.iter().map(|(value, _)| *value).collect();
         for (place, (&i, p)) in self.uncertain.iter().zip(&point.nuisance).enumerate() {
             let (value, deviation) = self.nominal[i];
-            if self.pinned == Some(place) {
+            if let Some((_, held)) = self.pinned.filter(|(own, _)| *own == place) {
+                values[i] = held;
                 continue;
             }
             // Sizes stay positive: counted by their logarithm unless they may be zero.
@@ -567,10 +568,10 @@ impl InParts for Measured<'_> {
             && session.any(|own| own.role == SessionRole::AgainstFirst && own.unit == unit)
     }
 
-    fn without_cause(&self, i: usize) -> Option<Self> {
+    fn pinned(&self, i: usize, value: f64) -> Option<Self> {
         let mut same = self.held();
         same.width = self.width;
-        same.pinned = Some(i);
+        same.pinned = Some((i, value));
         self.is_cause(i).then_some(same)
     }
 

@@ -33,6 +33,7 @@ mod natural;
 mod oscillator;
 mod parts;
 mod positioning_drive;
+mod profile;
 mod reading;
 mod readings;
 mod recording;

@@ -148,8 +148,8 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
         false
     }
 
-    /// The same model with that parameter at its stated value; none where it has no cause.
-    fn without_cause(&self, _i: usize) -> Option<Self>
+    /// The same model with that parameter held at `value`; none where it is no cause.
+    fn pinned(&self, _i: usize, _value: f64) -> Option<Self>
     where
         Self: Sized,
     {

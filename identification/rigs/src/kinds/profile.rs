@@ -1,0 +1,222 @@
+//! What data leave open of a nominal parameter that others can make up for.
+
+use rayon::prelude::*;
+
+use super::confirmed::{lengths, needed};
+use super::parts::{EVERYTHING, InParts};
+use super::readings::NEEDED;
+use diagnosis::{Point, all_errors, settled, squares};
+
+/// Values that are tried to either side.
+const TRIES: usize = 4;
+/// Share of a distance to which its end is found.
+const NEAR: f64 = 0.15;
+/// Share of the way between a value that agrees and one that does not which no further trial is nearer to either.
+const MARGIN: f64 = 0.1;
+/// Factor to the next distance where the last one changes hardly anything.
+const LONGER: f64 = 2.0;
+
+/// What the data leave open of a nominal parameter that differs from what was stated.
+pub(super) enum Open {
+    /// It may be as stated: the model there.
+    Stated(Point),
+    /// It is between these.
+    Within(f64, f64),
+}
+
+impl Open {
+    /// The ends; alike to either side of the `found` value if it may be as `stated`.
+    pub(super) fn ends(&self, found: f64, stated: f64) -> (f64, f64) {
+        let off = (found - stated).abs();
+        match self {
+            Self::Stated(_) => (found - off, found + off),
+            Self::Within(low, high) => (*low, *high),
+        }
+    }
+}
+
+/// What is open of the nominal parameter `i`, which was `stated`, beside the model at `point`, by the profile of the
+/// likelihood (Venzon and Moolgavkar, Applied Statistics 37, 1988). Everything else is fitted again, also what that model
+/// goes without. Open is where the squared error on all data is at most a tenth above the least, or above it by chance.
+/// A standard error holds for a model that is exact. Where delay, lag and feedforward make up for each other, an error
+/// of the model's form counts for more than noise. None where nothing can be fitted.
+pub(super) fn open<M: InParts>(measured: &M, point: &Point, i: usize, stated: f64) -> Option<Open> {
+    let starts = [measured.restored(point), point.clone()];
+    let fits = starts.par_iter().filter_map(|start| {
+        let best = settled(measured, start, EVERYTHING)?;
+        Some((all_errors(measured, &best, EVERYTHING), best))
+    });
+    let (errors, best) = fits.min_by(|a, b| squares(&a.0).total_cmp(&squares(&b.0)))?;
+    let value = measured.parameters(&best, &[]).get(i)?.value;
+    let profile = Profile {
+        measured,
+        starts,
+        i,
+        value,
+        best,
+        errors,
+        lengths: lengths(measured, EVERYTHING),
+    };
+    let off = value - stated;
+    Some(match profile.end(-off, off.abs()) {
+        (_, Some(stated)) => Open::Stated(stated),
+        (near, None) => {
+            let (far, _) = profile.end(near.copysign(off), f64::INFINITY);
+            let ends = [value - near.copysign(off), value + far.copysign(off)];
+            Open::Within(ends[0].min(ends[1]), ends[0].max(ends[1]))
+        }
+    })
+}
+
+struct Profile<'a, M> {
+    measured: &'a M,
+    starts: [Point; 2],
+    i: usize,
+    /// The parameter in the best model, and that.
+    value: f64,
+    best: Point,
+    errors: Vec<f64>,
+    lengths: Vec<usize>,
+}
+
+impl<M: InParts> Profile<'_, M> {
+    /// Distance at which the error begins to tell, on the side of `first`, which is tried first; at `most` it ends with
+    /// the model there.
+    fn end(&self, first: f64, most: f64) -> (f64, Option<Point>) {
+        let mut starts = self.starts.to_vec();
+        starts.push(self.best.clone());
+        let (mut inside, mut outside, mut at) = (0.0f64, f64::INFINITY, first.abs());
+        // Where the error is least, and what it is.
+        let mut least = (0.0, 1.0);
+        for _ in 0..TRIES {
+            let value = self.value + at.copysign(first);
+            let (growth, is_told, best) =
+                self.fitted(value, &starts)
+                    .unwrap_or((f64::INFINITY, true, self.best.clone()));
+            // From there it grows with the square of the distance.
+            let expected = if growth > least.1 {
+                least.0 + (at - least.0) * ((NEEDED - least.1) / (growth - least.1)).sqrt()
+            } else {
+                least = (at, growth);
+                f64::INFINITY
+            };
+            if is_told {
+                outside = at;
+            } else {
+                inside = at;
+            }
+            if inside >= most {
+                return (most, Some(best));
+            }
+            let farthest = outside.min(LONGER * inside.max(at));
+            let margin = MARGIN * (farthest - inside);
+            at = expected.clamp(inside + margin, farthest - margin);
+            if outside - inside < NEAR * outside {
+                break;
+            }
+            starts = vec![self.best.clone(), best];
+        }
+        (at.min(most), None)
+    }
+
+    /// Growth of the squared error with the parameter at `value`, whether it tells against that, and the best fit.
+    fn fitted(&self, value: f64, starts: &[Point]) -> Option<(f64, bool, Point)> {
+        let held = self.measured.pinned(self.i, value)?;
+        let fits = starts.par_iter().filter_map(|start| {
+            let best = settled(&held, start, EVERYTHING)?;
+            let errors = all_errors(&held, &best, EVERYTHING);
+            Some((squares(&errors) / squares(&self.errors), errors, best))
+        });
+        let (growth, errors, best) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let is_told = needed(&errors, &self.errors, &self.lengths);
+        Some((growth, is_told, best))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::super::measured::Measured;
+    use super::super::{Measurement, RigRecording, of_kind};
+    use super::*;
+    use recordings::{Channel, Recording};
+
+    const COMMAND: Channel = Channel::Other {
+        name: "command",
+        unit: "m",
+    };
+
+    fn command(t: f64) -> f64 {
+        let sines = (0..30).map(|i| {
+            let (frequency, phase) = (0.3 + 0.21 * f64::from(i), 1.7 * f64::from(i));
+            1e-3 / (0.5 + frequency) * (TAU * frequency * t + phase).sin()
+        });
+        sines.sum()
+    }
+
+    /// A valve of second order in a loop with feedforward, its flow less than proportional, by small steps.
+    fn played(delay: f64) -> RigRecording {
+        let (rate, count, steps) = (200.0, 4000, 50);
+        let (gain, sent_ahead, omega, damping) = (30.0, 0.85, 377.0, 0.9);
+        let h = 1.0 / rate / f64::from(steps);
+        let (mut flow, mut change, mut x) = (0.0f64, 0.0f64, command(-delay));
+        let mut rows = Vec::new();
+        for k in 0..count {
+            rows.push(x);
+            for part in 0..steps {
+                let t = f64::from(k) / rate + f64::from(part) * h - delay;
+                let speed = (command(t + 1e-5) - command(t - 1e-5)) / 2e-5;
+                let asked = gain * (command(t) - x) + sent_ahead * speed;
+                change += h * omega * (omega * (asked - flow) - 2.0 * damping * change);
+                flow += h * change;
+                x += h * flow * (1.0 - 0.5 * flow.abs());
+            }
+        }
+        let asked = (0..count).map(|k| command(f64::from(k) / rate));
+        let channels = vec![(COMMAND, asked.collect()), (Channel::Displacement, rows)];
+        let recording = Recording::new("valve", 1.0 / rate, channels).unwrap();
+        let mut own = RigRecording::new(recording, &[COMMAND], Channel::Displacement);
+        own.left_out[2000..].fill(true);
+        own
+    }
+
+    #[test]
+    fn the_interval_of_a_delay_holds_what_a_lag_that_was_left_out_takes_of_it() {
+        let rig = of_kind("closed_loop_actuator").unwrap();
+        let stated = |name: &str| match name {
+            "loop_gain" => (25.0, 12.5),
+            "loop_lag" => (4e-3, 4e-3),
+            "feedforward" => (0.1, 0.1),
+            "scale" => (1.0, 0.01),
+            "command_delay" => (0.0, 1.5e-3),
+            "resonance_damping" => (0.5, 0.0),
+            _ => (0.0, 0.0),
+        };
+        for delay in [0.0, 6e-3] {
+            let measurement = Measurement {
+                recordings: vec![played(delay)],
+            };
+            let nominal = rig.parameters().iter().map(|(name, _)| stated(name));
+            let measured = Measured::new(rig, &measurement, nominal.collect());
+            let place = |name: &str| {
+                let mut names = measured.uncertain_names().into_iter();
+                names.position(|own| own == name).unwrap()
+            };
+            let i = place("command_delay");
+            let bare = measured.without(&measured.origin(), place("loop_lag"));
+            let point = settled(&measured, &bare.unwrap(), EVERYTHING).unwrap();
+            let found = measured.parameters(&point, &[])[i].value;
+            assert!(found > delay + 2e-3, "the lag does not matter: {found}");
+            match open(&measured, &point, i, 0.0).unwrap() {
+                Open::Stated(_) => assert_eq!(delay, 0.0, "{found}"),
+                Open::Within(low, high) => {
+                    assert!(delay > 0.0, "{found}: {low} {high}");
+                    assert!((low..=high).contains(&delay), "{low} {high}");
+                    assert!(high - low < 0.012, "{low} {high}");
+                }
+            }
+        }
+    }
+}
