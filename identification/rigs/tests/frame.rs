@@ -230,6 +230,7 @@ fn another_motion_and_voltage_are_predicted_and_a_late_force_is_named() {
     let found = diagnose(&description, &measurement, Observer::none()).unwrap();
     assert_eq!(found.verdict, Verdict::Named, "{:?}", found.named);
     assert_eq!(found.named, ["force_delay"]);
+    assert_eq!(found.output, "drift and force");
     let delay = &found.confirmed.effects[0].1[0];
     assert!((delay.value - 0.02).abs() < 5e-4, "{delay:?}");
     assert!(found.confirmed.error < 0.03, "{}", found.confirmed.error);

@@ -74,7 +74,7 @@ pub struct FileErrors {
     pub extended_rms: f64,
     /// SI unit of the output.
     pub unit: String,
-    /// What the file has for itself, by the extended model, SI.
+    /// What the file has for itself, by the extended model, SI; with its first output.
     pub session: BTreeMap<String, f64>,
     /// What else was read out of it, a sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -398,11 +398,11 @@ impl ExtendedRig {
                 let notes = measured.notes(&point);
                 Ok::<_, DescriptionError>((errors, session, notes))
             };
-            let (extended, session, notes) = errors(&self.nominal, true)?;
+            let (extended, session, mut notes) = errors(&self.nominal, true)?;
             let nominal = errors(&self.refitted, false)?.0;
             let described = errors(&self.described, false)?.0;
             let named = rig.session().iter().zip(session);
-            let session: BTreeMap<String, f64> = named
+            let mut session: BTreeMap<String, f64> = named
                 .map(|(own, value)| (own.name.to_owned(), value))
                 .collect();
             let models = extended.into_iter().zip(nominal).zip(described);
@@ -413,9 +413,9 @@ impl ExtendedRig {
                 described_percent: 100.0 * described.1,
                 extended_percent: 100.0 * extended.1,
                 extended_rms: extended.2,
-                notes: notes.clone(),
+                notes: std::mem::take(&mut notes),
                 unit: extended.0.unit().to_owned(),
-                session: session.clone(),
+                session: std::mem::take(&mut session),
             }));
         }
         Ok(all)

@@ -1,5 +1,6 @@
 //! A rig with its measurements, as the engine of the diagnosis sees it.
 
+use super::cause::joined;
 use super::named_value::NamedValue;
 use super::parts::{self, EVERYTHING, File, InParts, NAMES, places};
 use super::{Begun, Cause, Effect, Measurement, Natural, Rig, RigRecording, SessionRole, Values};
@@ -513,7 +514,11 @@ impl InParts for Measured<'_> {
     }
 
     fn output(&self) -> String {
-        self.rig.output().name().to_owned()
+        let first = self.measurement.recordings.first();
+        let also = first.map_or(&[][..], RigRecording::also).iter();
+        let all = also.map(|(channel, _)| *channel);
+        let all = [self.rig.output()].into_iter().chain(all);
+        joined(&all.map(|own| own.name().to_owned()).collect::<Vec<_>>())
     }
 
     fn normalised_error(&self, point: &Point, record: usize) -> f64 {
@@ -522,11 +527,13 @@ impl InParts for Measured<'_> {
     }
 
     fn error_by_output(&self, point: &Point, record: usize) -> Vec<(&'static str, f64)> {
+        let mut recordings = self.measurement.recordings.iter();
+        if recordings.all(|one| one.also().is_empty()) {
+            return Vec::new();
+        }
         let all = self.errors_by_output(point, record).into_iter();
-        let all: Vec<_> = all
-            .map(|(channel, error, _)| (channel.name(), error))
-            .collect();
-        if all.len() > 1 { all } else { Vec::new() }
+        all.map(|(channel, error, _)| (channel.name(), error))
+            .collect()
     }
 
     fn parameters(&self, point: &Point, deviations: &[f64]) -> Vec<NamedValue> {

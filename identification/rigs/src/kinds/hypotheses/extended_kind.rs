@@ -268,6 +268,9 @@ impl Rig for ExtendedKind {
         for one in &present {
             match one.0.place {
                 Place::Output => {
+                    // Further outputs follow the one that is meant.
+                    let own = recording.len().min(out.len());
+                    let out = &mut out[..own];
                     let signal = running(one, values, recording).along(out, &begins);
                     out.copy_from_slice(&signal);
                 }
