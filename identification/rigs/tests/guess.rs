@@ -13,9 +13,7 @@ use rigs::kinds::{ExtendedRig, diagnose};
 /// title. Every small step is exact for a constant command.
 fn german(file: &Path, seconds: f64, seed: f64, size: f64, rail: f64) {
     let (gain, period, delay) = (30.0, 0.004, 0.012);
-    let late = (delay / period) as usize;
-    let command = |k: usize| {
-        let t = k as f64 * period;
+    let command = |t: f64| {
         let tone = |f: f64, a: f64| size * a * (std::f64::consts::TAU * f * t + seed * f).sin();
         tone(0.31, 3.0)
             + tone(0.83, 2.0)
@@ -28,14 +26,14 @@ fn german(file: &Path, seconds: f64, seed: f64, size: f64, rail: f64) {
     let mut text = String::from("Rütteltisch, Versuch 1\nZeit [s];Sollwert [mm];Weg [mm]\n");
     const STEPS: usize = 100;
     let step = period / STEPS as f64;
-    let (mut x, keep) = (1.05 * command(0), (-gain * step).exp());
+    let (mut x, keep) = (1.05 * command(0.0), (-gain * step).exp());
     for k in 0..(seconds / period) as usize {
         let noise = 0.002 * (k as f64 * 91.7 + seed).sin();
-        let (t, r) = (comma(k as f64 * period), comma(command(k)));
+        let now = k as f64 * period;
+        let (t, r) = (comma(now), comma(command(now)));
         writeln!(text, "{t};{r};{}", comma(x + noise)).unwrap();
-        let [now, next] = [k, k + 1].map(|k| 1.05 * command(k.saturating_sub(late)));
         for part in 0..STEPS {
-            let r = now + (next - now) * (part as f64 + 0.5) / STEPS as f64;
+            let r = 1.05 * command((now + (part as f64 + 0.5) * step - delay).max(0.0));
             let most = rail * step;
             x += ((r - x) * (1.0 - keep)).clamp(-most, most);
         }

@@ -2,11 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::confirmed::{lengths, needed};
+use super::confirmed::{clearly_better, lengths};
 use super::parts::{EVERYTHING, InParts};
 use super::readings::NEEDED;
 use diagnosis::{Point, all_errors, settled, squares};
 
+/// Share of the errors' power that is not white noise from which on a model is not exact.
+const INEXACT: f64 = 0.5;
 /// Values that are tried to either side.
 const TRIES: usize = 4;
 /// Share of a distance to which its end is found.
@@ -37,16 +39,26 @@ impl Open {
 
 /// What is open of the nominal parameter `i`, which was `stated`, beside the model at `point`, by the profile of the
 /// likelihood (Venzon and Moolgavkar, Applied Statistics 37, 1988). Everything else is fitted again, also what that model
-/// goes without. Open is where the squared error on all data is at most a tenth above the least, or above it by chance.
-/// A standard error holds for a model that is exact. Where delay, lag and feedforward make up for each other, an error
-/// of the model's form counts for more than noise. None where nothing can be fitted.
+/// goes without if noise is not most of its error. Open is where the squared error on all data is above the least by chance, or by a tenth at most of
+/// what in it is not white noise. A standard error holds for a model that is exact. Where delay, lag and feedforward
+/// make up for each other, an error of the model's form counts for more than noise. None where nothing can be fitted.
 pub(super) fn open<M: InParts>(measured: &M, point: &Point, i: usize, stated: f64) -> Option<Open> {
-    let starts = [measured.restored(point), point.clone()];
-    let fits = starts.par_iter().filter_map(|start| {
+    let fitted = |start: &Point| {
         let best = settled(measured, start, EVERYTHING)?;
         Some((all_errors(measured, &best, EVERYTHING), best))
-    });
-    let (errors, best) = fits.min_by(|a, b| squares(&a.0).total_cmp(&squares(&b.0)))?;
+    };
+    let (mut errors, mut best) = fitted(point)?;
+    let mut starts = vec![point.clone()];
+    // Where noise is all that is left, what the model goes without is not there.
+    if coloured(&errors) > INEXACT {
+        let restored = measured.restored(point);
+        if let Some(full) = fitted(&restored)
+            && squares(&full.0) < squares(&errors)
+        {
+            (errors, best) = full;
+        }
+        starts.push(restored);
+    }
     let value = measured.parameters(&best, &[]).get(i)?.value;
     let profile = Profile {
         measured,
@@ -54,6 +66,7 @@ pub(super) fn open<M: InParts>(measured: &M, point: &Point, i: usize, stated: f6
         i,
         value,
         best,
+        allowed: 1.0 + (NEEDED - 1.0) * coloured(&errors),
         errors,
         lengths: lengths(measured, EVERYTHING),
     };
@@ -68,14 +81,23 @@ pub(super) fn open<M: InParts>(measured: &M, point: &Point, i: usize, stated: f6
     })
 }
 
+/// Share of the power of `errors` that is not white noise, of which fourth differences have 70 times the power.
+fn coloured(errors: &[f64]) -> f64 {
+    let fourth = |e: &[f64]| e[0] - 4.0 * e[1] + 6.0 * e[2] - 4.0 * e[3] + e[4];
+    let white: f64 = errors.windows(5).map(|e| fourth(e).powi(2) / 70.0).sum();
+    (1.0 - white / squares(errors)).clamp(0.0, 1.0)
+}
+
 struct Profile<'a, M> {
     measured: &'a M,
-    starts: [Point; 2],
+    starts: Vec<Point>,
     i: usize,
     /// The parameter in the best model, and that.
     value: f64,
     best: Point,
     errors: Vec<f64>,
+    /// Growth of the squared error that tells nothing.
+    allowed: f64,
     lengths: Vec<usize>,
 }
 
@@ -83,7 +105,7 @@ impl<M: InParts> Profile<'_, M> {
     /// Distance at which the error begins to tell, on the side of `first`, which is tried first; at `most` it ends with
     /// the model there.
     fn end(&self, first: f64, most: f64) -> (f64, Option<Point>) {
-        let mut starts = self.starts.to_vec();
+        let mut starts = self.starts.clone();
         starts.push(self.best.clone());
         let (mut inside, mut outside, mut at) = (0.0f64, f64::INFINITY, first.abs());
         // Where the error is least, and what it is.
@@ -95,7 +117,7 @@ impl<M: InParts> Profile<'_, M> {
                     .unwrap_or((f64::INFINITY, true, self.best.clone()));
             // From there it grows with the square of the distance.
             let expected = if growth > least.1 {
-                least.0 + (at - least.0) * ((NEEDED - least.1) / (growth - least.1)).sqrt()
+                least.0 + (at - least.0) * ((self.allowed - least.1) / (growth - least.1)).sqrt()
             } else {
                 least = (at, growth);
                 f64::INFINITY
@@ -128,7 +150,7 @@ impl<M: InParts> Profile<'_, M> {
             Some((squares(&errors) / squares(&self.errors), errors, best))
         });
         let (growth, errors, best) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let is_told = needed(&errors, &self.errors, &self.lengths);
+        let is_told = growth > self.allowed && clearly_better(&errors, &self.errors, &self.lengths);
         Some((growth, is_told, best))
     }
 }
