@@ -211,7 +211,12 @@ fn plain(value: f64, half: f64) -> String {
         let half = half.max(10f64.powi(-(digits as i32)));
         format!("{value:.digits$} ± {half:.digits$}")
     } else {
-        let digits = digits_of(value) + if value == 0.0 { 0 } else { 2 };
+        let power = if value == 0.0 {
+            2.0
+        } else {
+            value.abs().log10().floor()
+        };
+        let digits = (2.0 - power).clamp(0.0, 9.0) as usize;
         format!("{value:.digits$}")
     }
 }
@@ -322,11 +327,11 @@ mod tests {
         let memory = |value: f64| [found("decay", value, 21.0, "1/m")];
         assert_eq!(
             effect_in_words("excursion_memory", &memory(39.65)),
-            "excursion memory (0 to 80.81 1/m)"
+            "excursion memory (0 to 80.8 1/m)"
         );
         assert_eq!(
             effect_in_words("excursion_memory", &memory(-39.65)),
-            "excursion memory (0 to -80.81 1/m)"
+            "excursion memory (0 to -80.8 1/m)"
         );
         let stiffness = found("stiffness", 2.9978e7, 1.8e4, "N/m3");
         assert_eq!(
@@ -339,7 +344,7 @@ mod tests {
         ];
         assert_eq!(
             effect_in_words("friction", std::slice::from_ref(&force)),
-            "friction (about 50.70 N, not determined by these records)"
+            "friction (about 50.7 N, not determined by these records)"
         );
         let effects = [
             ("friction".to_owned(), vec![force]),

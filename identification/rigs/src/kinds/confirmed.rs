@@ -107,6 +107,9 @@ fn widen(own: &mut [NamedValue], other: &[NamedValue]) {
     }
 }
 
+/// Why an effect is not named without which the error hardly grows.
+pub(super) const TOO_SMALL: &str = "it is too small to matter";
+
 /// An effect with a reason why it is not named.
 pub(super) type Refused = (usize, String);
 
@@ -148,7 +151,7 @@ pub(super) fn unfit<M: InParts>(
         if let Some(reason) = bound {
             refused.push((*index, reason));
         } else if sizes && !matters && !is_felt(measured, point, *index, record) {
-            refused.push((*index, "it is too small to matter".to_owned()));
+            refused.push((*index, TOO_SMALL.to_owned()));
         } else if sizes && !clear && !is_missed(measured, point, *index, record) {
             refused.push((
                 *index,

@@ -9,8 +9,8 @@ use super::alternatives::{
 };
 use super::cause::{Cause, INTERVAL_95, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
-    Confirmed, NominalFits, Refused, confirm, effects as named_values, is_vital, lengths, needed,
-    unfit,
+    Confirmed, NominalFits, Refused, TOO_SMALL, confirm, effects as named_values, is_vital,
+    lengths, needed, unfit,
 };
 use super::measured::Measured;
 use super::named_value::NamedValue;
@@ -437,9 +437,12 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         holds || explains || cause.deviations() > FAR
     }));
     let readings = readings(measured, weighed, &causes, &doubted, (&confirmed, crossed));
+    let of_parts = [&as_described, &swapped].into_iter();
+    let mut matter: Vec<&PartEffect> = of_parts.flat_map(|part| &part.effects).collect();
+    matter.retain(|own| own.objection.as_deref() != Some(TOO_SMALL));
     let verdict = match (named.is_empty() || !confirmed.pays, rivalled) {
         (true, _) if !causes.is_empty() => Verdict::Named,
-        (true, _) if here.is_empty() && there.is_empty() && holds => Verdict::Adequate,
+        (true, _) if matter.is_empty() && holds => Verdict::Adequate,
         (true, _) => Verdict::Unexplained,
         (_, true) => Verdict::Ambiguous,
         _ => Verdict::Named,
