@@ -8,31 +8,25 @@ use std::path::Path;
 use diagnosis::{Observer, Verdict};
 use rigs::kinds::{Description, RigDiagnosis, diagnose};
 
-/// `x' = K (r - x)` for a command that runs evenly between samples, in mm; `late` by whole samples.
-fn record(gain: f64, period: f64, late: usize) -> String {
-    let command = |k: usize| {
-        let t = k as f64 * period;
-        // A slow sweep of 1 to 6 Hz.
-        4.0 * (std::f64::consts::TAU * (1.0 + 0.25 * t) * t).sin()
+/// `x' = K (r - x)` for a sweep, in mm, in steps that are exact for a constant command; `late` by so many samples.
+fn record(gain: f64, period: f64, late: f64) -> String {
+    const STEPS: usize = 200;
+    let command = |t: f64| {
+        // A slow sweep, 1 to 6 Hz at 250 samples a second: with few samples a cycle nobody knows the course between.
+        let t = t.max(0.0);
+        4.0 * (std::f64::consts::TAU * (1.0 + 0.001 / period * t) * t).sin()
     };
     let mut text = String::from("t_s,r_mm,x_mm\n");
-    let mut x = 0.0;
-    let keep = (-gain * period).exp();
+    let step = period / STEPS as f64;
+    let (mut x, keep) = (0.0, (-gain * step).exp());
     for k in 0..(10.0 / period) as usize {
+        let now = k as f64 * period;
         let noise = 0.004 * (k as f64 * 91.7).sin() * (k as f64 * 13.31).cos();
-        writeln!(
-            text,
-            "{:.4},{:.5},{:.5}",
-            k as f64 * period,
-            command(k),
-            x + noise
-        )
-        .unwrap();
-        let [now, next] = [k, k + 1].map(|k| command(k.saturating_sub(late)));
-        // The particular solution of a ramp lags it by slope over gain.
-        let slope = (next - now) / period;
-        let off = x - (now - slope / gain);
-        x = next - slope / gain + off * keep;
+        writeln!(text, "{now:.4},{:.5},{:.5}", command(now), x + noise).unwrap();
+        for part in 0..STEPS {
+            let asked = command(now + (part as f64 + 0.5) * step - late * period);
+            x = asked + (x - asked) * keep;
+        }
     }
     text
 }
@@ -62,18 +56,22 @@ fn a_gain_far_from_what_was_stated_is_a_finding_and_no_effect() {
     let folder = tempfile::tempdir().unwrap();
     // At 250 Hz, and at 50 Hz, where the gain times a sample is 1.8.
     for period in [0.004, 0.02] {
-        let found = diagnosed(folder.path(), &record(90.0, period, 0));
+        let found = diagnosed(folder.path(), &record(90.0, period, 0.0));
         let part = &found.as_described;
         assert!(part.nominal_error > 0.05, "{}", part.nominal_error);
         assert!(part.refitted_error < 0.002, "{}", part.refitted_error);
         assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.named);
-        let gain = found
-            .confirmed
-            .parameters
-            .iter()
-            .find(|p| p.name == "loop_gain");
-        let gain = gain.unwrap();
-        assert!((gain.value - 90.0).abs() < 1.0, "{gain:?}");
+        let value = |name: &str| {
+            let mut all = found.confirmed.parameters.iter();
+            all.find(|p| p.name == name).unwrap().value
+        };
+        // At 50 Hz a gain and a lag of less than a millisecond make up for each other.
+        let (gain, lag) = (value("loop_gain"), value("command_lag"));
+        assert!(
+            (90.0 * (1.0 / gain + lag) - 1.0).abs() < 0.02,
+            "{gain} {lag}"
+        );
+        assert!(period > 0.01 || (gain - 90.0).abs() < 1.0, "{gain}");
         assert!(
             found.findings.iter().any(|f| f.contains("loop_gain")),
             "{:?}",
@@ -85,7 +83,7 @@ fn a_gain_far_from_what_was_stated_is_a_finding_and_no_effect() {
 #[test]
 fn a_delay_is_found_at_its_size() {
     let folder = tempfile::tempdir().unwrap();
-    let found = diagnosed(folder.path(), &record(60.0, 0.004, 5));
+    let found = diagnosed(folder.path(), &record(60.0, 0.004, 5.0));
     assert_eq!(found.verdict, Verdict::Named, "{:?}", found.set_aside);
     assert!(
         found.named.iter().any(|name| name.contains("delay")),

@@ -39,6 +39,8 @@ const DOUBTED: &str = "the prediction of either part is hardly worse without it"
 const UNUSED: &str = "the prediction of the other part is better without it";
 /// Error on all data over that of a model with more nominal parameters, up to which it does as well.
 const AS_WELL: f64 = 1.02;
+/// Share of the described model's squared error that is nothing to explain.
+const NOTHING: f64 = 1e-3;
 /// Share of the squared error beyond which what is explained is all of it.
 const ALL: f64 = 0.98;
 
@@ -439,7 +441,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let readings = readings(measured, weighed, &causes, &doubted, (&confirmed, crossed));
     let of_parts = [&as_described, &swapped].into_iter();
     let mut matter: Vec<&PartEffect> = of_parts.flat_map(|part| &part.effects).collect();
-    matter.retain(|own| own.objection.as_deref() != Some(TOO_SMALL));
+    matter.retain(|own| own.objection.as_deref() != Some(TOO_SMALL) && own.share > NOTHING);
     let verdict = match (named.is_empty() || !confirmed.pays, rivalled) {
         (true, _) if !causes.is_empty() => Verdict::Named,
         (true, _) if matter.is_empty() && holds => Verdict::Adequate,
