@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use sysid::levenberg_marquardt::{Problem, Quadratic, Search, Taken, minimise};
 
 use super::model::{Candidate, Point, Scale};
-use super::resampling::{correlation_time, scattered};
+use super::resampling::{correlation_time, dot, scattered};
 
 /// A prior counts as if it were this many times as wide as stated.
 pub const WEAK: f64 = 10.0;
@@ -145,10 +145,6 @@ pub struct Columns {
 /// Sum of the squares of `errors`.
 pub fn squares(errors: &[f64]) -> f64 {
     errors.iter().map(|e| e * e).sum()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 fn prior<M: SimulatedModel>(model: &M, point: &Point) -> f64 {
@@ -493,7 +489,7 @@ pub fn deviations<M: SimulatedModel>(model: &M, at: &Solution, record: usize) ->
     let inverse = reduced.try_inverse()?;
     let inverse = DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] / (size(i) * size(j)));
     let seen: Vec<&[f64]> = places.iter().map(|&i| all[i].as_slice()).collect();
-    let scattered = scattered(&(inverse.clone() / variance), &seen, &at.errors);
+    let scattered = scattered(&(&inverse / variance), &seen, &at.errors);
     let correlated = correlation_time(&at.errors);
     let mut deviations = vec![f64::NAN; all.len()];
     for (i, place) in places.iter().enumerate() {

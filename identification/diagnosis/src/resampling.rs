@@ -59,7 +59,7 @@ pub fn scattered(inverse: &DMatrix<f64>, columns: &[&[f64]], errors: &[f64]) -> 
     inverse * scatter * inverse
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
