@@ -385,6 +385,8 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let believed = |i: usize, cause: &Cause| {
         holds || ((explains || measured.is_of_first_file(i)) && cause.deviations() > FAR)
     };
+    // One fit serves every parameter that is profiled.
+    let mut profiled = None;
     let mut causes: Vec<Cause> = Vec::new();
     let mut doubted: Vec<Cause> = Vec::new();
     for i in (0..confirmed.parameters.len()).filter(|i| measured.is_cause(*i)) {
@@ -399,7 +401,9 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         let mut as_stated = None;
         if !measured.is_of_first_file(i)
             && !observer.is_over()
-            && let Some(open) = profile::open(measured, &confirmed.point, i, stated.0)
+            && let Some(own) =
+                profiled.get_or_insert_with(|| profile::beside(measured, &confirmed.point))
+            && let Some(open) = own.open(i, stated.0)
         {
             let own = &mut confirmed.parameters[i];
             let (low, high) = open.ends(own.value, stated.0);
@@ -596,10 +600,7 @@ impl RigDiagnosis {
             let mut all = parts.iter().flat_map(|part| &part.effects);
             all.find(|one| one.effect == name)
         };
-        let rivals = &mut self.as_described.rivals.iter();
-        let own = of(named).or_else(|| {
-            rivals.find_map(|(rival, against)| (against == named).then(|| of(rival))?)
-        });
+        let own = of(named).or_else(|| self.rivals_of(named).find_map(of));
         if let Some(own) = own {
             return (own.confidence, Some(own.share));
         }
@@ -610,16 +611,19 @@ impl RigDiagnosis {
 
     /// Effects that records cannot tell from `named`, with their parameters.
     fn instead_of(&self, named: &str) -> impl Iterator<Item = (&str, &[NamedValue])> {
+        self.rivals_of(named).filter_map(move |rival| {
+            let mut readings = self.readings.iter();
+            let own = readings.find(|own| !own.effects.iter().any(|(name, _)| name == named))?;
+            let (name, values) = own.effects.iter().find(|(name, _)| name == rival)?;
+            Some((name.as_str(), values.as_slice()))
+        })
+    }
+
+    /// The names of what does nearly as well in the place of `named`.
+    fn rivals_of(&self, named: &str) -> impl Iterator<Item = &str> {
         let rivals = self.as_described.rivals.iter();
-        rivals
-            .filter(move |(_, against)| against == named)
-            .filter_map(|(rival, against)| {
-                let mut readings = self.readings.iter();
-                let own =
-                    readings.find(|own| !own.effects.iter().any(|(name, _)| name == against))?;
-                let (name, values) = own.effects.iter().find(|(name, _)| name == rival)?;
-                Some((name.as_str(), values.as_slice()))
-            })
+        let own = rivals.filter(move |(_, against)| against == named);
+        own.map(|(rival, _)| rival.as_str())
     }
 
     fn causes_in_words(&self) -> Vec<String> {

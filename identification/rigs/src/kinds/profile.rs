@@ -37,12 +37,20 @@ impl Open {
     }
 }
 
-/// What is open of the nominal parameter `i`, which was `stated`, beside the model at `point`, by the profile of the
-/// likelihood (Venzon and Moolgavkar, Applied Statistics 37, 1988). Everything else is fitted again, also what that model
-/// goes without if noise is not most of its error. Open is where the squared error on all data is above the least by chance, or by a tenth at most of
-/// what in it is not white noise. A standard error holds for a model that is exact. Where delay, lag and feedforward
-/// make up for each other, an error of the model's form counts for more than noise. None where nothing can be fitted.
-pub(super) fn open<M: InParts>(measured: &M, point: &Point, i: usize, stated: f64) -> Option<Open> {
+/// The best model beside one that is told, from which its parameters are profiled.
+pub(super) struct Profiled<'a, M> {
+    measured: &'a M,
+    starts: Vec<Point>,
+    best: Point,
+    errors: Vec<f64>,
+    /// Growth of the squared error that tells nothing.
+    allowed: f64,
+    lengths: Vec<usize>,
+}
+
+/// The fit beside the model at `point`, also of what that model goes without if noise is not most of its error. None
+/// where nothing can be fitted.
+pub(super) fn beside<'a, M: InParts>(measured: &'a M, point: &Point) -> Option<Profiled<'a, M>> {
     let fitted = |start: &Point| {
         let best = settled(measured, start, EVERYTHING)?;
         Some((all_errors(measured, &best, EVERYTHING), best))
@@ -59,25 +67,13 @@ pub(super) fn open<M: InParts>(measured: &M, point: &Point, i: usize, stated: f6
         }
         starts.push(restored);
     }
-    let value = measured.parameters(&best, &[]).get(i)?.value;
-    let profile = Profile {
+    Some(Profiled {
         measured,
         starts,
-        i,
-        value,
         best,
         allowed: 1.0 + (NEEDED - 1.0) * coloured(&errors),
         errors,
         lengths: lengths(measured, EVERYTHING),
-    };
-    let off = value - stated;
-    Some(match profile.end(-off, off.abs()) {
-        (_, Some(stated)) => Open::Stated(stated),
-        (near, None) => {
-            let (far, _) = profile.end(near.copysign(off), f64::INFINITY);
-            let ends = [value - near.copysign(off), value + far.copysign(off)];
-            Open::Within(ends[0].min(ends[1]), ends[0].max(ends[1]))
-        }
     })
 }
 
@@ -88,33 +84,40 @@ fn coloured(errors: &[f64]) -> f64 {
     (1.0 - white / squares(errors)).clamp(0.0, 1.0)
 }
 
-struct Profile<'a, M> {
-    measured: &'a M,
-    starts: Vec<Point>,
-    i: usize,
-    /// The parameter in the best model, and that.
-    value: f64,
-    best: Point,
-    errors: Vec<f64>,
-    /// Growth of the squared error that tells nothing.
-    allowed: f64,
-    lengths: Vec<usize>,
-}
+impl<M: InParts> Profiled<'_, M> {
+    /// What is open of the nominal parameter `i`, which was `stated`, by the profile of the likelihood (Venzon and
+    /// Moolgavkar, Applied Statistics 37, 1988), everything else fitted again. Open is where the squared error on all
+    /// data is above the least by chance, or by a tenth at most of what in it is not white noise. A standard error holds
+    /// for a model that is exact. Where delay, lag and feedforward make up for each other, an error of the model's form
+    /// counts for more than noise.
+    pub(super) fn open(&self, i: usize, stated: f64) -> Option<Open> {
+        let value = self.measured.parameters(&self.best, &[]).get(i)?.value;
+        let off = value - stated;
+        Some(match self.end((i, value), -off, off.abs()) {
+            (_, Some(stated)) => Open::Stated(stated),
+            (near, None) => {
+                let (far, _) = self.end((i, value), near.copysign(off), f64::INFINITY);
+                let ends = [value - near.copysign(off), value + far.copysign(off)];
+                Open::Within(ends[0].min(ends[1]), ends[0].max(ends[1]))
+            }
+        })
+    }
 
-impl<M: InParts> Profile<'_, M> {
-    /// Distance at which the error begins to tell, on the side of `first`, which is tried first; at `most` it ends with
-    /// the model there.
-    fn end(&self, first: f64, most: f64) -> (f64, Option<Point>) {
+    /// Distance from the `found` value of parameter `i` at which the error begins to tell, on the side of `first`, which
+    /// is tried first; at `most` it ends with the model there.
+    fn end(&self, (i, found): (usize, f64), first: f64, most: f64) -> (f64, Option<Point>) {
         let mut starts = self.starts.clone();
         starts.push(self.best.clone());
         let (mut inside, mut outside, mut at) = (0.0f64, f64::INFINITY, first.abs());
         // Where the error is least, and what it is.
         let mut least = (0.0, 1.0);
         for _ in 0..TRIES {
-            let value = self.value + at.copysign(first);
-            let (growth, is_told, best) =
-                self.fitted(value, &starts)
-                    .unwrap_or((f64::INFINITY, true, self.best.clone()));
+            let value = found + at.copysign(first);
+            let (growth, is_told, best) = self.fitted((i, value), &starts).unwrap_or((
+                f64::INFINITY,
+                true,
+                self.best.clone(),
+            ));
             // From there it grows with the square of the distance.
             let expected = if growth > least.1 {
                 least.0 + (at - least.0) * ((self.allowed - least.1) / (growth - least.1)).sqrt()
@@ -141,9 +144,9 @@ impl<M: InParts> Profile<'_, M> {
         (at.min(most), None)
     }
 
-    /// Growth of the squared error with the parameter at `value`, whether it tells against that, and the best fit.
-    fn fitted(&self, value: f64, starts: &[Point]) -> Option<(f64, bool, Point)> {
-        let held = self.measured.pinned(self.i, value)?;
+    /// Growth of the squared error with parameter `i` at `value`, whether it tells against that, and the best fit.
+    fn fitted(&self, (i, value): (usize, f64), starts: &[Point]) -> Option<(f64, bool, Point)> {
+        let held = self.measured.pinned(i, value)?;
         let fits = starts.par_iter().filter_map(|start| {
             let best = settled(&held, start, EVERYTHING)?;
             let errors = all_errors(&held, &best, EVERYTHING);
@@ -231,7 +234,7 @@ mod tests {
             let point = settled(&measured, &bare.unwrap(), EVERYTHING).unwrap();
             let found = measured.parameters(&point, &[])[i].value;
             assert!(found > delay + 2e-3, "the lag does not matter: {found}");
-            match open(&measured, &point, i, 0.0).unwrap() {
+            match beside(&measured, &point).unwrap().open(i, 0.0).unwrap() {
                 Open::Stated(_) => assert_eq!(delay, 0.0, "{found}"),
                 Open::Within(low, high) => {
                     assert!(delay > 0.0, "{found}: {low} {high}");
