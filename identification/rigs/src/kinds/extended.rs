@@ -453,8 +453,7 @@ impl ExtendedRig {
                 file.display()
             )));
         }
-        let also = measurement.recordings[0].also().iter().copied();
-        let outputs = [(rig.output(), 1.0)].into_iter().chain(also);
+        let outputs = measurement.recordings[0].outputs();
         let columns = outputs.enumerate().map(|(i, (channel, size))| {
             let unit = self.columns.get(channel.name());
             let unit = unit.map_or(channel.unit(), |column| column.unit.as_str());

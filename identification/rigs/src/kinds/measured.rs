@@ -3,7 +3,7 @@
 use super::cause::joined;
 use super::named_value::NamedValue;
 use super::parts::{self, EVERYTHING, File, InParts, NAMES, places};
-use super::{Begun, Cause, Effect, Measurement, Natural, Rig, RigRecording, SessionRole, Values};
+use super::{Begun, Cause, Effect, Measurement, Natural, Rig, SessionRole, Values};
 use diagnosis::{Candidate, Point, SimulatedModel, WEAK, squares};
 use recordings::Channel;
 
@@ -264,36 +264,47 @@ impl<'a> Measured<'a> {
 
     /// As [`InParts::normalised_error`], by output, with each root mean square, SI.
     pub fn errors_by_output(&self, point: &Point, record: usize) -> Vec<(Channel, f64, f64)> {
-        let first = self.measurement.recordings.first();
-        let also = first.map_or(&[][..], RigRecording::also);
-        let outputs = also.iter().map(|(channel, _)| *channel);
-        let outputs = [self.rig.output()].into_iter().chain(outputs).enumerate();
+        let errors = self.errors_by_recording(point, record);
+        let outputs = self.outputs().enumerate();
         outputs
             .map(|(i, channel)| {
-                let (errors, size, count) = self.squares_of(point, record, Some(i));
+                let (errors, size, count) = self.squares_of(&errors, record, Some(i));
                 let mean = errors / count.max(1) as f64;
                 (channel, (errors / size).sqrt(), mean.sqrt())
             })
             .collect()
     }
 
-    /// Sums on `record` of the squared errors and of the squared output about its mean, and their number; of one
-    /// `output`, SI, or of all as they are fitted.
-    fn squares_of(&self, point: &Point, record: usize, output: Option<usize>) -> (f64, f64, usize) {
+    /// Channels that are simulated and compared.
+    fn outputs(&self) -> impl Iterator<Item = Channel> + '_ {
+        let first = self.measurement.recordings.first().into_iter();
+        first.flat_map(|one| one.outputs().map(|(channel, _)| channel))
+    }
+
+    /// Errors at `point` on `record`, a recording each.
+    fn errors_by_recording(&self, point: &Point, record: usize) -> Vec<Vec<f64>> {
+        let all = 0..self.measurement.recordings.len();
+        all.map(|s| self.errors(point, record, s)).collect()
+    }
+
+    /// Sums on `record` of the squared errors `all` ([`Self::errors_by_recording`]) and of the squared output about its
+    /// mean, and their number; of one `output`, SI, or of all as they are fitted.
+    fn squares_of(
+        &self,
+        all: &[Vec<f64>],
+        record: usize,
+        output: Option<usize>,
+    ) -> (f64, f64, usize) {
         let (mut errors, mut size, mut count) = (0.0, 0.0, 0);
-        for (s, places) in self.places[record].iter().enumerate() {
-            let one = &self.measurement.recordings[s];
-            let own = self.errors(point, record, s);
-            for i in 0..=one.also().len() {
+        let recordings = self.measurement.recordings.iter().zip(all);
+        for (places, (one, own)) in self.places[record].iter().zip(recordings) {
+            for (i, (_, size_of_one)) in one.outputs().enumerate() {
                 let unit = match output {
                     Some(wanted) if wanted != i => continue,
-                    Some(_) if i > 0 => one.also()[i - 1].1,
-                    _ => 1.0,
+                    Some(_) => size_of_one,
+                    None => 1.0,
                 };
-                let mine = places
-                    .iter()
-                    .zip(&own)
-                    .filter(|(k, _)| **k / one.len() == i);
+                let mine = places.iter().zip(own).filter(|(k, _)| **k / one.len() == i);
                 let (measured, off): (Vec<f64>, Vec<f64>) = mine
                     .map(|(&k, e)| (unit * one.output()[k], unit * e))
                     .unzip();
@@ -514,21 +525,18 @@ impl InParts for Measured<'_> {
     }
 
     fn output(&self) -> String {
-        let first = self.measurement.recordings.first();
-        let also = first.map_or(&[][..], RigRecording::also).iter();
-        let all = also.map(|(channel, _)| *channel);
-        let all = [self.rig.output()].into_iter().chain(all);
-        joined(&all.map(|own| own.name().to_owned()).collect::<Vec<_>>())
+        let all = self.outputs().map(|own| own.name().to_owned());
+        joined(&all.collect::<Vec<_>>())
     }
 
     fn normalised_error(&self, point: &Point, record: usize) -> f64 {
-        let (errors, size, _) = self.squares_of(point, record, None);
+        let errors = self.errors_by_recording(point, record);
+        let (errors, size, _) = self.squares_of(&errors, record, None);
         (errors / size).sqrt()
     }
 
     fn error_by_output(&self, point: &Point, record: usize) -> Vec<(&'static str, f64)> {
-        let mut recordings = self.measurement.recordings.iter();
-        if recordings.all(|one| one.also().is_empty()) {
+        if self.outputs().count() < 2 {
             return Vec::new();
         }
         let all = self.errors_by_output(point, record).into_iter();

@@ -138,6 +138,13 @@ impl RigRecording {
         &self.also
     }
 
+    /// Every output that is compared, in the order of [`Self::output`], with its size for one of the first, SI.
+    pub fn outputs(&self) -> impl Iterator<Item = (Channel, f64)> + '_ {
+        [(self.output, 1.0)]
+            .into_iter()
+            .chain(self.also.iter().copied())
+    }
+
     /// Restarts every `length` samples, from the `known` ones there, which are not compared.
     pub fn begin_every(&mut self, length: usize, known: usize) {
         let places = (0..self.len()).step_by(length.max(1));
