@@ -3,9 +3,8 @@
 
 use super::PartReport;
 use super::confirmed::{clearly_better, lengths, unfit, without_effect};
-use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts};
-use super::readings::{Crossed, NEEDED};
+use super::readings::{Crossed, NEEDED, likelier};
 use diagnosis::{Observer, Point, all_errors, looked, refit, settled};
 use rayon::prelude::*;
 
@@ -40,37 +39,51 @@ pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Ve
     all
 }
 
+/// A model, how either part with it predicts the other, and its errors on all data.
+struct Rival {
+    point: Point,
+    crossed: Crossed,
+    errors: Vec<f64>,
+}
+
+impl Rival {
+    fn of<M: InParts>(measured: &M, point: Point, crossed: Crossed) -> Self {
+        let errors = all_errors(measured, &point, EVERYTHING);
+        Self {
+            point,
+            crossed,
+            errors,
+        }
+    }
+
+    /// Logarithm of the likelihood beyond that of `other`, of what is predicted and of what is fitted: what is wrong in
+    /// both models may help one of them to predict.
+    fn likelier_than(&self, other: &Self) -> f64 {
+        self.crossed.likelier_than(&other.crossed) + likelier(&self.errors, &other.errors)
+    }
+}
+
 /// The model at `point` and those with effects in the place of others of their class, each from the best of its
-/// starts. First the one of which either part predicts the other best, or as well and its effects are more
-/// common; the rest are those that do nearly as well.
+/// starts. First the likeliest, or one that is nearly as likely with effects that are more common; the rest are
+/// those that do nearly as well.
 pub(super) fn of_its_class<M: InParts>(
     measured: &M,
     point: &Point,
     crossed: Crossed,
     observer: Observer<'_>,
 ) -> Vec<(Point, Crossed)> {
-    let mut all = vec![(point.clone(), crossed)];
+    let mut all = vec![Rival::of(measured, point.clone(), crossed)];
     let mut best = 0;
     for (place, &(own, _)) in point.effects.iter().enumerate() {
-        let known = |i: usize| point.effects.iter().any(|(known, _)| *known == i);
-        let others =
-            (0..measured.candidates().len()).filter(|&i| !known(i) && measured.are_alike(i, own));
-        for other in others {
+        for other in alike(measured, point, own) {
             if observer.is_over() {
                 break;
             }
-            let (base, against) = &all[best];
+            let base = &all[best].point;
             let taken = base.effects[place].0;
-            let candidate = &measured.candidates()[other];
-            let from = |start: &Vec<f64>| {
-                let mut trial = base.clone();
-                trial.effects[place] = (other, candidate.internal(start));
-                trial
-            };
             let error = |point: &Point| measured.normalised_error(point, EVERYTHING);
-            let trials = candidate.starts.iter().map(from);
-            let nearest = trials.min_by(|a, b| error(a).total_cmp(&error(b)));
-            let near = nearest.and_then(|trial| looked(measured, &trial, EVERYTHING));
+            let trial = in_place_of(measured, base, place, other);
+            let near = looked(measured, &trial, EVERYTHING);
             let near = near.filter(|near| error(near) < BEHIND * error(base));
             let Some((found, deviations)) =
                 near.and_then(|near| refit(measured, &near, EVERYTHING))
@@ -81,22 +94,55 @@ pub(super) fn of_its_class<M: InParts>(
             if reasons.any(|(i, _)| i == other) {
                 continue;
             }
-            let Some(errors) = Crossed::of(measured, &found.point) else {
+            let Some(crossed) = Crossed::of(measured, &found.point) else {
                 continue;
             };
-            // Of those that do as well, the one that a catalogue has first, since it is more common.
-            let is_first = other < taken && !against.needs(&errors);
-            if is_first || errors.likelier_than(against) > 0.0 {
+            let rival = Rival::of(measured, found.point, crossed);
+            // A catalogue has first what is more common.
+            let least = if other < taken { -NEARLY } else { NEARLY };
+            if rival.likelier_than(&all[best]) > least {
                 best = all.len();
             }
-            all.push((found.point, errors));
+            all.push(rival);
         }
     }
     let best = all.swap_remove(best);
-    all.retain(|own| best.1.likelier_than(&own.1) < NEARLY && replaced(&best.0, &own.0).is_some());
-    all.sort_by(|a, b| 0.0_f64.total_cmp(&a.1.likelier_than(&b.1)));
+    all.retain(|own| {
+        best.likelier_than(own) < NEARLY && replaced(&best.point, &own.point).is_some()
+    });
+    all.sort_by(|a, b| best.likelier_than(a).total_cmp(&best.likelier_than(b)));
     all.insert(0, best);
-    all
+    let own = all.into_iter();
+    own.map(|rival| (rival.point, rival.crossed)).collect()
+}
+
+/// The effects of the class of `own` that the model at `point` does not have, the most common first.
+pub(super) fn alike<'a, M: InParts>(
+    measured: &'a M,
+    point: &'a Point,
+    own: usize,
+) -> impl Iterator<Item = usize> + 'a {
+    let known = |i: usize| point.effects.iter().any(|(known, _)| *known == i);
+    let all = 0..measured.candidates().len();
+    all.filter(move |&i| !known(i) && measured.are_alike(i, own))
+}
+
+/// The model at `point` with `other` in the place of one of its effects, from the nearest of its starts.
+pub(super) fn in_place_of<M: InParts>(
+    measured: &M,
+    point: &Point,
+    place: usize,
+    other: usize,
+) -> Point {
+    let candidate = &measured.candidates()[other];
+    let error = |point: &Point| measured.normalised_error(point, EVERYTHING);
+    let starts = candidate.starts.iter().map(|start| {
+        let mut trial = point.clone();
+        trial.effects[place] = (other, candidate.internal(start));
+        (error(&trial), trial)
+    });
+    let nearest = starts.min_by(|a, b| a.0.total_cmp(&b.0));
+    nearest.map_or_else(|| point.clone(), |(_, trial)| trial)
 }
 
 /// The first effect of `model` in whose place `other` has another one, and that.
@@ -106,15 +152,15 @@ pub(super) fn replaced(model: &Point, other: &Point) -> Option<(usize, usize)> {
     Some((own.0, new.0))
 }
 
-/// Nominal parameters, on all data, of models without one of those at `point` that fit nearly as well: what they
-/// differ by is not known.
-pub(super) fn nearly_without<M: InParts>(measured: &M, point: &Point) -> Vec<Vec<NamedValue>> {
+/// Models without one of the nominal parameters at `point` that fit all data nearly as well: what they differ by is not
+/// known.
+pub(super) fn nearly_without<M: InParts>(measured: &M, point: &Point) -> Vec<Point> {
     let error = |point: &Point| measured.normalised_error(point, EVERYTHING).powi(2);
     let most = NEEDED * error(point);
     let all = (0..point.nuisance.len()).into_par_iter();
     let near = all.filter_map(|i| {
         let found = looked(measured, &measured.without(point, i)?, EVERYTHING)?;
-        (error(&found) < most).then(|| measured.parameters(&found, &[]))
+        (error(&found) < most).then_some(found)
     });
     near.collect()
 }

@@ -4,6 +4,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::alternatives::{alike, in_place_of};
 use super::cause::{INTERVAL_95, measure};
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part, file};
@@ -61,6 +62,9 @@ pub struct Confirmed {
     /// The effects that differ from zero by the intervals of the fit.
     #[serde(skip)]
     clear: Vec<usize>,
+    /// Standard errors of the nominal parameters by the fit and its scatter between parts, before other models widen them.
+    #[serde(skip)]
+    pub(super) of_the_fit: Vec<f64>,
     /// Where it is.
     #[serde(skip)]
     pub(super) point: Point,
@@ -73,11 +77,7 @@ impl Confirmed {
     /// Widens standard errors to half of what an estimate differs by from that of `other`, another model of the
     /// same data.
     pub(super) fn widen_to(&mut self, other: &Self) {
-        self.widen_by(&other.parameters);
-        for (name, own) in &mut self.effects {
-            let same = other.effects.iter().find(|(known, _)| known == name);
-            widen(own, same.map_or(&[], |(_, values)| values));
-        }
+        self.widen(&other.parameters, &other.effects);
     }
 
     /// The effects of which the widened intervals hold zero, and those of the fit did not.
@@ -91,9 +91,20 @@ impl Confirmed {
             .collect()
     }
 
-    /// As [`Self::widen_to`], the nominal parameters alone.
-    pub(super) fn widen_by(&mut self, others: &[NamedValue]) {
-        widen(&mut self.parameters, others);
+    /// As [`Self::widen_to`] by the model at `point`.
+    pub(super) fn widen_by<M: InParts>(&mut self, measured: &M, point: &Point) {
+        self.widen(
+            &measured.parameters(point, &[]),
+            &effects(measured, point, &[]),
+        );
+    }
+
+    fn widen(&mut self, parameters: &[NamedValue], effects: &[(String, Vec<NamedValue>)]) {
+        widen(&mut self.parameters, parameters);
+        for (name, own) in &mut self.effects {
+            let same = effects.iter().find(|(known, _)| known == name);
+            widen(own, same.map_or(&[], |(_, values)| values));
+        }
     }
 }
 
@@ -374,6 +385,13 @@ fn refused_by<M: InParts>(measured: &M, fits: &Fits) -> (Vec<Refused>, Vec<Strin
     (out, silent)
 }
 
+fn is_at_bound<M: InParts>(measured: &M, fits: &Fits, index: usize) -> bool {
+    let candidate = &measured.candidates()[index];
+    let points = fits.parts.iter().chain([&fits.everything]);
+    let mut own = points.flat_map(|(point, _)| point.effects.iter().filter(|(i, _)| *i == index));
+    own.any(|(_, internal)| candidate.bound(internal).is_some())
+}
+
 /// Whether an effect's size differs from zero: the interval of one of its parameters, shapes apart, excludes zero.
 fn differs_from_zero(effect: &Candidate, values: &[NamedValue]) -> bool {
     let pairs = effect.parameters.iter().zip(values);
@@ -397,12 +415,24 @@ pub(super) fn confirm<M: InParts>(
         if out.is_empty() {
             break (fits, silent);
         }
-        start
-            .effects
-            .retain(|(i, _)| out.iter().all(|(o, _)| o != i));
         for (index, reason) in out {
-            if refused.iter().all(|(known, _)| *known != index) {
+            let is_new = refused.iter().all(|(known, _)| *known != index);
+            if is_new {
                 refused.push((index, reason));
+            }
+            let Some(place) = start.effects.iter().position(|(i, _)| *i == index) else {
+                continue;
+            };
+            // At its bound it stands for another of its class: a gain that falls to nothing is a dead band.
+            let other = is_at_bound(measured, &fits, index).then(|| {
+                let is_out = |i: usize| refused.iter().any(|(known, _)| *known == i);
+                let mut others = alike(measured, &start, index).filter(|i| !is_out(*i));
+                others.next()
+            });
+            if let Some(other) = other.flatten() {
+                start = in_place_of(measured, &start, place, other);
+            } else {
+                start.effects.remove(place);
             }
         }
     };
@@ -473,6 +503,7 @@ pub(super) fn confirm<M: InParts>(
         effects,
         on_one_part,
         clear,
+        of_the_fit: scattered[..count].to_vec(),
         point: point.clone(),
         refitted_point: refitted.clone(),
     })
@@ -646,6 +677,7 @@ mod tests {
                 on_one_part: Vec::new(),
                 pays: true,
                 clear: places,
+                of_the_fit: Vec::new(),
                 refitted_point: point.clone(),
                 point,
             }

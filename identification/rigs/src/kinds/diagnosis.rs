@@ -308,7 +308,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             if !as_described.rivals.contains(&pair) {
                 as_described.rivals.push(pair);
             }
-            confirmed.widen_by(&measured.parameters(&point, &[]));
+            confirmed.widen_by(measured, &point);
             weighed.extend(Weighed::of(measured, &point, errors));
         }
     }
@@ -318,7 +318,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     };
     if !observer.is_over() && confirmed.parameters.iter().enumerate().any(is_told) {
         for near in nearly_without(measured, &confirmed.point) {
-            confirmed.widen_by(&near);
+            confirmed.widen_by(measured, &near);
         }
     }
     // What the model may lack or not changes the others by as much as is not known.
@@ -391,29 +391,35 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let mut doubted: Vec<Cause> = Vec::new();
     for i in (0..confirmed.parameters.len()).filter(|i| measured.is_cause(*i)) {
         let stated = measured.stated(i);
-        let Some(cause) = Cause::of(confirmed.parameters[i].clone(), stated) else {
-            continue;
+        let fitted = NamedValue {
+            standard_error: confirmed.of_the_fit[i],
+            ..confirmed.parameters[i].clone()
         };
-        if !believed(i, &cause) || cause.makes_up(&confirmed.parameters) {
+        let is_off = (fitted.value - stated.0).abs() > stated.1;
+        let told = Cause::of(fitted, stated);
+        let told = told.filter(|own| believed(i, own) && !own.makes_up(&confirmed.parameters));
+        if told.is_none() && !is_off {
             continue;
         }
-        let mut told = cause.clone();
-        let mut as_stated = None;
-        if !measured.is_of_first_file(i)
-            && !observer.is_over()
-            && let Some(own) =
-                profiled.get_or_insert_with(|| profile::beside(measured, &confirmed.point))
-            && let Some(open) = own.open(i, stated.0)
-        {
+        let mut open = None;
+        if !measured.is_of_first_file(i) && !observer.is_over() {
+            let own = profiled.get_or_insert_with(|| profile::beside(measured, &confirmed.point));
+            open = own.as_ref().and_then(|own| own.open(i, stated.0));
+        }
+        if let Some(Open::Stated(point)) = &open {
+            confirmed.widen_by(measured, point);
+        }
+        let Some(mut told) = told else {
+            continue;
+        };
+        if let Some(open) = &open {
             let own = &mut confirmed.parameters[i];
             let (low, high) = open.ends(own.value, stated.0);
             told.widen((low, high));
             let farthest = (own.value - low).max(high - own.value);
             own.standard_error = own.standard_error.max(farthest / INTERVAL_95);
-            if let Open::Stated(point) = open {
-                as_stated = Some(point);
-            }
         }
+        let as_stated = open.and_then(Open::stated);
         let without = measured.pinned(i, stated.0).and_then(|own| {
             // No part tells another one's zero.
             if measured.is_of_first_file(i) {

@@ -113,18 +113,19 @@ impl Crossed {
 
     /// Logarithm of the likelihood beyond that of `other`, correlated samples counted once.
     pub(super) fn likelier_than(&self, other: &Self) -> f64 {
-        let growths = self.growths(other);
-        let of = |i: usize| {
-            let own = &self.errors[i];
-            let independent = 0.5 * own.len() as f64 / correlation_time(own);
-            independent.min(MOST) * growths[i].ln()
-        };
+        let of = |i: usize| likelier(&self.errors[i], &other.errors[i]);
         of(0) + of(1)
     }
 
     fn explains(&self, nominal: &[f64]) -> f64 {
         1.0 - squares(&self.errors[1]) / squares(nominal)
     }
+}
+
+/// Logarithm of the likelihood of `errors` beyond that of `others`, correlated samples counted once.
+pub(super) fn likelier(errors: &[f64], others: &[f64]) -> f64 {
+    let independent = 0.5 * errors.len() as f64 / correlation_time(errors);
+    independent.min(MOST) * (squares(others) / squares(errors)).ln()
 }
 
 /// What is weighed: a model, what it says, and its errors.
