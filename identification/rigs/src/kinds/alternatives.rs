@@ -83,7 +83,7 @@ pub(super) fn of_its_class<M: InParts>(
             let taken = base.effects[place].0;
             let error = |point: &Point| measured.normalised_error(point, EVERYTHING);
             let trial = in_place_of(measured, base, place, other);
-            let near = looked(measured, &trial, EVERYTHING);
+            let near = trial.and_then(|trial| looked(measured, &trial, EVERYTHING));
             let near = near.filter(|near| error(near) < BEHIND * error(base));
             let Some((found, deviations)) =
                 near.and_then(|near| refit(measured, &near, EVERYTHING))
@@ -107,12 +107,12 @@ pub(super) fn of_its_class<M: InParts>(
         }
     }
     let best = all.swap_remove(best);
-    all.retain(|own| {
-        best.likelier_than(own) < NEARLY && replaced(&best.point, &own.point).is_some()
-    });
-    all.sort_by(|a, b| best.likelier_than(a).total_cmp(&best.likelier_than(b)));
-    all.insert(0, best);
-    let own = all.into_iter();
+    all.retain(|own| replaced(&best.point, &own.point).is_some());
+    let behind = all.into_iter().map(|own| (best.likelier_than(&own), own));
+    let mut near: Vec<(f64, Rival)> = behind.filter(|(by, _)| *by < NEARLY).collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let others: Vec<Rival> = near.into_iter().map(|(_, own)| own).collect();
+    let own = [best].into_iter().chain(others);
     own.map(|rival| (rival.point, rival.crossed)).collect()
 }
 
@@ -127,13 +127,14 @@ pub(super) fn alike<'a, M: InParts>(
     all.filter(move |&i| !known(i) && measured.are_alike(i, own))
 }
 
-/// The model at `point` with `other` in the place of one of its effects, from the nearest of its starts.
+/// The model at `point` with `other` in the place of one of its effects, from the nearest of its starts; none where it
+/// has no starts.
 pub(super) fn in_place_of<M: InParts>(
     measured: &M,
     point: &Point,
     place: usize,
     other: usize,
-) -> Point {
+) -> Option<Point> {
     let candidate = &measured.candidates()[other];
     let error = |point: &Point| measured.normalised_error(point, EVERYTHING);
     let starts = candidate.starts.iter().map(|start| {
@@ -142,7 +143,7 @@ pub(super) fn in_place_of<M: InParts>(
         (error(&trial), trial)
     });
     let nearest = starts.min_by(|a, b| a.0.total_cmp(&b.0));
-    nearest.map_or_else(|| point.clone(), |(_, trial)| trial)
+    nearest.map(|(_, trial)| trial)
 }
 
 /// The first effect of `model` in whose place `other` has another one, and that.

@@ -385,6 +385,7 @@ fn refused_by<M: InParts>(measured: &M, fits: &Fits) -> (Vec<Refused>, Vec<Strin
     (out, silent)
 }
 
+/// Whether an effect is at its bound in all data or in a part.
 fn is_at_bound<M: InParts>(measured: &M, fits: &Fits, index: usize) -> bool {
     let candidate = &measured.candidates()[index];
     let points = fits.parts.iter().chain([&fits.everything]);
@@ -416,23 +417,21 @@ pub(super) fn confirm<M: InParts>(
             break (fits, silent);
         }
         for (index, reason) in out {
-            let is_new = refused.iter().all(|(known, _)| *known != index);
-            if is_new {
+            if refused.iter().all(|(known, _)| *known != index) {
                 refused.push((index, reason));
             }
             let Some(place) = start.effects.iter().position(|(i, _)| *i == index) else {
                 continue;
             };
             // At its bound it stands for another of its class: a gain that falls to nothing is a dead band.
-            let other = is_at_bound(measured, &fits, index).then(|| {
-                let is_out = |i: usize| refused.iter().any(|(known, _)| *known == i);
-                let mut others = alike(measured, &start, index).filter(|i| !is_out(*i));
-                others.next()
-            });
-            if let Some(other) = other.flatten() {
-                start = in_place_of(measured, &start, place, other);
-            } else {
-                start.effects.remove(place);
+            let is_out = |i: usize| refused.iter().any(|(known, _)| *known == i);
+            let other = alike(measured, &start, index).find(|i| !is_out(*i));
+            let other = other.filter(|_| is_at_bound(measured, &fits, index));
+            match other.and_then(|other| in_place_of(measured, &start, place, other)) {
+                Some(replaced) => start = replaced,
+                None => {
+                    start.effects.remove(place);
+                }
             }
         }
     };

@@ -395,31 +395,29 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             standard_error: confirmed.of_the_fit[i],
             ..confirmed.parameters[i].clone()
         };
-        let is_off = (fitted.value - stated.0).abs() > stated.1;
-        let told = Cause::of(fitted, stated);
-        let told = told.filter(|own| believed(i, own) && !own.makes_up(&confirmed.parameters));
-        if told.is_none() && !is_off {
-            continue;
-        }
-        let mut open = None;
-        if !measured.is_of_first_file(i) && !observer.is_over() {
-            let own = profiled.get_or_insert_with(|| profile::beside(measured, &confirmed.point));
-            open = own.as_ref().and_then(|own| own.open(i, stated.0));
-        }
-        if let Some(Open::Stated(point)) = &open {
-            confirmed.widen_by(measured, point);
-        }
-        let Some(mut told) = told else {
+        let Some(mut told) = Cause::of(fitted, stated) else {
             continue;
         };
-        if let Some(open) = &open {
+        if !believed(i, &told) || told.makes_up(&confirmed.parameters) {
+            continue;
+        }
+        let mut as_stated = None;
+        if !measured.is_of_first_file(i)
+            && !observer.is_over()
+            && let Some(own) =
+                profiled.get_or_insert_with(|| profile::beside(measured, &confirmed.point))
+            && let Some(open) = own.open(i, stated.0)
+        {
             let own = &mut confirmed.parameters[i];
             let (low, high) = open.ends(own.value, stated.0);
             told.widen((low, high));
             let farthest = (own.value - low).max(high - own.value);
             own.standard_error = own.standard_error.max(farthest / INTERVAL_95);
+            if let Open::Stated(point) = open {
+                confirmed.widen_by(measured, &point);
+                as_stated = Some(point);
+            }
         }
-        let as_stated = open.and_then(Open::stated);
         let without = measured.pinned(i, stated.0).and_then(|own| {
             // No part tells another one's zero.
             if measured.is_of_first_file(i) {

@@ -27,14 +27,6 @@ pub(super) enum Open {
 }
 
 impl Open {
-    /// The model where it is as stated.
-    pub(super) fn stated(self) -> Option<Point> {
-        match self {
-            Self::Stated(point) => Some(point),
-            Self::Within(..) => None,
-        }
-    }
-
     /// The ends; alike to either side of the `found` value if it may be as `stated`.
     pub(super) fn ends(&self, found: f64, stated: f64) -> (f64, f64) {
         let off = (found - stated).abs();
