@@ -76,6 +76,10 @@ effects! {
         share: size("1", 0.02, (-1.0, 0.9)),
         rate: shape("1", 20.0, 1.0),
     } from [[0.1, 20.0], [-0.1, 20.0]];
+    /// The load cell reads that much without a stress.
+    load_cell_zero: LoadCellZero {
+        zero: size("Pa", 2e6, (-2e8, 2e8)),
+    } from [[1e7], [-1e7]], like ["strength_differential"];
     /// Compression yields at (1 + a) of tension.
     strength_differential: StrengthDifferential {
         asymmetry: size("1", 0.01, (-0.5, 0.5)),
@@ -90,10 +94,6 @@ effects! {
     stress_late: StressLate {
         samples: size("1", 0.05, (-2.0, 2.0)),
     } from [[0.3], [-0.3]];
-    /// The load cell reads that much without a stress.
-    load_cell_zero: LoadCellZero {
-        zero: size("Pa", 2e6, (-2e8, 2e8)),
-    } from [[1e7], [-1e7]], like ["strength_differential"];
 }
 
 impl Equations for CyclicMaterial {
