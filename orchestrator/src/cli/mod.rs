@@ -254,7 +254,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(2);
         }
         Some(GivenUnits::System(units)) => {
-            units.choose();
+            out::choose(units);
             (Some(units), None)
         }
         None => (None, None),

@@ -10,7 +10,7 @@ use clap::Args;
 use super::OneVersion;
 use super::interrupt;
 use super::motion::MotionArguments;
-use super::out::{given, installation, is_forced, unused};
+use super::out::{given, installation, is_forced, units, unused};
 use super::quantity::{at_least_one, if_given, percent, positive};
 use super::rig::RigArguments;
 use super::watch::watch;
@@ -286,7 +286,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.json {
         super::print_json(serde_json::json!(summary), &folder);
     } else {
-        print!("{}", text(&summary, &outcome.record, motion));
+        print!("{}", text(&summary, &outcome.record, motion, units()));
         println!();
         print_files(&files);
     }

@@ -9,7 +9,7 @@ use bridges::element::{Interval, Moves, Shape};
 use bridges::{Admission, Event};
 use clap::{Args, ValueEnum};
 
-use super::out::{given, unused};
+use super::out::{self, given, unused};
 use super::quantity::{at_least_one, if_given, positive};
 use super::rig::RigArguments;
 use super::{OneVersion, interrupt, run};
@@ -159,7 +159,7 @@ pub fn execute(arguments: &Arguments, units: Option<&str>) -> Result<ExitCode, E
     say_what(&service);
     let n = service.channels().degrees_of_freedom();
     let mut watched = match arguments.watch {
-        Some(port) => Some(Watched::start(&arguments.system, n, port)?),
+        Some(port) => Some(Watched::start(&arguments.system, n, port, out::units())?),
         None => None,
     };
     if let Some(watched) = &watched {

@@ -461,7 +461,7 @@ mod tests {
             notes: Vec::new(),
             stop: None,
         };
-        let tuning = Tuning::new(&none, Arc::clone(&panel), 1.0);
+        let tuning = Tuning::new(&none, Arc::clone(&panel), 1.0, UnitSystem::Us);
         let tap = Arc::new(Tap::new(vec![0], 3));
         let server = Server::start(&scene(), tap, Some(tuning), 0).unwrap();
         let host = server.address;
