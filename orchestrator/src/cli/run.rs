@@ -56,7 +56,7 @@ pub struct Arguments {
     /// Parameter, such as control.valve_limit="5 V"; repeatable
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
-    /// Version of FMI of the components
+    /// FMI version of the components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
     /// Order of calls [default: from the system, otherwise gauss-seidel]

@@ -124,7 +124,7 @@ pub struct Arguments {
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
-    /// Version of FMI of the project's own components
+    /// FMI version of the project's own components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
     /// Coupling step [default: that of the system]

@@ -311,6 +311,7 @@ fn reply(mut stream: &TcpStream, status: &str, kind: &str, body: &str) -> io::Re
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::UnitSystem;
     use fmi_master::{Panel, Tunable};
     use fmi_system::System;
 

@@ -274,31 +274,34 @@ fn a_long_run_stays_a_small_file() {
         ..motion
     };
     let (displacement, velocity, acceleration) = followed(&motion);
-    let page = html(&run(&Run {
-        system: "three-variable",
-        motion: &motion,
-        duration: motion.duration(),
-        displacement: &displacement,
-        velocity: &velocity,
-        acceleration: &acceleration,
-        identity: Vec::new(),
-        commands: vec![
-            ("control.valve_command".into(), velocity.clone()),
-            ("interlock.valve_command".into(), velocity.clone()),
-        ],
-        valve_limit: Some(10.0),
-        specimen: Some(SpecimenHistory {
-            drift: displacement.clone(),
-            force: acceleration.clone(),
+    let page = html(
+        &run(&Run {
+            system: "three-variable",
+            motion: &motion,
+            duration: motion.duration(),
+            displacement: &displacement,
+            velocity: &velocity,
+            acceleration: &acceleration,
+            identity: Vec::new(),
+            commands: vec![
+                ("control.valve_command".into(), velocity.clone()),
+                ("interlock.valve_command".into(), velocity.clone()),
+            ],
+            valve_limit: Some(10.0),
+            specimen: Some(SpecimenHistory {
+                drift: displacement.clone(),
+                force: acceleration.clone(),
+            }),
+            trip: Some((20.0, "the table left its reference".into())),
+            changed: Vec::new(),
+            components: Vec::new(),
+            tracking: None,
+            ended: "complete",
+            settings: Vec::new(),
+            footer: String::new(),
         }),
-        trip: Some((20.0, "the table left its reference".into())),
-        changed: Vec::new(),
-        components: Vec::new(),
-        tracking: None,
-        ended: "complete",
-        settings: Vec::new(),
-        footer: String::new(),
-    }))
+        None,
+    )
     .unwrap();
     println!("a minute at 500 Hz: {} bytes", page.len());
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
