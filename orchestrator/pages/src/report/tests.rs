@@ -443,3 +443,38 @@ fn an_error_is_the_reference_less_the_table() {
         assert_eq!(stroke.values, [low, high], "{}", stroke.name);
     }
 }
+
+/// The triangle's limits are 4 in or 101.6 mm: the units are those that are asked for, and only without a wish can a
+/// reader switch them.
+#[test]
+fn pages_and_pictures_are_in_the_units_that_were_asked_for() {
+    let panel = Panel {
+        title: "triangle".into(),
+        x: Axis::linear("time", Units::TIME),
+        y: Axis::linear("displacement", Units::DISPLACEMENT).between(0.0, 4.0 * INCH),
+        series: vec![Series::history("a", 1.0, &[0.0, 2.0 * INCH, 0.0])],
+    };
+    let us = svg(&panel, UnitSystem::Us);
+    assert!(
+        us.contains("displacement [in]") && us.contains(">4<"),
+        "{us}"
+    );
+    let si = svg(&panel, UnitSystem::Si);
+    assert!(
+        si.contains("displacement [mm]") && si.contains(">100<"),
+        "{si}"
+    );
+    for (asked, tag) in [
+        (None, "data-units=\"laboratory\">"),
+        (
+            Some(UnitSystem::Us),
+            "data-units=\"laboratory\" data-units-asked=\"1\">",
+        ),
+        (
+            Some(UnitSystem::Si),
+            "data-units=\"si\" data-units-asked=\"1\">",
+        ),
+    ] {
+        assert!(html(&gallery(), asked).unwrap().contains(tag), "{tag}");
+    }
+}
