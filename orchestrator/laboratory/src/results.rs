@@ -563,5 +563,7 @@ mod tests {
             (Path::new("models"), true)
         );
         assert_eq!(&*Out::new("rig.toml").folder(), Path::new("."));
+        let metric = out.in_units(Some(UnitSystem::Si)).folder();
+        assert_eq!((metric.units(), metric.replaces()), (UnitSystem::Si, true));
     }
 }
